@@ -24,7 +24,7 @@ from control.limits import JointRange
 from control.modes import MOVING, Mode
 from control.rate import PERIOD_S
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_both
-from tests.control.made_up_states import states_at
+from tests.control.synthetic_states import states_at
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 POSE = Joints(0.2, -0.4, 0.3, -0.5)
@@ -193,7 +193,7 @@ def test_stopping_raises_the_flippers_where_they_are_and_hold_keeps_them_there()
     assert wanted_pose(controller, Mode.HOLD, sagged) == pytest.approx(RAISED)
 
 
-def test_a_stop_on_the_way_to_the_front_raises_the_flippers_too() -> None:
+def test_a_stop_on_the_path_to_the_front_raises_the_flippers_too() -> None:
     controller = weightless()
     controller.order = WalkOrder(0.03)
     for _ in range(20):
@@ -204,7 +204,7 @@ def test_a_stop_on_the_way_to_the_front_raises_the_flippers_too() -> None:
     assert pose == pytest.approx(RAISED)
 
 
-def test_raised_is_told_only_while_stopping() -> None:
+def test_raised_is_reported_only_while_stopping() -> None:
     controller = weightless()
     for _ in range(1000):
         wanted_pose(controller, Mode.STOPPING, RAISED)
@@ -264,7 +264,7 @@ def test_damping_forgets_every_target_at_once(before: Mode) -> None:
     assert controller.target is RESTING
 
 
-def test_damping_brakes_each_joint_and_never_with_more_than_its_share() -> None:
+def test_damping_brakes_each_joint_within_its_torque_limit() -> None:
     controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(), recovery())
     torques = controller.step(PERIOD_S, Mode.DAMPING, turning_at((2.0, -2.0, 100.0, -100.0)))
     assert torques == pytest.approx((-0.12, 0.16, -DAMPING_NM, DAMPING_NM))
@@ -288,12 +288,12 @@ def test_joints_that_do_not_rest_are_given_up_in_bounded_time(velocities: tuple[
     assert ticks_until_settled(velocities) == pytest.approx(DAMPING_S / PERIOD_S, abs=1)
 
 
-def test_the_rest_of_a_joint_that_nobody_sees_is_not_waited_for() -> None:
+def test_damping_does_not_wait_for_a_joint_without_encoder() -> None:
     ticks = ticks_until_settled((nan, 5.0, 0.0, 0.0), Joints(False, False, True, True))
     assert ticks == pytest.approx(SETTLED_S / PERIOD_S, abs=1)
 
 
-def test_a_joint_that_moves_once_more_is_waited_for_anew() -> None:
+def test_damping_waits_again_for_a_joint_that_moves_again() -> None:
     controller = weightless()
     for tick in range(1, 220):
         position_s = 1.0 if tick >= 100 else 0.0
@@ -302,7 +302,7 @@ def test_a_joint_that_moves_once_more_is_waited_for_anew() -> None:
     assert controller.settled
 
 
-def test_settled_is_told_only_while_damping_and_of_this_time() -> None:
+def test_settled_is_true_only_in_the_present_damping() -> None:
     controller = weightless()
     for _ in range(200):
         controller.step(PERIOD_S, Mode.DAMPING, states_at(POSE))
@@ -324,7 +324,7 @@ def test_a_walk_that_a_fault_holds_stays_at_the_measured_pose_with_its_whole_sti
     assert wanted_pose(controller, Mode.HOLD, POSE) == pytest.approx(here)
 
 
-def test_a_pose_that_nobody_needs_is_told_after_its_time_and_never_without_one() -> None:
+def test_rested_is_true_after_the_configured_time_and_never_without_one() -> None:
     def ticks_held(longest_s: float) -> int | None:
         motion = MotionParameters(longest_hold_s=longest_s)
         controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), motion, recovery())
@@ -339,7 +339,7 @@ def test_a_pose_that_nobody_needs_is_told_after_its_time_and_never_without_one()
     assert ticks_held(10.0) is None
 
 
-def test_the_time_of_holding_begins_anew_with_every_hold_and_does_not_run_elsewhere() -> None:
+def test_the_hold_time_restarts_with_every_hold_and_stops_in_other_modes() -> None:
     motion = MotionParameters(longest_hold_s=1.0)
     controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), motion, recovery())
     controller.order = WalkOrder(0.03)
@@ -349,7 +349,7 @@ def test_the_time_of_holding_begins_anew_with_every_hold_and_does_not_run_elsewh
             assert not controller.rested
 
 
-def test_the_time_of_holding_begins_anew_with_every_move() -> None:
+def test_the_hold_time_restarts_with_every_move() -> None:
     controller = Controller(GAIT, GEOMETRY, SPRING, ArmMass(), MotionParameters(longest_hold_s=1.0), recovery())
     for _ in range(4):
         for _ in range(370):

@@ -113,7 +113,7 @@ def test_a_fault_that_comes_and_goes_is_one_fault() -> None:
     assert (begun, over) == (1, 0)
 
 
-def test_news_is_told_in_one_tick_only() -> None:
+def test_an_event_is_reported_in_one_tick_only() -> None:
     latch = FaultLatch()
     reported = []
     for tick in range(200):

@@ -43,7 +43,7 @@ def test_an_unconfigured_joint_has_none(angle: float, velocity: float) -> None:
     assert NO_FRICTION.torque_nm(angle, velocity) == 0.0
 
 
-def test_dry_friction_is_whole_at_walking_speeds_and_odd() -> None:
+def test_dry_friction_is_full_at_walking_speeds_and_antisymmetric() -> None:
     for velocity in (0.3, 1.0, 10.0):
         assert DRY.torque_nm(1.0, velocity) == pytest.approx(0.02, rel=1e-4)  # 1 - tanh 6 = 1e-5
         assert DRY.torque_nm(1.0, -velocity) == -DRY.torque_nm(1.0, velocity)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from control.gait.joint_path import still
 from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm, pd_torque_nm
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
-from tests.control.made_up_states import states_at
+from tests.control.synthetic_states import states_at
 
 WEIGHTLESS = ArmMass(arm_mass_kg=0.0)
 angles = st.floats(-pi / 2, pi / 2)

@@ -224,7 +224,7 @@ def test_one_measurement_that_is_not_finite_turns_all_four_to_zero(joint: int, b
     st.builds(Joints, *[st.builds(DriveState, st.floats(), st.floats(), temperature_c=st.floats())] * 4),
     st.floats(0.0, 1.0),
 )
-def test_what_leaves_is_always_finite_and_says_so_when_it_had_to_give_up(
+def test_the_limited_torques_are_always_finite_and_flag_a_replaced_input(
     wanted: Torques, previous: Torques, measured: DriveStates, dt: float
 ) -> None:
     sent = apply_limits(wanted, previous, measured, LIMITS, RANGES, dt)
@@ -238,7 +238,7 @@ def test_what_leaves_is_always_finite_and_says_so_when_it_had_to_give_up(
 
 
 @given(four_torques(torques), four_torques(previous_torques), st.builds(Joints, states, states, states, states))
-def test_limited_is_told_exactly_when_something_changed(
+def test_limited_is_reported_exactly_when_something_changed(
     wanted: Torques, previous: Torques, measured: DriveStates
 ) -> None:
     sent = apply_limits(wanted, previous, measured, LIMITS, RANGES, PERIOD_S)

@@ -112,7 +112,7 @@ def test_fault_lasts_until_no_fault_stands_that_stops() -> None:
         assert next_mode(Mode.FAULT, request, health) is (Mode.FAULT if stands else Mode.IDLE)
 
 
-def test_walking_starts_only_from_hold_when_told_and_with_no_fault_that_holds() -> None:
+def test_walking_starts_only_from_hold_on_request_and_without_a_fault_that_holds() -> None:
     for mode, request, health in EVERYTHING:
         if mode is not Mode.WALKING and next_mode(mode, request, health) is Mode.WALKING:
             assert (mode, request) == (Mode.HOLD, Request.WALK)
@@ -139,7 +139,7 @@ def test_a_stop_raises_flippers_that_a_fault_left_in_the_mud() -> None:
         assert next_mode(Mode.HOLD, Request.STOP, health) is Mode.HOLD
 
 
-def test_a_stop_for_a_person_ends_in_hold_and_one_for_a_fault_without_torque() -> None:
+def test_a_requested_stop_ends_in_hold_and_one_for_a_fault_without_torque() -> None:
     for request in set(Request) - {Request.DISARM}:
         assert next_mode(Mode.STOPPING, request, WELL) is Mode.STOPPING
         raised = WELL._replace(raised=True)
@@ -154,7 +154,7 @@ def test_a_fault_that_holds_ends_a_walk_where_it_is_and_lets_a_stop_go_on() -> N
     assert next_mode(Mode.HOLD, Request.WALK, faulty(Reaction.HOLD)) is Mode.HOLD
 
 
-def test_a_stop_is_heeded_also_in_the_tick_of_a_fault_that_holds() -> None:
+def test_a_stop_is_handled_also_in_the_tick_of_a_fault_that_holds() -> None:
     """Or the flippers would stay in the mud, against a person's wish."""
     assert next_mode(Mode.WALKING, Request.STOP, faulty(Reaction.HOLD)) is Mode.STOPPING
 
@@ -165,7 +165,7 @@ def test_a_warning_changes_no_mode() -> None:
             assert next_mode(mode, request, health) is next_mode(mode, request, faulty(Reaction.WARN, health))
 
 
-def test_a_pose_that_nobody_needs_is_not_held_for_ever() -> None:
+def test_a_pose_without_requests_is_not_held_for_ever() -> None:
     assert next_mode(Mode.HOLD, Request.NONE, WELL._replace(rested=True)) is Mode.IDLE
 
 
@@ -174,7 +174,7 @@ def test_boot_ends_when_every_drive_was_heard_and_at_nothing_else() -> None:
         assert next_mode(Mode.BOOT, request, health) is (Mode.IDLE if health.drives_heard else Mode.BOOT)
 
 
-def test_every_row_of_the_table_is_the_first_that_holds_somewhere() -> None:
+def test_every_row_of_the_table_applies_for_some_input() -> None:
     """A row that is hidden by those above it in each of its modes would be a lie in the diagram."""
     for place, row in enumerate(TRANSITIONS):
         above = TRANSITIONS[:place]
@@ -196,7 +196,7 @@ def test_a_request_is_refused_exactly_where_it_could_change_nothing() -> None:
         assert (refusal(mode, request, health) is None) == effective, (mode, request, health)
 
 
-def test_a_refusal_tells_the_cause_where_there_is_one() -> None:
+def test_a_refusal_names_its_cause() -> None:
     blocked = WELL._replace(blocking=(OF_REACTION[Reaction.NONE], OF_REACTION[Reaction.WARN]))
     assert refusal(Mode.IDLE, Request.ARM, blocked) == Refusal(Mode.IDLE, Request.ARM, blocked.blocking)
     held = (OF_REACTION[Reaction.HOLD],)

@@ -28,7 +28,7 @@ def test_the_prior_alone_makes_k_s_a_fifth_lower_at_5_cm_than_at_3() -> None:
 
 
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04, 0.06])
-def test_the_doubt_is_the_spread_of_samples_of_level_and_exponent(depth_m: float) -> None:
+def test_the_uncertainty_is_the_spread_of_samples_of_level_and_exponent(depth_m: float) -> None:
     random = np.random.default_rng(1)
     coefficient = KNOWN._replace(exponent_std_error=0.1)
     levels = np.log(coefficient.value) + 0.05 * random.standard_normal(200_000)
@@ -39,7 +39,7 @@ def test_the_doubt_is_the_spread_of_samples_of_level_and_exponent(depth_m: float
 
 
 @given(depths, depths)
-def test_a_force_predicted_farther_off_is_doubted_more(one_m: float, other_m: float) -> None:
+def test_a_force_predicted_farther_off_is_uncertain_more(one_m: float, other_m: float) -> None:
     nearer_m, farther_m = sorted((one_m, other_m), key=lambda depth_m: abs(log(depth_m / KNOWN.depth_m)))
     near, near_error = KNOWN.at(nearer_m)
     far, far_error = KNOWN.at(farther_m)
@@ -47,7 +47,7 @@ def test_a_force_predicted_farther_off_is_doubted_more(one_m: float, other_m: fl
 
 
 @given(depths)
-def test_a_law_that_is_known_exactly_adds_no_doubt(depth_m: float) -> None:
+def test_a_law_that_is_known_exactly_adds_no_uncertainty(depth_m: float) -> None:
     value, std_error = KNOWN._replace(exponent_std_error=0.0).at(depth_m)
     assert std_error / value == pytest.approx(0.05)
 
@@ -64,7 +64,7 @@ def test_no_number_makes_it_raise(numbers: tuple[float, float, float, float, flo
     assert isinstance(value, float) and isinstance(std_error, float)
 
 
-def test_a_belief_tells_the_flippers_apart() -> None:
+def test_an_estimate_distinguishes_the_flippers() -> None:
     mud_estimate = MudEstimate(left=FlipperEstimate(k_s=KNOWN), right=FlipperEstimate(k_e=KNOWN))
     assert mud_estimate.of("left") == FlipperEstimate(None, KNOWN, None)
     assert mud_estimate.of("right") == FlipperEstimate(None, None, KNOWN)

@@ -218,7 +218,7 @@ def is_zero(expression: sympy.Expr) -> bool:
     return bool(sympy.simplify(expression) == 0)
 
 
-def test_a_point_is_as_deep_as_the_docstring_says() -> None:
+def test_the_depth_of_a_point_is_the_docstrings() -> None:
     edge = POSITION.subs({U: 0, S: 0})
     by_plate = -edge[2] - AXIS - U * sympy.cos(ALPHA) * sympy.sin(BETA) - S * sympy.cos(BETA)
     assert is_zero(-POSITION[2] - AXIS - by_plate)
@@ -235,7 +235,7 @@ def test_a_load_along_the_normal_turns_the_joints_by_its_arm_and_by_its_drop_tim
     assert is_zero(NORMAL.dot(POSITION.diff(BETA)) + below_arm * sympy.sin(ALPHA))
 
 
-def test_the_way_within_the_plates_plane_per_radian_of_adduction_is_the_docstrings_root() -> None:
+def test_the_path_within_the_plates_plane_per_radian_is_the_docstrings_root() -> None:
     across = NORMAL.dot(POSITION.diff(BETA))
     square = POSITION.diff(BETA).dot(POSITION.diff(BETA)) - across**2
     assert is_zero(square - sympy.cos(ALPHA) ** 2 * ((LENGTH + U) ** 2 + (DROP - S) ** 2))
@@ -336,7 +336,7 @@ def test_a_plate_wholly_under_is_a_rectangle_at_its_middles_depth(
 @given(poses, st.floats(1e-6, 0.05))
 @example(CORNER, 1e-6)
 @example(TOP_CORNER_DRY, 1e-6)
-def test_the_moments_grow_with_depth_as_the_wet_area_says(pose: Pose, deeper_m: float) -> None:
+def test_the_moments_grow_with_depth_by_the_wet_area(pose: Pose, deeper_m: float) -> None:
     """d/dδ ∫ζ dA = ∫dA, so the mean slope lies between the areas before and after; and the area grows by the
     waterline's length over the depth's slope along the plate, at most by the diagonal over cos β.
     """

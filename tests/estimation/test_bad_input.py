@@ -175,7 +175,7 @@ def invalid(stroke: Phase, spoil: Callable[[list[Row]], list[Row]]) -> list[Row]
 
 @pytest.mark.parametrize("spoil", SPOILS, ids=lambda spoil: spoil.__name__)
 @pytest.mark.parametrize("stroke", COEFFICIENT)
-def test_a_spoilt_stroke_gives_no_number_for_a_value(
+def test_a_invalid_stroke_gives_no_number_for_a_value(
     stroke: Phase, spoil: Callable[[list[Row]], list[Row]], method: Method
 ) -> None:
     strides = fed(new_estimator(method), invalid(stroke, spoil))

@@ -211,7 +211,7 @@ def test_where_the_surface_is_known_shear_and_extraction_are_found(
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
 @pytest.mark.parametrize("depth_m", [0.02, 0.025, 0.03])
 @pytest.mark.parametrize("factor", [0.25, 1.0, 3.0])
-def test_where_the_surface_has_to_be_found_truth_is_within_the_doubt_of_it(
+def test_where_the_surface_has_to_be_found_truth_is_within_the_uncertainty_of_it(
     factor: float, depth_m: float, surface_m: float
 ) -> None:
     """Nothing is known beforehand, nothing is noisy: the surface is told to 0.8 mm, and each coefficient to 6 %."""
@@ -279,7 +279,7 @@ def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_f
     assert corrected[1] == pytest.approx(corrected[0], rel=0.01)  # the square of the surfaces' difference
 
 
-def test_a_load_on_the_face_adds_to_the_doubt() -> None:
+def test_a_load_on_the_face_adds_to_the_uncertainty() -> None:
     """By a quarter of what is taken off: 2.8 % beside the 3.2 % of the torque constant."""
     plain, faced = (
         one(rows_of(motion(), MUD._replace(face_fraction=fraction)), estimator(surface_error_m=KNOWN_M))
@@ -289,7 +289,7 @@ def test_a_load_on_the_face_adds_to_the_doubt() -> None:
     assert uncertainties(faced)[2] > 0.04
 
 
-def test_at_five_centimetres_and_thirty_degrees_the_way_above_is_observed() -> None:
+def test_at_five_centimetres_and_thirty_degrees_the_upper_part_is_observed() -> None:
     """The arm hangs so steeply there that its adduction joint has 14 mm of lever left. Both k_p and k_e are from the
     poses in which it has more.
     """
@@ -309,7 +309,7 @@ def test_at_five_centimetres_a_narrow_sweep_can_be_observed() -> None:
 # the zero
 
 
-def test_mud_that_clings_and_its_drift_are_told() -> None:
+def test_mud_that_clings_and_its_drift_are_reported() -> None:
     """To 0.02 N: a hundredth of the force on the way down, whose bend leaves a level."""
     single = motion(strides=1)
     weights_n, period_s = (0.7, 1.1, 0.9), single[-1].now_s - single[0].now_s
@@ -336,7 +336,7 @@ def test_what_clings_changes_no_coefficient(weight_n: float, offset_nm: float) -
         assert b.std_error == pytest.approx(a.std_error, rel=1e-2)
 
 
-def test_without_air_before_it_the_insertion_itself_tells_the_zero() -> None:
+def test_without_air_before_it_the_insertion_itself_gives_the_zero() -> None:
     """A walk that begins with an insertion: its way down to the mud shows 0.7 N of clinging mud to a tenth of a newton,
     which is 5 % of k_p. Left in, it would be a third of it.
     """
@@ -350,7 +350,7 @@ def test_without_air_before_it_the_insertion_itself_tells_the_zero() -> None:
 
 
 @pytest.mark.parametrize("times", [2, 3, 10])
-def test_rows_that_repeat_change_neither_value_nor_doubt(times: int) -> None:
+def test_rows_that_repeat_change_neither_value_nor_uncertainty(times: int) -> None:
     """But for the moment at which a batch ends, which only its speed shows."""
     rows = noisy(rows_of(motion(), MUD, HEAVY), 3)
     step_s = 1.0 / RATE_HZ / times
@@ -361,7 +361,7 @@ def test_rows_that_repeat_change_neither_value_nor_doubt(times: int) -> None:
 
 
 @pytest.mark.parametrize("ticks", [2, 4, 10])
-def test_messages_that_last_several_ticks_change_value_and_doubt_little(ticks: int) -> None:
+def test_slow_messages_change_value_and_error_little(ticks: int) -> None:
     """190 to 38 messages a second. With a tenth of the messages there is √10 of the noise; of 0.02 A that is nothing
     beside the torque constants' 3.2 %.
     """
@@ -389,7 +389,7 @@ def _invalid(row: Row, joint: str, field: str, bad: float) -> Row:
 
 
 @pytest.mark.parametrize("lost", [5, 20])
-def test_a_gap_in_each_stroke_moves_no_coefficient_by_more_than_its_doubt(lost: int) -> None:
+def test_a_gap_in_each_stroke_moves_no_coefficient_by_more_than_its_uncertainty(lost: int) -> None:
     """Of 13 and 52 ms: longer than what two samples say together of one motion."""
     rows = rows_of(motion(gait=SINGLE_FLIPPER), MUD, HEAVY)
     whole = one(rows, estimator(HEAVY))
@@ -444,7 +444,7 @@ def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
     return mud, one(noisy(rows_of(motion(), mud), seed), estimator(known))
 
 
-def test_the_interval_of_95_percent_covers_the_truth_about_as_often_as_it_says() -> None:
+def test_the_interval_of_95_percent_covers_the_truth_about_that_often() -> None:
     """Of 300 strides: k_p 98 %, k_s 94 %, k_e 93 %. A true 95 % would read 92.2 to 97.4 % in 49 of 50 such tests; 88
     and 99.5 % are where intervals would be half as wide or twice as wide as they should be.
     """
@@ -456,7 +456,7 @@ def test_the_interval_of_95_percent_covers_the_truth_about_as_often_as_it_says()
         assert 0.88 <= np.mean(hits) <= 0.995
 
 
-def test_no_coefficient_is_biased_by_more_than_half_its_doubt() -> None:
+def test_no_coefficient_is_biased_by_more_than_half_its_uncertainty() -> None:
     """The bent law makes 3 to 5 %, a whole doubt; the surface's nominal height, which is weighed against it, and the
     face, whose load rises with depth squared, take most of that back. Of 100 strides a mean errs by a tenth.
     """
@@ -468,7 +468,7 @@ def test_no_coefficient_is_biased_by_more_than_half_its_doubt() -> None:
     assert np.abs(np.mean(scores, axis=0)).max() < 0.5
 
 
-def test_more_noise_makes_more_doubt() -> None:
+def test_more_noise_makes_more_uncertainty() -> None:
     rows = rows_of(motion())
     little, some, much = (uncertainties(one(noisy(rows, 1, noise_a))) for noise_a in (0.05, 0.3, 1.0))
     assert all(a < b for a, b in zip(little, some, strict=True))
@@ -506,7 +506,7 @@ def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_stren
     assert stride.k_s.value < 2.0e6
 
 
-def test_a_stance_that_stands_almost_at_once_tells_not_even_a_bound() -> None:
+def test_a_stance_that_stops_almost_at_once_gives_not_even_a_bound() -> None:
     """However long the motor pushes: what stands is one batch, and a bound is what three in a row have borne."""
     stride = one(noisy(rows_of(stuck(radians(25.0))), 1, 0.01), estimator(WEIGHTLESS._replace(current_limit_a=1.0)))
     assert (stride.stance, stride.k_s.reason) == ("saturated", "a motor at its limit")
@@ -526,7 +526,7 @@ def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
 
 
 @pytest.mark.parametrize(("fraction", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "body")])
-def test_the_place_of_the_body_tells_what_gave_way(fraction: float, case: str) -> None:
+def test_the_body_position_shows_whether_mud_or_body_moved(fraction: float, case: str) -> None:
     stride = one(carried(rows_of(motion()), fraction), estimator(surface_error_m=KNOWN_M, base=Base.FREE))
     assert stride.stance == case
     assert stride.k_s.at_least is (case == "body")
@@ -540,7 +540,7 @@ def test_without_a_pose_the_stance_is_unknown_and_the_shear_strength_a_bound() -
     assert not isfinite(stride.step_m) and not isfinite(stride.position_m)
 
 
-def test_step_and_place_are_the_bodys() -> None:
+def test_step_and_position_are_the_bodys() -> None:
     """Advance from close to close; the place where the insertion ended."""
     rows = [row._replace(body_m=7.0 + 0.05 * row.now_s) for row in rows_of(motion(strides=3))]
     first, *later = strides = closed(rows)
@@ -570,7 +570,7 @@ def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
             assert load.depth_m == pytest.approx(row.depth_m, abs=1e-4)
 
 
-def test_forces_are_the_smallest_ones_and_in_stance_none_upward_is_told() -> None:
+def test_forces_are_the_smallest_ones_and_in_stance_none_upward_is_reported() -> None:
     """Of the pose half-way between two samples."""
     flipper, rows = estimator(), rows_of(motion())[:-1]
     loads = [flipper.update(*row)[0] for row in rows]
@@ -592,7 +592,7 @@ def test_a_row_that_repeats_shows_the_same_load() -> None:
         assert repr(flipper.update(*row)) == repr((load, None))
 
 
-def test_the_largest_forces_of_the_stride_are_told() -> None:
+def test_the_largest_forces_of_the_stride_are_reported() -> None:
     """To 3 %: the level that the insertion leaves for the zero, and the quick extraction's half a tick."""
     stride, forces = one(rows_of(motion())), dict[Phase, list[tuple[float, float]]]()
     for moment in motion():
@@ -639,7 +639,7 @@ def test_durations_and_times_are_those_of_the_gait() -> None:
     assert (stride.t_start_s, stride.t_end_s) == (begun_s, rows[-1].now_s)
 
 
-def test_a_flipper_that_meets_no_mud_says_why_it_knows_nothing() -> None:
+def test_a_flipper_that_meets_no_mud_gives_a_reason() -> None:
     stride = one(noisy(rows_of(motion(-0.001)), 1, 0.05))
     assert not any(each.valid for each in coefficients(stride))
     assert all(each.reason for each in coefficients(stride))
@@ -668,7 +668,7 @@ def edge_depth_m(lowest_depth_m: float) -> float:
 
 @pytest.mark.parametrize("surface_m", [-0.003, 0.003])
 @pytest.mark.parametrize(("below_m", "released"), [(-1e-4, True), (1e-4, False)])
-def test_released_is_what_the_gait_sees_whatever_the_height_of_the_mud(
+def test_released_follows_the_gaits_condition_at_any_height_of_the_mud(
     below_m: float, released: bool, surface_m: float
 ) -> None:
     moments = lifted_to(edge_depth_m(OUT_M + below_m))
@@ -722,7 +722,7 @@ def test_a_recovery_does_not_shift_the_zero() -> None:
     assert second.tare_n == pytest.approx(plain.tare_n, abs=1e-3)
 
 
-def test_a_flipper_that_stays_down_tells_only_how_much_the_mud_has_borne() -> None:
+def test_a_flipper_that_stays_down_gives_only_a_lower_bound() -> None:
     """To 5 %: a batch of 33 samples, the first of which is half in stance."""
     stride = one(noisy(rows_of(lifted_to(0.03)), 1, 0.01), estimator(surface_error_m=KNOWN_M))
     assert not stride.released
@@ -734,7 +734,7 @@ def test_a_flipper_that_stays_down_tells_only_how_much_the_mud_has_borne() -> No
 # memory
 
 
-def test_each_stride_of_a_walk_tells_the_same() -> None:
+def test_each_stride_of_a_walk_gives_the_same() -> None:
     strides = closed(rows_of(motion(strides=3)))
     assert [stride.index for stride in strides] == [0, 1, 2]
     for stride in strides[1:]:  # ticks fall differently into each: up to one of 26 in a batch's way

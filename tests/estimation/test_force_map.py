@@ -46,7 +46,7 @@ def test_hand_numbers(
 
 
 @given(angles, angles, st.floats(-10.0, 10.0))
-def test_a_force_square_to_the_plate_has_exactly_the_forward_part_that_the_map_tells(
+def test_the_map_gives_exactly_the_forward_part_of_a_force_normal_to_the_plate(
     sweep: float, adduction: float, normal_n: float
 ) -> None:
     jacobian = FlipperGeometry(0.12, 0.0, 0.03).jacobian(sweep, adduction)

@@ -108,7 +108,7 @@ def test_friction_of_an_unknown_velocity_leaves_cogging_alone() -> None:
         (0.0, 0.0, False),
     ],
 )
-def test_a_motor_at_its_limit_is_told(sweep_a: float, lift_a: float, saturated: bool) -> None:
+def test_a_motor_at_its_limit_is_reported(sweep_a: float, lift_a: float, saturated: bool) -> None:
     """Clipped currents waver a little under the limit."""
     assert SATURATION == 0.98
     limited = DRIVE._replace(current_limit_a=10.0)
@@ -162,7 +162,7 @@ def largest_nm(loads: list[JointLoad]) -> float:
 INERTIA_NM = MASS.adduction_inertia_kg_m2 * 0.2 * 25.0**2
 
 
-def test_a_free_arm_in_quick_motion_bears_no_load() -> None:
+def test_a_free_arm_in_quick_motion_withstands_no_load() -> None:
     """Of the 0.08 N·m that its inertia takes, (ω dt)²/8 is left by taking lines for curves: 0.1 %."""
     assert largest_nm(loads_of_a_free_arm(PERIOD_S, PERIOD_S, 0.0)) < 0.002 * INERTIA_NM
 
@@ -217,7 +217,7 @@ def test_between_two_samples_everything_is_half_way(
 
 
 @pytest.mark.parametrize("gap_s", [LONGEST_GAP_S, 1.0, 0.0, -0.01, nan, inf])
-def test_samples_that_do_not_tell_of_one_motion_are_taken_as_they_are(gap_s: float) -> None:
+def test_samples_that_do_not_give_of_one_motion_are_taken_as_they_are(gap_s: float) -> None:
     motion = motion_between(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0 + gap_s))
     assert motion == (0.3, 3.0, 0.0, 4.0)
 
@@ -321,7 +321,7 @@ def test_along_a_line_through_currents_half_of_that_load_would_be_lost() -> None
     assert np.sqrt(np.mean(errors_nm**2)) > 0.5 * abs(MUD_NM)
 
 
-def test_two_samples_of_one_moment_tell_no_acceleration() -> None:
+def test_two_samples_of_one_moment_give_no_acceleration() -> None:
     for motion in (motion_between, motion_at):
         assert motion(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0)) == (0.3, 3.0, 0.0, 4.0)
 
@@ -337,7 +337,7 @@ def test_the_papers_motion_is_at_the_newest_sample() -> None:
     assert motion == pytest.approx((0.3, 3.0, 200.0, 4.0))
 
 
-def test_a_joint_that_is_unknown_does_not_spoil_the_other_one() -> None:
+def test_an_unknown_joint_does_not_invalidate_the_other_one() -> None:
     loads = JointLoads(GEOMETRY, DRIVE)
     loads.update(sample(0.0, nan, 0.0, 1.0), sample(0.0, 0.0, 0.0, 1.0))
     load = loads.update(sample(0.01, 1.0, 0.0, 1.01), sample(0.01, 1.0, 0.0, 1.01))

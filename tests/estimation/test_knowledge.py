@@ -25,7 +25,7 @@ from estimation.strokes.depth_line import (
     Reading,
     reading_of,
 )
-from tests.control import made_up_muds
+from tests.control import synthetic_muds
 
 K_P, K_S, K_E = 1.0e6, 0.6e6, 1.1e6
 REPORTED = 0.03  # relative standard error of a stride in these tests, where there is any
@@ -47,7 +47,7 @@ def stride(
     depth_m: float = 0.03,
     flipper: str = "left",
 ) -> StrideEstimate:
-    return made_up_muds.stride(flipper, depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
+    return synthetic_muds.stride(flipper, depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
 
 
 def after(*strides: StrideEstimate) -> MudEstimate:
@@ -113,7 +113,7 @@ class TestOneMud:
             at = np.array([1.0, log_depth])
             assert line.expected(log_depth) == pytest.approx((at @ solution, at @ covariance @ at), rel=1e-6)
 
-    def test_a_belief_at_another_depth_is_what_the_line_expects_there(self) -> None:
+    def test_a_estimate_at_another_depth_is_what_the_line_expects_there(self) -> None:
         line = line_through(readings(6, 1))
         k, std_error = line.coefficient().at(0.05)
         expected, variance = line.expected(log(0.05))
@@ -131,11 +131,11 @@ class TestOneMud:
             assert merged.depth_m == pytest.approx(0.03)
             assert (merged.strides, merged.at_least, mud_estimate.boundary) == (len(rows), False, False)
 
-    def test_one_stride_is_doubted_by_its_own_error_and_the_repeatability(self) -> None:
+    def test_one_stride_is_uncertain_by_its_own_error_and_the_repeatability(self) -> None:
         only = found(after(stride(k_s=reported(K_S, 0.06))).k_s)
         assert only.std_error / only.value == pytest.approx(0.10)
 
-    def test_on_one_mud_the_doubt_narrows_to_eight_strides_worth_and_no_further(self) -> None:
+    def test_on_one_mud_the_uncertainty_narrows_to_eight_strides_worth_and_no_further(self) -> None:
         knowledge = MudKnowledge()
         uncertainties = []
         for _ in range(100):
@@ -159,7 +159,7 @@ class TestOneMud:
         assert boundaries == 0
         assert found(knowledge.mud_estimate.k_s).value == pytest.approx(k_s, rel=0.09)
 
-    def test_the_doubt_covers_the_truth_about_95_times_in_a_hundred(self) -> None:
+    def test_the_uncertainty_covers_the_truth_about_95_times_in_a_hundred(self) -> None:
         covered = runs = 0
         for seed in range(400):
             mud = Mud(seed)
@@ -251,7 +251,7 @@ class TestBoundaries:
         assert both.uncertainty == pytest.approx(sqrt((REPEATABILITY**2 + REPORTED**2) / 2.0), rel=0.01)
 
     @pytest.mark.parametrize("step", [0.8, 1.25])
-    def test_a_boundary_of_20_percent_is_told_within_two_strides_and_mostly_followed(self, step: float) -> None:
+    def test_a_boundary_of_20_percent_is_reported_within_two_strides_and_mostly_followed(self, step: float) -> None:
         both, only_k_s = following(step, step), following(step, 1.0)
         assert both.reported >= 0.97 and both.nearer >= 0.78
         assert only_k_s.reported >= 0.9 and only_k_s.nearer >= 0.6
@@ -270,7 +270,7 @@ class TestBoundaries:
             assert is_value(k, 1e6 * step)
             assert (found(k).strides, mud_estimate.boundary) == (strides, boundary)
 
-    def test_a_change_is_told_from_2_6_standard_deviations_on(self) -> None:
+    def test_a_change_is_reported_from_2_6_standard_deviations_on(self) -> None:
         known = [stride(k_s=reported(K_S))] * 8
         deviation = sqrt(REPEATABILITY**2 + REPEATABILITY**2 / 8.0)
         for sign in (-1.0, 1.0):
@@ -316,7 +316,7 @@ class TestBoundaries:
             assert found(mud_estimate.k_s).value == pytest.approx(k_s)
 
     @pytest.mark.parametrize(("changed", "also"), [("k_p", "k_s"), ("k_p", "k_e"), ("k_s", "k_p"), ("k_s", "k_e")])
-    def test_what_tells_another_mud_makes_the_others_forget(self, changed: str, also: str) -> None:
+    def test_a_coefficient_of_another_mud_clears_the_others(self, changed: str, also: str) -> None:
         known = {"k_p": reported(K_P), "k_s": reported(K_S), "k_e": reported(K_E)}
         new = known | {changed: reported(2.0 * known[changed].value), also: reported(1.05 * known[also].value)}
         knowledge = MudKnowledge()
@@ -347,7 +347,7 @@ class TestBoundaries:
             mud_estimate = walked(knowledge, stride(reported(k_p)))
             assert mud_estimate.k_s is None
 
-    def test_a_stride_that_tells_neither_k_p_nor_k_s_settles_no_alarm(self) -> None:
+    def test_a_stride_that_gives_neither_k_p_nor_k_s_settles_no_alarm(self) -> None:
         knowledge = MudKnowledge()
         alarmed = walked(knowledge, *[stride(reported(K_P))] * 8, stride(reported(2.0 * K_P)))
         assert walked(knowledge, stride(k_e=reported(K_E)), stride()).k_p == alarmed.k_p
@@ -383,7 +383,7 @@ class TestBothFlippers:
         assert together.std_error / together.value == pytest.approx(sqrt(1.0 / np.sum(1.0 / variances)))
         assert together.strides == 2
 
-    def test_a_difference_beyond_their_doubts_stays_in_the_doubt(self) -> None:
+    def test_a_difference_beyond_the_errors_stays_in_the_error(self) -> None:
         apart, alike = (found(self.believed(reported(K_P), reported(k)).k_p) for k in (1.18 * K_P, K_P))
         assert apart.std_error / apart.value == pytest.approx(log(1.18) / 2.0, rel=0.01)
         assert alike.std_error / alike.value == pytest.approx(REPEATABILITY / 4.0)
@@ -406,11 +406,11 @@ class TestBothFlippers:
         assert together.depth_m == pytest.approx(sqrt(0.03 * 0.05))
         assert together.at(0.03)[0] == pytest.approx(K_P)
 
-    def test_the_depth_laws_doubt_does_not_shrink_by_being_told_twice(self) -> None:
+    def test_the_depth_laws_error_does_not_shrink_with_two_flippers(self) -> None:
         together = found(self.believed(reported(K_P), reported(K_P)).k_p)
         assert (together.exponent, together.exponent_std_error) == pytest.approx(STROKE_LAW)
 
-    def test_of_two_bounds_the_lower_holds_for_both(self) -> None:
+    def test_the_lower_of_two_bounds_counts_for_both(self) -> None:
         assert is_bound(self.believed(bound(K_P), bound(2.0 * K_P)).k_p, K_P)
         assert is_bound(self.believed(bound(2.0 * K_P), bound(K_P)).k_p, K_P)
 
@@ -425,14 +425,14 @@ class TestBothFlippers:
 
 
 class TestLowerBounds:
-    def test_with_nothing_else_known_a_bound_is_believed_as_a_bound(self) -> None:
+    def test_with_nothing_else_known_a_bound_is_trusted_as_a_bound(self) -> None:
         k_s = found(after(stride(k_s=bound(K_S, 0.06), depth_m=0.04)).k_s)
         assert is_bound(k_s, K_S)
         assert k_s.depth_m == pytest.approx(0.04)
         assert k_s.std_error / k_s.value == pytest.approx(0.1)
         assert (k_s.exponent, k_s.exponent_std_error) == pytest.approx(SHEAR_LAW)
 
-    def test_a_bound_is_believed_also_where_its_estimate_is_not_called_valid(self) -> None:
+    def test_a_bound_is_trusted_also_where_its_estimate_is_not_called_valid(self) -> None:
         assert found(after(stride(k_s=bound(K_S)._replace(valid=False))).k_s).at_least
 
     def test_a_bound_does_not_change_a_remembered_value(self) -> None:
@@ -442,14 +442,14 @@ class TestLowerBounds:
             assert mud_estimate.k_s == after(*known).k_s
             assert not mud_estimate.boundary
 
-    def test_a_bound_well_above_the_remembered_value_tells_a_stronger_mud(self) -> None:
+    def test_a_bound_well_above_the_remembered_value_gives_a_stronger_mud(self) -> None:
         known = stride(reported(K_P), reported(K_S), reported(K_E))
         mud_estimate = after(*[known] * 8, stride(k_s=bound(1.5 * K_S)))
         assert mud_estimate.boundary
         assert is_bound(mud_estimate.k_s, 1.5 * K_S)
         assert mud_estimate.k_p is None and mud_estimate.k_e is None
 
-    def test_a_stronger_mud_told_by_a_bound_is_kept_until_a_value_comes(self) -> None:
+    def test_a_stronger_mud_by_a_bound_stays_until_a_value_comes(self) -> None:
         knowledge = MudKnowledge()
         walked(knowledge, *[stride(reported(K_P), reported(K_S))] * 8)
         for _ in range(3):
@@ -460,7 +460,7 @@ class TestLowerBounds:
         mud_estimate = walked(knowledge, stride(reported(K_P), reported(1.8 * K_S)))
         assert is_value(mud_estimate.k_s, 1.8 * K_S)
 
-    def test_a_stronger_mud_told_by_a_bound_is_not_taken_back_by_silence(self) -> None:
+    def test_a_stronger_mud_by_a_bound_is_not_revoked_by_an_empty_stride(self) -> None:
         known = stride(reported(K_P), reported(K_S))
         mud_estimate = after(*[known] * 8, stride(reported(K_P), bound(1.5 * K_S)), stride(reported(K_P)))
         assert is_bound(mud_estimate.k_s, 1.5 * K_S)
@@ -471,7 +471,7 @@ class TestLowerBounds:
         assert is_value(mud_estimate.k_s, K_S)
         assert found(mud_estimate.k_s).strides == 9
 
-    def test_the_greatest_bound_that_a_second_stride_bears_out_is_kept(self) -> None:
+    def test_the_greatest_bound_that_a_second_stride_confirms_counts(self) -> None:
         def kept(*factors: float) -> Coefficient | None:
             return after(*(stride(k_s=bound(factor * K_S)) for factor in factors)).k_s
 
@@ -487,7 +487,7 @@ class TestLowerBounds:
         assert found(after(shallow, shallow, deep, deep).k_s).depth_m == pytest.approx(0.05)
         assert found(after(deep, shallow, shallow).k_s).depth_m == pytest.approx(0.03)
 
-    def test_a_boundary_that_only_two_strides_tell_leaves_the_bound_of_the_last_one(self) -> None:
+    def test_a_boundary_that_only_two_strides_give_leaves_the_bound_of_the_last_one(self) -> None:
         deviation = sqrt(REPEATABILITY**2 / 2.0 + REPEATABILITY**2 / 8.0)
         new_k_p = reported(K_P * exp(-(PAIR_CHANGE + 0.01) * deviation))
         knowledge = MudKnowledge()
@@ -504,7 +504,7 @@ class TestLowerBounds:
         known = [stride(reported(K_P), bound(0.9 * K_S)), *[stride(reported(K_P), reported(K_S))] * 7]
         assert after(*known, stride(new_k_p), stride(new_k_p)).k_s is None
 
-    def test_a_bound_is_forgotten_where_k_p_tells_another_mud(self) -> None:
+    def test_a_bound_is_forgotten_where_k_p_gives_another_mud(self) -> None:
         knowledge = MudKnowledge()
         walked(knowledge, *[stride(reported(K_P), bound(K_S))] * 4)
         assert walked(knowledge, stride(reported(0.4 * K_P))).k_s is None
@@ -519,7 +519,7 @@ class TestDepthLaw:
         for k, law in ((mud_estimate.k_p, STROKE_LAW), (mud_estimate.k_s, SHEAR_LAW), (mud_estimate.k_e, STROKE_LAW)):
             assert (found(k).exponent, found(k).exponent_std_error) == pytest.approx(law)
 
-    def test_the_clay_models_third_is_within_what_the_prior_doubts(self) -> None:
+    def test_the_clay_models_third_is_within_the_priors_error(self) -> None:
         k, std_error = found(after(*[stride(k_s=reported(K_S))] * 8).k_s).at(0.05)
         assert abs(K_S * 2.0 / 3.0 - k) < 2.0 * std_error
 
@@ -534,7 +534,7 @@ class TestDepthLaw:
         assert np.mean([k.exponent for k in learned]) == pytest.approx(exponent, abs=0.06)
         assert all(SURE_EXPONENT * 0.999 <= k.exponent_std_error < 0.13 for k in learned)
 
-    def test_a_learned_law_predicts_another_depth_within_its_doubt(self) -> None:
+    def test_a_learned_law_predicts_another_depth_within_its_uncertainty(self) -> None:
         within = 0
         for seed in range(200):
             mud = Mud(seed, -0.8, depths_m=(0.025, 0.03, 0.035))
@@ -549,7 +549,7 @@ class TestDepthLaw:
             deeper = stride(reported(K_P * (0.05 / 0.03) ** exponent), depth_m=0.05)
             assert not after(*[stride(reported(K_P))] * 8, deeper).boundary
 
-    def test_at_a_boundary_the_exponent_stays_with_at_least_half_its_first_doubt(self) -> None:
+    def test_at_a_boundary_the_exponent_stays_with_at_least_half_its_first_uncertainty(self) -> None:
         mud = Mud(3, -0.9, depths_m=(0.02, 0.03, 0.06))
         for _ in range(40):
             mud.walk()
@@ -607,7 +607,7 @@ class TestBadInput:
         assert reading_of(reported(K_P), 0.03) is not None
 
     @given(st.lists(st.lists(any_stride, max_size=3), max_size=12))
-    def test_whatever_comes_every_belief_is_a_finite_positive_number_or_none(
+    def test_for_any_input_every_estimate_is_a_finite_positive_number_or_none(
         self, walk: list[list[StrideEstimate]]
     ) -> None:
         knowledge = MudKnowledge()
@@ -618,7 +618,7 @@ class TestBadInput:
                 assert k is None or (k.value > 0.0 and k.std_error > 0.0 and k.strides > 0)
 
     @given(st.lists(any_stride, max_size=12))
-    def test_whatever_came_two_strides_in_a_mud_bring_its_coefficients(self, walk: list[StrideEstimate]) -> None:
+    def test_after_any_history_two_strides_in_a_mud_give_its_coefficients(self, walk: list[StrideEstimate]) -> None:
         knowledge = MudKnowledge()
         walked(knowledge, *walk)
         sure = [stride(reported(K_P), reported(K_S), reported(K_E))] * 2
@@ -631,7 +631,7 @@ class TestBadInput:
         assert knowledge.update([]) == before
         assert knowledge.update([stride(reported(9 * K_P), flipper="tail")]) == before
 
-    def test_a_boundary_is_told_once(self) -> None:
+    def test_a_boundary_is_reported_once(self) -> None:
         knowledge = MudKnowledge()
         assert walked(knowledge, *[stride(reported(K_P))] * 4, stride(reported(4 * K_P))).boundary
         assert not knowledge.update([]).boundary

@@ -65,7 +65,7 @@ def flipper_estimator(flipper: str, method: Method) -> FlipperEstimator | PaperE
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_each_flipper_is_told_what_it_would_be_told_alone(method: Method) -> None:
+def test_each_flipper_gets_the_samples_that_it_would_get_alone(method: Method) -> None:
     left, right, mud = walk(1), walk(2), estimator(method)
     alone = {flipper: flipper_estimator(flipper, method) for flipper in FLIPPERS}
     times_s = [nan, nan, *(sample.now_s for sample in left)]  # a sample answers the commands of the two before it
@@ -104,7 +104,7 @@ def test_each_joint_has_its_own_torque_constant(method: Method) -> None:
     assert torques == pytest.approx([-0.05, -0.12, -0.21, -0.32])
 
 
-def test_without_any_sample_nothing_is_said() -> None:
+def test_without_any_sample_the_reading_is_empty() -> None:
     reading = MudReading()
     assert (reading.left, reading.right, reading.strides) == (NO_LOAD, NO_LOAD, ())
     assert estimator().mud_estimate == NOTHING_KNOWN
@@ -120,7 +120,7 @@ def test_the_method_paper_gives_the_papers_estimators() -> None:
         assert (flipper.flipper, flipper.body_drag_n) == (name, 0.0)
 
 
-def test_the_paper_adds_the_drag_only_where_it_is_asked_to() -> None:
+def test_the_paper_adds_the_drag_only_if_configured() -> None:
     parameters = EstimationParameters(method="paper", paper=PaperEstimationParameters(compensation=True))
     left = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0).left
     assert isinstance(left, PaperEstimator)
@@ -140,7 +140,7 @@ def test_the_default_gets_base_drag_and_surface_error(fixed_base: bool, base: Ba
 # what is known from stride to stride
 
 
-def test_belief_is_that_of_the_strides_so_far() -> None:
+def test_estimate_is_that_of_the_strides_so_far() -> None:
     mud = estimator()
     for a, b in zip(walk(1), walk(2), strict=True):
         before, reading = mud.mud_estimate, update(mud, a, b)
@@ -153,7 +153,7 @@ def test_belief_is_that_of_the_strides_so_far() -> None:
     assert mud.mud_estimate.k_p.value == pytest.approx(K_P, rel=0.1)  # 3 to 5 % by the surface, see test_flipper
 
 
-def test_the_belief_of_both_is_between_those_of_each() -> None:
+def test_the_estimate_of_both_is_between_those_of_each() -> None:
     mud = estimator()
     strides_of(mud, walk(1), walk(2))
     assert (
@@ -174,7 +174,7 @@ def test_the_papers_strides_are_remembered_like_ours(method: Method) -> None:
     assert mud.mud_estimate.left.k_p.strides == STRIDES
 
 
-def test_the_map_holds_both_flippers_strides_at_the_bodys_place() -> None:
+def test_the_map_contains_both_flippers_strides_at_the_body_position() -> None:
     """0.1 m/s, a stride every 2 s: 20 cm from close to close, which are four pieces."""
     mud = estimator()
     strides = strides_of(mud, walk(1), walk(2), speed_m_s=0.1)
@@ -185,7 +185,7 @@ def test_the_map_holds_both_flippers_strides_at_the_bodys_place() -> None:
     assert [row.k_p.strides for row in rows if row.k_p is not None] == [2] * STRIDES
 
 
-def test_without_a_pose_there_is_a_belief_and_no_map() -> None:
+def test_without_a_pose_there_is_a_estimate_and_no_map() -> None:
     mud = estimator()
     strides_of(mud, walk(1), walk(2), speed_m_s=nan)
     assert mud.mud_estimate.k_p is not None
@@ -193,7 +193,7 @@ def test_without_a_pose_there_is_a_belief_and_no_map() -> None:
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_a_reset_forgets_strides_belief_and_map(method: Method) -> None:
+def test_a_reset_forgets_strides_estimate_and_map(method: Method) -> None:
     mud = estimator(method)
     first = strides_of(mud, walk(1), walk(2), speed_m_s=0.1)
     mud_estimate, rows = mud.mud_estimate, mud.map.rows()
@@ -255,12 +255,12 @@ BOTH_OLD: tuple[Four, Four] = ((0.0, 0.002, 0.001, 0.0005), (0.002, 0.0005, 0.0,
 
 
 @pytest.mark.parametrize("ages", [(NO_AGES_S, NO_AGES_S), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
-def test_messages_of_any_age_tell_the_load_of_fresh_ones(ages: tuple[Four, Four]) -> None:
+def test_messages_of_any_age_give_the_load_of_fresh_ones(ages: tuple[Four, Four]) -> None:
     assert max(load_of_a_free_arm_nm(*ages, reported=True)) < 1e-9 * LARGEST_NM
 
 
 @pytest.mark.parametrize("ages", [ANGLES_OLD, BOTH_OLD])
-def test_ages_that_are_not_told_would_be_taken_for_mud(ages: tuple[Four, Four]) -> None:
+def test_unknown_ages_would_be_taken_for_mud(ages: tuple[Four, Four]) -> None:
     """A millisecond of 5 Hz is 3 % of the inertia."""
     assert max(load_of_a_free_arm_nm(*ages, reported=False)) > 0.03 * LARGEST_NM
 

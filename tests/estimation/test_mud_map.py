@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from control.records import Estimate, StrideEstimate
 from estimation.mud_map import MOST_PIECES, PIECE_M, Mapped, MudMap
 from estimation.strokes.depth_line import REPEATABILITY
-from tests.control import made_up_muds
+from tests.control import synthetic_muds
 
 NOT_REPORTED = Estimate(nan, nan, 0, False, "fewer than 5 samples in the mud")
 
@@ -22,7 +22,7 @@ def reported(value: float, relative: float = 0.0, at_least: bool = False) -> Est
 def stride(
     k_p: Estimate = NOT_REPORTED, k_s: Estimate = NOT_REPORTED, k_e: Estimate = NOT_REPORTED, depth_m: float = 0.03
 ) -> StrideEstimate:
-    return made_up_muds.stride("left", depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
+    return synthetic_muds.stride("left", depth_m, k_p=k_p, k_s=k_s, k_e=k_e)
 
 
 def mapped(*strides: StrideEstimate, position_m: float = 0.01) -> MudMap:
@@ -40,7 +40,7 @@ def only(mud_map: MudMap) -> Mapped:
 
 
 @given(st.lists(st.tuples(st.floats(0.9, 1.1), st.floats(0.1, 0.5), st.floats(0.02, 0.05)), min_size=1, max_size=30))
-def test_a_piece_holds_the_weighted_mean_of_its_strides(rows: list[tuple[float, float, float]]) -> None:
+def test_a_piece_has_the_weighted_mean_of_its_strides(rows: list[tuple[float, float, float]]) -> None:
     piece = only(mapped(*(stride(k_s=reported(1e6 * value, relative), depth_m=z) for value, relative, z in rows)))
     weights = np.array([1.0 / (relative**2 + REPEATABILITY**2) for _, relative, _ in rows])
     assert piece.value == pytest.approx(1e6 * exp(np.average([log(value) for value, _, _ in rows], weights=weights)))
@@ -49,7 +49,7 @@ def test_a_piece_holds_the_weighted_mean_of_its_strides(rows: list[tuple[float, 
     assert (piece.strides, piece.at_least) == (len(rows), False)
 
 
-def test_strides_that_differ_by_more_than_their_doubts_widen_it_by_their_scatter() -> None:
+def test_strides_that_differ_by_more_than_their_errors_widen_it_by_their_scatter() -> None:
     factors = [0.5, 0.6, 1.5, 1.9]
     piece = only(mapped(*(stride(k_s=reported(1e6 * factor)) for factor in factors)))
     scatter = float(np.std(np.log(factors), ddof=1)) / sqrt(len(factors))
@@ -57,7 +57,7 @@ def test_strides_that_differ_by_more_than_their_doubts_widen_it_by_their_scatter
     assert scatter > 3.0 * REPEATABILITY / 2.0
 
 
-def test_every_coefficient_has_its_own_place_in_the_row() -> None:
+def test_every_coefficient_has_its_own_field_in_the_row() -> None:
     (row,) = mapped(stride(reported(1e6), NOT_REPORTED, reported(2e6))).rows()
     assert row.k_s is None
     assert row.k_p is not None and row.k_p.value == pytest.approx(1e6)
@@ -70,7 +70,7 @@ def test_both_flippers_of_a_stride_count() -> None:
     assert only(mud_map).strides == 2
 
 
-def test_pieces_are_five_centimetres_long_and_told_in_the_order_of_places() -> None:
+def test_pieces_are_five_centimetres_long_and_known_in_the_order_of_positions() -> None:
     mud_map = MudMap()
     for position_m in (0.12, -0.01, 0.04, 0.06, 0.001, 0.0999):
         mud_map.update(position_m, [stride(k_s=reported(1e6))])
@@ -90,7 +90,7 @@ def test_a_boundary_of_muds_stands_where_it_was_walked_over() -> None:
 
 
 @pytest.mark.parametrize("position_m", [nan, inf, -inf, 1.7e308])
-def test_a_stride_without_a_place_is_on_no_map(position_m: float) -> None:
+def test_a_stride_without_a_position_is_on_no_map(position_m: float) -> None:
     assert mapped(stride(k_s=reported(1e6)), position_m=position_m).rows() == ()
 
 
@@ -106,7 +106,7 @@ def test_a_stride_without_a_place_is_on_no_map(position_m: float) -> None:
         stride(k_s=reported(1e6)._replace(valid=False)),
     ],
 )
-def test_a_stride_that_tells_nothing_leaves_no_trace(odd: StrideEstimate) -> None:
+def test_a_stride_that_gives_no_estimate_leaves_no_trace(odd: StrideEstimate) -> None:
     assert mapped(odd).rows() == ()
     known = stride(k_s=reported(1e6))
     assert mapped(known, odd).rows() == mapped(known).rows()
@@ -147,7 +147,7 @@ anything = st.builds(Estimate, numbers, numbers, st.integers(), st.booleans(), s
 
 
 @given(st.lists(st.tuples(st.floats(), anything, st.floats() | st.floats(0.01, 0.06)), max_size=20))
-def test_whatever_comes_the_map_holds_positive_numbers(walk: list[tuple[float, Estimate, float]]) -> None:
+def test_for_any_input_the_map_contains_positive_numbers(walk: list[tuple[float, Estimate, float]]) -> None:
     mud_map = MudMap()
     for position_m, estimate, depth_m in walk:
         mud_map.update(position_m, [stride(estimate, estimate, estimate, depth_m)])

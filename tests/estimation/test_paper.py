@@ -184,7 +184,7 @@ def test_the_law_is_found_through_the_pauses_of_the_single_flipper_protocol() ->
     assert_found(one(triggered(motion(gait=SINGLE_FLIPPER), MUD)), MUD)
 
 
-def test_each_stride_of_a_walk_tells_the_same_law() -> None:
+def test_each_stride_of_a_walk_gives_the_same_law() -> None:
     single = motion()
     period_s = single[-1].now_s
     samples = [
@@ -204,7 +204,7 @@ def test_the_load_is_the_force_that_the_mud_exerts() -> None:
         assert load.depth_m == sample.depth_m
 
 
-def test_forces_and_durations_of_the_stride_are_told() -> None:
+def test_forces_and_durations_of_the_stride_are_reported() -> None:
     samples = triggered(motion(), MUD)
     stride = one(samples)
     start = first_below(samples, MUD.surface_m)
@@ -305,7 +305,7 @@ def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
     assert np.std(scores, axis=0)[1:] == pytest.approx([1.0, 1.0], abs=0.3)  # of k_p the jump alone adds doubt
 
 
-def test_more_noise_makes_more_doubt() -> None:
+def test_more_noise_makes_more_uncertainty() -> None:
     samples = triggered(motion(), MUD)
     little, much = (one(noisy(samples, 1, noise_a)) for noise_a in (0.01, 0.1))
     assert much.k_s.std_error == pytest.approx(10.0 * little.k_s.std_error, rel=1e-3)

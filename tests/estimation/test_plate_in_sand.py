@@ -44,7 +44,7 @@ def best_exponent(depth_m: np.ndarray, force_n: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("path", RUNS, ids=lambda path: path.name.removesuffix(".csv.gz"))
-def test_a_line_fits_dry_sand_as_the_measurement_says(path: Path) -> None:
+def test_a_line_fits_dry_sand_as_measured(path: Path) -> None:
     depth_m, force_n, area_m2 = pushed(path)
     fit = LineFit()
     for depth, force in zip((area_m2 * depth_m).tolist(), force_n.tolist(), strict=True):

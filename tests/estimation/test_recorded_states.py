@@ -10,7 +10,7 @@ from estimation.recorded_states import recorded_states
 
 
 @given(st.floats(1e-3, 1e9), st.floats(0.0, 0.5))
-def test_a_stamp_survives_its_way_through_the_log(now_s: float, fraction: float) -> None:
+def test_a_stamp_survives_the_log(now_s: float, fraction: float) -> None:
     stamp_s = now_s - fraction * now_s
     ages_s = (now_s - stamp_s,) * 4
     states = recorded_states(now_s, (1.0, 2.0, 3.0, 4.0), (0.0,) * 4, (5.0, 6.0, 7.0, 8.0), ages_s, ages_s)

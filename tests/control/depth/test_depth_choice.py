@@ -14,7 +14,7 @@ from control.depth.step_model import BodyDrag, Traction, step_m
 from control.gait.gait import GaitParameters
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import StrideEstimate
-from tests.control.made_up_muds import (
+from tests.control.synthetic_muds import (
     GAIT,
     GEOMETRY,
     LIFTING_NM,
@@ -86,7 +86,7 @@ exponents = st.floats(-1.0, 0.2)
 
 class TestTheFastestDepth:
     @given(shears, suctions, exponents, exponents, made_up_strides)
-    def test_it_promises_the_highest_speed_of_all_that_come_out(
+    def test_it_predicts_the_highest_speed_of_all_that_come_out(
         self, k_s: float, k_e: float, m_s: float, m_e: float, strides: list[StrideEstimate]
     ) -> None:
         mud_estimate = believed(reported(k_s, exponent=m_s), reported(k_e, exponent=m_e))
@@ -99,7 +99,7 @@ class TestTheFastestDepth:
             next(speed for z, speed in out.items() if abs(z - choice.depth_m) < 1e-9)
         )
 
-    def test_it_slips_where_less_than_half_an_arm_is_promised(self) -> None:
+    def test_it_slips_where_less_than_half_an_arm_is_predicted(self) -> None:
         """6 cm. At 5 cm, in muds that grow firmer in steps of 1 %, which is at most 3 mm of step."""
         slipping, walking = list[float](), list[float]()
         for k_s in 0.06e6 * 1.01 ** np.arange(60):
@@ -110,7 +110,7 @@ class TestTheFastestDepth:
         assert 0.057 < max(slipping) < 0.06 <= min(walking) < 0.063
 
     @given(shears, suctions, made_up_strides)
-    def test_it_slips_by_what_is_promised_of_the_chosen_depth(
+    def test_it_slips_by_what_is_predicted_of_the_chosen_depth(
         self, k_s: float, k_e: float, strides: list[StrideEstimate]
     ) -> None:
         mud_estimate = believed(reported(k_s), reported(k_e))
@@ -141,7 +141,7 @@ class TestTheFastestDepth:
         assert firm.depth_m == 0.015
 
     @pytest.mark.parametrize(("k_e", "expected_m"), [(LOOSE, 0.05), (reported(1.5e6), 0.035)])
-    def test_where_no_depth_promises_a_step_the_deepest_that_comes_out_is_taken(
+    def test_where_no_depth_predicts_a_step_the_deepest_that_comes_out_is_taken(
         self, k_e: Coefficient, expected_m: float
     ) -> None:
         assert k_e.value * lift_m4(expected_m) < BEARABLE_NM
@@ -164,7 +164,7 @@ class TestTheFastestDepth:
 
 
 class TestWhatIsNotKnown:
-    def test_where_nothing_is_known_of_the_thrust_the_depth_is_kept(self) -> None:
+    def test_without_an_estimate_of_the_thrust_the_depth_stays(self) -> None:
         adaptation = adapted()
         adaptation.reset(0.0375)
         kept = DepthChoice(0.0375, False, "nothing known of the thrust, depth kept")
@@ -201,7 +201,7 @@ class TestUncertainty:
     fractions = st.tuples(*[st.floats(0.0, 1.0)] * 2)
 
     @given(shears, suctions, exponents, fractions)
-    def test_doubt_about_thrust_never_chooses_a_depth_with_less_thrust(
+    def test_uncertainty_about_thrust_never_chooses_a_depth_with_less_thrust(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
     ) -> None:
         sure, doubtful = (
@@ -212,7 +212,7 @@ class TestUncertainty:
         assert doubtful.slips >= sure.slips
 
     @given(shears, suctions, exponents, fractions)
-    def test_doubt_about_suction_never_chooses_a_deeper_one(
+    def test_uncertainty_about_suction_never_chooses_a_deeper_one(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
     ) -> None:
         sure, doubtful = (
@@ -222,7 +222,7 @@ class TestUncertainty:
         assert doubtful.depth_m <= sure.depth_m
 
     @given(shears, suctions, exponents, st.tuples(*[st.floats(0.0, 1.0)] * 2), st.floats(0.02, 0.05))
-    def test_suction_learned_elsewhere_is_doubted_the_more_the_less_its_depth_law_is_known(
+    def test_suction_at_another_depth_is_as_uncertain_as_its_depth_law(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float], depth_m: float
     ) -> None:
         sure, doubtful = (
@@ -270,10 +270,10 @@ class TestStuck:
             assert chosen(believed(k_s), both(0.015, released=False)).depth_m == 0.015
 
     @pytest.mark.parametrize("reached_m", [nan, inf, -inf])
-    def test_one_that_stuck_nobody_knows_where_goes_to_the_shallowest_depth(self, reached_m: float) -> None:
+    def test_a_stride_stuck_at_an_unknown_depth_leads_to_the_shallowest(self, reached_m: float) -> None:
         assert chosen(self.SINKING, both(reached_m, released=False)).depth_m == 0.015
 
-    def test_a_depth_that_stuck_stays_out_of_bounds_whatever_is_believed(self) -> None:
+    def test_a_depth_that_stuck_is_excluded_for_any_estimate(self) -> None:
         adaptation = adapted()
         assert adaptation.step(self.SINKING, both(), adaptation.choice.depth_m).depth_m == same_depth(0.05)
         for strides in (both(0.04, released=False), both(0.025), both(0.03), both(0.0375)):
@@ -295,7 +295,7 @@ class TestStuck:
         ).depth_m == same_depth(0.05)
         assert other_walk.step(self.SINKING, both(), other_walk.choice.depth_m).depth_m == same_depth(0.05)
 
-    def test_a_lower_bound_of_suction_never_says_that_a_flipper_comes_out(self) -> None:
+    def test_a_lower_bound_of_suction_never_proves_that_a_flipper_comes_out(self) -> None:
         unknown, at_least = (chosen(believed(BOTTOMLESS, k_e), both(0.03)) for k_e in (None, bound(0.1e6)))
         assert at_least == unknown
 
@@ -381,7 +381,7 @@ class TestMuds:
         assert 300.0 <= slipping[-1] < 700.0
 
     @pytest.mark.parametrize("strength_pa", [500.0, 1500.0, 3000.0])
-    def test_the_choice_settles_where_the_strides_confirm_the_belief(self, strength_pa: float) -> None:
+    def test_the_choice_settles_where_the_strides_confirm_the_estimate(self, strength_pa: float) -> None:
         adaptation, clay = adapted(), Clay(strength_pa)
         depths_m = []
         for _ in range(6):
@@ -441,7 +441,7 @@ class TestRange:
         parameters = AdaptationParameters(min_depth_m=0.15, max_depth_m=0.2)
         assert adapted(parameters).step(believed(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
 
-    def test_the_grid_holds_both_ends_of_its_range(self) -> None:
+    def test_the_grid_contains_both_ends_of_its_range(self) -> None:
         assert adapted()._depths_m == pytest.approx(DEPTHS_M, abs=1e-12)
         assert DEPTHS_M[-1] == same_depth(PARAMETERS.max_depth_m)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from control.depth.forecast import DepthForecast
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.records import Estimate, StrideEstimate
-from tests.control.made_up_muds import (
+from tests.control.synthetic_muds import (
     GAIT,
     GEOMETRY,
     LIFTING_NM,
@@ -46,7 +46,7 @@ def forecast(
 
 class TestThrust:
     @pytest.mark.parametrize("depth_m", DEPTHS_M)
-    def test_a_mud_that_yielded_bears_its_k_s_times_the_depth_moment_of_both_plates(self, depth_m: float) -> None:
+    def test_a_mud_that_yielded_withstands_its_k_s_times_the_depth_moment_of_both_plates(self, depth_m: float) -> None:
         expected_n = 2.0 * 0.12e6 * thrust_m3(depth_m)
         assert forecast(believed(reported(0.12e6))).thrust_n(depth_m) == pytest.approx(expected_n, rel=PIECES)
 
@@ -65,7 +65,7 @@ class TestThrust:
     def test_it_is_less_by_one_standard_error(self) -> None:
         assert forecast(believed(reported(0.3e6, 0.1e6))).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
 
-    def test_the_doubt_about_the_depth_law_counts_away_from_where_it_was_learned(self) -> None:
+    def test_the_error_of_the_depth_law_counts_at_other_depths(self) -> None:
         doubtful, sure = (
             forecast(believed(reported(0.1e6, exponent_uncertainty=uncertainty))) for uncertainty in (0.3, 0.0)
         )
@@ -73,7 +73,7 @@ class TestThrust:
         for depth_m, expected in ((0.03, 1.0), (0.05, fraction)):
             assert doubtful.thrust_n(depth_m) == pytest.approx(expected * (sure.thrust_n(depth_m) or nan))
 
-    def test_more_doubt_than_value_bears_nothing(self) -> None:
+    def test_an_error_above_the_value_gives_no_thrust(self) -> None:
         assert forecast(believed(reported(0.1e6, 0.2e6))).thrust_n(0.03) == 0.0
 
     def test_the_mean_of_the_flippers_counts_for_each(self) -> None:
@@ -96,33 +96,33 @@ class TestThrust:
 class TestMudThatHeld:
     """Its k_s is only a lower bound; k_p of the insertion is told by value."""
 
-    def test_the_insertion_tells_what_a_mud_bears_that_never_yielded(self) -> None:
+    def test_the_insertion_gives_the_thrust_of_a_mud_that_never_yielded(self) -> None:
         """By the ratio 0.55, less its doubt of a fifth."""
         alone, derived = believed(None, None, reported(0.5e6)), believed(reported(0.8 * 0.55 * 0.5e6))
         assert forecast(alone).thrust_n(0.03) == pytest.approx(forecast(derived).thrust_n(0.03))
 
     @pytest.mark.parametrize(("least", "k_p", "bears"), [(0.3e6, 0.5e6, 0.3e6), (0.1e6, 0.5e6, 0.22e6)])
-    def test_of_bound_and_insertion_the_larger_holds(self, least: float, k_p: float, bears: float) -> None:
+    def test_the_larger_of_bound_and_insertion_counts(self, least: float, k_p: float, bears: float) -> None:
         mud_estimate = believed(bound(least), None, reported(k_p))
         assert forecast(mud_estimate).thrust_n(0.03) == pytest.approx(
             forecast(believed(reported(bears))).thrust_n(0.03)
         )
 
-    def test_a_bound_alone_bears_itself(self) -> None:
+    def test_a_bound_alone_gives_its_own_thrust(self) -> None:
         assert forecast(believed(bound(0.2e6))).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
 
-    def test_a_k_s_that_was_told_by_value_needs_no_insertion(self) -> None:
+    def test_a_k_s_that_was_set_by_value_needs_no_insertion(self) -> None:
         mud_estimate = believed(SOFT, None, reported(9e6))
         assert forecast(mud_estimate).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
 
-    def test_the_doubt_about_the_insertion_counts(self) -> None:
+    def test_the_uncertainty_about_the_insertion_counts(self) -> None:
         doubtful, sure = believed(None, None, reported(0.5e6, 0.2e6)), believed(None, None, reported(0.3e6))
         assert forecast(doubtful).thrust_n(0.03) == pytest.approx(forecast(sure).thrust_n(0.03))
 
 
 class TestRatio:
     @pytest.mark.parametrize("truth", [0.3, 0.55, 0.69, 1.2])
-    def test_every_stride_that_tells_both_takes_a_quarter_of_the_way_to_the_truth(self, truth: float) -> None:
+    def test_each_stride_with_both_coefficients_moves_the_ratio_a_quarter_towards_the_truth(self, truth: float) -> None:
         learning = forecast(NOTHING_KNOWN)
         for strides in range(1, 30):
             learning.update(believed(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
@@ -135,7 +135,7 @@ class TestRatio:
         assert learning.shear_ratio == pytest.approx(0.55)
 
     @pytest.mark.parametrize(("truth", "nearest"), [(30.0, 1.5), (0.001, 0.2)])
-    def test_nonsense_is_believed_only_so_far(self, truth: float, nearest: float) -> None:
+    def test_nonsense_is_trusted_only_so_far(self, truth: float, nearest: float) -> None:
         learning = forecast(NOTHING_KNOWN)
         for _ in range(30):
             learning.update(believed(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
@@ -162,7 +162,7 @@ class TestFeltFraction:
     def test_before_any_extraction_the_whole_torque_is_expected(self) -> None:
         assert forecast(believed(None, reported(0.6e6))).felt_fraction == 1.0
 
-    def test_the_first_extraction_is_believed_fully(self) -> None:
+    def test_the_first_extraction_is_trusted_fully(self) -> None:
         assert self.reported_by(0.6).felt_fraction == pytest.approx(0.6, rel=PIECES)
 
     def test_the_first_four_count_alike_and_later_ones_a_quarter(self) -> None:
@@ -180,7 +180,7 @@ class TestFeltFraction:
             assert self.reported_by(start, *[truth] * 30).felt_fraction == pytest.approx(truth, rel=2.0 * PIECES)
 
     @pytest.mark.parametrize(("fraction", "nearest"), [(9.0, 1.5), (0.01, 0.2)])
-    def test_nonsense_is_believed_only_so_far(self, fraction: float, nearest: float) -> None:
+    def test_nonsense_is_trusted_only_so_far(self, fraction: float, nearest: float) -> None:
         assert self.reported_by(fraction).felt_fraction == nearest
 
     @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ class TestFeltFraction:
             stride(k_e=measured(-0.6e6), extraction_nm=0.1),
         ],
     )
-    def test_an_extraction_that_did_not_tell_teaches_nothing(self, teaches_nothing: StrideEstimate) -> None:
+    def test_an_extraction_without_a_coefficient_changes_nothing(self, teaches_nothing: StrideEstimate) -> None:
         assert forecast(NOTHING_KNOWN, [teaches_nothing]).felt_fraction == 1.0
 
     def test_the_surface_that_the_flipper_met_counts(self) -> None:
@@ -214,7 +214,7 @@ class TestExtraction:
             found = forecast(believed(None, reported(k_e, uncertainty)), both(nan)).extraction_nm(depth_m)
             assert found == pytest.approx(0.4e6 * lift_m4(depth_m), rel=PIECES)
 
-    def test_the_share_that_was_felt_counts(self) -> None:
+    def test_the_learned_fraction_counts(self) -> None:
         felt = [stride(k_e=measured(0.6e6), extraction_nm=0.5 * 0.6e6 * lift_m4(0.03))]
         found = forecast(believed(None, reported(0.6e6)), felt).extraction_nm(0.05)
         assert found == pytest.approx(0.5 * 0.6e6 * lift_m4(0.05), rel=2.0 * PIECES)
@@ -251,7 +251,7 @@ class TestExtraction:
             found = forecast(believed(None, reported(k_e)), stuck).extraction_nm(0.02)
             assert found == pytest.approx(expected_nm, rel=PIECES)
 
-    def test_a_k_e_below_zero_is_none_but_keeps_its_doubt(self) -> None:
+    def test_a_k_e_below_zero_is_none_but_keeps_its_uncertainty(self) -> None:
         found = forecast(believed(None, reported(-0.4e6, 0.2e6)), both(nan)).extraction_nm(0.03)
         assert found == pytest.approx(0.4e6 * lift_m4(0.03), rel=PIECES)
 
@@ -263,15 +263,15 @@ class TestExtraction:
         assert unsure.extraction_nm(0.0325) < 0.2 * LIFTING_NM
         assert unsure.extraction_nm(0.0326) == LIFTING_NM
 
-    def test_a_lower_bound_says_what_it_takes_at_least(self) -> None:
+    def test_a_lower_bound_gives_the_least_torque(self) -> None:
         assert forecast(believed(None, bound(2.5e6)), both(0.03)).extraction_nm(0.03) == pytest.approx(
             2.5e6 * lift_m4(0.03), rel=PIECES
         )
 
-    def test_of_a_stride_that_ended_nobody_knows_where_nothing_is_proven(self) -> None:
+    def test_a_stride_that_ended_at_an_unknown_depth_proves_nothing(self) -> None:
         assert forecast(believed(None), both(nan, extraction_nm=0.1)).extraction_nm(0.015) == LIFTING_NM
 
-    def test_above_the_surface_nothing_holds(self) -> None:
+    def test_above_the_surface_no_mud_holds_the_flipper(self) -> None:
         sunk = forecast(believed(None, reported(9e6)), both(surface_m=0.03))
         assert sunk.extraction_nm(0.03) == sunk.extraction_nm(0.02) == 0.0
 
@@ -290,7 +290,7 @@ class TestStuck:
         for depth_m in DEPTHS_M:
             assert stuck.extraction_nm(depth_m) == pytest.approx(LIFTING_NM * depth_m / 0.04)
 
-    def test_coming_out_of_a_shallower_place_does_not_forget_it(self) -> None:
+    def test_coming_out_of_a_shallower_depth_does_not_clear_it(self) -> None:
         stuck = self.after(both(0.04, released=False), *[both(0.0375)] * 5)
         assert stuck.extraction_nm(0.04) == pytest.approx(LIFTING_NM)
 
@@ -324,7 +324,7 @@ class TestStuck:
         remembering.update(self.LOOSE, both(0.02), 0.02)
         assert remembering.extraction_nm(0.04) == pytest.approx(LIFTING_NM)
 
-    def test_one_that_stuck_nobody_knows_where_is_held_everywhere(self) -> None:
+    def test_a_stride_stuck_at_an_unknown_depth_is_held_at_every_depth(self) -> None:
         assert self.after(both(nan, released=False)).extraction_nm(0.01) > LIFTING_NM
 
 
@@ -345,7 +345,7 @@ class TestHowDeepTheFlippersGo:
     def test_flippers_that_did_not_reach_their_depth_do_not_sag(self) -> None:
         assert forecast(believed(SOFT), [stride("left", 0.025), stride("right", 0.04)], 0.03).reached_m(0.02) == 0.02
 
-    def test_a_flipper_whose_depth_is_not_known_says_nothing_of_sag(self) -> None:
+    def test_an_unknown_depth_gives_no_sag(self) -> None:
         pair = [stride("left", nan), stride("right", 0.034)]
         assert forecast(believed(SOFT), pair, 0.03).reached_m(0.02) == pytest.approx(0.021)
         assert forecast(believed(SOFT), both(nan), 0.03).reached_m(0.02) == 0.02
@@ -414,7 +414,7 @@ strides = st.builds(stride, flippers, numbers, st.booleans(), numbers, estimates
     st.lists(st.tuples(beliefs, st.lists(strides, min_size=1, max_size=2)), min_size=1, max_size=2),
     st.floats(0.005, 0.2),
 )
-def test_nothing_that_is_believed_or_measured_raises(
+def test_nothing_that_is_trusted_or_measured_raises(
     walk: list[tuple[MudEstimate, list[StrideEstimate]]], depth_m: float
 ) -> None:
     survivor = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)

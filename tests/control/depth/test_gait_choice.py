@@ -17,7 +17,7 @@ from control.limits import JointLimits
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.plate import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
-from tests.control.made_up_muds import both
+from tests.control.synthetic_muds import both
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 PARAMETERS = AdaptationParameters(method="gait")
@@ -209,7 +209,7 @@ class TestStuck:
         choice = adaptation.step(FIRM, strides(depth_m=0.03), adaptation.choice.depth_m)
         assert (choice.depth_m, sweep_deg(choice)) > (0.015, 30.0)
 
-    def test_it_says_so(self) -> None:
+    def test_the_reason_names_it(self) -> None:
         adaptation, _ = self.walked()
         assert adaptation.step(FIRM, strides(released=False), adaptation.choice.depth_m).reason == "a flipper was stuck"
 
@@ -245,7 +245,7 @@ def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None
     assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "extraction")
 
 
-def test_where_none_promises_a_step_the_deepest_is_taken() -> None:
+def test_where_none_predicts_a_step_the_deepest_is_taken() -> None:
     choice = adapted().step(believed(0.005e6, 0.001e6), strides(), 0.03)
     assert (choice.reason, choice.slips) == ("thrust", True)
     assert choice.depth_m == pytest.approx(0.05)

@@ -14,7 +14,7 @@ from control.depth.paper_choice import PaperAdaptation
 from control.gait.gait import GaitParameters
 from control.mud_estimate import NOTHING_KNOWN
 from control.records import Estimate, StrideEstimate
-from tests.control.made_up_muds import (
+from tests.control.synthetic_muds import (
     GAIT,
     GEOMETRY,
     NOT_REPORTED,
@@ -71,7 +71,7 @@ class TestDepth:
         assert chosen(NOT_REPORTED, measured(1.0)).depth_m == pytest.approx(PARAMETERS.max_depth_m)
 
     @given(st.floats(1e4, 1e7), st.floats(0.0, 5e6))
-    def test_doubt_and_what_is_believed_from_many_strides_are_not_asked(self, k_e: float, uncertainty: float) -> None:
+    def test_uncertainty_and_the_memory_of_many_strides_are_ignored(self, k_e: float, uncertainty: float) -> None:
         doubtful = measured(k_e)._replace(std_error=uncertainty)
         choice = adapted().step(believed(reported(3e6), reported(9e6)), alike(NOT_REPORTED, doubtful), 0.03)
         assert choice == chosen(NOT_REPORTED, measured(k_e))
@@ -121,7 +121,7 @@ class TestSlip:
 
 class TestMemory:
     @pytest.mark.parametrize("first", [0, 1])
-    def test_the_right_flipper_decides_in_whatever_order_they_come(self, first: int) -> None:
+    def test_the_right_flipper_decides_in_any_order(self, first: int) -> None:
         strides = [stride("left", k_e=measured(1e6)), stride("right", k_e=measured(2e6))]
         assert adapted().step(NOTHING_KNOWN, strides[first:] + strides[:first], 0.03).depth_m == pytest.approx(0.03)
 
@@ -129,7 +129,7 @@ class TestMemory:
         strides = [stride("left", k_e=measured(2e6)), stride("right")]
         assert adapted().step(NOTHING_KNOWN, strides, 0.03).depth_m == pytest.approx(0.03)
 
-    def test_the_last_valid_coefficients_are_kept(self) -> None:
+    def test_the_last_valid_coefficients_stay(self) -> None:
         adaptation = adapted()
         known = adaptation.step(NOTHING_KNOWN, alike(measured(0.08e6), measured(1e6)), adaptation.choice.depth_m)
         assert known.slips
@@ -141,7 +141,7 @@ class TestMemory:
         ) == THREE_CM._replace(slips=True)
         assert adaptation.step(NOTHING_KNOWN, alike(measured(0.3e6), invalid), adaptation.choice.depth_m) == THREE_CM
 
-    def test_without_a_k_e_the_depth_is_kept(self) -> None:
+    def test_without_a_k_e_the_depth_stays(self) -> None:
         adaptation = adapted()
         adaptation.reset(0.04)
         kept = DepthChoice(0.04, False, "no k_e known, depth kept")
@@ -156,7 +156,7 @@ class TestMemory:
         assert adaptation.choice == DepthChoice(0.02, False, "start")
         assert adaptation.step(NOTHING_KNOWN, [], adaptation.choice.depth_m).depth_m == 0.02
 
-    def test_a_stuck_flipper_is_not_asked(self) -> None:
+    def test_a_stuck_flipper_does_not_decide(self) -> None:
         """As in the paper, whose conditions know nothing of it."""
         stuck = [stride("right", released=False, depth_m=nan, k_e=measured(1e6))]
         assert adapted().step(NOTHING_KNOWN, stuck, 0.03).depth_m == pytest.approx(0.05)
@@ -167,7 +167,7 @@ estimates = st.builds(Estimate, numbers, numbers, st.just(9), st.booleans())
 
 
 @given(st.lists(st.tuples(estimates, estimates), max_size=4))
-def test_whatever_is_measured_the_depth_stays_in_its_range(walk: list[tuple[Estimate, Estimate]]) -> None:
+def test_for_any_input_the_depth_stays_in_its_range(walk: list[tuple[Estimate, Estimate]]) -> None:
     adaptation = adapted()
     for k_s, k_e in walk:
         depth_m = adaptation.step(NOTHING_KNOWN, alike(k_s, k_e), adaptation.choice.depth_m).depth_m

@@ -120,7 +120,7 @@ class TestLimits:
         steps_m = [promised_m(thrust_n) for thrust_n in np.arange(2.6, 12.5, 0.1)]
         assert all(shorter < longer for shorter, longer in zip(steps_m[:-1], steps_m[1:], strict=True))
 
-    def test_a_firm_hold_and_a_stiff_grip_carry_the_body_as_far_as_the_arms_go(self) -> None:
+    def test_firm_mud_and_stiff_traction_carry_the_body_as_far_as_the_arms_sweep(self) -> None:
         """The spring gives by what drag and start take, m a + f_r + b v, and swings through by no more."""
         top_m_s, stiffness_n_m = top_speed_m_s(WALKING), 10000.0
         acceleration_m_s2 = top_m_s * pi / (2.0 * RAMP_S)

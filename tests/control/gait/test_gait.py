@@ -135,7 +135,7 @@ def test_smooth_progress_rests_before_the_start_and_after_the_end(duration: floa
 
 
 @given(st.floats(0.01, 20.0), st.floats(0.01, 0.99))
-def test_smooth_progress_moves_at_the_rate_that_it_tells(duration: float, fraction: float) -> None:
+def test_smooth_progress_moves_at_the_rate_that_it_returns(duration: float, fraction: float) -> None:
     time, step = fraction * duration, 1e-5 * duration
     difference = smooth_progress(time + step, duration)[0] - smooth_progress(time - step, duration)[0]
     _, rate = smooth_progress(time, duration)
@@ -202,7 +202,7 @@ def test_a_thousand_strides_keep_their_exact_rate(depth_m: float) -> None:
 
 
 @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=20))
-def test_the_place_in_the_stride_depends_on_the_time_only_and_not_on_the_ticks(steps: list[float]) -> None:
+def test_the_phase_depends_on_the_time_and_not_on_the_number_of_ticks(steps: list[float]) -> None:
     gait, other = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
     gait.reset(0.04)
     other.reset(0.04)
@@ -277,7 +277,7 @@ def test_a_reset_starts_the_first_stride_again() -> None:
 
 
 @pytest.mark.parametrize("depth_m", DEPTHS_M)
-def test_no_joint_is_asked_for_more_than_its_velocity_limit(depth_m: float) -> None:
+def test_no_joint_target_exceeds_its_velocity_limit(depth_m: float) -> None:
     limit = JointLimits().velocity_rad_s
     for target in islice(targets(PERIOD_S, depth_m), 1000):
         assert max(abs(target.sweep_velocity_rad_s), abs(adduction_velocity_rad_s(target))) < limit
@@ -307,7 +307,7 @@ STRIDE_S = stride_duration_s(WALKING, GEOMETRY, 0.03)
 
 
 @pytest.mark.parametrize("change", [{0.0: WIDE}, {0.0: NARROW}, {0.3: WIDE}, {0.1: WIDE, 0.4: NARROW}])
-def test_another_sweep_told_in_swing_moves_the_target_without_a_jump(change: dict[float, GaitParameters]) -> None:
+def test_another_sweep_set_in_swing_moves_the_target_without_a_jump(change: dict[float, GaitParameters]) -> None:
     seen = swept(change, STRIDE_S + 0.8)
     for before, after in pairwise(seen):
         mean_rad_s = (before.sweep_velocity_rad_s + after.sweep_velocity_rad_s) / 2.0
@@ -328,14 +328,14 @@ def test_the_stride_after_a_change_sweeps_from_its_own_front_to_its_own_rear(las
     assert extraction
 
 
-def test_the_swing_of_a_stride_lasts_as_long_as_its_own_gait_says() -> None:
+def test_the_swing_of_a_stride_has_the_duration_of_its_own_gait() -> None:
     seen = swept({0.0: WIDE}, 2.0 * STRIDE_S + 0.2)
     assert [
         sum(target.phase is Phase.SWING and target.stride == stride for target in seen) * 0.0005 for stride in (0, 1)
     ] == pytest.approx([0.8, 0.3], abs=0.001)
 
 
-def test_a_gait_told_late_in_the_swing_is_that_of_the_stride_after_the_next() -> None:
+def test_a_gait_set_late_in_the_swing_is_that_of_the_stride_after_the_next() -> None:
     seen = swept({0.6: WIDE}, 2.0 * STRIDE_S + 0.5)
     fronts = [next(t.sweep_rad for t in seen if t.stride == i and t.phase is Phase.INSERTION) for i in (1, 2)]
     assert fronts == pytest.approx([radians(30.0), radians(45.0)])
@@ -389,7 +389,7 @@ def test_only_an_insertion_can_end_early_and_only_that_of_its_own_stride() -> No
     assert gait.commanded_depth_m == 0.03
 
 
-def test_a_depth_meant_for_a_narrower_sweep_that_was_told_late_stays_within_reach() -> None:
+def test_a_depth_meant_for_a_narrower_sweep_that_was_set_late_stays_within_reach() -> None:
     gait = Gait(replace(WALKING, sweep_angle_deg=50.0), GEOMETRY)
     gait.reset(0.02)
     while (target := gait.step(PERIOD_S)).stride == 0:

@@ -29,7 +29,7 @@ def angles_of(targets: JointTargets) -> JointAngles:
 
 
 @given(poses, poses, speeds)
-def test_a_path_starts_where_it_is_told_and_ends_at_its_last_point(
+def test_a_path_starts_at_its_first_point_and_ends_at_its_last(
     start: JointAngles, end: JointAngles, speed: float
 ) -> None:
     path = JointPath(start, [end], speed)
@@ -49,7 +49,7 @@ def test_no_joint_is_faster_than_twice_the_mean_speed(
 
 
 @given(poses, st.lists(poses, min_size=1, max_size=3), speeds)
-def test_a_path_lasts_its_longest_ways_over_the_speed(
+def test_a_path_lasts_its_longest_legs_over_the_speed(
     start: JointAngles, way_points: list[JointAngles], speed: float
 ) -> None:
     ways = [max(abs(b - a) for a, b in zip(p, q, strict=True)) for p, q in pairwise([start, *way_points])]
@@ -68,7 +68,7 @@ def test_after_the_end_the_last_pose_is_held_at_rest(
 
 
 @given(poses, speeds)
-def test_a_leg_without_way_takes_the_shortest_time_and_moves_nothing(pose: JointAngles, speed: float) -> None:
+def test_a_leg_of_zero_length_takes_the_shortest_time_and_moves_nothing(pose: JointAngles, speed: float) -> None:
     steps = walked(JointPath(pose, [pose, pose], speed))
     assert len(steps) * PERIOD_S == pytest.approx(2.0 * SHORTEST_LEG_S, abs=2.0 * PERIOD_S)
     assert set(steps) == {still(pose)}

@@ -32,7 +32,7 @@ from control.records import (
     same_for_all,
     same_for_both,
 )
-from tests.control.made_up_states import states_at
+from tests.control.synthetic_states import states_at
 
 DEPTH_M = 0.04
 GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), RecoveryParameters()
@@ -59,10 +59,10 @@ class SeenRecovery(Recovery):
         return self.given
 
 
-Hold = Callable[["MadeUpRobot"], Sequence[str]]
+Hold = Callable[["SyntheticRobot"], Sequence[str]]
 
 
-class MadeUpRobot:
+class SyntheticRobot:
     """`hold` tells which flippers the mud holds where they are; it begins to with the extraction."""
 
     def __init__(
@@ -106,7 +106,7 @@ class MadeUpRobot:
         begun = phase is Phase.EXTRACTION or (self.waited_s > 0.0 and phase in (Phase.PAUSE, Phase.RECOVERY))
         self.waited_s = self.waited_s + PERIOD_S if begun else 0.0
 
-    def walk(self, seconds: float) -> MadeUpRobot:
+    def walk(self, seconds: float) -> SyntheticRobot:
         for _ in range(round(seconds / PERIOD_S)):
             self.step()
         return self
@@ -123,18 +123,18 @@ class MadeUpRobot:
         return [moment for moment in self.moments if moment.attempt == attempt]
 
 
-def nobody(robot: MadeUpRobot) -> Sequence[str]:
+def nobody(robot: SyntheticRobot) -> Sequence[str]:
     return ()
 
 
-def everybody(robot: MadeUpRobot) -> Sequence[str]:
+def everybody(robot: SyntheticRobot) -> Sequence[str]:
     return BOTH
 
 
 def until_attempt(attempt: int, flippers: Sequence[str] = BOTH, after_s: float = 1.0) -> Hold:
     """Held until that attempt has lasted so long."""
 
-    def hold(robot: MadeUpRobot) -> Sequence[str]:
+    def hold(robot: SyntheticRobot) -> Sequence[str]:
         return () if robot.recovery.attempt == attempt and robot.attempt_s > after_s else flippers
 
     return hold
@@ -143,16 +143,16 @@ def until_attempt(attempt: int, flippers: Sequence[str] = BOTH, after_s: float =
 # when there is a recovery
 
 
-def test_flippers_that_follow_are_never_recovered_and_walk_as_if_nobody_waited() -> None:
-    waiting, other = MadeUpRobot(nobody).walk(6.0), MadeUpRobot(nobody, RecoveryParameters(attempts=0)).walk(6.0)
+def test_flippers_that_follow_are_never_recovered_and_walk_without_a_wait() -> None:
+    waiting, other = SyntheticRobot(nobody).walk(6.0), SyntheticRobot(nobody, RecoveryParameters(attempts=0)).walk(6.0)
     assert Phase.RECOVERY not in waiting.phases
     assert waiting.moments == other.moments
     assert waiting.moments[-1].target.stride >= 2
 
 
 def test_with_no_attempts_the_gaits_clock_does_not_wait() -> None:
-    held = MadeUpRobot(everybody, RecoveryParameters(attempts=0)).walk(6.0)
-    free = MadeUpRobot(nobody).walk(6.0)
+    held = SyntheticRobot(everybody, RecoveryParameters(attempts=0)).walk(6.0)
+    free = SyntheticRobot(nobody).walk(6.0)
     assert [moment.target for moment in held.moments] == [moment.target for moment in free.moments]
     assert [moment.joints for moment in held.moments] == [moment.joints for moment in free.moments]
     assert not held.recovery.given_up
@@ -163,10 +163,10 @@ def test_a_flipper_that_comes_out_within_the_grace_is_only_waited_for(gait: Gait
     extraction_s = (DEPTH_M + GEOMETRY.clearance_m) / gait.extraction_speed_m_s + gait.pause_s
     late_s = extraction_s + PARAMETERS.grace_s - 5.0 * PERIOD_S
 
-    def hold(robot: MadeUpRobot) -> Sequence[str]:
+    def hold(robot: SyntheticRobot) -> Sequence[str]:
         return BOTH if robot.waited_s < late_s else ()
 
-    robot = MadeUpRobot(hold, gait=gait).walk(2.0 * stride_duration_s(gait, GEOMETRY, DEPTH_M))
+    robot = SyntheticRobot(hold, gait=gait).walk(2.0 * stride_duration_s(gait, GEOMETRY, DEPTH_M))
     assert Phase.RECOVERY not in robot.phases
     assert robot.events == []
     assert Phase.SWING in robot.phases
@@ -176,7 +176,7 @@ def test_a_flipper_that_comes_out_within_the_grace_is_only_waited_for(gait: Gait
 
 
 def test_a_flipper_that_stays_in_is_given_up_after_the_last_attempt_in_bounded_time() -> None:
-    robot = MadeUpRobot(lambda robot: ("right",))
+    robot = SyntheticRobot(lambda robot: ("right",))
     while not robot.recovery.given_up:
         robot.step()
         assert robot.waited_s < LONGEST_S + 0.2
@@ -189,7 +189,7 @@ def test_a_flipper_that_stays_in_is_given_up_after_the_last_attempt_in_bounded_t
 
 
 def test_a_flipper_that_comes_out_at_the_second_attempt_swings_and_walks_on() -> None:
-    robot = MadeUpRobot(until_attempt(2)).walk(8.5)
+    robot = SyntheticRobot(until_attempt(2)).walk(8.5)
     assert robot.controller.fault is None
     assert robot.phases[:6] == [
         Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.RECOVERY, Phase.SWING, Phase.INSERTION,
@@ -202,7 +202,7 @@ def test_a_flipper_that_comes_out_at_the_second_attempt_swings_and_walks_on() ->
 
 
 def test_swing_begins_in_the_tick_after_the_last_flipper_is_out() -> None:
-    robot = MadeUpRobot(until_attempt(1, ("left",))).walk(5.0)
+    robot = SyntheticRobot(until_attempt(1, ("left",))).walk(5.0)
     out = next(
         i
         for i, moment in enumerate(robot.moments)
@@ -212,7 +212,7 @@ def test_swing_begins_in_the_tick_after_the_last_flipper_is_out() -> None:
     assert robot.moments[out + 1].target.phase is Phase.SWING
 
 
-def test_an_angle_that_nobody_knows_is_not_waited_for() -> None:
+def test_the_gait_does_not_wait_for_an_unknown_angle() -> None:
     """Its silence is a fault of its own."""
     lost, inside = DriveState(angle_rad=nan), DriveState(angle_rad=-0.6)
     level = DriveState(angle_rad=0.0)
@@ -222,7 +222,7 @@ def test_an_angle_that_nobody_knows_is_not_waited_for() -> None:
 
 
 def test_stopping_ends_a_recovery_and_forgets_it() -> None:
-    robot = MadeUpRobot(everybody).walk(3.0)
+    robot = SyntheticRobot(everybody).walk(3.0)
     assert robot.recovery.attempt == 1
     robot.step(Mode.STOPPING)
     assert (robot.recovery.attempt, robot.recovery.events, robot.recovery.given_up) == (0, "", ())
@@ -259,7 +259,7 @@ def test_the_first_attempt_pulls_to_the_rear_and_the_others_away_from_the_middle
         assert sum(lead_deg > 0.0 for lead_deg in pulled) / len(pulled) == pytest.approx(AWAY_FRACTION, abs=0.1)
 
 
-def test_the_sweep_rocks_as_often_as_its_parameter_says() -> None:
+def test_the_sweep_rocks_with_the_configured_period() -> None:
     targets = attempts_at(-30.0)[0]
     leads_deg = [degrees(each[0].angle_rad) + 30.0 for each in targets]
     turns = sum(before < 0.0 <= now for before, now in pairwise(leads_deg))
@@ -279,7 +279,7 @@ def test_a_flipper_that_is_out_stays_where_it_is() -> None:
         assert {each[2:] for each in targets} == {still(Joints(0.0, 0.0, 0.0, 0.0))[2:]}
 
 
-def test_both_flippers_go_the_same_way_also_from_both_sides_of_the_middle() -> None:
+def test_both_flippers_rock_in_the_same_direction_from_both_sides_of_the_middle() -> None:
     recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
     down, left, right = DriveState(angle_rad=-0.6), DriveState(angle_rad=0.2), DriveState(angle_rad=-0.1)
     targets = still(Joints(0.0, 0.0, 0.0, 0.0))
@@ -291,14 +291,14 @@ def test_both_flippers_go_the_same_way_also_from_both_sides_of_the_middle() -> N
 
 
 def test_every_attempt_lifts_at_the_same_speed() -> None:
-    robot = MadeUpRobot(everybody).walk(LONGEST_S + 1.5)
+    robot = SyntheticRobot(everybody).walk(LONGEST_S + 1.5)
     for attempt in (1, 2, 3):
         speeds = [abs(moment.joints[place].velocity_rad_s) for moment in robot.in_attempt(attempt) for place in (1, 3)]
         assert max(speeds) == pytest.approx(PARAMETERS.lift_rad_s)
 
 
 def test_each_attempt_begins_with_a_pause_where_the_flippers_are() -> None:
-    robot = MadeUpRobot(everybody).walk(LONGEST_S + 1.5)
+    robot = SyntheticRobot(everybody).walk(LONGEST_S + 1.5)
     for attempt in (1, 2, 3):
         moments = robot.in_attempt(attempt)
         for moment in moments[: round(PARAMETERS.pause_s / PERIOD_S) - 1]:
@@ -308,7 +308,7 @@ def test_each_attempt_begins_with_a_pause_where_the_flippers_are() -> None:
 
 
 def test_targets_lead_their_joints_by_no_more_than_the_lead() -> None:
-    robot = MadeUpRobot(everybody).walk(LONGEST_S + 1.5)
+    robot = SyntheticRobot(everybody).walk(LONGEST_S + 1.5)
     leads = [
         abs(joint.angle_rad - angle_rad)
         for moment in robot.moments
@@ -323,7 +323,7 @@ def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
     sweeps = JointRange(radians(-30.0 - margin_deg), radians(30.0 + margin_deg))
     lifts = JointRange(radians(-75.0), 0.0)
     wild = RecoveryParameters(lift_rad_s=5.0, rock_s=2.0, lead_deg=45.0)
-    robot = MadeUpRobot(until_attempt(3), wild, same_for_both(sweeps, lifts)).walk(LONGEST_S + 1.0)
+    robot = SyntheticRobot(until_attempt(3), wild, same_for_both(sweeps, lifts)).walk(LONGEST_S + 1.0)
     assert "the flippers came out after 3 attempts" in robot.events
     for moment in robot.moments:
         for joint, span in zip(moment.joints, same_for_both(sweeps, lifts), strict=True):
@@ -337,7 +337,7 @@ def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
 @pytest.mark.parametrize("after_s", [0.5, 1.0, 2.0])
 def test_targets_and_their_velocities_are_continuous_from_recovery_through_swing(attempt: int, after_s: float) -> None:
     """Gap and swing ask for 130 rad/s² at most, so an angle is the mean velocity's way to 0.1 mrad."""
-    robot = MadeUpRobot(until_attempt(attempt, after_s=after_s)).walk(LONGEST_S + 3.0)
+    robot = SyntheticRobot(until_attempt(attempt, after_s=after_s)).walk(LONGEST_S + 3.0)
     begin = next(i for i, moment in enumerate(robot.moments) if moment.events.startswith("the flippers came out"))
     end = next(i for i, moment in enumerate(robot.moments) if moment.target.stride == 1)
     assert {moment.target.phase for moment in robot.moments[begin:end]} == {Phase.SWING}
@@ -350,14 +350,14 @@ def test_targets_and_their_velocities_are_continuous_from_recovery_through_swing
 
 
 def test_the_swing_after_a_recovery_ends_where_every_swing_ends() -> None:
-    robot = MadeUpRobot(until_attempt(2)).walk(9.0)
+    robot = SyntheticRobot(until_attempt(2)).walk(9.0)
     first = next(moment for moment in robot.moments if moment.target.stride == 1)
     assert first.target.phase is Phase.INSERTION
     assert first.joints == robot.controller._follow(first.target)
 
 
 def test_the_plates_are_clear_of_the_mud_soon_after_the_swing_began() -> None:
-    robot = MadeUpRobot(until_attempt(2)).walk(9.0)
+    robot = SyntheticRobot(until_attempt(2)).walk(9.0)
     swing = [moment for moment in robot.moments if moment.target.phase is Phase.SWING and moment.target.stride == 0]
     for moment in swing[round(0.2 / PERIOD_S) :]:
         assert lowest_point_m(GEOMETRY, *moment.angles_rad[:2]) < -0.9 * GEOMETRY.clearance_m

@@ -46,11 +46,11 @@ def test_a_jump_begins_beyond_what_the_drives_own_speed_explains(sign: float, ve
         assert reported([(0.0, velocity_rad_s), (step_rad, velocity_rad_s)]) == expected
 
 
-def test_a_magnet_that_slips_at_rest_is_told() -> None:
+def test_a_magnet_that_slips_at_rest_is_reported() -> None:
     assert reported([(0.1, 0.0)] * 5 + [(0.2, 0.0)] * 5) == [(5, "encoder_jump")]
 
 
-def test_readings_that_leap_about_a_joint_at_rest_are_told_again_and_again() -> None:
+def test_readings_that_jump_about_a_joint_at_rest_are_reported_repeatedly() -> None:
     random = Random(3)
     found = reported((random.uniform(-0.1, 0.1), 0.0) for _ in range(200))
     assert len(found) > 50
@@ -76,7 +76,7 @@ def test_a_stamp_that_goes_back_is_no_jump_by_itself() -> None:
     assert encoder.update(DriveState(angle_rad=0.01, velocity_rad_s=0.0, angle_stamp_s=0.5), PERIOD_S) is None
 
 
-def test_the_same_message_is_judged_once() -> None:
+def test_the_same_message_is_evaluated_once() -> None:
     encoder, state = (
         EncoderMonitor("left_sweep", JUMP_RAD),
         DriveState(angle_rad=0.3, velocity_rad_s=9.0, angle_stamp_s=1.0),
@@ -85,14 +85,16 @@ def test_the_same_message_is_judged_once() -> None:
 
 
 @pytest.mark.parametrize("velocity_rad_s", [-5.0, -0.5, -1e-3, 1e-6, 0.5, 5.0])
-def test_an_angle_that_hangs_is_told_by_the_way_of_its_speed_or_by_a_speed_without_noise(velocity_rad_s: float) -> None:
+def test_a_frozen_angle_shows_in_the_integral_of_the_velocity_or_in_a_velocity_without_noise(
+    velocity_rad_s: float,
+) -> None:
     found = reported(hanging(velocity_rad_s, 60))
     expected_s = min(max(MOVED_RAD / abs(velocity_rad_s), MOVED_S), FROZEN_S)
     assert {problem for _, problem in found} == {"encoder_stuck"}
     assert found[0][0] * MESSAGE_S == pytest.approx(expected_s, abs=1.5 * MESSAGE_S)
 
 
-def test_a_joint_at_rest_whose_drive_tells_no_speed_at_all_is_not_stuck() -> None:
+def test_a_joint_at_rest_without_a_velocity_is_not_stuck() -> None:
     """ODrive tells 0 below a bound."""
     assert reported(hanging(0.0, 30000)) == []
 
@@ -101,7 +103,7 @@ def test_a_speed_that_has_died_away_to_its_last_bit_is_rest() -> None:
     assert reported(hanging(2.4e-17, 1000)) == []
 
 
-def test_the_noise_of_a_speed_at_rest_is_no_way() -> None:
+def test_the_noise_of_a_velocity_at_rest_is_no_travel() -> None:
     random = Random(1)
     assert reported((0.3, random.gauss(0.0, 0.1)) for _ in range(30000)) == []
 

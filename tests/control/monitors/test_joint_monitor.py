@@ -148,7 +148,7 @@ def test_a_signal_counts_as_gone_from_its_bound_on(
     st.floats(0.0, 0.1) | st.sampled_from([inf]),
     st.floats(0.0, 0.1) | st.sampled_from([inf]),
 )
-def test_of_two_silences_the_hardest_is_told_and_more_silence_is_never_milder(
+def test_the_more_severe_of_two_silences_is_reported_and_more_silence_is_never_milder(
     position_s: float, current_s: float
 ) -> None:
     def reported(position_age_s: float, current_age_s: float) -> int:
@@ -198,7 +198,7 @@ def test_slow_signals_that_end_are_noticed_within_their_ticks(name: str, stamp: 
     assert FAULT_KINDS[name].bound_ticks - 42 <= ticks_until(name, state_at) <= FAULT_KINDS[name].bound_ticks
 
 
-def test_messages_every_two_milliseconds_are_never_late_whatever_their_phase_to_the_ticks() -> None:
+def test_messages_every_two_milliseconds_are_never_late_at_any_phase_to_the_ticks() -> None:
     for offset in range(20):
         watch = make_watch()
         for tick in range(1, 400):
@@ -220,11 +220,11 @@ def test_one_message_that_is_lost_is_at_most_late() -> None:
         assert found <= {"drive_late"}
 
 
-def test_a_drive_that_never_told_its_temperature_is_not_asked_for_it() -> None:
+def test_a_drive_that_never_reported_its_temperature_has_no_temperature_fault() -> None:
     assert names(HEALTHY._replace(temperature_c=nan, temperature_stamp_s=NEVER_S)) == set()
 
 
-def test_silence_is_told_with_signal_joint_and_time() -> None:
+def test_silence_is_reported_with_signal_joint_and_time() -> None:
     late = seen(make_watch(), HEALTHY._replace(current_stamp_s=START_S - 0.0201))
     assert late == {"current_stale": "No current came from the left_sweep drive for 20 ms."}
     gone = seen(make_watch(), HEALTHY._replace(angle_stamp_s=NEVER_S, current_stamp_s=NEVER_S))
@@ -253,14 +253,14 @@ def test_a_drive_out_of_closed_loop_is_a_fault_only_where_it_is_expected_there()
     assert names(idle, moving=False) == set()
 
 
-def test_a_drive_in_closed_loop_unasked_is_told_once_it_had_time_to_obey() -> None:
+def test_an_unrequested_closed_loop_is_a_fault_after_the_time_to_obey() -> None:
     watch = make_watch()
     unasked = [tick for tick in range(200) if "drive_energised" in seen(watch, HEALTHY, energised=False, moving=False)]
     assert unasked[0] == pytest.approx(0.2 / PERIOD_S, abs=1)
     assert unasked[0] + 38 + 2 <= FaultKind.DRIVE_ENERGISED.bound_ticks  # a heartbeat tells of it
 
 
-def test_the_time_to_obey_begins_anew_with_every_obedience() -> None:
+def test_the_time_to_obey_begins_again_with_every_obedience() -> None:
     watch = make_watch()
     for tick in range(400):
         reported = seen(watch, HEALTHY._replace(closed_loop=tick % 70 > 0), energised=False, moving=False)
@@ -271,7 +271,7 @@ def test_the_time_to_obey_begins_anew_with_every_obedience() -> None:
     ("voltage_v", "expected"),
     [(24.0, None), (20.0, None), (19.99, "voltage_low"), (18.0, "voltage_low"), (17.99, "voltage_under"), (nan, None)],
 )
-def test_a_supply_is_low_and_then_too_low_once_two_messages_say_so(voltage_v: float, expected: str | None) -> None:
+def test_a_supply_is_low_and_then_too_low_after_two_messages(voltage_v: float, expected: str | None) -> None:
     assert lasting(HEALTHY._replace(bus_voltage_v=voltage_v)) == ({expected} - {None})
 
 
@@ -284,7 +284,7 @@ def test_a_joint_may_be_past_its_range_by_the_margin_and_no_further(edge: float,
     assert names(HEALTHY._replace(angle_rad=radians(edge) + outward * 1e-9)) == {"joint_position"}
 
 
-def test_out_of_range_is_told_in_degrees_with_the_range() -> None:
+def test_out_of_range_is_reported_in_degrees_with_the_range() -> None:
     (message,) = seen(make_watch(), HEALTHY._replace(angle_rad=radians(80.0))).values()
     assert message == "The left_sweep joint is at 80.0 degrees, outside of -70 to 70."
 
@@ -346,7 +346,7 @@ def test_an_encoder_jumps_beyond_what_its_speed_explains() -> None:
             assert samples(make_watch(), [(0.0, 0.0), (0.002, sign * step_rad)]) == [set(), expected]
 
 
-def test_a_jump_is_told_once_and_the_new_place_is_then_where_it_is() -> None:
+def test_a_jump_is_reported_once_and_the_new_angle_then_counts() -> None:
     found = samples(make_watch(), [(0.002 * tick, 0.5 * (tick >= 5)) for tick in range(10)])
     assert found == [set()] * 5 + [{"encoder_jump"}] + [set()] * 4
 
@@ -411,7 +411,7 @@ def test_everything_else_follows_or_is_excused(torque_nm: float, velocity_rad_s:
     assert stalled_ticks(torque_nm, velocity_rad_s, excused, 2000) is None
 
 
-def test_a_move_begins_the_wait_anew_and_the_noise_of_a_speed_does_not() -> None:
+def test_a_move_begins_the_wait_again_and_the_noise_of_a_speed_does_not() -> None:
     watch, random = make_watch(), Random(1)
     for tick in range(2000):
         state = HEALTHY._replace(angle_rad=0.05 * (tick // 700))
@@ -499,7 +499,7 @@ def test_a_winding_that_is_too_hot_is_not_hidden_by_a_sensor_that_is_nearly_so()
     assert set(seen(warm_watch(95.0), HEALTHY._replace(temperature_c=85.0))) == {"winding_hot"}
 
 
-def test_where_both_are_as_hot_the_sensor_is_believed() -> None:
+def test_where_both_are_as_hot_the_sensor_is_trusted() -> None:
     watch = warm_watch(95.0)
     for _ in range(TWO_MESSAGES + 2):
         reported = seen(watch, HEALTHY._replace(temperature_c=96.0))
@@ -572,7 +572,7 @@ def missing_ticks(sent_nm: float, current_a: float, moving: bool = True) -> int 
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_torque_is_missing_beyond_its_share_of_the_limit_and_not_before(sign: float) -> None:
+def test_a_torque_is_missing_beyond_its_fraction_of_the_limit_and_not_before(sign: float) -> None:
     fraction_nm = MISSING_FRACTION * LIMITS.torque_nm
     assert missing_ticks(sign * (fraction_nm + 1e-6), 0.0) is not None
     assert missing_ticks(sign * (fraction_nm - 1e-6), 0.0) is None

@@ -37,12 +37,12 @@ def test_it_begins_as_warm_as_the_room_and_stays_so_without_current() -> None:
 
 @pytest.mark.parametrize("current_a", [2.0, -2.0, 5.0, 9.0])
 @pytest.mark.parametrize("time_s", [1.0, 20.0, 120.0])
-def test_a_steady_current_warms_it_as_the_closed_form_says(current_a: float, time_s: float) -> None:
+def test_a_steady_current_heats_it_by_the_closed_form(current_a: float, time_s: float) -> None:
     reported_c = heated(current_a, round(time_s / PERIOD_S)).temperature_c
     assert reported_c == pytest.approx(closed_form_c(current_a, time_s), abs=0.02)
 
 
-def test_a_changing_current_warms_it_as_an_integrator_says() -> None:
+def test_a_changing_current_heats_it_like_an_integrator() -> None:
     def current_a(time_s: float) -> float:
         return 6.0 * sin(2.0 * time_s) + 2.0
 
@@ -88,7 +88,7 @@ def test_it_cools_to_the_rooms_temperature_with_its_time_constant() -> None:
     assert (winding.temperature_c - PARAMETERS.room_c) / rise_k == pytest.approx(exp(-1.0), rel=1e-3)
 
 
-def test_a_sensor_that_reads_higher_is_believed_and_one_that_reads_lower_is_not() -> None:
+def test_a_sensor_that_reads_higher_is_trusted_and_one_that_reads_lower_is_not() -> None:
     winding = heated(5.0, 10000)
     before_c = winding.temperature_c
     assert winding.update(PERIOD_S, 5.0, before_c - 10.0) == pytest.approx(before_c, abs=0.01)
@@ -102,7 +102,7 @@ def test_a_current_that_is_no_number_adds_no_heat() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 10.0), st.floats(-1e38, 1e38) | st.just(nan), st.floats() | st.just(nan))))
-def test_whatever_is_told_the_temperature_stays_a_number_from_the_room_to_burning(
+def test_for_any_input_the_temperature_stays_between_room_and_burning(
     updates: list[tuple[float, float, float]],
 ) -> None:
     winding = Winding(PARAMETERS)

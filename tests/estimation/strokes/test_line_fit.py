@@ -61,7 +61,7 @@ def test_the_fit_is_unbiased() -> None:
     assert mean == pytest.approx(2.0, abs=4.0 * estimates[0].std_error / sqrt(500))
 
 
-def test_a_line_without_noise_is_found_without_doubt() -> None:
+def test_a_line_without_noise_is_found_without_uncertainty() -> None:
     x = np.linspace(0.1, 3.0, 20)
     estimate = fitted(x, 4.0 * x)
     assert estimate.value == pytest.approx(4.0, rel=1e-14)
@@ -70,7 +70,7 @@ def test_a_line_without_noise_is_found_without_doubt() -> None:
 
 
 @pytest.mark.parametrize("count", range(MIN_SAMPLES + 2))
-def test_too_few_samples_tell_nothing(count: int) -> None:
+def test_too_few_samples_give_no_estimate(count: int) -> None:
     x = np.linspace(0.5, 1.0, count)
     estimate = fitted(x, x)
     assert estimate.valid == (count >= MIN_SAMPLES)
@@ -78,7 +78,7 @@ def test_too_few_samples_tell_nothing(count: int) -> None:
     assert ("fewer than 5 samples" in estimate.reason) == (count < MIN_SAMPLES)
 
 
-def test_samples_at_the_surface_tell_nothing() -> None:
+def test_samples_at_the_surface_give_no_estimate() -> None:
     estimate = fitted(np.zeros(50), np.ones(50))
     assert not estimate.valid
     assert estimate.reason
@@ -93,7 +93,7 @@ def test_a_force_along_the_motion_is_not_valid(k: float) -> None:
     assert estimate.reason == "the force does not oppose the motion"
 
 
-def test_a_doubt_is_too_large_from_half_of_the_value_on() -> None:
+def test_an_error_above_half_of_the_value_is_too_large() -> None:
     verdicts = set()
     for noise in np.linspace(0.1, 8.0, 200):
         estimate = fitted(*noisy_line(7, 20, 1.0, float(noise)))

@@ -115,7 +115,7 @@ def test_the_fit_does_not_care_about_the_unit_of_x(scale: float) -> None:
 
 
 @pytest.mark.parametrize("place", [0, 7, 19])
-def test_one_wild_batch_moves_the_slope_by_a_bounded_amount_whatever_its_size(place: int) -> None:
+def test_one_outlier_of_any_size_moves_the_slope_by_a_bounded_amount(place: int) -> None:
     """It pulls no more than a residual of the clip, c s, would; least squares follows it everywhere."""
     x, y = noisy(3, 20)
     plain, slopes = fitted(x, y).slope, []
@@ -220,19 +220,19 @@ def test_residuals_that_hang_together_widen_the_standard_error() -> None:
     assert widened >= 45
 
 
-def test_more_noise_makes_more_doubt() -> None:
+def test_more_noise_makes_more_uncertainty() -> None:
     x, y = calm(1, 30)
     assert fitted(x, K * x + 10.0 * (y - K * x)).std_error == pytest.approx(10.0 * fitted(x, y).std_error, rel=1e-6)
 
 
-def test_a_law_without_noise_is_found_without_doubt() -> None:
+def test_a_law_without_noise_is_found_without_uncertainty() -> None:
     x = np.linspace(0.1, 1.0, 20)
     fit = fitted(x, K * x)
     assert fit.slope == pytest.approx(K, rel=1e-14)
     assert fit.std_error < 1e-14
 
 
-def test_a_bend_from_the_law_makes_no_doubt() -> None:
+def test_a_bend_from_the_law_makes_no_uncertainty() -> None:
     """Mud that starts at a force of its own: the slope is the mean law's, and scatter alone counts as doubt."""
     x, y = calm(2, 30)
     straight, bent = fitted(x, y), fitted(x, y + 0.05 - 0.05 * x)
@@ -243,23 +243,23 @@ def test_a_bend_from_the_law_makes_no_doubt() -> None:
 
 
 @pytest.mark.parametrize("count", range(MIN_BATCHES))
-def test_too_few_batches_tell_nothing(count: int) -> None:
+def test_too_few_batches_give_no_estimate(count: int) -> None:
     assert fit_through_origin([1.0] * count, [1.0] * count) is None
 
 
-def test_just_enough_batches_tell_something() -> None:
+def test_just_enough_batches_give_a_slope() -> None:
     assert fitted(np.linspace(0.1, 1.0, MIN_BATCHES), np.linspace(0.2, 2.0, MIN_BATCHES)).slope == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("x", [0.0, -1.0, 1e-200])
-def test_regressors_of_nothing_tell_nothing(x: float) -> None:
+def test_regressors_of_nothing_give_no_estimate(x: float) -> None:
     """The last one vanishes when it is squared."""
     assert fit_through_origin([x] * 10, [1.0] * 10) is None
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf, 1e200])
 @pytest.mark.parametrize("place", [0, 5, 9])
-def test_a_regressor_that_is_no_number_tells_nothing(bad: float, place: int) -> None:
+def test_a_regressor_that_is_no_number_gives_no_estimate(bad: float, place: int) -> None:
     x = [0.1 * (i + 1) for i in range(10)]
     y = [2.0 * each for each in x]
     x[place] = bad
@@ -267,7 +267,7 @@ def test_a_regressor_that_is_no_number_tells_nothing(bad: float, place: int) -> 
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
-def test_a_torque_that_is_no_number_tells_nothing(bad: float) -> None:
+def test_a_torque_that_is_no_number_gives_no_estimate(bad: float) -> None:
     x = [0.1 * (i + 1) for i in range(10)]
     assert fit_through_origin(x, [*x[:9], bad]) is None
 
@@ -297,7 +297,9 @@ modest = st.floats(-100.0, 100.0)
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 100.0), modest), min_size=MIN_BATCHES, max_size=30))
-def test_modest_numbers_give_a_finite_slope_and_a_doubt_that_is_not_negative(pairs: list[tuple[float, float]]) -> None:
+def test_modest_numbers_give_a_finite_slope_and_a_uncertainty_that_is_not_negative(
+    pairs: list[tuple[float, float]],
+) -> None:
     fit = fit_through_origin([x for x, _ in pairs], [y for _, y in pairs])
     assert fit is None or fit.std_error >= 0.0
 

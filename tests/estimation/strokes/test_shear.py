@@ -88,16 +88,14 @@ def borne(batches: Sequence[Batch]) -> list[float]:
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
 @pytest.mark.parametrize("k_s", [0.05e6, 0.6e6, 5.0e6])
 @pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
-def test_where_the_body_stands_the_mud_yields_and_its_strength_is_told(
-    base: Base, k_s: float, surface_m: float
-) -> None:
+def test_a_body_at_rest_gives_the_strength_of_the_mud(base: Base, k_s: float, surface_m: float) -> None:
     shear = found(pressed(poses(), k_s, surface_m), base, surface_m=surface_m)
     assert (shear.case, shear.at_least, shear.reason) == ("yield", False, "")
     assert k_of(shear) == pytest.approx(k_s, rel=EXACT)
 
 
 @pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
-def test_what_was_borne_before_the_mud_was_mobilised_does_not_count(base: Base) -> None:
+def test_the_load_before_the_mud_was_mobilised_does_not_count(base: Base) -> None:
     batches = sheared(poses(), base=base)
     assert borne(batches)[2] < 0.6 * K_S  # so it would be noticed
     assert k_of(found(batches, base)) == pytest.approx(K_S, rel=EXACT)
@@ -118,11 +116,11 @@ def test_a_fixed_base_needs_no_pose() -> None:
     assert found(blind(sheared(poses())), Base.FIXED) == found(sheared(poses()), Base.FIXED)
 
 
-def test_on_a_fixed_base_it_does_not_matter_what_a_pose_says() -> None:
+def test_a_fixed_base_ignores_the_pose() -> None:
     assert found(pressed(poses(0.9)), Base.FIXED).case == "yield"
 
 
-def test_the_doubt_is_that_of_the_batches_that_yield() -> None:
+def test_the_uncertainty_is_that_of_the_batches_that_yield() -> None:
     """5 % up and down in turn: more doubt than without, and not more than 5 %."""
     batches = pressed(poses())
     shaken = [b._replace(sweep_nm=b.sweep_nm * (1.05 if i % 2 else 0.95)) for i, b in enumerate(batches)]
@@ -143,7 +141,7 @@ def test_where_the_body_goes_along_and_the_mud_holds_there_is_a_bound() -> None:
 
 
 @pytest.mark.parametrize("body_fraction", [0.25, 0.5, 0.7])
-def test_where_the_plate_slips_while_the_body_advances_the_strength_is_told(body_fraction: float) -> None:
+def test_where_the_plate_slips_while_the_body_advances_the_strength_is_reported(body_fraction: float) -> None:
     """At 70 % of 12 cm it slips 3.6 cm, so few batches are left; but they have all of the strength."""
     shear = found(sheared(poses(body_fraction), base=Base.FREE))
     assert (shear.case, shear.at_least) == ("mixed", False)
@@ -162,7 +160,7 @@ def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
 
 
 @pytest.mark.parametrize(("body_fraction", "case"), [(0.15, "yield"), (0.25, "mixed")])
-def test_up_to_a_fifth_of_the_way_the_body_counts_as_standing(body_fraction: float, case: str) -> None:
+def test_up_to_a_fifth_of_the_travel_the_body_counts_as_standing(body_fraction: float, case: str) -> None:
     assert found(pressed(poses(body_fraction))).case == case
 
 
@@ -179,7 +177,7 @@ def test_a_body_that_slides_back_is_no_travel_of_the_plates() -> None:
     assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
 
 
-def test_the_slip_is_the_way_back_through_the_mud() -> None:
+def test_the_slip_is_the_path_back_through_the_mud() -> None:
     batches = poses(0.4)
     reported = slips_m(GEOMETRY, batches, Base.FREE)
     assert reported is not None
@@ -203,13 +201,13 @@ def test_a_motor_at_its_limit_bounds_the_strength(base: Base) -> None:
     assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
 
 
-def test_a_motor_at_its_limit_that_still_shears_the_mud_tells_its_strength() -> None:
+def test_a_motor_at_its_limit_that_shears_the_mud_gives_its_strength() -> None:
     shear = found(stuck(COUNT))
     assert (shear.case, shear.at_least) == ("yield", False)
 
 
 @pytest.mark.parametrize("count", range(1, HELD[0]))
-def test_less_than_three_pieces_say_nothing(count: int) -> None:
+def test_fewer_than_three_batches_give_no_estimate(count: int) -> None:
     shear = found(stuck(count))
     assert shear.fit is None
     assert shear.reason == "a motor at its limit"
@@ -259,13 +257,13 @@ def test_two_wild_pieces_do_not_move_the_body() -> None:
     assert found(weak).case == "yield"
 
 
-def test_one_lost_place_of_the_body_is_no_pose() -> None:
+def test_one_lost_position_of_the_body_is_no_pose() -> None:
     batches = pressed(poses())
     batches[7] = batches[7]._replace(body_m=nan)
     assert found(batches).case == "unknown"
 
 
-def test_without_a_pose_a_short_stance_tells_no_value() -> None:
+def test_without_a_pose_a_short_stance_gives_no_value() -> None:
     """However small its force: so little way mobilises no mud."""
     assert found(blind(pressed(poses(count=5), 1e3))).at_least
 
@@ -277,7 +275,7 @@ loads_nm = st.lists(st.floats(0.0, 2.0), min_size=3, max_size=COUNT)
 
 
 @given(loads_nm)
-def test_a_bound_never_exceeds_what_two_pieces_have_borne(torques_nm: list[float]) -> None:
+def test_a_bound_never_exceeds_the_load_of_two_batches(torques_nm: list[float]) -> None:
     """The body moves all the way. One wild piece cannot make a bound: it is a median of three at least."""
     batches = [batch._replace(sweep_nm=torque_nm) for batch, torque_nm in zip(poses(1.0), torques_nm, strict=False)]
     shear = found(batches)
@@ -286,12 +284,12 @@ def test_a_bound_never_exceeds_what_two_pieces_have_borne(torques_nm: list[float
 
 
 @given(st.lists(st.floats(0.1, 2.0), min_size=3, max_size=COUNT))
-def test_what_all_pieces_have_borne_is_a_bound(torques_nm: list[float]) -> None:
+def test_the_load_of_all_batches_is_a_bound(torques_nm: list[float]) -> None:
     batches = [batch._replace(sweep_nm=torque_nm) for batch, torque_nm in zip(poses(1.0), torques_nm, strict=False)]
     assert k_of(found(batches)) >= min(borne(batches))
 
 
-def test_the_bound_is_the_largest_that_was_borne_for_a_while() -> None:
+def test_the_bound_is_the_largest_sustained_load() -> None:
     """Half of the strength, all of it, and half again."""
     fractions = [0.5] * 7 + [1.0] * 7 + [0.5] * 7
     batches = [
@@ -300,7 +298,7 @@ def test_the_bound_is_the_largest_that_was_borne_for_a_while() -> None:
     assert k_of(found(batches)) == pytest.approx(K_S, rel=EXACT)
 
 
-def test_a_bound_is_in_more_doubt_where_it_was_borne_unevenly() -> None:
+def test_an_uneven_load_makes_a_bound_more_uncertain() -> None:
     even = pressed(poses(1.0))
     uneven = [b._replace(sweep_nm=b.sweep_nm * (1.2 if i % 2 else 0.8)) for i, b in enumerate(even)]
     uncertainties = [fit.std_error / fit.slope for fit in (found(even).fit, found(uneven).fit) if fit is not None]
@@ -312,13 +310,13 @@ def test_a_bound_is_in_more_doubt_where_it_was_borne_unevenly() -> None:
 
 
 @pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
-def test_a_plate_in_the_air_tells_nothing(base: Base) -> None:
+def test_a_plate_in_the_air_gives_no_estimate(base: Base) -> None:
     shear = found(poses(depth_m=-0.005), base)
     assert shear == Shear(None, False, "unknown", 0, "no depth in any batch")
     assert found([], base).fit is None
 
 
-def test_pieces_above_the_surface_bear_nothing() -> None:
+def test_pieces_above_the_surface_withstand_nothing() -> None:
     """A plate that comes in on the way: what lies before has no pressure, and no part in a bound."""
     batches = [*poses(1.0, -0.005, 4), *pressed(poses(1.0))[4:]]
     assert k_of(found(batches)) == pytest.approx(K_S, rel=EXACT)

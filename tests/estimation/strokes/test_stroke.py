@@ -99,13 +99,13 @@ def test_a_stroke_without_end_takes_no_more_memory() -> None:
     assert stroke.batches[-1].travel_m < (LONGEST + 10) * STEP_M
 
 
-def test_the_longest_stroke_of_this_robot_is_kept_whole() -> None:
+def test_the_longest_stroke_of_this_robot_is_stored_whole() -> None:
     """A sweep of ±60° at 6 mm, and 7 cm of insertion from 1.5 cm above the mud at 1.5 mm."""
     assert 2.0 * np.deg2rad(60.0) * 0.12 / 0.006 < LONGEST
     assert (0.07 + 0.0145) / STEP_M < LONGEST
 
 
-def test_a_lost_place_of_the_body_loses_only_the_place() -> None:
+def test_a_lost_body_position_loses_only_the_position() -> None:
     stroke = Stroke(STEP_M)
     for i in range(10):
         stroke.update(*row(0.01 * i, 0.0, body_m=nan if i == 3 else 1.0))
@@ -165,7 +165,7 @@ def test_what_counts_as_moving_is_one_piece_whose_ends_are_quick(speeds_m_s: lis
         assert any(speeds_m_s[i : i + len(kept)] == kept for i in range(len(speeds_m_s)))
 
 
-def test_a_stroke_that_never_moved_is_kept() -> None:
+def test_a_stroke_that_never_moved_is_stored() -> None:
     assert moving([0.0, 0.0]) == [0.0, 0.0]
     assert moving([]) == []
 
@@ -173,7 +173,7 @@ def test_a_stroke_that_never_moved_is_kept() -> None:
 # beginning and end
 
 
-def test_the_first_travel_is_kept() -> None:
+def test_the_first_travel_is_stored() -> None:
     assert stroke_of(even(380.0)).first_m == pytest.approx(-0.0145)
     assert not isfinite(Stroke(STEP_M).first_m)
 

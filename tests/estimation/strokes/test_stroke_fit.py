@@ -104,7 +104,7 @@ def extraction(
 @pytest.mark.parametrize("face_nm", [-0.3, 0.0, 0.1, 0.3])
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.0021])
 @pytest.mark.parametrize("k", [1e4, 1e6, 3e7])
-def test_a_stroke_that_keeps_the_law_tells_its_coefficient(k: float, surface_m: float, face_nm: float) -> None:
+def test_a_stroke_that_keeps_the_law_gives_its_coefficient(k: float, surface_m: float, face_nm: float) -> None:
     """Exactly, whatever the face bears: that is what the sweep joint is asked for."""
     inserted = insertion(down(k, surface_m, face_nm=face_nm), surface_at(surface_m))
     extracted = extraction(up(k, surface_m, face_nm=face_nm), surface_at(surface_m))
@@ -140,7 +140,7 @@ def test_samples_are_those_of_the_batches_in_the_mud() -> None:
     assert insertion(down()).samples == inside * SAMPLES
 
 
-def test_pieces_count_by_their_way_and_not_by_their_number() -> None:
+def test_batches_count_by_their_travel_and_not_by_their_number() -> None:
     """The lower half in pieces a quarter as long: where the law bends, counting pieces would read 2 % less. Half a
     percent is left, since the Huber weights ask all pieces for their median residual.
     """
@@ -252,14 +252,14 @@ def test_without_noise_only_the_torques_repeatability_is_left() -> None:
 
 
 @pytest.mark.parametrize("error_m", [0.0002, 0.001])
-def test_the_doubt_of_the_surface_is_that_of_a_moved_one(error_m: float) -> None:
+def test_the_uncertainty_of_the_surface_is_that_of_a_moved_one(error_m: float) -> None:
     """To 10 %: first order in 1 mm of 3 cm, and Φ's fall as above."""
     reported = systematic(insertion(down(), surface_at(0.0, error_m)))
     deeper, higher = (insertion(down(), surface_at(sign * error_m)).value for sign in (1.0, -1.0))
     assert reported == pytest.approx((deeper - higher) / 2.0 / K, rel=0.1)
 
 
-def test_the_doubt_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
+def test_the_uncertainty_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
     """3/2 of it over the edge and the depth, for a line through the origin: as of a plate that moves straight down.
     A leaning one has less lever for a weight than for its volume, so this is more than enough, by half as much again.
     """
@@ -277,13 +277,13 @@ def test_the_doubt_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
 
 
 @pytest.mark.parametrize("face_nm", [-0.3, 0.2])
-def test_a_quarter_of_what_is_taken_off_the_face_stays_in_doubt(face_nm: float) -> None:
+def test_a_quarter_of_the_cross_coupling_stays_uncertain(face_nm: float) -> None:
     unfelt = insertion([batch._replace(sweep_nm=0.0) for batch in down(face_nm=face_nm)]).value
     reported = systematic(insertion(down(face_nm=face_nm)))
     assert reported == pytest.approx(CROSS_COUPLING_UNCERTAINTY * abs(unfelt / K - 1.0), rel=1e-3)
 
 
-def test_scatter_of_the_batches_adds_to_the_doubt() -> None:
+def test_scatter_of_the_batches_adds_to_the_uncertainty() -> None:
     random = np.random.default_rng(1)
     uncertainties = []
     for noise_nm in (0.005, 0.02):
@@ -300,7 +300,7 @@ def lever_m(batch: Batch) -> float:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_pieces_in_poses_without_a_vertical_lever_are_not_asked(sign: float) -> None:
+def test_batches_in_poses_without_a_vertical_lever_do_not_count(sign: float) -> None:
     """At 5 cm and 30 degrees there are 14 mm of it, and 30 mm at 4.68 cm."""
     batches = [loaded(batch_at(travel_m, sign * FRONT_RAD), sign * K) for travel_m in depths(end_m=0.05)[:: int(sign)]]
     blind = [batch for batch in batches if lever_m(batch) < MIN_VERTICAL_LEVER_M]
@@ -323,13 +323,13 @@ def test_a_stroke_wholly_in_poses_without_a_vertical_lever_cannot_be_observed() 
 
 
 @pytest.mark.parametrize("count", range(MIN_BATCHES))
-def test_too_few_pieces_say_so(count: int) -> None:
+def test_too_few_batches_are_the_reason(count: int) -> None:
     reported = insertion(down()[-count:] if count else [])
     assert reported == NOT_THERE._replace(samples=reported.samples)
     assert not reported.valid and reported.reason
 
 
-def test_a_stroke_in_the_air_says_so() -> None:
+def test_a_stroke_in_the_air_is_the_reason() -> None:
     assert insertion([batch_at(travel_m) for travel_m in depths(end_m=0.0)]) == NOT_THERE
 
 
@@ -338,7 +338,7 @@ def test_a_force_along_the_motion_is_no_mud() -> None:
         assert (reported.valid, reported.reason) == (False, "the force does not oppose the motion")
 
 
-def test_a_fit_is_judged_with_all_its_doubt() -> None:
+def test_a_fit_is_evaluated_with_its_full_error() -> None:
     reported = evaluated(OriginFit(K, 0.03 * K), 0.04 * K, 7)
     assert reported._replace(std_error=0.0) == Estimate(K, 0.0, 7, True)
     assert reported.std_error == pytest.approx(hypot(0.03, 0.04, TORQUE_REPEATABILITY) * K)
@@ -356,13 +356,13 @@ def test_a_fit_is_judged_with_all_its_doubt() -> None:
         (K, nan, "not finite"),
     ],
 )
-def test_what_is_not_believed_says_why(slope: float, std_error: float, reason: str) -> None:
+def test_an_invalid_estimate_has_a_reason(slope: float, std_error: float, reason: str) -> None:
     reported = evaluated(OriginFit(slope, std_error), 0.0, 7)
     assert (reported.valid, reported.at_least, reported.samples, reported.reason) == (False, False, 7, reason)
     assert isfinite(reported.value) == (reason != "not finite")
 
 
-def test_up_to_half_of_itself_a_doubt_is_borne() -> None:
+def test_an_error_up_to_its_limit_is_valid() -> None:
     assert evaluated(
         OriginFit(K, 0.0), 0.99 * float(np.sqrt(LARGEST_UNCERTAINTY**2 - TORQUE_REPEATABILITY**2)) * K, 7
     ).valid
@@ -396,7 +396,7 @@ def test_a_level_is_taken_off_as_of_a_straight_arm(level_nm: float) -> None:
 # a flipper that did not come out
 
 
-def test_mud_that_held_on_has_borne_at_least_so_much() -> None:
+def test_mud_that_did_not_yield_gives_a_lower_bound() -> None:
     """It rose by 6 mm: too little for a fit."""
     batches = [loaded(batch_at(travel_m, -FRONT_RAD), -K, face_nm=0.2) for travel_m in (0.03, 0.028, 0.026, 0.024)]
     reported = bound_extraction(GEOMETRY, batches, surface_at(0.0))

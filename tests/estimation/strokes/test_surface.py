@@ -120,7 +120,7 @@ def test_offsets_of_force_and_depth_only_move_the_result(
 
 
 @pytest.mark.parametrize(("slope_n_m", "jump_n"), [(100.0, 0.0), (100.0, 1.0)])
-def test_the_level_errs_as_it_says(slope_n_m: float, jump_n: float) -> None:
+def test_the_level_errs_by_its_standard_error(slope_n_m: float, jump_n: float) -> None:
     """By the noise over the root of the batches above, nine or ten of them; a kink lends it a little more."""
     errors_n, reported_n = [], 0.0
     for seed in range(400):
@@ -132,13 +132,13 @@ def test_the_level_errs_as_it_says(slope_n_m: float, jump_n: float) -> None:
     assert np.std(errors_n) == pytest.approx(reported_n, rel=0.15)
 
 
-def test_shapes_that_disagree_add_to_the_doubt() -> None:
+def test_shapes_that_disagree_add_to_the_uncertainty() -> None:
     """Where a jump and a kink fit alike, two millimetres apart, there is more doubt than of either."""
     reported_mm = [scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200).reported_mm for jump_n in (0.0, 0.2, 1.0)]
     assert reported_mm[1] > 1.3 * max(reported_mm[0], reported_mm[2])
 
 
-def test_more_noise_makes_more_doubt() -> None:
+def test_more_noise_makes_more_uncertainty() -> None:
     z = depths(3)
     law, wave = 100.0 * np.maximum(0.0, z), noise(3, len(z))
     errors_m = [found(z, law + noise_n * wave).std_error_m for noise_n in (0.01, 0.03, 0.1)]
@@ -159,7 +159,7 @@ def test_mud_that_jumps_begins_at_the_jump(jump_n: float, slope_n_m: float) -> N
     assert result.reported_mm == pytest.approx(step_mm / sqrt(12.0), rel=0.1)
 
 
-def test_a_jump_whose_border_is_in_doubt_says_so() -> None:
+def test_a_jump_with_an_uncertain_border_has_a_large_error() -> None:
     """A step of four noises and no slope below: the border may be a batch aside."""
     weak, clear = (scores(1e-9, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200) for jump_n in (0.2, 1.0))
     assert np.std(weak.errors_mm) > 1.2 * np.std(clear.errors_mm)
@@ -167,7 +167,7 @@ def test_a_jump_whose_border_is_in_doubt_says_so() -> None:
     assert weak.covered > 0.92
 
 
-def test_a_jump_hardly_above_the_noise_is_doubted_not_missed() -> None:
+def test_a_jump_hardly_above_the_noise_is_uncertain_not_missed() -> None:
     """0.2 N at a slope of 1 N/cm: a kink 2 mm higher fits almost as well, and the doubt says so."""
     weak, clear = (scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200) for jump_n in (0.2, 1.0))
     assert np.mean(weak.errors_mm) == pytest.approx(-0.6, abs=0.4)
@@ -199,11 +199,11 @@ def test_noise_alone_is_no_mud(level_n: float) -> None:
 
 
 @pytest.mark.parametrize("count", range(MIN_ABOVE + MIN_BELOW))
-def test_too_few_batches_tell_nothing(count: int) -> None:
+def test_too_few_batches_give_no_estimate(count: int) -> None:
     assert found(np.linspace(-0.01, 0.03, count), np.linspace(0.0, 3.0, count)) == NO_SURFACE
 
 
-def test_just_enough_batches_tell_a_surface() -> None:
+def test_just_enough_batches_give_a_surface() -> None:
     assert found(np.array([-0.01, -0.005, 0.005, 0.01, 0.015, 0.02]), np.array([0.0, 0.0, 0.5, 1.0, 1.5, 2.0])).found
 
 
@@ -213,7 +213,7 @@ def test_falling_forces_are_no_mud() -> None:
     assert found(z, np.where(z > 0.0, -1.0 - 50.0 * z, 0.0)) == NO_SURFACE
 
 
-def test_an_insertion_that_leads_upward_tells_nothing() -> None:
+def test_an_insertion_that_leads_upward_gives_no_estimate() -> None:
     z = depths(4)[::-1]
     assert found(z, 100.0 * np.maximum(0.0, z)) == NO_SURFACE
 
@@ -225,7 +225,7 @@ def test_a_line_from_the_first_batch_on_has_its_surface_there_or_none() -> None:
     assert not surface.found or surface.depth_m < z[MIN_ABOVE]
 
 
-def test_a_flipper_that_is_held_has_no_slope_to_tell_by() -> None:
+def test_a_flipper_at_rest_gives_no_slope() -> None:
     """Depths that are equal to rounding: the spread of a line through them may come out below zero."""
     forces_n = [0.0, 0.0, 1.0, 2.0, 1.5, 1.0, 2.0, 1.5]
     assert find_surface([0.01] * 8, forces_n) == NO_SURFACE
@@ -235,7 +235,7 @@ def test_a_flipper_that_is_held_has_no_slope_to_tell_by() -> None:
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf, 1e200])
-def test_a_force_that_is_no_number_tells_nothing(bad: float) -> None:
+def test_a_force_that_is_no_number_gives_no_estimate(bad: float) -> None:
     z = depths(6)
     force = 100.0 * np.maximum(0.0, z)
     force[7] = bad
@@ -325,7 +325,7 @@ def test_an_expectation_never_wins_against_good_data(depth_m: float) -> None:
     assert abs(both.depth_m - depth_m) <= 0.05 * abs(depth_m)
 
 
-def test_slow_messages_make_the_told_surface_count_less() -> None:
+def test_slow_messages_make_the_reported_surface_count_less() -> None:
     reported = Surface(0.004, 0.0003, 0.0, 0.1, True)
     weights = [combined(reported, 0.0015, sample_m).depth_m / 0.004 for sample_m in (0.0, 0.001, 0.005, 0.02)]
     assert weights == sorted(weights, reverse=True)

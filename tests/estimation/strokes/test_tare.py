@@ -71,7 +71,7 @@ def test_the_standard_error_is_that_of_the_weights_scatter() -> None:
     assert np.mean([zero.weight_n for zero in zeros]) == pytest.approx(WEIGHT_N, abs=4.0 * scatter_n / sqrt(300))
 
 
-def test_of_few_samples_the_squared_doubt_is_that_of_their_mean() -> None:
+def test_of_few_samples_the_squared_uncertainty_is_that_of_their_mean() -> None:
     """σ²/n without bias: the variance is counted about the samples' own mean."""
     per_nm = 1.0 / GEOMETRY.jacobian(0.0, 0.1).z_adduction
     squares = [taken([(0.0, 0.1)] * 8, WEIGHT_N, NOISE_NM, seed).zero.std_error_n ** 2 for seed in range(1000)]
@@ -121,7 +121,7 @@ def test_the_drift_is_the_change_from_stride_to_stride() -> None:
         assert tare.drift_n == pytest.approx(drift_n)
 
 
-def test_the_drift_is_of_the_air_whatever_the_way_down_corrected() -> None:
+def test_the_drift_is_that_in_air_for_any_correction_on_the_way_down() -> None:
     tare = taken(swing(), 1.0)
     tare.correct(0.5, 0.001)
     hang(tare, swing(), 1.0)
