@@ -37,7 +37,6 @@ ERROR_FLAGS = {DriveError.OVERCURRENT: 0x400, DriveError.WATCHDOG: codec.ERROR_W
 OLD_FIRMWARE = (2, 4, 4, 58, 0, 5, 6, 0)
 BOOT_S = 1.0  # silence of a drive that restarts
 
-
 FORGERIES: Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]] = {  # message, values, and bytes after them
     Forgery.EMERGENCY_STOP: (codec.ESTOP, (), b""),
     Forgery.CLOSE_LOOP: (codec.SET_AXIS_STATE, (AxisState.CLOSED_LOOP,), b""),
@@ -45,6 +44,13 @@ FORGERIES: Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]] = {  # messa
     Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
     Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
 }
+
+
+def finite(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Raises MalformedMessageError for NaN and infinity."""
+    if not all(map(isfinite, values)):
+        raise MalformedMessageError("not a finite number")
+    return values
 
 
 class SimulatedOdrive:
@@ -103,21 +109,21 @@ class SimulatedOdrive:
         if command == codec.RX_SDO.command:
             return self._read_parameter(frame.data)
         with suppress(MalformedMessageError):  # a drive ignores malformed messages
-            self._obey(command, frame.data, now_s)
+            self._execute(command, frame.data, now_s)
         return []
 
-    def _obey(self, command: int, data: bytes, now_s: float) -> None:
+    def _execute(self, command: int, data: bytes, now_s: float) -> None:
         if command == codec.SET_INPUT_TORQUE.command:
-            (torque_nm,) = codec.SET_INPUT_TORQUE.decode(data)
-            self._set_torque(torque_nm, now_s)
+            (self._setpoint_nm,) = finite(codec.SET_INPUT_TORQUE.decode(data))
+            self._fed_s = now_s
         elif command == codec.SET_AXIS_STATE.command:
             self._change_state(codec.SET_AXIS_STATE.decode(data)[0], now_s)
         elif command == codec.SET_CONTROLLER_MODE.command:
             self._modes = codec.SET_CONTROLLER_MODE.decode(data)
         elif command == codec.SET_LIMITS.command:
-            self._set_limits(*codec.SET_LIMITS.decode(data))
+            self._set_limits(*finite(codec.SET_LIMITS.decode(data)))
         elif command == codec.SET_VEL_GAINS.command:
-            self._set_gain(codec.SET_VEL_GAINS.decode(data)[0])
+            (self._velocity_gain_nm_s_turn,) = finite(codec.SET_VEL_GAINS.decode(data)[:1])
         elif command == codec.CLEAR_ERRORS.command:
             self.errors = 0
         elif command == codec.ESTOP.command:
@@ -138,20 +144,7 @@ class SimulatedOdrive:
         answer = codec.TX_SDO.encode(0, endpoint, 0) + values[endpoint]
         return [Frame(arbitration_id(self.parameters.node_id, codec.TX_SDO), answer)]
 
-    def _set_torque(self, torque_nm: float, now_s: float) -> None:
-        if not isfinite(torque_nm):
-            raise MalformedMessageError("not a finite number")
-        self._setpoint_nm = torque_nm
-        self._fed_s = now_s
-
-    def _set_gain(self, velocity_gain_nm_s_turn: float) -> None:
-        if not isfinite(velocity_gain_nm_s_turn):
-            raise MalformedMessageError("not a finite number")
-        self._velocity_gain_nm_s_turn = velocity_gain_nm_s_turn
-
     def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:
-        if not isfinite(velocity_turn_s + current_a):
-            raise MalformedMessageError("not a finite number")
         self._velocity_limit_turn_s = velocity_turn_s
         largest_a = min(current_a, self.parameters.motor_current_limit_a)
         self._largest_nm = largest_a * self.parameters.torque_constant_nm_a

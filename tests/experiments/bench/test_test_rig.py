@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from control.records import JOINTS, NO_TORQUE, Joints
+from drivers.can.frames import Frame
+from drivers.odrive import codec
 from experiments.bench.joint_zero_check import check_level_pose, check_turning
 from experiments.bench.operator import AbsentBenchOperator, PromptedBenchOperator, SimulatedBenchOperator
 from experiments.bench.reading import Reading, left_out
@@ -19,7 +21,6 @@ from experiments.bench.test_rig import TestRig, first_lasting
 from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError
 from firmware_host.configuration.configuration import Configuration
 from simulation.devices.drive import DriveError
-from simulation.devices.odrive import SimulatedOdrive
 from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
 from tests.scripted_operator import ScriptedOperator
@@ -104,8 +105,15 @@ def test_a_drive_that_does_not_go_idle_is_reported(bench: StagedBench, rig: Simu
     for port in rig.buses["right"].ports[1:]:
         port.full = True
     drive = rig.robot.drives[3]
-    assert isinstance(drive, SimulatedOdrive)
-    rig.others.append(lambda _: drive._set_torque(0.0, rig.now_s))  # somebody feeds its watchdog
+    zero_torque = Frame(
+        codec.arbitration_id(drive.parameters.node_id, codec.SET_INPUT_TORQUE), codec.SET_INPUT_TORQUE.encode(0.0)
+    )
+
+    def feed_watchdog(rig: SimulatedRig) -> None:
+        """Acts as another program on the bus."""
+        drive.receive(zero_torque, rig.now_s)
+
+    rig.others.append(feed_watchdog)
     with pytest.raises(BenchError, match="right_adduction: still in closed loop"):
         bench.test_rig.switch_off()
 
