@@ -1,8 +1,8 @@
-"""What is wrong with the robot at this moment, and what was and has not been cleared.
+"""Decides how long a fault is present.
 
-A fault stands from the tick in which it was seen until its cause has been gone for a while. One that met the robot with
-torque on stands longer: while torque is on if it asks for a stop, until somebody clears it, or for ever, by its kind.
-So the modes see one reaction, that of the worst fault which stands.
+A fault is present from the tick in which it is detected until its cause has been gone for a while. A fault that occurs
+while torque is on is latched: it stays at least until torque is off if its reaction is a stop, and depending on its
+kind until an operator clears it or the daemon restarts. The modes see only the reaction of the worst present fault.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from control.rate import PERIOD_S
 GOOD_S = 0.132  # without its cause before a fault is over: 50 ticks
 
 
-class Standing(NamedTuple):
-    fault: Fault  # as last seen
+class PresentFault(NamedTuple):
+    fault: Fault  # with the values of its last detection
     first_tick: int
     last_tick: int
-    latched: bool  # torque was on while it was seen, or it is of a kind for which that is all the same
+    latched: bool  # it occurred while torque was on, or its kind always latches
 
 
 class FaultLatch:
-    """Owns the faults that stand."""
+    """Owns the present faults."""
 
     def __init__(self, period_s: float = PERIOD_S) -> None:
         self._good_ticks = round(GOOD_S / period_s)
         self.reset()
 
     def reset(self) -> None:
-        self._standing: dict[tuple[str, str], Standing] = {}
+        self._present: dict[tuple[str, str], PresentFault] = {}
         self._tick = 0
         self.begun: list[Fault] = []  # in this tick, for the log
         self.over: list[Fault] = []
@@ -39,49 +39,49 @@ class FaultLatch:
 
     @property
     def present(self) -> list[Fault]:
-        return [standing.fault for standing in self._standing.values()]
+        return [each.fault for each in self._present.values()]
 
     @property
     def reaction(self) -> Reaction:
         return self.worst.kind.reaction if self.worst else Reaction.NONE
 
     def age_ticks(self, fault: Fault) -> int:
-        """Since a fault that stands was seen first."""
-        return self._tick - self._standing[fault.name, fault.subject].first_tick
+        """Ticks since a present fault was detected first."""
+        return self._tick - self._present[fault.name, fault.subject].first_tick
 
     def blocking(self, forced: bool = False) -> list[Fault]:
-        """What stands against arming."""
+        """The present faults that block arming."""
         least = Blocks.ALWAYS if forced else Blocks.UNLESS_FORCED
         return [fault for fault in self.present if fault.kind.blocks >= least]
 
     def update(self, present: Sequence[Fault], energised: bool, clearing: bool = False, ticks: int = 1) -> None:
-        """Once a tick, with all that is seen in it, `ticks` after the last time."""
+        """Take in all faults that this tick detects, `ticks` after the last update."""
         self._tick += ticks
         self.begun, self.over = [], []
-        if not present and not self._standing:
+        if not present and not self._present:
             return
         for fault in present:
-            self._see(fault, energised)
-        for key, standing in list(self._standing.items()):
-            if standing.last_tick < self._tick and self._is_over(standing, energised, clearing):
-                self.over.append(self._standing.pop(key).fault)
-        # Of equals the one that began first.
+            self._detect(fault, energised)
+        for key, each in list(self._present.items()):
+            if each.last_tick < self._tick and self._is_over(each, energised, clearing):
+                self.over.append(self._present.pop(key).fault)
+        # Of equal reactions the fault that began first counts.
         self.worst = max(self.present, key=lambda fault: fault.kind.reaction, default=None)
 
-    def _see(self, fault: Fault, energised: bool) -> None:
+    def _detect(self, fault: Fault, energised: bool) -> None:
         key = (fault.name, fault.subject)
-        before = self._standing.get(key)
+        before = self._present.get(key)
         if before is None:
             self.begun.append(fault)
-        self._standing[key] = Standing(
-            fault,
-            before.first_tick if before else self._tick,
-            self._tick,
-            energised or fault.kind.latches_idle or (before is not None and before.latched),
+        self._present[key] = PresentFault(
+            fault=fault,
+            first_tick=before.first_tick if before else self._tick,
+            last_tick=self._tick,
+            latched=energised or fault.kind.latches_idle or (before is not None and before.latched),
         )
 
-    def _is_over(self, standing: Standing, energised: bool, clearing: bool) -> bool:
-        fault, _, last_tick, latched = standing
+    def _is_over(self, each: PresentFault, energised: bool, clearing: bool) -> bool:
+        fault, _, last_tick, latched = each
         if latched and fault.kind.clears is Clears.BY_RESTART:
             return False
         if latched and clearing:

@@ -36,7 +36,7 @@ class Request(IntEnum):
 
 ENERGISED = frozenset({Mode.ARMING, Mode.HOLD, Mode.WALKING, Mode.STOPPING, Mode.DAMPING})
 MOVING = ENERGISED - {Mode.ARMING}  # the modes that may command torque
-HELD = MOVING - {Mode.DAMPING}  # those with stiffness
+HELD = MOVING - {Mode.DAMPING}  # the modes with stiffness
 
 
 class Health(NamedTuple):
@@ -61,7 +61,7 @@ class Cause(NamedTuple):
     """The condition of a transition, with its text for the diagram."""
 
     text: str
-    holds: Callable[[Request, Health], bool]
+    is_true: Callable[[Request, Health], bool]
 
 
 class Transition(NamedTuple):
@@ -75,12 +75,12 @@ def _at_least(reaction: Reaction) -> Cause:
     return Cause(f"fault: {name}", lambda request, health: health.reaction >= reaction)
 
 
-def _asked(asked: Request) -> Cause:
-    return Cause(asked.name.lower(), lambda request, health: request is asked)
+def _requested(wanted: Request) -> Cause:
+    return Cause(wanted.name.lower(), lambda request, health: request is wanted)
 
 
-def _is(text: str, holds: Callable[[Health], bool]) -> Cause:
-    return Cause(text, lambda request, health: holds(health))
+def _is(text: str, is_true: Callable[[Health], bool]) -> Cause:
+    return Cause(text, lambda request, health: is_true(health))
 
 
 def _from(*modes: Mode) -> frozenset[Mode]:
@@ -91,7 +91,7 @@ SOFT_STOP_DONE = Cause("raised, after a fault", lambda request, health: health.r
 STOP_AFTER_FAULT = Cause(
     "stop, after a fault has held a walk", lambda request, health: request is Request.STOP and health.cut_short
 )
-ARM_ACCEPTED = Cause("arm, and nothing against it", lambda request, health: request is Request.ARM and _well(health))
+ARM_ACCEPTED = Cause("arm, and no fault blocks it", lambda request, health: request is Request.ARM and _well(health))
 WALK_ACCEPTED = Cause("walk", lambda request, health: request is Request.WALK and health.reaction < Reaction.HOLD)
 
 
@@ -106,17 +106,17 @@ def _well(health: Health) -> bool:
 # In each mode the first row whose cause is true applies. A disarm precedes every row that continues with torque.
 TRANSITIONS: tuple[Transition, ...] = (
     Transition(ENERGISED, _at_least(Reaction.DRIVES_IDLE), Mode.FAULT),
-    Transition(ENERGISED, _asked(Request.DISARM), Mode.IDLE),
+    Transition(ENERGISED, _requested(Request.DISARM), Mode.IDLE),
     Transition(_from(Mode.ARMING), _at_least(Reaction.SOFT_STOP), Mode.FAULT),
     Transition(HELD, _at_least(Reaction.DAMPING), Mode.DAMPING),
     Transition(_from(Mode.HOLD, Mode.WALKING), _at_least(Reaction.SOFT_STOP), Mode.STOPPING),
     Transition(_from(Mode.BOOT), _is("all drives heard", lambda health: health.drives_heard), Mode.IDLE),
     Transition(_from(Mode.IDLE), ARM_ACCEPTED, Mode.ARMING),
-    Transition(_from(Mode.ARMING), _asked(Request.STOP), Mode.IDLE),
+    Transition(_from(Mode.ARMING), _requested(Request.STOP), Mode.IDLE),
     Transition(_from(Mode.ARMING), _is("closed loop", lambda health: health.closed_loop), Mode.HOLD),
     Transition(_from(Mode.HOLD), WALK_ACCEPTED, Mode.WALKING),
-    Transition(_from(Mode.HOLD), _is("nobody needs it", lambda health: health.rested), Mode.IDLE),
-    Transition(_from(Mode.WALKING), _asked(Request.STOP), Mode.STOPPING),
+    Transition(_from(Mode.HOLD), _is("held for too long", lambda health: health.rested), Mode.IDLE),
+    Transition(_from(Mode.WALKING), _requested(Request.STOP), Mode.STOPPING),
     Transition(_from(Mode.HOLD), STOP_AFTER_FAULT, Mode.STOPPING),
     Transition(_from(Mode.WALKING), _is("strides done", lambda health: health.walk_finished), Mode.STOPPING),
     Transition(_from(Mode.WALKING), _at_least(Reaction.HOLD), Mode.HOLD),
@@ -127,14 +127,14 @@ TRANSITIONS: tuple[Transition, ...] = (
 )
 
 _ROWS_OF: dict[Mode, tuple[tuple[Callable[[Request, Health], bool], Mode], ...]] = {
-    mode: tuple((row.cause.holds, row.target) for row in TRANSITIONS if mode in row.sources) for mode in Mode
+    mode: tuple((row.cause.is_true, row.target) for row in TRANSITIONS if mode in row.sources) for mode in Mode
 }
 
 
 def next_mode(mode: Mode, request: Request, health: Health) -> Mode:
     """Return the mode of the next tick. A request that the mode does not accept changes nothing: see `refusal`."""
-    for holds, target in _ROWS_OF[mode]:
-        if holds(request, health):
+    for is_true, target in _ROWS_OF[mode]:
+        if is_true(request, health):
             return target
     return mode
 

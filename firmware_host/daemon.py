@@ -1,8 +1,9 @@
 """mudskipperd: the process on the robot.
 
-Reads the configuration, opens the buses, and runs the loop until it is told to end. SIGTERM, SIGINT and SIGHUP let it
-finish safely: flippers out of the mud, torque to zero, drives idle, log closed. What nobody expected ends in one place,
-which idles the drives, says what happened, and exits with status 1; systemd starts it again, disarmed.
+The daemon reads the configuration, opens the buses, and runs the loop until a signal ends it. SIGTERM, SIGINT and
+SIGHUP let it finish safely: flippers out of the mud, torque to zero, drives idle, log closed. An unexpected exception
+ends in one place, which idles the drives, reports the exception, and exits with status 1; systemd starts the daemon
+again, disarmed.
 """
 
 from __future__ import annotations
@@ -48,13 +49,13 @@ from firmware_host.ticker import Tick, Ticker
 EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0
 LONGEST_LOG_CLOSE_S = 10.0
-GOODBYE_S = 0.3  # for idle requests to leave and be obeyed
-GOODBYE_FRAMES = 5  # to each drive when a bug ends the loop
+IDLING_S = 0.3  # for the drives to obey a request to go idle
+IDLE_REQUESTS = 5  # to each drive when a bug ends the loop
 NOTIFY_TICKS = int(RATE_HZ / 4)
 
 
 class WatchdogFeed:
-    """Feeds systemd's watchdog from the ticks themselves: a loop that misses more than it makes is not healthy."""
+    """Feeds systemd's watchdog from the ticks themselves, as long as the loop misses no more ticks than it makes."""
 
     def __init__(self, notifier: SystemdNotifier) -> None:
         self._notifier = notifier
@@ -71,27 +72,27 @@ class WatchdogFeed:
 
 
 class Shutdown:
-    """Owns the wish to end, and asks the loop for one step towards it per tick."""
+    """Owns whether the daemon must end, and requests one step towards the end from the loop in each tick."""
 
     def __init__(self) -> None:
-        self.wanted = False
+        self.requested = False
         self._since_s: float | None = None
         self._idle_since_s: float | None = None
 
-    def ask(self, number: int, frame: object) -> None:
-        """A signal handler."""
-        self.wanted = True
+    def request(self, number: int, frame: object) -> None:
+        """Handle a signal."""
+        self.requested = True
 
     def step(self, loop: Loop, now_s: float) -> bool:
-        """Whether the loop may end now."""
-        if not self.wanted:
+        """Request the next step of the shutdown; returns whether the loop may end now."""
+        if not self.requested:
             return False
         loop.ending = True
         self._since_s = self._since_s or now_s
         if loop.mode not in ENERGISED:
             self._idle_since_s = self._idle_since_s or now_s
             all_idle = not any(state.closed_loop for state in loop.states)
-            return all_idle or now_s - self._idle_since_s > GOODBYE_S
+            return all_idle or now_s - self._idle_since_s > IDLING_S
         in_the_mud = loop.mode is Mode.WALKING or loop.controller.cut_short
         if now_s - self._since_s > LONGEST_SHUTDOWN_S or (loop.mode in (Mode.HOLD, Mode.ARMING) and not in_the_mud):
             loop.request(Request.DISARM, now_s)
@@ -101,7 +102,7 @@ class Shutdown:
 
 
 def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
-    """Of a new run. Raises OSError where no log can be written at all."""
+    """Start the log of a new run; raises OSError if the log cannot be written."""
     if not configuration.log.enabled:
         return NullRecorder()
     folder, robot = Path(configuration.log.directory), configuration.robot.name
@@ -114,12 +115,12 @@ def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
 
 
 def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
-    """Until `shutdown` is wanted and done.
+    """Run the loop until the shutdown is complete; returns the exit status.
 
-    Raises BusError, PoseSourceError, AlreadyServedError or OSError before it has begun.
+    Raises BusError, PoseSourceError, AlreadyServedError or OSError before the first tick.
     """
     with ExitStack() as stack:
-        # First: it refuses to be the second daemon.
+        # The socket comes first, since it detects another daemon.
         status = StatusSocket(Path(configuration.status.socket), {}, rights)
         stack.callback(status.close)
         failures = failures_of(configuration)
@@ -144,14 +145,14 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
 
 
 def _serve_loop(status: StatusSocket, loop: Loop) -> None:
-    """What the socket needs of the loop beside its methods."""
+    """Connect the socket to the loop's lease and log."""
     status.on_hang_up = loop.lease.hang_up
     status.spares = lambda caller: caller == loop.lease.holder
     status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
 
 
 def _prepare(parameters: LoopParameters) -> list[str]:
-    """The process for real time: what could not be had, which is told."""
+    """Prepare the process for real time; prints and returns what could not be provided."""
     warnings = prepare_loop(parameters.priority, parameters.cpu, parameters.lock_memory)
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
@@ -181,15 +182,15 @@ def _run_loop(
             reopen_pose(loop, pose, now_s)
         notifier.send("STOPPING=1")
         return 0
-    except Exception as problem:  # noqa: BLE001 - the one place where surprises end
+    except Exception as problem:  # noqa: BLE001 - the one place where unexpected exceptions end
         notifier.send("STOPPING=1")
-        if failures is not None:  # or what fails on purpose would keep the drives from hearing the end
+        if failures is not None:  # an injected failure could keep the drives from going idle
             failures.end_all()
         return end_safely(loop, problem)
 
 
 def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -> None:
-    """Those that are off, while torque is: opening one may take longer than a tick."""
+    """Open lost buses again, only while torque is off: opening a bus may take longer than a tick."""
     if loop.mode in ENERGISED:
         return
     for name, port in buses.items():
@@ -198,18 +199,18 @@ def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -
 
 
 def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
-    """The same for a source that was unplugged."""
+    """Open a pose source again that was unplugged, only while torque is off."""
     if loop.mode not in ENERGISED and pose.reopen(now_s):
-        loop.events.report(now_s, "the pose's source was opened again; its zero may be another one")
+        loop.events.report(now_s, "the pose source was opened again; its zero may have moved")
 
 
 def end_safely(loop: Loop, problem: Exception) -> int:
-    """Idle the drives, whatever state the rest is in, and say what happened."""
-    loop.drives.force_idle(GOODBYE_FRAMES)
+    """Idle the drives, in whatever state the rest is, and report the exception."""
+    loop.drives.force_idle(IDLE_REQUESTS)
     place = traceback.extract_tb(problem.__traceback__)[-1]
     message = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
     print(f"mudskipperd: stopped by a bug, the drives are idle: {message}", file=sys.stderr)
-    with suppress(Exception):  # or the log
+    with suppress(Exception):  # the log may be what broke
         loop.events.report(time.monotonic(), f"stopped by a bug: {message}")
     return EXIT_FAILED
 
@@ -217,7 +218,7 @@ def end_safely(loop: Loop, problem: Exception) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="mudskipperd", description="The robot's real-time controller.")
     parser.add_argument("--config", type=Path, default=Path("/etc/mudskipper/mudskipper.toml"))
-    parser.add_argument("--check-config", action="store_true", help="read the configuration, say what is wrong, end")
+    parser.add_argument("--check-config", action="store_true", help="validate the configuration and exit")
     options = parser.parse_args(arguments)
     try:
         configuration = load_configuration(options.config)
@@ -229,7 +230,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.check_config:
         return 0
     shutdown = Shutdown()
-    _on_signals(shutdown.ask)
+    _on_signals(shutdown.request)
     try:
         return run(configuration, rights, shutdown)
     except (BusError, PoseSourceError, AlreadyServedError) as problem:

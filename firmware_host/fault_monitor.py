@@ -1,6 +1,6 @@
-"""All faults that a tick can show: those of the joints and their drives, of the buses, of the loop, of what it writes.
+"""Detects every fault that a tick can show: of the joints and drives, the buses, the loop, the pose and the log.
 
-Each is data. What comes of them is decided by the latch, which knows how long they stand, and by the modes.
+The result is data. The latch decides how long a fault is present, and the modes decide how the robot reacts.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from firmware_host.log.recorder import LogReport
 from firmware_host.loop_monitor import LoopMonitor
 from firmware_host.ticker import Tick
 
-ARMING_S = 2.0  # a drive that takes longer to go into closed loop does not mean to
+ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
 REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
 BUS_TROUBLE_S = 2.0  # after the last error frame
-POSE_FORGOTTEN_S = 10.0  # a motion capture that was switched off on purpose
-BROKEN = frozenset({FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK})  # they show in some ticks, and last
+POSE_FORGOTTEN_S = 10.0  # after this time a motion capture counts as switched off on purpose
+BROKEN = frozenset({FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK})  # detected in single ticks, but lasting
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
 EXPLAINED = frozenset({FaultKind.DRIVE_ERROR, FaultKind.DRIVE_DISARMED})  # by the drive's own error text
 
@@ -40,21 +40,21 @@ BUS_FAULTS = {
 
 
 class MonitorInput(NamedTuple):
-    """What the loop knows of the moment, before the mode changes."""
+    """The state of the loop in one tick, before the mode changes."""
 
     mode: Mode
     mode_since_s: float
     states: DriveStates
     body: BodyPose
     sent: LimitedTorques  # in the tick before
-    freeing: bool  # a recovery pulls at full torque on purpose
+    freeing: bool  # a recovery pulls a flipper at full torque
     wall_minus_monotonic_s: float
     log: LogReport
     lost_lease_holder: str  # the program that has lost the lease; empty: none
 
 
 class FaultMonitor:
-    """Owns the watches of the joints and of the loop, and what is counted over ticks."""
+    """Owns the monitors of joints, loop and log, and the counts of the ticks before."""
 
     def __init__(self, configuration: Configuration, drives: Drives, period_s: float = PERIOD_S) -> None:
         self._period_s = period_s
@@ -91,7 +91,7 @@ class FaultMonitor:
         self._restarts = {health.joint: health.restarts for health in self._drives.health}
         self._refused_commands = self._drives.refused_commands
         self._pose_stamp_s: float | None = None
-        self._broken: set[str] = set()  # encoders, until torque is off
+        self._broken: set[str] = set()  # joints with an invalid encoder, until torque is off
         self.trusted: Joints[bool] = ALL_TRUSTED  # of the joints' encoders
 
     @property
@@ -100,7 +100,7 @@ class FaultMonitor:
         return Joints(*(joint.winding.temperature_c for joint in self.joints))
 
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
-        """With the temperatures that the watches believe, where one is warm enough for the limits to heed it."""
+        """The states with the estimated winding temperatures, if one is warm enough to matter for the limits."""
         if all(joint.winding.temperature_c <= self._warm_c for joint in self.joints) and not any(
             state.temperature_c > self._warm_c for state in states
         ):
@@ -113,30 +113,30 @@ class FaultMonitor:
         )
 
     def update(self, tick: Tick, monitor_input: MonitorInput) -> list[Fault]:
-        """Everything that is wrong in this tick."""
+        """Return all faults of this tick."""
         found = self._loop.update(tick, monitor_input.wall_minus_monotonic_s)
         found += self._log.update(monitor_input.log)
-        self._watch_buses(found, tick.now_s)
+        self._check_buses(found, tick.now_s)
         if monitor_input.lost_lease_holder:
             found.append(FaultKind.LEASE_LOST.fault(holder=monitor_input.lost_lease_holder))
         if monitor_input.mode is Mode.BOOT and not self._drives.heard:
             return found
-        self._watch_joints(found, tick, monitor_input)
-        self._watch_trust(found, monitor_input.mode)
+        self._check_joints(found, tick, monitor_input)
+        self._check_trust(found, monitor_input.mode)
         if not monitor_input.sent.finite:
             found.append(FaultKind.TORQUE_NOT_FINITE.fault())
         if monitor_input.mode is Mode.ARMING and tick.now_s - monitor_input.mode_since_s > ARMING_S:
-            self._watch_arming(found, monitor_input.states)
-        self._watch_gate(found)
+            self._check_arming(found, monitor_input.states)
+        self._check_gate(found)
         for health in self._drives.health:
-            self._watch_drive(found, health)
+            self._check_drive(found, health)
             if health.busy_state and monitor_input.mode not in ENERGISED:
                 found.append(FaultKind.DRIVE_ENERGISED.fault(health.joint, activity=f"in {health.busy_state}"))
-        self._watch_pose(found, tick.now_s, monitor_input.body)
+        self._check_pose(found, tick.now_s, monitor_input.body)
         return found
 
-    def _watch_buses(self, found: list[Fault], now_s: float) -> None:
-        """A warning ends with the error frames: not every CAN driver tells that its controller has recovered."""
+    def _check_buses(self, found: list[Fault], now_s: float) -> None:
+        """A warning ends with the error frames: not every CAN driver reports that its controller has recovered."""
         for name, port in self._drives.ports.items():
             if (port.error_frames, port.state) != self._bus_events[name]:
                 self._bus_events[name], self._error_s[name] = (port.error_frames, port.state), now_s
@@ -153,7 +153,7 @@ class FaultMonitor:
                 ticks, why = self._refused_ticks[name], port.last_send_error
                 found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=why))
 
-    def _watch_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
+    def _check_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
         dt_s = (1 + tick.missed) * self._period_s
         for joint, health, state, torque_nm in zip(
@@ -169,27 +169,27 @@ class FaultMonitor:
             )
             found += [_explained(fault, health) for fault in joint.update(facts, state)]
 
-    def _watch_trust(self, found: list[Fault], mode: Mode) -> None:
-        """What breaks an encoder shows in some ticks only, silence in all of its own."""
+    def _check_trust(self, found: list[Fault], mode: Mode) -> None:
+        """Update the trust in the encoders: a broken one stays untrusted, a silent one only while it is silent."""
         if mode not in ENERGISED:
             self._broken.clear()
         self._broken.update(fault.subject for fault in found if fault.kind in BROKEN)
         blind = self._broken.union(fault.subject for fault in found if fault.kind in BLIND)
         self.trusted = Joints(*(joint not in blind for joint in JOINTS)) if blind else ALL_TRUSTED
 
-    def _watch_arming(self, found: list[Fault], states: DriveStates) -> None:
+    def _check_arming(self, found: list[Fault], states: DriveStates) -> None:
         for joint, state in zip(JOINTS, states, strict=True):
             if not state.closed_loop:
                 found.append(FaultKind.ARMING_FAILED.fault(joint, longest_s=ARMING_S))
 
-    def _watch_gate(self, found: list[Fault]) -> None:
+    def _check_gate(self, found: list[Fault]) -> None:
         refused = self._drives.refused_commands
         if refused > self._refused_commands:
             self._refused_commands = refused
             found.append(FaultKind.COMMAND_REFUSED.fault(reason=self._drives.last_refusal))
 
-    def _watch_drive(self, found: list[Fault], health: DriveHealth) -> None:
-        """What a drive tells of itself beside its signals."""
+    def _check_drive(self, found: list[Fault], health: DriveHealth) -> None:
+        """Check what a drive reports about itself."""
         joint = health.joint
         if health.restarts != self._restarts[joint]:
             self._restarts[joint] = health.restarts
@@ -199,10 +199,10 @@ class FaultMonitor:
         if not health.firmware_supported:
             version, supported = health.firmware or "unknown", health.supported_firmware
             found.append(FaultKind.DRIVE_VERSION.fault(joint, version=version, supported=supported))
-        self._watch_watchdog(found, joint, health.watchdog_s)
+        self._check_watchdog(found, joint, health.watchdog_s)
 
-    def _watch_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
-        """It alone acts when this program dies."""
+    def _check_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
+        """Check the drive's watchdog, the only protection if this program dies."""
         if 0.0 < watchdog_s <= self._longest_watchdog_s:
             return
         if isnan(watchdog_s):
@@ -211,7 +211,7 @@ class FaultMonitor:
             setting = f"set to {watchdog_s:g} s" if watchdog_s else "off"
             found.append(FaultKind.WATCHDOG_OFF.fault(joint, setting=setting, longest_s=self._longest_watchdog_s))
 
-    def _watch_pose(self, found: list[Fault], now_s: float, body: BodyPose) -> None:
+    def _check_pose(self, found: list[Fault], now_s: float, body: BodyPose) -> None:
         if body.stamp_s > float("-inf"):
             self._pose_stamp_s = now_s
         elif self._pose_stamp_s is not None:

@@ -1,4 +1,4 @@
-"""What the loop's own beat and clocks say: ticks missed, a rate that is not kept, a stall, a clock that was set."""
+"""Detects faults of the loop's own timing: missed ticks, a low rate, a stall, and a wall clock that was set."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from firmware_host.ticker import Tick
 
 MEAN_TICKS = 100
 CRAWL_TICKS = 5
-STEP_S = 0.1  # by which a clock on the wall does not drift between two ticks
+CLOCK_STEP_S = 0.1  # more than a wall clock drifts between two ticks
 
 
 class LoopMonitor:
-    """Owns the last stamps and the distance of the two clocks."""
+    """Owns the stamps of the last ticks and the offset between the two clocks."""
 
     def __init__(self, bounds: FaultBounds, period_s: float = PERIOD_S) -> None:
         self._period_s = period_s
@@ -24,17 +24,17 @@ class LoopMonitor:
 
     def reset(self) -> None:
         self._stamps_s: deque[float] = deque(maxlen=MEAN_TICKS + 1)
-        self._distance_s: float | None = None
+        self._clock_offset_s: float | None = None
 
     def update(self, tick: Tick, wall_minus_monotonic_s: float) -> list[Fault]:
-        found = self._watch_beat(tick)
-        before_s, self._distance_s = self._distance_s, wall_minus_monotonic_s
-        if before_s is not None and abs(wall_minus_monotonic_s - before_s) > STEP_S:
+        found = self._check_ticks(tick)
+        before_s, self._clock_offset_s = self._clock_offset_s, wall_minus_monotonic_s
+        if before_s is not None and abs(wall_minus_monotonic_s - before_s) > CLOCK_STEP_S:
             step_s = wall_minus_monotonic_s - before_s
             found.append(FaultKind.CLOCK_STEP.fault(step_s=step_s))
         return found
 
-    def _watch_beat(self, tick: Tick) -> list[Fault]:
+    def _check_ticks(self, tick: Tick) -> list[Fault]:
         found: list[Fault] = []
         missed_s = tick.missed * self._period_s
         if missed_s > self._bounds.silence_s:

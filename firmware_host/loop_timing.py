@@ -1,4 +1,4 @@
-"""How the loop keeps time: histograms in buckets of one microsecond, so a percentile is exact to that."""
+"""Measures the loop's timing in histograms with buckets of one microsecond, so percentiles are exact to that."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Histogram:
             self.max_us = duration_us
 
     def percentile_us(self, fraction: float) -> float:
-        """The duration that `share` of all did not exceed, rounded up to a microsecond."""
+        """The duration that this fraction of all durations did not exceed, rounded up to a microsecond."""
         if self.count == 0:
             return 0.0
-        wanted, seen = fraction * self.count, 0
-        for place, count in enumerate(self._counts):
-            seen += count
-            if count and seen >= wanted:
-                return self.max_us if place == LONGEST_US else float(place + 1)
+        wanted, counted = fraction * self.count, 0
+        for duration_us, count in enumerate(self._counts):
+            counted += count
+            if count and counted >= wanted:
+                return self.max_us if duration_us == LONGEST_US else float(duration_us + 1)
         return 0.0
 
     def summary(self) -> dict[str, Any]:
@@ -44,7 +44,7 @@ class Histogram:
 
 
 class LoopTiming:
-    """Owns the counts since `reset`."""
+    """Owns the histograms and counts since the last reset."""
 
     def __init__(self) -> None:
         self.wake_late = Histogram()
@@ -69,7 +69,7 @@ class LoopTiming:
 
     @property
     def rate_hz(self) -> float:
-        """Ticks that ran, per second: missed ones lower it."""
+        """Ticks that ran per second; missed ticks lower it."""
         elapsed_s = self._last_s - self._first_s
         return (self.ticks - 1) / elapsed_s if elapsed_s > 0.0 else 0.0
 

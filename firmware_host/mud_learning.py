@@ -1,7 +1,7 @@
-"""What the loop learns of the mud as it walks, and what the gait makes of it.
+"""Learns the mud's coefficients while the robot walks, and adapts the gait to them.
 
-Samples go to the estimator with the phase that the measured motion was commanded in, as the log records it. Once a
-stride, in swing, the depth of the next one is chosen; mud that might hold a flipper is entered no deeper.
+Each sample goes to the estimator together with the phase in which the measured motion was commanded, as in the log.
+Once a stride, in swing, the depth of the next stride is chosen. An insertion that meets solid mud ends early.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from estimation.mud_map import MapRow
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.control_setup import choice_text, make_adaptation
 
-FIRM_TICKS = 3  # of a load that ends an insertion: one odd sample says nothing
-KEPT_STRIDES = 200  # for clients that ask what happened
+FIRM_TICKS = 3  # of a high load end an insertion: one outlier does not
+STORED_STRIDES = 200  # for clients of the status socket
 LARGEST_N_M3 = 1e10  # 10 kN/cm³: a thousand times any mud
 
 
 class ClosedStride(NamedTuple):
-    """A stride of one flipper with the depth that was chosen from it."""
+    """A finished stride of one flipper, with the depth that was chosen after it."""
 
-    number: int  # counts all of both flippers since the start
+    number: int  # since the start, counting both flippers
     estimate: StrideEstimate
     chosen_depth_m: float
 
 
 class MudLearning:
-    """Owns the estimator, the choice of depth and the strides of late."""
+    """Owns the estimator, the choice of depth and the latest strides."""
 
     def __init__(self, configuration: Configuration) -> None:
         self.estimator = MudEstimator(
@@ -48,7 +48,7 @@ class MudLearning:
         self._firm_ticks = 0
 
     def reset(self, depth_m: float) -> None:
-        """A walk begins; the strides before it are kept."""
+        """Start a new walk; earlier strides stay stored."""
         self.estimator.reset()
         self.adaptation.reset(depth_m)
         self._firm_ticks = 0
@@ -65,10 +65,10 @@ class MudLearning:
         return self.estimator.map.rows()
 
     def step(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
-        """What this tick changes in the gait: the strides that closed, and sentences for the log."""
+        """Adapt the gait in this tick; returns the strides that closed, and messages for the log."""
         closed, messages = self._close(controller) if self.reading.strides else ([], [])
         if self._is_firm(controller) and controller.gait.end_insertion():
-            messages.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: firm mud")
+            messages.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: solid mud")
         return closed, messages
 
     def _close(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
@@ -78,11 +78,11 @@ class MudLearning:
         first = self.strides_closed
         closed = [ClosedStride(first + i, estimate, depth_m) for i, estimate in enumerate(self.reading.strides)]
         self.strides_closed += len(closed)
-        self.strides = (self.strides + closed)[-KEPT_STRIDES:]
+        self.strides = (self.strides + closed)[-STORED_STRIDES:]
         return closed, messages
 
     def _choose(self, controller: Controller) -> list[str]:
-        """The depth of the next stride, and its gait where the method chooses that as well."""
+        """Choose the depth of the next stride, and its gait if the method chooses that too; returns messages."""
         gait, order = controller.gait, controller.order
         if not order.adaptive:
             gait.next_depth_m = order.depth_m
@@ -94,7 +94,7 @@ class MudLearning:
         return [choice_text(choice)] if changes else []
 
     def _is_firm(self, controller: Controller) -> bool:
-        """Where a depth is chosen."""
+        """Whether an insertion of an adaptive walk has met solid mud."""
         limit_nm, reading = self.adaptation.largest_insertion_nm, self.reading
         firm = reading.left.adduction_torque_nm > limit_nm or reading.right.adduction_torque_nm > limit_nm
         inserting = controller.order.adaptive and controller.target.phase is Phase.INSERTION
@@ -103,7 +103,7 @@ class MudLearning:
 
     @property
     def faults(self) -> list[Fault]:
-        """Coefficients of this tick's strides that no mud has."""
+        """Faults of strides in this tick whose coefficients are beyond what any mud has."""
         wild = [stride for stride in self.reading.strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
         return [FaultKind.ESTIMATE_WILD.fault(each.flipper, stride=each.index) for each in wild]
 

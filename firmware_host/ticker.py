@@ -1,8 +1,8 @@
-"""The beat of the loop, and the only place that sleeps.
+"""The ticker paces the loop; it is the only place that sleeps.
 
 Deadlines are absolute, start + n · period, so the rate does not drift with the work done in a tick. A deadline that
-is missed by a whole period or more is skipped and counted, never made up for: two control ticks in a row on one
-stale sample are worse than a gap.
+is missed by a whole period or more is skipped and counted, and no tick makes up for it: two control ticks in a row on
+one stale sample are worse than a gap.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from control.rate import PERIOD_S
 
 class Tick(NamedTuple):
     now_s: float
-    late_s: float  # after the deadline that was waited for
-    number: int  # of the deadline, missed ones included
-    missed: int  # deadlines skipped just now
+    late_s: float  # delay of the wake-up after the deadline
+    number: int  # of the deadline, counting missed ones
+    missed: int  # deadlines skipped before this tick
 
 
 class Ticker:
@@ -34,7 +34,7 @@ class Ticker:
         self.reset()
 
     def reset(self) -> None:
-        """The first deadline is one period from now."""
+        """Set the first deadline to one period from now."""
         self._start_s = self._clock()
         self._number = 0
 

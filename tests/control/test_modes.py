@@ -181,7 +181,7 @@ def test_every_row_of_the_table_applies_for_some_input() -> None:
         for source in row.sources:
             hidden = [other for other in above if source in other.sources]
             assert any(
-                row.cause.holds(request, health) and not any(other.cause.holds(request, health) for other in hidden)
+                row.cause.is_true(request, health) and not any(other.cause.is_true(request, health) for other in hidden)
                 for request, health in product(Request, HEALTHS)
             ), (row, source)
 

@@ -40,7 +40,7 @@ def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lo
     robot.walk(WalkOrder(0.03))
     robot.run_for(walked_s)
     shutdown = Shutdown()
-    shutdown.ask(15, None)
+    shutdown.request(15, None)
     assert run_shutdown(robot, shutdown)
     assert energised(robot) == [False] * 4
     assert robot.loop.events.notice == ""  # it would say if they had stayed in the mud
@@ -55,7 +55,7 @@ def test_a_shutdown_that_nobody_wants_does_nothing(robot: Lockstep) -> None:
 def test_a_shutdown_waits_for_the_last_drive_to_be_idle(robot: Lockstep) -> None:
     lose_first_idle_requests(robot, ["left", "right"], lost=3)
     shutdown = Shutdown()
-    shutdown.ask(15, None)
+    shutdown.request(15, None)
     assert run_shutdown(robot, shutdown)
     assert energised(robot) == [False] * 4
 
@@ -78,7 +78,7 @@ def lose_first_idle_requests(robot: Lockstep, buses: list[str], lost: int) -> No
 
 def test_nothing_is_armed_while_the_daemon_ends(robot: Lockstep) -> None:
     shutdown = Shutdown()
-    shutdown.ask(15, None)
+    shutdown.request(15, None)
     shutdown.step(robot.loop, robot.now_s)
     robot.step()
     assert robot.loop.request(Request.ARM, robot.now_s) == "the daemon is ending"

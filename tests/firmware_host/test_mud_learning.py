@@ -14,7 +14,7 @@ from control.gait.gait import GaitParameters
 from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
 from estimation.mud import MudReading
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.mud_learning import FIRM_TICKS, KEPT_STRIDES, LARGEST_N_M3, MudLearning
+from firmware_host.mud_learning import FIRM_TICKS, LARGEST_N_M3, STORED_STRIDES, MudLearning
 
 GOOD = Estimate(2e6, 1e5, 100, True)
 
@@ -87,12 +87,12 @@ def test_without_a_stride_nothing_is_learned_or_said(learning: MudLearning) -> N
 
 def test_only_strides_of_late_are_kept_but_all_are_counted(learning: MudLearning) -> None:
     controller = MadeUpController(WalkOrder(0.03, adaptive=False))
-    for index in range(KEPT_STRIDES + 50):
+    for index in range(STORED_STRIDES + 50):
         learning.reading = MudReading(strides=(stride("left", index),))
         step(learning, controller)
-    assert len(learning.strides) == KEPT_STRIDES
-    assert learning.strides_closed == KEPT_STRIDES + 50
-    assert learning.strides[-1].number == KEPT_STRIDES + 49
+    assert len(learning.strides) == STORED_STRIDES
+    assert learning.strides_closed == STORED_STRIDES + 50
+    assert learning.strides[-1].number == STORED_STRIDES + 49
 
 
 def test_a_new_walk_keeps_the_strides_before_it(learning: MudLearning) -> None:
@@ -139,7 +139,7 @@ def test_the_end_of_an_insertion_is_told_once(learning: MudLearning) -> None:
     load = NO_LOAD._replace(adduction_torque_nm=10.0)
     learning.reading = MudReading(left=load, right=load)
     reported = [message for _ in range(10) for message in step(learning, controller)[1]]
-    assert reported == ["insertion ended at 0.0300 m: firm mud"]
+    assert reported == ["insertion ended at 0.0300 m: solid mud"]
 
 
 # nonsense

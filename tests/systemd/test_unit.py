@@ -114,7 +114,7 @@ def test_a_wrong_configuration_is_not_tried_again(unit: Settings) -> None:
 
 
 def test_systemd_waits_longer_than_the_daemon_ever_takes_to_end(unit: Settings) -> None:
-    longest_s = daemon.LONGEST_SHUTDOWN_S + daemon.GOODBYE_S + daemon.LONGEST_LOG_CLOSE_S
+    longest_s = daemon.LONGEST_SHUTDOWN_S + daemon.IDLING_S + daemon.LONGEST_LOG_CLOSE_S
     assert seconds(unit, "TimeoutStopSec") > longest_s + 2.0
 
 
