@@ -110,7 +110,7 @@ def test_no_log_is_copied_before_the_robot_obeys_and_a_failed_copy_is_reported(
             robot.call("walk", depth_m=0.03)
         assert robot.copy_logs(tmp_path) == []
         arm(robot)
-        with pytest.raises(BenchError, match=r"/gone/.*: No such file or directory; it stays in .*/logs, copy it from"):
+        with pytest.raises(BenchError, match=r"/gone/.*: No such file or directory; it remains in .*/logs, copy it from"):
             robot.copy_logs(tmp_path / "gone")
     finally:
         robot.close()
@@ -119,7 +119,7 @@ def test_no_log_is_copied_before_the_robot_obeys_and_a_failed_copy_is_reported(
 def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> None:  # noqa: F811
     first = DaemonRobot(bench.socket)
     try:
-        with pytest.raises(BenchError, match="operates the robot: wait until it has ended"):
+        with pytest.raises(BenchError, match="operates the robot: wait for its end"):
             DaemonRobot(bench.socket)
         arm(first)
         for command in (("move", "left_sweep=3"), ("walk",), ("walk", "--attended")):
@@ -145,6 +145,6 @@ def test_a_robot_that_another_program_took_over_is_left_alone(bench: Bench) -> N
             operate()
     robot.close()
     assert bench.run("walk").returncode == exit_codes.OK
-    with pytest.raises(BenchError, match="the robot is walking: wait for its end, or 'mudskipper stop' it"):
+    with pytest.raises(BenchError, match="the robot is walking: wait for its end, or 'mudskipper stop'"):
         DaemonRobot(bench.socket)
     assert bench.wait_for(lambda status: status["lease"] is None)["mode"] == "walking"
