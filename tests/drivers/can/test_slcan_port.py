@@ -165,7 +165,7 @@ def test_a_frame_that_the_adapter_refuses_is_a_failed_send(bench: Bench) -> None
     assert bench.port.last_send_error == "the adapter refused a frame"
 
 
-def test_garbled_lines_are_counted_and_hide_nothing(bench: Bench) -> None:
+def test_malformed_lines_are_counted_and_hide_nothing(bench: Bench) -> None:
     bench.write(b"tG0980001020304050607\rt00\rt0093GG\r\xff\xfe\r" + LINES[1])
     assert bench.receive() == [FRAMES[1]]
     assert bench.port.error_frames == 3  # python-can takes the one without a letter for an answer

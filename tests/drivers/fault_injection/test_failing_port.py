@@ -255,7 +255,7 @@ def test_random_errors_are_never_none_and_leave_the_state_as_it_is() -> None:
     assert {state for _, state in reported} == {AxisState.CLOSED_LOOP}
 
 
-def test_a_garbled_heartbeat_of_a_drive_with_an_error_stays_garbled() -> None:
+def test_a_malformed_heartbeat_of_a_drive_with_an_error_stays_malformed() -> None:
     failures, bus = Failures(("left",)), MockBus()
     robot, inner = bus.open(), bus.open()
     port = FailingPort("left", inner, DRIVES, failures)

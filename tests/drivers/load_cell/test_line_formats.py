@@ -36,7 +36,7 @@ def test_a_line_is_read(name: str, line: bytes, value: float, unit: str) -> None
 
 @pytest.mark.parametrize("line", [b"", b"hello", b"12.3.4", b"12\xff4", b"--5", b"1,2", b"ST,GS", b"12 34"])
 @pytest.mark.parametrize("name", ["number", "indicator"])
-def test_a_garbled_line_is_none(name: str, line: bytes) -> None:
+def test_a_malformed_line_is_none(name: str, line: bytes) -> None:
     assert LineFormat(name).decode(line) is None
 
 
@@ -64,7 +64,7 @@ def test_no_bytes_break_a_format(line: bytes, name: str) -> None:
     assert reading is None or reading.overloaded or isfinite(reading.value)
 
 
-def test_a_number_beyond_all_numbers_is_garbled() -> None:
+def test_a_number_beyond_all_numbers_is_malformed() -> None:
     assert LineFormat("number").decode(b"1e999") is None
 
 

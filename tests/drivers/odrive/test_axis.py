@@ -289,7 +289,7 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
 
 
 @pytest.mark.parametrize(("endpoint", "value"), [(219, "02"), (218, "0000c07f"), (218, "000080bf"), (218, "0000")])
-def test_a_setting_that_makes_no_sense_is_garbled_and_stays_unknown(bench: Bench, endpoint: int, value: str) -> None:
+def test_a_setting_that_makes_no_sense_is_malformed_and_stays_unknown(bench: Bench, endpoint: int, value: str) -> None:
     bench.report(GET_VERSION, *PRO)
     bench.report_setting(219, "01")
     bench.read(0.1)

@@ -100,7 +100,7 @@ def test_the_dbc_knows_the_same_error_flags_and_axis_states() -> None:
 
 @pytest.mark.parametrize("name", WHOLE)
 @given(data=st.binary(max_size=64))
-def test_any_bytes_of_another_length_are_garbled(name: str, data: bytes) -> None:
+def test_any_bytes_of_another_length_are_malformed(name: str, data: bytes) -> None:
     golden = next(bytes.fromhex(golden) for golden_name, _, _, golden in GOLDEN if golden_name == name)
     if len(data) == len(golden):
         assert len(MESSAGES[name].decode(data)) == len(in_dbc(name).signals)

@@ -166,7 +166,7 @@ def known_frame(message: Message, data: bytes, **flags: bool) -> Frame:
     return Frame(arbitration_id(0, message), data, **flags)
 
 
-GARBLED = [
+MALFORMED = [
     known_frame(GET_ENCODER_ESTIMATES, bytes(7)),
     known_frame(GET_ENCODER_ESTIMATES, pack("<ff", nan, 0.0)),
     known_frame(GET_ENCODER_ESTIMATES, pack("<ff", 0.0, -inf)),
@@ -187,15 +187,17 @@ UNKNOWN = [
 ]
 
 
-@pytest.mark.parametrize(("frames", "garbled", "unknown"), [(GARBLED, len(GARBLED), 0), (UNKNOWN, 0, len(UNKNOWN))])
-def test_garbled_and_unknown_frames_are_counted_and_change_nothing(
-    bench: Bench, frames: list[Frame], garbled: int, unknown: int
+@pytest.mark.parametrize(
+    ("frames", "malformed", "unknown"), [(MALFORMED, len(MALFORMED), 0), (UNKNOWN, 0, len(UNKNOWN))]
+)
+def test_malformed_and_unknown_frames_are_counted_and_change_nothing(
+    bench: Bench, frames: list[Frame], malformed: int, unknown: int
 ) -> None:
     before = bench.report_everything(1.0)
     for frame in frames:
         bench.far["left"].send(frame)
     assert bench.drives.read(2.0) == before
-    assert (bench.drives.malformed_frames, bench.drives.unknown_frames) == (garbled, unknown)
+    assert (bench.drives.malformed_frames, bench.drives.unknown_frames) == (malformed, unknown)
 
 
 def understood(frame: Frame, node_ids: tuple[int, int]) -> bool:
@@ -358,7 +360,7 @@ def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Benc
 
 def test_a_reset_forgets_everything(bench: Bench) -> None:
     bench.report_everything(1.0)
-    bench.far["left"].send(GARBLED[0])
+    bench.far["left"].send(MALFORMED[0])
     bench.drives.read(1.0)
     bench.drives.reset()
     assert not bench.drives.heard

@@ -182,7 +182,7 @@ def test_bodies_are_found_by_name(version: NatNetVersion) -> None:
 
 
 @each_version
-def test_a_packet_that_is_cut_off_anywhere_is_garbled(version: NatNetVersion) -> None:
+def test_a_packet_that_is_cut_off_anywhere_is_malformed(version: NatNetVersion) -> None:
     """By its header; and so it is where the header was made to fit, unless only the final zero is missing."""
     whole = packet_of(version)
     layout = FrameLayout(version)
@@ -212,7 +212,7 @@ def test_garbage_raises_only_the_error_for_malformed_packets(data: bytes, versio
 
 
 @each_version
-def test_a_packet_of_which_bytes_were_changed_is_garbled_or_holds_numbers(version: NatNetVersion) -> None:
+def test_a_packet_of_which_bytes_were_changed_is_malformed_or_holds_numbers(version: NatNetVersion) -> None:
     """It also ends quickly, with any count in it."""
     chance = random.Random(1)
     whole = packet_of(version)

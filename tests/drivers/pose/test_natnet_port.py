@@ -198,7 +198,7 @@ def test_a_pose_ends_when_it_is_stale(open_laboratory: Open) -> None:
     assert 0.49 + STALE_S - FRAME_S < last_s <= 0.5 + STALE_S
 
 
-def test_garbled_and_foreign_packets_are_counted_and_cost_nothing_else(open_laboratory: Open) -> None:
+def test_malformed_and_foreign_packets_are_counted_and_cost_nothing_else(open_laboratory: Open) -> None:
     lab = open_laboratory(moving(0.5))
     assert known(lab.run(0.4))
     frame = encode_frame(lab.server.version, 1, [], FrameTimes(0.0, 0, 0, 0))

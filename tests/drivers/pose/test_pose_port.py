@@ -83,11 +83,11 @@ def test_any_bytes_are_a_finite_pose_or_counted(tmp_path_factory: pytest.TempPat
 
     @given(st.binary(max_size=80) | st.binary(min_size=16, max_size=16))
     def examine(data: bytes) -> None:
-        garbled = port.malformed_messages
+        malformed = port.malformed_messages
         port.reset()
         send_bytes(path, data)
         pose = port.read(1.0)
-        assert (port.malformed_messages - garbled) + (pose.stamp_s == 1.0 and abs(pose.x_m) < float("inf")) == 1
+        assert (port.malformed_messages - malformed) + (pose.stamp_s == 1.0 and abs(pose.x_m) < float("inf")) == 1
 
     examine()
     port.close()

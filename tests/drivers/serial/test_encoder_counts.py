@@ -15,7 +15,7 @@ def test_a_labelled_count_is_a_position(line: bytes) -> None:
 
 
 @pytest.mark.parametrize("line", [b"250", b"x250.5", b"y:250", b"x", b"", b"x 2 5", b"\xff"])
-def test_what_is_no_count_is_garbled(line: bytes) -> None:
+def test_what_is_no_count_is_malformed(line: bytes) -> None:
     counts = EncoderCounts(1e-3, "x")
     assert counts.accept(line, 0.0) is None
     assert (counts.accepted, counts.malformed) == (0, 1)
