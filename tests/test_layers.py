@@ -20,7 +20,7 @@ LAYERS = [
     ("control",),
     ("estimation", "drivers"),
     ("firmware_host",),
-    ("simulation",),
+    ("simulation", "mudskipper"),
     ("experiments",),
     ("command_line",),
 ]

@@ -106,7 +106,7 @@ def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Wat
 
 def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
     """Return a walk of a log that was read already; `path` is for messages. Raises LogError."""
-    configuration = configuration_of(path, log)
+    configuration = configuration_of(path, log.configuration_text)
     borders = np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
     starts, ends = borders[::2], borders[1::2]
     _refuse_number(path, number, len(starts))

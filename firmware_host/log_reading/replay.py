@@ -92,7 +92,7 @@ def replay_log(
     watch: Watch = unwatched,
 ) -> Replay:
     """With the configuration that the log carries, unless another one is given."""
-    configuration = configuration or configuration_of(path, log)
+    configuration = configuration or configuration_of(path, log.configuration_text)
     parameters = _by_method(configuration.estimation, method)
     drag_n = configuration.adaptation.body_drag_n
     estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
@@ -100,10 +100,10 @@ def replay_log(
     return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete, segment_of(log), begin_s(log))
 
 
-def configuration_of(path: Path, log: Log) -> Configuration:
-    """That the log carries. Raises LogError."""
+def configuration_of(path: Path, text: str) -> Configuration:
+    """Parses the configuration that a log carries. Raises LogError."""
     try:
-        return parse_configuration(log.configuration_text)
+        return parse_configuration(text)
     except ConfigurationError as problem:
         raise LogError(f"{path}: its configuration is not one of this version: {problem.problems[0]}") from problem
 

@@ -1,0 +1,26 @@
+"""The public interface for people's own scripts and notebooks.
+
+`open_log` reads a log into numpy arrays, `replay` estimates the mud from a log again, and `Client` operates a robot
+through the daemon's socket.
+"""
+
+from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.log_reading.log_reader import LogError
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError
+from firmware_host.software_version import software_version
+from mudskipper.client import Client
+from mudskipper.logs import OpenedLog, open_log, replay
+
+__version__ = software_version()
+__all__ = [
+    "CallRefusedError",
+    "Client",
+    "ConfigurationError",
+    "LogError",
+    "NoDaemonError",
+    "NotPermittedError",
+    "OpenedLog",
+    "__version__",
+    "open_log",
+    "replay",
+]

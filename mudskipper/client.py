@@ -1,0 +1,112 @@
+"""Operates a robot through the daemon's socket."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from firmware_host.configuration.configuration import StatusParameters
+from firmware_host.operator.status_client import StatusClient
+
+POLL_S = 0.05
+Report = dict[str, Any]
+
+
+class Client:
+    """Owns a connection to the daemon; use it in a `with` statement.
+
+    With `lease_s`, the orders that move the robot take a lease of so many seconds: the robot stops by itself when the
+    lease ends, and no other program moves the robot meanwhile. `wait_for` renews the lease, and leaving the `with`
+    statement releases it. All methods raise NoDaemonError where no daemon answers, CallRefusedError with the daemon's
+    reason where it refuses an order, and NotPermittedError.
+    """
+
+    def __init__(self, socket: str | Path | None = None, lease_s: float = 0.0) -> None:
+        """`socket`: the environment's MUDSKIPPER_SOCKET where it is not given, or else the default path."""
+        path = socket or os.environ.get("MUDSKIPPER_SOCKET") or StatusParameters().socket
+        self._client = StatusClient(Path(path))
+        self._lease = {"lease_s": lease_s} if lease_s else {}
+        self._leased = False
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Without a release, the end of the connection stops a robot that this client moves."""
+        try:
+            if self._leased and kind is None:
+                self.release()
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        self._client.close()
+
+    def status(self) -> Report:
+        """Returns mode, faults, joints, mud and log of the robot (docs/reference/socket.md)."""
+        return dict(self._client.call("status"))
+
+    def check(self) -> list[Report]:
+        """Returns every condition of arming with `ok`, `text` and `fix`."""
+        return list(self._client.call("check"))
+
+    def strides(self, since: int = 0) -> list[Report]:
+        """Returns the strides closed since that number, a limited number at a time."""
+        return list(self._client.call("strides", since=since))
+
+    def map(self) -> list[Report]:
+        """Returns the mud along the track since the walk began."""
+        return list(self._client.call("map"))
+
+    def arm(self, force: bool = False) -> None:
+        """Energises the joints; `force` overrules the faults that are not mandatory."""
+        self._move("arm", force=force)
+
+    def walk(self, strides: int = 0, depth_m: float | None = None) -> None:
+        """Walks so many strides (0: without end), at a fixed depth or at depths that adapt to the mud."""
+        self._move("walk", strides=strides, **({} if depth_m is None else {"depth_m": depth_m}))
+
+    def move(self, **angles_rad: float) -> None:
+        """Moves joints slowly while the robot holds: `move(left_sweep_rad=0.1, right_sweep_rad=0.1)`."""
+        self._move("move", **angles_rad)
+
+    def _move(self, method: str, **params: Any) -> None:
+        self._client.call(method, **params, **self._lease)
+        self._leased = bool(self._lease)
+
+    def stop(self) -> None:
+        """Ends the walk with raised flippers; no lease is needed."""
+        self._client.call("stop")
+
+    def disarm(self) -> None:
+        """Switches the torque off; no lease is needed."""
+        self._client.call("disarm")
+
+    def clear(self) -> None:
+        """Clears faults whose cause has ended."""
+        self._client.call("clear")
+
+    def renew(self) -> None:
+        """Renews the lease."""
+        self._client.call("lease", for_s=self._lease["lease_s"])
+
+    def release(self) -> None:
+        """Ends the lease."""
+        self._client.call("release")
+        self._leased = False
+
+    def wait_for(self, mode: str, timeout_s: float = 30.0) -> Report:
+        """Returns the status once the robot is in a mode such as "hold". Raises TimeoutError; renews the lease."""
+        deadline_s = time.monotonic() + timeout_s
+        while (report := self.status())["mode"] != mode:
+            if time.monotonic() > deadline_s:
+                raise TimeoutError(f"the robot is in mode {report['mode']} after {timeout_s:g} s, not in {mode}")
+            if self._leased:
+                self.renew()
+            time.sleep(POLL_S)
+        return report

@@ -1,0 +1,49 @@
+"""A program of one's own operates the simulated robot, in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import mudskipper
+from tests.command_line.conftest import Bench
+from tests.mudskipper.test_examples import run_example
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    made = Bench(tmp_path_factory.mktemp("b"), tmp_path_factory.mktemp("logs"))
+    try:
+        made.wait_until_ready()
+        yield made
+    finally:
+        made.end()
+
+
+def test_the_example_walks_three_strides(bench: Bench) -> None:
+    lines = run_example("operate_robot.py", MUDSKIPPER_SOCKET=str(bench.socket)).splitlines()
+    assert sum("k_p = " in line for line in lines) == 6
+
+
+def test_joints_move_under_a_lease(bench: Bench) -> None:
+    bench.wait_until_ready()
+    with mudskipper.Client(bench.socket, lease_s=1.0) as robot:
+        robot.arm()
+        assert robot.wait_for("hold")["lease"]
+        robot.move(left_sweep_rad=0.2)
+        with pytest.raises(mudskipper.CallRefusedError), mudskipper.Client(bench.socket) as other:
+            other.walk(1)
+        robot.disarm()
+        robot.wait_for("idle")
+    with mudskipper.Client(bench.socket) as robot:
+        assert robot.status()["lease"] is None
+        with pytest.raises(TimeoutError):
+            robot.wait_for("walking", timeout_s=0.1)
+
+
+def test_the_socket_s_path_is_that_of_the_environment(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUDSKIPPER_SOCKET", str(bench.socket))
+    with mudskipper.Client() as robot:
+        assert robot.map() is not None and robot.check() and Path(robot.status()["log"]["path"]).exists()
