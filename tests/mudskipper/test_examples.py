@@ -35,7 +35,7 @@ def test_a_log_is_arrays_by_field_name() -> None:
     assert log.ticks["phase"].max() >= Phase.SWING
     assert log.strides["k_p"].tolist() == [stride["k_p"] for stride in read.strides]
     assert log.events["text"].tolist() == [event["text"] for event in read.events]
-    assert log.configuration.robot.name == log.metadata["robot"]
+    assert log.configuration.robot.name == "mudskipper" and log.metadata["robot"] == "test"
     assert log.complete and not log.unknown_fields
 
 
@@ -47,8 +47,9 @@ def test_a_log_without_strides_has_their_fields(tmp_path: Path) -> None:
 
 
 def test_a_replay_is_that_of_the_command() -> None:
-    assert mudskipper.replay(LOG).strides == replay_file(LOG).strides
-    assert mudskipper.replay(str(LOG), method="paper").strides != replay_file(LOG).strides
+    expected = repr(replay_file(LOG).strides)  # in which NaN equals NaN
+    assert repr(mudskipper.replay(LOG).strides) == expected
+    assert repr(mudskipper.replay(str(LOG), method="paper").strides) != expected
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
