@@ -6,7 +6,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --nitpicky --quiet
 
 # These tests run a robot in real time or depend on their order: they run one after the other, with nothing next to them.
-SERIAL := bench $(addprefix command_line/,experiments/test_actuator.py operation/test_attended_walk.py demo/test_demo.py doctor/test_doctor.py operation/test_failing.py operation/test_operation.py test_permission.py) $(addprefix experiments/,bench/test_rig.py robot/test_daemon_robot.py)
+SERIAL := bench $(addprefix command_line/,experiments/test_actuator.py operation/test_attended_walk.py demo/test_demo.py doctor/test_doctor.py operation/test_failing.py operation/test_operation.py test_permission.py) $(addprefix experiments/,bench/test_rig.py robot/test_daemon_robot.py) mudskipper/test_client.py
 
 # Ends a test that hangs, and prints where it hangs.
 PYTEST := $(BIN)/python -m pytest -q --durations=10 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
