@@ -110,7 +110,7 @@ def test_no_log_is_copied_before_the_robot_obeys_and_a_failed_copy_is_reported(
             robot.call("walk", depth_m=0.03)
         assert robot.copy_logs(tmp_path) == []
         arm(robot)
-        with pytest.raises(BenchError, match=r"/gone/.*: No such file or directory; it remains in .*/logs, copy it from"):
+        with pytest.raises(BenchError, match=r"/gone/.*: No such file or directory; it remains in .*/logs, copy it"):
             robot.copy_logs(tmp_path / "gone")
     finally:
         robot.close()
