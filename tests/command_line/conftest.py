@@ -1,25 +1,27 @@
-"""A simulated robot and a real daemon as processes, operated through the command line."""
+"""Runs a simulated robot and a real daemon as processes, operated through the command line."""
 
 from __future__ import annotations
 
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from firmware_host.operator.status_client import NoDaemonError, StatusClient
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from tests.command_line.command_lines import run
 from tests.waiting import LONGEST_S
 
 
 class Bench:
-    """Owns the processes of one test. `run` is what a person types."""
+    """Owns the processes of one robot. `run` is what an operator types."""
 
     def __init__(self, folder: Path, logs: Path) -> None:
         self.folder, self.logs = folder, logs
@@ -49,10 +51,39 @@ class Bench:
             if done(report):
                 return report
             time.sleep(0.02)
-        raise AssertionError(f"it never came to that: {report.get('mode')} {report.get('fault')}")
+        raise AssertionError(f"never reached: {report.get('mode')} {report.get('fault')}")
 
     def wait_until_ready(self) -> None:
         self.wait_for(lambda report: bool(report["mode"] == "idle" and report["fault"] is None))
+
+    def reset(self) -> None:
+        """Ends what the test before left: failures, torque, joints beyond their limits, faults."""
+        client = StatusClient(self.socket)
+        client.call("fail", component="all", kind="ok")
+        client.call("disarm")
+        self.wait_for(lambda report: report["mode"] in ("idle", "fault"))
+        self.robot.send_signal(signal.SIGUSR1)  # moves the joints back
+        with suppress(CallRefusedError):  # as long as they are beyond their limits
+            client.call("clear")
+        self.wait_for(lambda report: report["mode"] in ("idle", "fault") and not report["failing"])
+        while client.call("status")["fault"]:
+            with suppress(CallRefusedError):
+                client.call("clear")
+            time.sleep(0.05)
+        client.close()
+        self.wait_until_ready()
+
+    def stop_daemon(self) -> Path:
+        """Ends it in order; returns its only log."""
+        self.daemon.send_signal(signal.SIGTERM)
+        assert self.daemon.wait(LONGEST_S) == 0
+        (path,) = (self.logs / "done").glob("*.mcap")
+        return path
+
+    def restart_daemon(self) -> None:
+        assert self.daemon.stderr is not None
+        self.daemon.stderr.close()
+        self.daemon = self.start("firmware_host.daemon")
 
     def end(self) -> None:
         for process in (self.daemon, self.robot):
@@ -63,11 +94,32 @@ class Bench:
             process.stderr.close()
 
 
-@pytest.fixture
-def bench(short_folder: Path, tmp_path: Path) -> Iterator[Bench]:
-    made = Bench(short_folder, tmp_path / "logs")
-    try:
-        made.wait_until_ready()
+@contextmanager
+def running_bench(logs: Path) -> Iterator[Bench]:
+    with tempfile.TemporaryDirectory(prefix="mud-") as folder:
+        made = Bench(Path(folder), logs)
+        try:
+            made.wait_until_ready()
+            yield made
+        finally:
+            made.end()
+
+
+@pytest.fixture(scope="module")
+def module_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with running_bench(tmp_path_factory.mktemp("bench") / "logs") as made:
         yield made
-    finally:
-        made.end()
+
+
+@pytest.fixture
+def bench(module_bench: Bench) -> Bench:
+    """A robot at rest that the tests of a module share: they leave both processes running."""
+    module_bench.reset()
+    return module_bench
+
+
+@pytest.fixture
+def own_bench(tmp_path: Path) -> Iterator[Bench]:
+    """A robot whose processes the test may end."""
+    with running_bench(tmp_path / "logs") as made:
+        yield made
