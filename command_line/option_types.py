@@ -1,4 +1,4 @@
-"""What a person may type for a number: each kind with its bounds, refused in a sentence."""
+"""Parses the values of options and refuses those outside their bounds, in the unit that the user typed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
-    """A number within its bounds."""
+    """Returns a parser of numbers from `low` to `high`."""
 
     def value_of(text: str) -> float:
         value = _number(text)
@@ -22,7 +22,7 @@ def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:
-    """A whole number within its bounds."""
+    """Returns a parser of whole numbers from `low` to `high`."""
 
     def value_of(text: str) -> int:
         value = _number(text)
@@ -34,7 +34,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
 
 
 def _number(text: str) -> float:
-    """NaN for what is none, which no bounds let through."""
+    """Returns NaN for a text that is no number; every bound refuses it."""
     with suppress(ValueError):
         return float(text)
     return nan
@@ -66,20 +66,20 @@ def joint_angle(text: str) -> tuple[str, float]:
     with suppress(ValueError):
         if joint and isfinite(float(angle_deg)):
             return joint, float(angle_deg)
-    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, as left_sweep=10")
+    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, such as left_sweep=10")
 
 
 def mud_length(text: str) -> tuple[str, float]:
-    """A mud's name, and its length in cm: the paper's where none is given."""
+    """Parses NAME or NAME=CM; the default length is that of the paper."""
     name, _, length_cm = text.partition("=")
     value = _number(length_cm or "61")
     if not (name and 20.0 <= value <= 10000.0):
-        raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length from 20 to 10000 cm, as 47.6=61")
+        raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length from 20 to 10000 cm, such as 47.6=61")
     return name, value
 
 
 def plate_cm(text: str) -> tuple[float, float, float]:
-    """3x3.5 or, with its thickness, 3x3.5x0.4."""
+    """Parses 3x3.5 or, with its thickness, 3x3.5x0.4."""
     sides = text.lower().removesuffix("cm").split("x")
     if len(sides) not in (2, 3):
         raise argparse.ArgumentTypeError(f"{text}: must be width x height, or width x height x thickness, in cm")
@@ -102,10 +102,10 @@ def weights_g(text: str) -> tuple[float, ...]:
 
 
 def folder(text: str) -> Path:
-    """That there is, or that can be made."""
+    """Accepts an existing folder and one that can be made."""
     path = Path(text)
     if path.exists() and not path.is_dir():
-        raise argparse.ArgumentTypeError(f"{text}: is no folder")
+        raise argparse.ArgumentTypeError(f"{text}: must be a folder")
     return path
 
 

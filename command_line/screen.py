@@ -1,4 +1,4 @@
-"""How things look on a terminal: colours where a person sees them, none where the output is piped."""
+"""Formats text for a terminal: tables, colours, progress. Piped output has no colours."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
 
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
-PATIENCE_S = 2.0  # of a person who sees nothing
-SOON_S = 0.1
+QUIET_S = 2.0  # before progress is shown
+REFRESH_S = 0.1
 BAR_WIDTH = 20  # characters
 
 
@@ -25,7 +25,7 @@ def coloured(text: str, colour: str) -> str:
 
 
 def size_text(size: float) -> str:
-    """Of bytes."""
+    """Formats a number of bytes."""
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
 
 
@@ -35,17 +35,16 @@ def bar(done: int, total: int) -> str:
 
 
 class Progress:
-    """One line on a terminal's standard error while something takes its time; silent anywhere else."""
+    """Shows progress in one line on the terminal of standard error, after `quiet_s`; shows nothing elsewhere."""
 
-    def __init__(self, what: str, patience_s: float = 0.0) -> None:
-        """Silent too for as long as the patience lasts."""
+    def __init__(self, what: str, quiet_s: float = 0.0) -> None:
         self._what = what
         self._shown = sys.stderr.isatty()
-        self._interval_s = SOON_S if patience_s else 0.0  # what is watched row by row is shown now and then
-        self._due_s = time.monotonic() + patience_s
+        self._interval_s = REFRESH_S if quiet_s else 0.0  # rows come faster than a terminal draws
+        self._due_s = time.monotonic() + quiet_s
 
     def follow(self, what: str, done: int, total: int) -> None:
-        """Of something that comes in several stretches."""
+        """Shows a part of the work that has its own count."""
         self._what = what
         self.show(done, total)
 
@@ -61,8 +60,8 @@ class Progress:
 
 @contextmanager
 def watched() -> Iterator[Callable[[str, int, int], None]]:
-    """Something that a person may have to wait for: what is done, how far, of how much."""
-    progress = Progress("", PATIENCE_S)
+    """Yields a function that shows progress: what is done, how much, of how much."""
+    progress = Progress("", QUIET_S)
     try:
         yield progress.follow
     finally:
@@ -70,13 +69,13 @@ def watched() -> Iterator[Callable[[str, int, int], None]]:
 
 
 def complain(*messages: str) -> None:
-    """To a person, beside the data."""
+    """Prints messages to standard error."""
     for message in messages:
         print(f"mudskipper: {message}", file=sys.stderr)
 
 
 def coefficient(estimate: dict[str, Any]) -> str:
-    """In N/cm³ with its standard error; after a ≥ where it is a lower bound, in brackets where it is not valid."""
+    """Formats an estimate in N/cm³ with its standard error; ≥ marks a lower bound, brackets an invalid one."""
     if estimate["value"] is None or estimate["std_error"] is None:
         return "-"
     text = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
@@ -95,7 +94,7 @@ STRIDE_UNITS = (
 
 
 def stride_line(stride: dict[str, Any], start_s: float = 0.0) -> str:
-    """One stride of one flipper: when, how long its phases took, what it said of the mud, and what came of it."""
+    """Formats one stride of one flipper: time, durations of its phases, estimates, depth and step."""
     chosen_m = stride.get("chosen_depth_m")
     return (
         f"{stride['flipper']:7} {stride['index']:3d} {stride['t_end_s'] - start_s:7.2f} "

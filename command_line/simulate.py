@@ -1,4 +1,4 @@
-"""`mudskipper simulate`: the robot without its controller, for a daemon that is started by hand."""
+"""Runs `mudskipper simulate`: the simulated robot alone, for a daemon in another terminal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def simulate(options: argparse.Namespace) -> int:
         return exit_codes.USAGE
     try:
         if options.world:
-            complain(*load_world(options.world).warnings)  # before anything is written; the peer reads it itself
+            complain(*load_world(options.world).warnings)  # before anything is written; the peer reads it again
         path = options.config or _local_configuration(options.bus)
     except ConfigurationError as problem:
         complain(*problem.problems)
@@ -48,5 +48,5 @@ def _local_configuration(bus: str) -> Path:
     programs = Path(sys.executable).parent
     print(f"Simulating, until Ctrl-C. In other terminals:\n  {programs}/mudskipperd --config {path}")
     print(f"  export MUDSKIPPER_SOCKET={folder}/mudskipper.sock; {programs}/mudskipper status")
-    print(f"Where the joints lie beyond their limits, 'kill -USR1 {os.getpid()}' moves them back by hand.", flush=True)
+    print(f"'kill -USR1 {os.getpid()}' moves joints back that lie beyond their limits.", flush=True)
     return path

@@ -1,7 +1,6 @@
-"""`mudskipper demo`: a simulated robot as a process of its own, the real daemon against it, and a walk over three muds.
+"""Runs `mudskipper demo`: the real daemon against a simulated robot, in real time, over three muds.
 
-Everything happens in real time and through the interfaces that a person or a program would use. It ends with a
-summary, a plot and the log.
+It uses the interfaces that operators and their programs use, and ends with a summary, a plot and the log.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from typing import Any
 from command_line import exit_codes
 from command_line.demo.demo_summary import summarise, summary_text
 from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
+from command_line.json_output import with_schema
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from experiments.reports.mud_names import mud_text
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -46,14 +46,14 @@ def demo(options: argparse.Namespace) -> int:
 
 
 def _on_signals() -> None:
-    """They all end the demo as Ctrl-C does."""
+    """Lets all ending signals end the demo as Ctrl-C does."""
     for number in ENDING_SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup wants it
+        if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
             signal.signal(number, signal.default_int_handler)
 
 
 def _refuse(options: argparse.Namespace) -> int | None:
-    """What cannot be is refused before anything starts: the exit status, or None."""
+    """Returns the exit status if the options cannot work, before anything starts."""
     try:
         if options.world:
             load_world(options.world)
@@ -70,7 +70,7 @@ def _refuse(options: argparse.Namespace) -> int | None:
 def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
     print("Starting a simulated robot and the daemon ...", flush=True)
     with running_demo(options.out, options.seed, options.world) as demonstration:
-        os.nice(5)  # whoever watches gives way to those who work
+        os.nice(5)  # the display gives way to robot and daemon
         demonstration.connect()
         print("Arming ...", flush=True)
         demonstration.arm()
@@ -89,16 +89,16 @@ def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
 
 
 def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> None:
-    """Summary, plot, and the JSON if wanted."""
+    """Prints the summary, draws the plot, and writes the JSON if asked for."""
     log_path = present_path(Path(report["log"]["path"]))
     log = read_log(log_path)
     plot_path = options.out / log_path.with_suffix(".png").name
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
     from experiments.pictures.recorded_walk import read_walk
-    from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time; the walk must not wait for it
+    from experiments.pictures.walk_plot import plot_walk  # matplotlib loads slowly; the walk must not wait
 
     plot_walk(read_walk(log_path), plot_path, demonstration.track)
     print(f"plot     {plot_path}")
     if options.json:
-        options.json.write_text(json.dumps(summary, indent=1) + os.linesep, encoding="utf-8")
+        options.json.write_text(json.dumps(with_schema("demo", summary), indent=1) + os.linesep, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What a demo's walk came to: strides with their mud, speeds, and how well the loop kept its time."""
+"""Summarises a demo: its strides with their mud, the speed in each mud, and the timing of the loop."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from firmware_host.log_reading.log_reader import Log
 from firmware_host.operator.counted_nouns import counted
 from simulation.mud.track import Track
 
-LEAD_M = 0.06  # the flippers are in the mud about this far ahead of the body's middle when a stride begins
+LEAD_M = 0.06  # distance of the flippers ahead of the body's middle when a stride begins
 
 
 def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: P
 
 
 def walked_path(log: Log) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-    """(time in s, body's place in m) of the ticks in which the robot walked and its pose was known."""
+    """Returns time in s and position in m of the ticks in which the robot walked with a known pose."""
     rows = log.ticks[(log.ticks["mode"] == Mode.WALKING) & np.isfinite(log.ticks["body_x_m"])]
     return rows["stamp_s"], rows["body_x_m"]
 
@@ -44,7 +44,7 @@ def walked_path(log: Log) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
 def speeds_cm_s(
     stamps_s: np.ndarray[Any, Any], positions_m: np.ndarray[Any, Any], track: Track
 ) -> dict[str, float | None]:
-    """Mean speed between the first arrival in each mud and the first arrival in the next."""
+    """Returns the mean speed from the first arrival in each mud to the first arrival in the next."""
     speeds: dict[str, float | None] = {}
     start_m = float(positions_m[0]) if len(positions_m) else 0.0
     for segment in track.segments:
@@ -53,7 +53,7 @@ def speeds_cm_s(
         first = int(inside[0]) if len(inside) else -1
         last = int(beyond[0]) if len(beyond) else len(positions_m) - 1
         name = segment.clay.name
-        if name in speeds:  # the same mud once more
+        if name in speeds:  # the same mud again
             name = f"{name} at {start_m:.2f} m"
         speeds[name] = None
         if 0 <= first < last:

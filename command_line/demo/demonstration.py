@@ -1,7 +1,7 @@
-"""A simulated robot and the real daemon as processes of their own, with a client that makes the robot walk.
+"""Runs a simulated robot and the real daemon as two processes, and makes the robot walk through the daemon's socket.
 
-Both run in sessions of their own, so that Ctrl-C reaches us alone and we end them in order: the daemon first, which
-stops the robot by itself if it has to. Their files are in a folder that is gone afterwards.
+Both processes run in sessions of their own, so Ctrl-C reaches only this program, which ends the daemon first: the
+daemon needs the robot to stop in order. Their files are in a folder that is removed afterwards.
 """
 
 from __future__ import annotations
@@ -25,17 +25,16 @@ from simulation.harness.world import load_world
 from simulation.mud.track import Track, paper_track
 
 LONGEST_WALK_S = 60.0
-STARTING_S = 20.0
-MODE_S = 10.0
-ENDING_S = 15.0  # for one process, after which it is killed
+START_TIMEOUT_S = 20.0
+MODE_TIMEOUT_S = 10.0
+END_TIMEOUT_S = 15.0  # of one process, which is killed then
 POLL_S = 0.05
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 FINISH_M = 0.02  # before the end of the track
 
 
-def _begin(signals_waiting: set[int | signal.Signals]) -> None:
-    """In a process that was just forked."""
-    signal.pthread_sigmask(signal.SIG_SETMASK, signals_waiting)
+def _prepare_child(blocked_before: set[int | signal.Signals]) -> None:
+    signal.pthread_sigmask(signal.SIG_SETMASK, blocked_before)
     end_with_parent()
 
 
@@ -44,32 +43,31 @@ class DemoError(Exception):
 
 
 class InterruptedDemoError(Exception):
-    """A person has ended the demo; the text says in which state."""
+    """A signal ended the demo; the text says in which state."""
 
 
 class Demo:
-    """Owns the two processes, the client and what was learned so far."""
+    """Owns the two processes, the client, and the strides received so far."""
 
     def __init__(self, folder: Path, logs: Path, seed: int, world: Path | None = None) -> None:
         self.folder = folder
-        self.seed = seed
         self.track: Track = load_world(world).track if world else paper_track()
         self.configuration_path = write_local_setup(folder, logs)
         self.output = (folder / "output.txt").open("w+", encoding="utf-8")
         ground = () if world is None else ("--world", str(world))
         self.robot = self._start("simulation.harness.peer", "--seed", str(seed), *ground)
         self.daemon = self._start("firmware_host.daemon")
-        self.client: StatusClient | None = None
+        self._client: StatusClient | None = None
         self.strides: list[dict[str, Any]] = []
         self.walk_start_s = 0.0
         self.armed = False
 
     def _start(self, module: str, *arguments: str) -> subprocess.Popen[bytes]:
-        """In a session of its own, so that Ctrl-C reaches only us and we end things in order.
+        """Starts a process in a session of its own.
 
-        A signal waits until the fork is over: Python drops an exception that it raises in there.
+        Signals are blocked during the fork, in which Python drops the exception of a signal handler.
         """
-        waiting = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        blocked_before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         try:
             return subprocess.Popen(
                 [sys.executable, "-P", "-m", module, "--config", str(self.configuration_path), *arguments],
@@ -77,85 +75,83 @@ class Demo:
                 stdout=self.output,
                 stderr=self.output,
                 start_new_session=True,
-                preexec_fn=partial(_begin, waiting),  # noqa: PLW1509 - no threads here
+                preexec_fn=partial(_prepare_child, blocked_before),  # noqa: PLW1509 - no threads here
             )
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, waiting)
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked_before)
 
-    def connect(self) -> StatusClient:
-        deadline_s = time.monotonic() + STARTING_S
+    def connect(self) -> None:
+        deadline_s = time.monotonic() + START_TIMEOUT_S
         while time.monotonic() < deadline_s:
-            self._look_after_processes()
+            self._check_processes()
             try:
-                self.client = StatusClient(self.folder / "mudskipper.sock")
-                return self.client
+                self._client = StatusClient(self.folder / "mudskipper.sock")
+                return
             except NoDaemonError:
                 time.sleep(POLL_S)
         raise DemoError("the daemon does not answer")
 
-    def _look_after_processes(self) -> None:
+    def _call(self, method: str, **params: Any) -> Any:
+        assert self._client is not None, "connect first"
+        return self._client.call(method, **params)
+
+    def _check_processes(self) -> None:
         for name, process in (("simulated robot", self.robot), ("daemon", self.daemon)):
             if process.poll() is not None:
-                raise DemoError(f"the {name} ended with status {process.returncode}: {self.last_words()}")
+                raise DemoError(f"the {name} ended with status {process.returncode}: {self._last_output()}")
 
-    def last_words(self) -> str:
+    def _last_output(self) -> str:
         self.output.flush()
         lines = (self.folder / "output.txt").read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        return lines[-1] if lines else "it said nothing"
+        return lines[-1] if lines else "it printed nothing"
 
-    def wait_for(self, done: Callable[[dict[str, Any]], bool], longest_s: float = MODE_S) -> dict[str, Any]:
-        assert self.client is not None
-        deadline_s = time.monotonic() + longest_s
+    def _wait_for(self, done: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """Returns the first status that is `done`. Raises DemoError after MODE_TIMEOUT_S or at a fault."""
+        deadline_s = time.monotonic() + MODE_TIMEOUT_S
         while time.monotonic() < deadline_s:
-            self._look_after_processes()
-            report: dict[str, Any] = self.client.call("status")
+            self._check_processes()
+            report: dict[str, Any] = self._call("status")
             if report["mode"] == "fault":
                 raise DemoError(f"fault: {report['fault']['message']}")
             if done(report):
                 return report
             time.sleep(POLL_S)
-        raise DemoError(f"still {report['mode']} after {longest_s:g} s: {report['fault']}")
+        raise DemoError(f"still {report['mode']} after {MODE_TIMEOUT_S:g} s: {report['fault']}")
 
     def arm(self) -> None:
-        assert self.client is not None
-        self.wait_for(lambda report: report["mode"] == "idle" and report["fault"] is None)
+        self._wait_for(lambda report: report["mode"] == "idle" and report["fault"] is None)
         self.armed = True
-        self.client.call("arm")
-        self.wait_for(lambda report: bool(report["mode"] == "hold"))
+        self._call("arm")
+        self._wait_for(lambda report: bool(report["mode"] == "hold"))
 
     def walk(self, depth_cm: float | None, show: Callable[[dict[str, Any]], None]) -> None:
-        """To the end of the track, or as long as there is patience."""
-        assert self.client is not None
-        self.client.call("reset_timing")
-        params = {} if depth_cm is None else {"depth_m": depth_cm / 100.0}
-        self.client.call("walk", **params)
+        """Walks to the end of the track, for LONGEST_WALK_S at most."""
+        self._call("reset_timing")
+        self._call("walk", **({} if depth_cm is None else {"depth_m": depth_cm / 100.0}))
         self.walk_start_s = time.monotonic()
         end_m = self.track.length_m - FINISH_M
         while time.monotonic() < self.walk_start_s + LONGEST_WALK_S:
-            report = self.wait_for(lambda _: True)
+            report = self._wait_for(lambda _: True)
             self.fetch_strides(show)
             if report["body_x_m"] is not None and report["body_x_m"] >= end_m:
                 return
             time.sleep(POLL_S)
 
     def fetch_strides(self, show: Callable[[dict[str, Any]], None]) -> None:
-        assert self.client is not None
-        while fetched := self.client.call("strides", since=len(self.strides)):
+        while fetched := self._call("strides", since=len(self.strides)):
             for stride in fetched:
                 self.strides.append(stride)
                 show(stride)
 
     def stop(self) -> dict[str, Any]:
-        """Flippers up, torque off; the last status."""
-        assert self.client is not None
-        self.client.call("stop")
-        self.wait_for(lambda report: bool(report["mode"] in ("hold", "idle")))
-        report: dict[str, Any] = self.client.call("status")
-        self.client.call("disarm")
+        """Raises the flippers, switches torque off, and returns the last status."""
+        self._call("stop")
+        self._wait_for(lambda report: bool(report["mode"] in ("hold", "idle")))
+        report: dict[str, Any] = self._call("status")
+        self._call("disarm")
         return report
 
     def last_state(self) -> str:
-        """After the end, in words."""
         if not self.armed:
             return "stopped before torque was on"
         if self.daemon.returncode == 0:
@@ -163,19 +159,16 @@ class Demo:
         return f"stopped, but the daemon ended with status {self.daemon.returncode}"
 
     def end(self) -> None:
-        """The daemon first: it stops the robot by itself if it has to, and needs it alive for that.
-
-        It takes a moment, in which no further Ctrl-C is heard.
-        """
+        """Ends the daemon, which stops the robot, and then the robot. Further signals are ignored meanwhile."""
         handlers = {number: signal.signal(number, signal.SIG_IGN) for number in ENDING_SIGNALS}
-        if self.client is not None:
-            self.client.close()
+        if self._client is not None:
+            self._client.close()
         for process in (self.daemon, self.robot):
             if process.poll() is not None:
                 continue
             process.send_signal(signal.SIGTERM)
             try:
-                process.wait(ENDING_S)
+                process.wait(END_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
@@ -186,7 +179,7 @@ class Demo:
 
 @contextmanager
 def running_demo(logs: Path, seed: int, world: Path | None = None) -> Iterator[Demo]:
-    """A demo whose processes and folder are gone afterwards, whatever happens."""
+    """Yields a demo and ends its processes. Raises InterruptedDemoError for KeyboardInterrupt."""
     folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
     try:
         demonstration = Demo(folder, logs, seed, world)

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.screen import PATIENCE_S, Progress, complain, size_text
+from command_line.screen import QUIET_S, Progress, complain, size_text
 from experiments.reports.text_tables import number, table
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -141,7 +141,7 @@ def recover(options: Options) -> int:
 def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Recovered], list[str]]:
     """Of files that nobody named, those of living writers are passed over."""
     recovered, resisted = [], []
-    progress = Progress("", PATIENCE_S)
+    progress = Progress("", QUIET_S)
     for done, path in enumerate(paths):
         progress.follow("logs", done, len(paths))
         try:

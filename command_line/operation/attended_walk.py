@@ -1,7 +1,7 @@
-"""A walk that somebody stays with: it goes on for as long as this program renews its lease.
+"""Runs an attended walk: the robot walks for as long as this program renews its lease.
 
-Ctrl-C stops the robot and waits until it holds. Where this program dies, hangs, or loses its machine's attention for
-longer than it has promised, the daemon stops the robot by itself.
+Ctrl-C stops the robot and waits until it holds. If this program dies or hangs for longer than its lease, the daemon
+stops the robot.
 """
 
 from __future__ import annotations
@@ -15,44 +15,44 @@ from command_line.screen import complain
 from experiments.reports.text_tables import number
 from firmware_host.operator.status_client import CallRefusedError, StatusClient
 
-PROMISE_S = 1.0
+LEASE_S = 1.0
 RENEWAL_S = 0.2
-UNDER_WAY = ("walking", "stopping", "damping")
-MILD = ("none", "warn")  # reactions that leave a walk alone
+MOVING = ("walking", "stopping", "damping")
+MILD = ("none", "warn")  # reactions that do not end a walk
 
 
 def attend(client: StatusClient, params: dict[str, Any]) -> int:
-    """Walk, and return when the robot is at rest. Only a walk that is accepted takes the lease, and with it."""
-    client.call("walk", lease_s=PROMISE_S, **params)
+    """Walks, and returns when the robot is at rest. A walk that is refused takes no lease."""
+    client.call("walk", lease_s=LEASE_S, **params)
     try:
-        report, status = _stay(client), exit_codes.OK
+        report, status = _renew(client), exit_codes.OK
     except KeyboardInterrupt:
         client.call("stop")
-        report, status = _stay(client), exit_codes.INTERRUPTED
+        report, status = _renew(client), exit_codes.INTERRUPTED
     client.call("release")
     return _conclude(report, status)
 
 
-def _stay(client: StatusClient) -> dict[str, Any]:
-    """The status at the walk's end."""
+def _renew(client: StatusClient) -> dict[str, Any]:
+    """Renews the lease until the walk ends; returns the last status."""
     line = LiveLine()
     while True:
         report: dict[str, Any] = client.call("status")
-        if report["mode"] not in UNDER_WAY:
+        if report["mode"] not in MOVING:
             line.end()
             return report
         line.show(report)
         try:
-            client.call("lease", for_s=PROMISE_S)
+            client.call("lease", for_s=LEASE_S)
         except CallRefusedError:
-            if client.call("status")["mode"] in UNDER_WAY:
+            if client.call("status")["mode"] in MOVING:
                 line.end()
                 raise
         time.sleep(RENEWAL_S)
 
 
 def _conclude(report: dict[str, Any], status: int) -> int:
-    """It has ended well where the robot holds its pose, and nothing is to be told: no fault kept it from walking."""
+    """Prints why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
     print(report["mode"])
     fault = report["fault"]
     if report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD):
@@ -62,21 +62,21 @@ def _conclude(report: dict[str, Any], status: int) -> int:
 
 
 class LiveLine:
-    """Written over again and again on a terminal; a line each stride anywhere else."""
+    """Overwrites one line on a terminal; prints one line per stride elsewhere."""
 
     def __init__(self) -> None:
         self._live = sys.stdout.isatty()
         self._shown = ""
 
     def show(self, report: dict[str, Any]) -> None:
-        place = f"{report['mode']}, stride {report['stride']}"
+        summary = f"{report['mode']}, stride {report['stride']}"
         if self._live:
             depth_cm, x_m = 100.0 * report["depth_m"], number(report["body_x_m"])
-            text = f"{place}, {report['phase']}, depth {depth_cm:.1f} cm, body {x_m} m; Ctrl-C stops"
+            text = f"{summary}, {report['phase']}, depth {depth_cm:.1f} cm, body {x_m} m; Ctrl-C stops"
             print(f"\r\033[K{text}", end="", flush=True)
-        elif place != self._shown:
-            print(place, flush=True)
-        self._shown = place
+        elif summary != self._shown:
+            print(summary, flush=True)
+        self._shown = summary
 
     def end(self) -> None:
         if self._live and self._shown:

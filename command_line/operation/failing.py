@@ -1,4 +1,4 @@
-"""`mudskipper fail`: parts of a robot made to fail on purpose, where its configuration allows that."""
+"""Runs `mudskipper fail`: makes a part of the robot fail on purpose, where its configuration allows that."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 from typing import Any
 
 from command_line import exit_codes
+from command_line.json_output import print_json
 from command_line.operation.operation import with_daemon
 from command_line.screen import complain
 from experiments.reports.text_tables import table
@@ -26,8 +27,7 @@ def fail(options: argparse.Namespace) -> int:
 
 
 def _fail(client: StatusClient, options: argparse.Namespace) -> int:
-    wish: dict[str, Any] = {"component": options.component, "kind": options.kind, "for_s": options.seconds}
-    failing = client.call("fail", **wish)
+    failing = client.call("fail", component=options.component, kind=options.kind, for_s=options.seconds)
     print(json.dumps(failing) if options.json else failing_table(failing))
     return exit_codes.OK
 
@@ -35,27 +35,27 @@ def _fail(client: StatusClient, options: argparse.Namespace) -> int:
 def _show(client: StatusClient, as_json: bool) -> int:
     report = client.call("failures")
     if as_json:
-        print(json.dumps(report))
+        print_json("failures", report)
     elif report["allowed"]:
         print(f"{families_table(report['table'])}\n\n{failing_table(report['failing'])}")
     else:
-        print("nothing may fail on purpose: failures.allowed is false in the configuration")
+        print("deliberate failures are not allowed: failures.allowed is false in the configuration")
     return exit_codes.OK
 
 
 def families_table(rows: list[dict[str, Any]]) -> str:
-    """A row for all that can fail alike, such as the joints; --json has each, with what it does."""
+    """Returns a row for each family of components with the same kinds; --json lists every component."""
     kinds: dict[str, dict[str, None]] = {}
     members: dict[str, dict[str, None]] = {}
     for row in rows:
         kinds.setdefault(row["family"], {})[row["kind"]] = None
-        for place in ("JOINT", "NAME"):
-            head, found, tail = row["family"].partition(place)
+        for placeholder in ("JOINT", "NAME"):
+            head, found, tail = row["family"].partition(placeholder)
             if found:
                 name = row["component"].removeprefix(head).removesuffix(tail)
-                members.setdefault(place, {})[name] = None
+                members.setdefault(placeholder, {})[name] = None
     text = table([("component", "kinds"), *((family, ", ".join(each)) for family, each in kinds.items())])
-    return "\n".join([text, "", *(f"{place}: {', '.join(names)}" for place, names in members.items())])
+    return "\n".join([text, "", *(f"{placeholder}: {', '.join(names)}" for placeholder, names in members.items())])
 
 
 def failing_table(failing: list[dict[str, Any]]) -> str:

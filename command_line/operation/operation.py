@@ -1,4 +1,7 @@
-"""Commands to the running daemon. Standard library and msgpack only, so they start in a blink."""
+"""Sends an operator's commands to the running daemon.
+
+It imports the standard library and msgpack only, so these commands start fast.
+"""
 
 from __future__ import annotations
 
@@ -31,6 +34,7 @@ MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "
 
 
 def with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
+    """Calls `act` with a client; prints why that failed and returns the exit status."""
     try:
         client = StatusClient(options.socket)
         try:
@@ -84,7 +88,7 @@ def walk(options: Options) -> int:
 
 
 def move(options: Options) -> int:
-    """Until the joints are there; Ctrl-C stops them on their way."""
+    """Waits until the joints have arrived; Ctrl-C stops them."""
 
     def act(client: StatusClient) -> int:
         try:
@@ -124,25 +128,25 @@ def clear(options: Options) -> int:
                 return exit_codes.OK
             time.sleep(0.05)
         messages = [fault["message"] for fault in stopping_faults(report)]
-        complain(f"the cause persists: {' '.join(messages) or report['mode']}")
+        complain(f"the cause is still there: {' '.join(messages) or report['mode']}")
         return exit_codes.REFUSED
 
     return with_daemon(options, act)
 
 
 def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
-    """Of a status: the faults that stand and are more than a warning."""
+    """Returns the active faults that are more than a warning."""
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
 def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
-    """Ask, then wait until the robot is in one of `modes`. Whoever may stop it need not be allowed to see that."""
+    """Sends a request and waits until the robot is in one of `modes`, if this user may see the status."""
     accepted = client.call(method, **params)
     try:
         return _await(client, modes, longest_s)
     except NotPermittedError as problem:
         group = str(problem).partition(FOR_MEMBERS)[2].partition(". ")[0]
-        print(f"{accepted}; whether the robot has stopped is shown to members of {group}")
+        print(f"{accepted}; only members of the group {group} can see whether the robot has stopped")
         return exit_codes.OK
 
 
@@ -164,17 +168,15 @@ def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> in
 
 
 def check(options: Options) -> int:
-    """Ask the daemon; where none runs, try what it would need."""
+    """Asks the daemon; where none runs, checks what it would need."""
     try:
         StatusClient(options.socket).close()
     except NoDaemonError as problem:
-        from command_line.doctor.checks_before_arming import (
-            desk_check,  # brings python-can and pydantic, which `status` must not load
-        )
+        from command_line.doctor.checks_before_arming import desk_check  # python-can, pydantic: too slow for `status`
 
         return _show_items(options, desk_check(options.config, str(problem)))
     except NotPermittedError:
-        pass  # as with_daemon tells it
+        pass  # with_daemon reports it
     return with_daemon(options, lambda client: _show_items(options, client.call("check")))
 
 
@@ -189,7 +191,7 @@ def _show_items(options: Options, items: list[dict[str, Any]]) -> int:
 
 def _check_line(item: dict[str, Any]) -> str:
     mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
-    overruled = "" if item.get("mandatory", True) else "; 'mudskipper arm --force' overrules this"
+    overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force'"
     fix = f"\n       -> {item['fix']}{overruled}" if item["fix"] and not item["ok"] else ""
     return f"{mark} {item['id']:24} {item['text']}{fix}"
 
@@ -203,10 +205,10 @@ def status_text(report: dict[str, Any]) -> str:
         lines.append(_boot_line(report["drives"]))
     lines += [_fault_line(fault) for fault in report["faults"]]
     if report["lease"]:
-        lines.append(f"operated by {report['lease']}, which holds the lease")
+        lines.append(f"the lease is held by {report['lease']}")
     notices = [report["notice"]] if report["notice"] else []
     if report["forced"]:
-        notices.append("armed by force, against what 'mudskipper check' says")
+        notices.append("armed by 'mudskipper arm --force' against failed checks: see 'mudskipper check'")
     if report["pose"]["trouble"]:
         notices.append(f"{report['pose']['trouble']} 'mudskipper check' says what to do")
     lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
@@ -222,7 +224,7 @@ def _boot_line(drives: list[dict[str, Any]]) -> str:
 
 def _fault_line(fault: dict[str, Any]) -> str:
     colour = YELLOW if fault["reaction"] in MILD else RED
-    against = ", against arming" if fault["blocks_arming"] else ""
+    against = ", prevents arming" if fault["blocks_arming"] else ""
     reaction = fault["reaction"].replace("_", " ")
     return coloured(f"{fault['name']} ({reaction}{against}): {fault['message']}\n    -> {fault['what_to_do']}", colour)
 
@@ -252,17 +254,17 @@ def _drives_table(drives: list[dict[str, Any]]) -> str:
 def _loop_text(report: dict[str, Any]) -> str:
     loop, bus, log = report["loop"], report["bus"], report["log"]
     late, tick, pose = loop["wake_late_us"], loop["tick_us"], report["pose"]
-    seen = f"{pose['source']}: {pose['poses']} poses, {pose['malformed']} malformed, {pose['lost']} without the body"
+    poses = f"{pose['source']}: {pose['poses']} poses, {pose['malformed']} malformed, {pose['lost']} without the body"
     return "\n".join(
         (
             f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
             f"late   {late['p50']:.0f} us median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
             f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
-            f"bus    {bus['unknown_frames']} unknown, {bus['malformed_frames']} garbled,"
+            f"bus    {bus['unknown_frames']} unknown, {bus['malformed_frames']} malformed,"
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
-            f"pose   {seen if pose['source'] else 'none'}",
+            f"pose   {poses if pose['source'] else 'none'}",
             f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped",
         )
     )

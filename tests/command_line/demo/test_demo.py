@@ -1,4 +1,4 @@
-"""The demo, once to its end and once interrupted."""
+"""The demo runs to its end over a short world, and every signal ends it in order."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line.main import main
 from firmware_host.log_reading.log_reader import read_log
 from tests.waiting import LONGEST_S
 
@@ -21,8 +22,22 @@ def start_demo(out: Path, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
+def interrupt(demo: subprocess.Popen[str], number: signal.Signals, line: str) -> tuple[str, str]:
+    """Sends the signal after a line that begins with `line`; returns output and complaints."""
+    assert demo.stdout is not None
+    shown = ""
+    for text in demo.stdout:
+        shown += text
+        if text.startswith(line):
+            break
+    demo.send_signal(number)
+    printed, complaints = demo.communicate(timeout=LONGEST_S)
+    assert demo.returncode == exit_codes.INTERRUPTED and "Traceback" not in complaints
+    return shown + printed, complaints
+
+
 def children_of(out: Path) -> list[str]:
-    """Command lines of processes that still use the demo's files."""
+    """Returns the command lines of processes that still use the demo's files."""
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
@@ -35,28 +50,8 @@ def children_of(out: Path) -> list[str]:
     return found
 
 
-def test_the_demo_walks_three_muds_and_sums_up(tmp_path: Path) -> None:
-    with start_demo(tmp_path / "out", "--json", str(tmp_path / "demo.json")) as demo:
-        printed, complaints = demo.communicate(timeout=LONGEST_S)
-    assert (demo.returncode, complaints) == (exit_codes.OK, "")
-    summary = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
-    assert set(summary) >= {
-        "ticks", "rate_hz", "missed_ticks", "wake_late_us", "tick_us", "strides", "speed_cm_s", "log", "plot"
-    }  # fmt: skip
-    assert set(summary["wake_late_us"]) == set(summary["tick_us"]) == {"p50", "p99", "max"}
-    assert {stride["mud"] for stride in summary["strides"]} == {"48.5", "53.1", "45.3"}
-    assert {stride["flipper"] for stride in summary["strides"]} == {"left", "right"}
-    assert all(speed > 3.0 for speed in summary["speed_cm_s"].values())
-    assert summary["log"] in printed and summary["plot"] in printed
-    assert Path(summary["plot"]).read_bytes().startswith(b"\x89PNG")
-    log = read_log(Path(summary["log"]))
-    assert log.complete and len(log.strides) == len(summary["strides"])
-    lines = [line for line in printed.splitlines() if line.startswith(("left ", "right "))]
-    assert len(lines) == len(summary["strides"])
-
-
-def test_the_demo_walks_the_ground_that_a_file_describes(tmp_path: Path) -> None:
-    """The same mud twice, which is told apart by its place, and another by its strength."""
+def test_the_demo_walks_a_described_ground_and_summarises_it(tmp_path: Path) -> None:
+    """The first mud appears twice and is told apart by its position."""
     world = tmp_path / "world.toml"
     borders_m, muds = (0.0, 0.1, 0.2, 0.3), ("water_percent = 48.5", "strength_pa = 1500", "water_percent = 48.5")
     world.write_text(
@@ -71,22 +66,28 @@ def test_the_demo_walks_the_ground_that_a_file_describes(tmp_path: Path) -> None
     assert (demo.returncode, complaints) == (exit_codes.OK, "")
     assert "Walking 0.30 m over mud with 48.5 %, 1500 Pa, 48.5 % water." in printed
     summary = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
-    assert set(summary["speed_cm_s"]) == {"48.5", "1500 Pa", "48.5 at 0.20 m"}
-    assert "48.5 % at 0.20 m: " in printed
+    assert summary["schema"] == "demo/1"
+    assert set(summary) >= {
+        "ticks", "rate_hz", "missed_ticks", "wake_late_us", "tick_us", "strides", "speed_cm_s", "log", "plot"
+    }  # fmt: skip
+    assert set(summary["wake_late_us"]) == set(summary["tick_us"]) == {"p50", "p99", "max"}
     assert {stride["mud"] for stride in summary["strides"]} <= {"48.5", "1500 Pa"}
+    assert {stride["flipper"] for stride in summary["strides"]} == {"left", "right"}
+    assert set(summary["speed_cm_s"]) == {"48.5", "1500 Pa", "48.5 at 0.20 m"}
+    assert "48.5 % at 0.20 m: " in printed and summary["log"] in printed and summary["plot"] in printed
+    assert Path(summary["plot"]).read_bytes().startswith(b"\x89PNG")
+    log = read_log(Path(summary["log"]))
+    assert log.complete and len(log.strides) == len(summary["strides"])
+    lines = [line for line in printed.splitlines() if line.startswith(("left ", "right "))]
+    assert len(lines) == len(summary["strides"])
 
 
-def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
+def test_ctrl_c_in_a_walk_over_the_three_muds_stops_the_robot_and_closes_the_log(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with start_demo(out) as demo:
-        assert demo.stdout is not None
-        for line in demo.stdout:
-            if line.startswith("left "):
-                break
-        demo.send_signal(signal.SIGINT)
-        printed, complaints = demo.communicate(timeout=LONGEST_S)
-    assert demo.returncode == exit_codes.INTERRUPTED
-    assert "torque is off" in complaints and "Traceback" not in complaints
+        printed, complaints = interrupt(demo, signal.SIGINT, "left ")
+    assert "Walking 1.83 m over mud with 48.5 %, 53.1 %, 45.3 % water." in printed
+    assert "torque is off" in complaints
     (path,) = (out / "done").glob("*.mcap")
     assert str(path) in printed
     log = read_log(path)
@@ -95,32 +96,30 @@ def test_ctrl_c_ends_the_demo_cleanly(tmp_path: Path) -> None:
     assert children_of(out) == []
 
 
-def test_an_early_ctrl_c_says_that_nothing_moved(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "line"), [(signal.SIGINT, ""), (signal.SIGTERM, "Arming")])
+def test_a_signal_before_the_walk_leaves_no_process(tmp_path: Path, number: signal.Signals, line: str) -> None:
     with start_demo(tmp_path / "out") as demo:
-        assert demo.stdout is not None
-        demo.stdout.readline()
-        demo.send_signal(signal.SIGINT)
-        _, complaints = demo.communicate(timeout=LONGEST_S)
-    assert demo.returncode == exit_codes.INTERRUPTED
-    assert "stopped" in complaints and "Traceback" not in complaints
+        _, complaints = interrupt(demo, number, line)
+    assert "stopped" in complaints
     assert children_of(tmp_path / "out") == []
 
 
-def test_sigterm_ends_the_demo_as_ctrl_c_does(tmp_path: Path) -> None:
-    with start_demo(tmp_path / "out") as demo:
-        assert demo.stdout is not None
-        for line in demo.stdout:
-            if line.startswith("Arming"):
-                break
-        demo.send_signal(signal.SIGTERM)
-        _, complaints = demo.communicate(timeout=LONGEST_S)
-    assert demo.returncode == exit_codes.INTERRUPTED and "Traceback" not in complaints
-    assert children_of(tmp_path / "out") == []
-
-
-@pytest.mark.parametrize("arguments", [("--depth", "nan"), ("--depth", "-1"), ("--json", "/nonexistent/x.json")])
-def test_what_cannot_work_is_told_before_anything_starts(tmp_path: Path, arguments: tuple[str, str]) -> None:
-    with start_demo(tmp_path / "out", *arguments) as demo:
-        printed, complaints = demo.communicate(timeout=LONGEST_S)
-    assert demo.returncode in (exit_codes.USAGE, exit_codes.UNHEALTHY)
-    assert printed == "" and complaints and "Traceback" not in complaints
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        (("--depth", "nan"), exit_codes.USAGE),
+        (("--depth", "-1"), exit_codes.USAGE),
+        (("--json", "/nonexistent/x.json"), exit_codes.UNHEALTHY),
+    ],
+)
+def test_impossible_options_are_refused_before_anything_starts(
+    tmp_path: Path, arguments: tuple[str, str], status: int, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("command_line.demo.demo._on_signals", lambda: None)
+    try:
+        ended: object = main(["demo", "--out", str(tmp_path / "out"), *arguments])
+    except SystemExit as problem:
+        ended = problem.code
+    printed = capsys.readouterr()
+    assert ended == status and printed.out == "" and printed.err

@@ -147,10 +147,10 @@ def test_a_command_that_takes_its_time_says_how_far_it_is(
     walk: Path, command: tuple[str, ...], word: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    monkeypatch.setattr(screen, "SOON_S", 0.0)
+    monkeypatch.setattr(screen, "REFRESH_S", 0.0)
     assert main([*command, str(walk)]) == exit_codes.OK
     assert word not in capsys.readouterr().err  # it took no time
-    monkeypatch.setattr(screen, "PATIENCE_S", 1e-9)
+    monkeypatch.setattr(screen, "QUIET_S", 1e-9)
     assert main([*command, str(walk)]) == exit_codes.OK
     assert word in capsys.readouterr().err
 

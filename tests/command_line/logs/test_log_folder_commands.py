@@ -100,7 +100,7 @@ def test_recovery_that_takes_its_time_says_how_far_it_is(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    monkeypatch.setattr(log_care, "PATIENCE_S", 1e-9)
+    monkeypatch.setattr(log_care, "QUIET_S", 1e-9)
     assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
     assert "of 1 logs" in capsys.readouterr().err
 
