@@ -123,7 +123,7 @@ def test_an_estimate_is_told_with_its_doubt_and_what_is_wrong_with_it(valid: boo
         (("loadcell", "--plate", "3x"), "3x: width and height must be from"),
         (("flipper", "--depth", "deep"), "deep: must be more than 0 and at most 20 cm"),
         (("trackway", "--mud", "48.5=long"), "48.5=long: must be a mud and its length"),
-        (("walk", "--out", __file__), "is no folder"),
+        (("walk", "--out", __file__), "must be a folder"),
     ],
 )
 def test_what_is_no_number_or_no_folder_is_refused_in_words(
