@@ -13,6 +13,7 @@ from docs.generate.command_line import commands, exit_statuses
 from docs.generate.configuration import sections
 from docs.generate.faults import failures, faults, modes, reactions
 from docs.generate.log import topics
+from docs.generate.socket import methods
 
 TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "commands": commands,
@@ -23,6 +24,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "faults": faults,
     "failures": failures,
     "log": topics,
+    "socket": methods,
 }
 
 
