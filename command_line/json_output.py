@@ -11,7 +11,7 @@ from typing import Any
 
 EXPERIMENTS = ("actuator", "estimation", "faults", "flipper", "loadcell", "mud-fit", "sweep", "trackway", "walk")
 SCHEMAS = {  # what prints it -> version
-    "status": 1,
+    "status": 2,
     "failures": 1,
     "demo": 1,
     "replay": 1,
