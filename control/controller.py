@@ -74,7 +74,14 @@ def measured_angles(states: DriveStates) -> JointAngles:
     return states.map(lambda state: state.angle_rad)
 
 
-RESTING = GaitTarget(Phase.REST, -1, 0.0, 0.0, 0.0, 0.0)
+RESTING = GaitTarget(
+    phase=Phase.REST,
+    stride=-1,
+    sweep_rad=0.0,
+    sweep_velocity_rad_s=0.0,
+    depth_m=0.0,
+    depth_velocity_m_s=0.0,
+)
 
 
 class Controller:

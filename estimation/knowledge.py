@@ -208,12 +208,12 @@ def _mean(
     fraction = weight_right / (weight_left + weight_right)
     k = left.at(depth_m)[0] * exp(fraction * excess)
     return Coefficient(
-        k,
-        k / sqrt(weight_left + weight_right),
-        depth_m,
-        left.exponent + fraction * (right.exponent - left.exponent),
-        left.exponent_std_error + fraction * (right.exponent_std_error - left.exponent_std_error),
-        left.strides + right.strides,
+        value=k,
+        std_error=k / sqrt(weight_left + weight_right),
+        depth_m=depth_m,
+        exponent=left.exponent + fraction * (right.exponent - left.exponent),
+        exponent_std_error=left.exponent_std_error + fraction * (right.exponent_std_error - left.exponent_std_error),
+        strides=left.strides + right.strides,
     )
 
 

@@ -67,7 +67,13 @@ class Sums(NamedTuple):
     def mapped(self) -> Mapped:
         k, strides = exp(self.log_k), self.strides
         scatter = max(1.0, self.squares / (strides - 1)) if strides > 1 else 1.0
-        return Mapped(k, k * sqrt(scatter / self.weight), exp(self.log_depth), strides, self.at_least)
+        return Mapped(
+            value=k,
+            std_error=k * sqrt(scatter / self.weight),
+            depth_m=exp(self.log_depth),
+            strides=strides,
+            at_least=self.at_least,
+        )
 
 
 def _alone(reading: Reading) -> Sums:

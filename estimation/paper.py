@@ -96,4 +96,10 @@ class PaperEstimator(StrideEstimator):
         k_p = self._penetration.estimate()
         if not isfinite(self._surface_m):
             k_p = k_p._replace(reason=f"no force above {SURFACE_FORCE_N} N in insertion")
-        return Learned(k_p, self._shear.estimate(), self._extraction.estimate(), self.surface_m, self._extraction_nm)
+        return Learned(
+            k_p=k_p,
+            k_s=self._shear.estimate(),
+            k_e=self._extraction.estimate(),
+            surface_m=self.surface_m,
+            extraction_torque_nm=self._extraction_nm,
+        )

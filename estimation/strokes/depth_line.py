@@ -97,5 +97,11 @@ class Line(NamedTuple):
 
     def coefficient(self) -> Coefficient:
         k, depth_m = exp(self.log_k), exp(self.log_depth)
-        std_error, exponent_std_error = k / sqrt(self.weight), 1.0 / sqrt(self.exponent_weight)
-        return Coefficient(k, std_error, depth_m, self.exponent, exponent_std_error, self.strides)
+        return Coefficient(
+            value=k,
+            std_error=k / sqrt(self.weight),
+            depth_m=depth_m,
+            exponent=self.exponent,
+            exponent_std_error=1.0 / sqrt(self.exponent_weight),
+            strides=self.strides,
+        )
