@@ -39,7 +39,8 @@ def only(mud_map: MudMap) -> Mapped:
     return row.k_s
 
 
-@given(st.lists(st.tuples(st.floats(0.9, 1.1), st.floats(0.1, 0.5), st.floats(0.02, 0.05)), min_size=1, max_size=30))
+# Values this close never differ by more than their errors explain, which would widen the standard error.
+@given(st.lists(st.tuples(st.floats(0.95, 1.05), st.floats(0.1, 0.5), st.floats(0.02, 0.05)), min_size=1, max_size=30))
 def test_a_piece_has_the_weighted_mean_of_its_strides(rows: list[tuple[float, float, float]]) -> None:
     piece = only(mapped(*(stride(k_s=reported(1e6 * value, relative), depth_m=z) for value, relative, z in rows)))
     weights = np.array([1.0 / (relative**2 + REPEATABILITY**2) for _, relative, _ in rows])
