@@ -1,7 +1,7 @@
-"""What only a whole configuration can show: values that are each within their bounds and do not go together.
+"""Checks values that are each within their bounds and contradict each other.
 
-That the gait is within reach of the geometry and of the joint limits, that drives and buses are told apart, that faults
-begin in an order in which they can be told from each other: each contradiction is one sentence.
+The gait must be within reach of the geometry and of the joint limits, drives and buses must be distinct, and milder
+faults must begin before harder ones. Each contradiction is one message.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROUNDING = 1e-6  # of numbers that a file gives with few digits
 
 
 def contradictions(configuration: Configuration) -> Iterator[str]:
-    """Each with key, value and bound."""
+    """Yields a message with key, value and bound for each contradiction."""
     yield from _text_problems(configuration)
     yield from pose_problems(configuration.pose)
     yield from _drive_problems(configuration)
@@ -119,7 +119,7 @@ def _fault_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _motor_force_problems(configuration: Configuration) -> Iterator[str]:
-    """What is predicted of an extraction must be within what the limits let the motors do."""
+    """The force that is predicted for an extraction must be within the torque limit."""
     length_m, force_n = configuration.geometry.flipper_length_m, configuration.adaptation.motor_force_n
     largest_n = configuration.limits.torque_nm / length_m
     if force_n > largest_n * (1.0 + ROUNDING):
@@ -180,7 +180,7 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _sweep_problems(configuration: Configuration) -> Iterator[str]:
-    """Of the sweeps among which the method "gait" chooses; wide ones go less deep, as far as they reach."""
+    """Checks the sweeps among which the method "gait" chooses; a wide one reaches less deep."""
     geometry, limits, adaptation = configuration.geometry, configuration.limits, configuration.adaptation
     widest_deg, widest = (
         adaptation.gait.max_sweep_deg,

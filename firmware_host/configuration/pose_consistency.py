@@ -1,4 +1,4 @@
-"""What is wrong with the choice of a pose source: keys that do not go together, addresses that are none."""
+"""Checks the choice of a pose source: keys that contradict each other, malformed addresses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LONGEST_INTERFACE = 15  # IFNAMSIZ with its final zero
 
 
 def pose_problems(pose: PoseParameters) -> Iterator[str]:
-    """Each with key, value and bound."""
+    """Yields a message with key, value and bound for each problem."""
     if pose.chosen == "socket" and not pose.socket:
         yield "pose.socket = '': must name a socket where pose.source = 'socket'"
     if pose.chosen in ("natnet", "rail_encoder") and pose.socket:

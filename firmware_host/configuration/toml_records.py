@@ -1,8 +1,8 @@
-"""Records filled from a TOML file, or everything that is wrong with the file, in sentences.
+"""Fills records from a TOML file, or lists everything that is wrong with the file.
 
-A record is a frozen dataclass that states default, unit and bounds beside each field. The reader makes a pydantic
-model of it and of the records in it, which refuses unknown keys, other types, numbers that are none and values out of
-bounds; each problem becomes one sentence with key, value and bound. Tables of an array are counted from 1.
+A record is a frozen dataclass that states default, unit and bounds next to each field. The reader makes a pydantic
+model of it and of the records in it, which refuses unknown keys, other types, NaN and infinity, and values out of
+bounds; each problem becomes one message with key, value and bound. Tables of an array are counted from 1.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
 
 
 class ConfigurationError(Exception):
-    """Everything that is wrong with a file, one sentence each, naming key, value and bound.
+    """Everything that is wrong with a file, one message each, naming key, value and bound.
 
-    Keys and values may be of any length and of any characters: what a terminal would obey is escaped, and of a long
-    sentence the middle is left out, since its key stands at the beginning and its bound at the end.
+    Keys and values may have any length and any characters: control characters are escaped, and a long message loses
+    its middle, since its key is at the beginning and its bound at the end.
     """
 
     def __init__(self, problems: list[str]) -> None:
@@ -67,13 +67,13 @@ def read_text(path: Path) -> str:
 
 
 def parse_document(text: str, file: Path | None = None) -> dict[str, Any]:
-    """Raises ConfigurationError, which names the file that the text is from."""
+    """Raises ConfigurationError, which names the file of the text."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
         last = text.count("\n", 0, len(text.rstrip())) + 1
         why = str(problem).replace("at end of document", f"at the end, line {last}")
-        why = f"not a TOML file: {why}; mend it there: key = value, words in quotes, sections in [brackets]"
+        why = f"not a TOML file: {why}; fix it there: key = value, words in quotes, sections in [brackets]"
     except RecursionError:
         why = "not a TOML file that can be read: it is nested too deep"
     except ValueError:
@@ -128,12 +128,12 @@ class RecordReader:
 
 
 def _hints(record: type, without: Collection[str] = ()) -> dict[str, Any]:
-    """Annotations of the fields that a file may hold."""
+    """Returns the annotations of the fields that a file may give."""
     return {name: hint for name, hint in get_type_hints(record, include_extras=True).items() if name not in without}
 
 
 def _model_of(record: type, hints: Mapping[str, Any] | None = None) -> type[BaseModel]:
-    """A pydantic model with a record's fields, defaults and bounds, which refuses anything else."""
+    """Makes a pydantic model with a record's fields, defaults and bounds, which refuses anything else."""
     hints = _hints(record) if hints is None else hints
     definitions: dict[str, Any] = {}
     for item in fields(record):
@@ -168,7 +168,7 @@ def _changes(hint: Any) -> ChangesOf | None:
 
 
 def _record_in(hint: Any) -> type | None:
-    """Of which a dict or a list is made."""
+    """Returns the record that a dict or a list consists of, or None."""
     last = get_args(hint)[-1] if get_args(hint) else None
     return last if is_dataclass(last) and isinstance(last, type) else None
 
@@ -178,7 +178,7 @@ def _values(hints: Mapping[str, Any], model: BaseModel) -> dict[str, Any]:
 
 
 def _as_records(hint: Any, value: Any) -> Any:
-    """Models back to the records that they were made from."""
+    """Turns models back into the records that they were made from."""
     if changes := _changes(hint):
         return _changed(changes, value)
     record = _record_in(hint)
@@ -190,7 +190,7 @@ def _as_records(hint: Any, value: Any) -> Any:
 
 
 def _changed(changes: ChangesOf, value: Any) -> dict[str, Any]:
-    """Only what the file sets: the rest stays with whoever makes the record."""
+    """Returns only the fields that the file sets; the part that makes the record has the others."""
     if not isinstance(value, BaseModel):  # the section is not there
         return {}
     hints = _hints(changes.record, changes.without)
@@ -206,7 +206,7 @@ def _key(location: tuple[str | int, ...]) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value of the file, whatever it is."""
+    """Returns the text of any value of the file."""
     try:
         return repr(value)
     except (ValueError, RecursionError):  # a whole number of thousands of digits, tables within tables

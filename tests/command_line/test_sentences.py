@@ -88,7 +88,7 @@ def test_a_configuration_that_is_no_toml_is_refused_by_file_and_line(
     assert (
         "robot.toml: not a TOML file: Expected '=' after a key in a key/value pair (at line 2, column 11)" in reported
     )
-    assert "mend it there: " in reported
+    assert "fix it there: " in reported
 
 
 def test_a_status_before_all_drives_are_heard_names_those_that_are_not() -> None:

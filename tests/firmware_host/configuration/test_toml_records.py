@@ -112,8 +112,8 @@ def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
     [
         (f"note = {'9' * 5000}", "not a TOML file that can be read: a number or a date is beyond all size"),
         (f"note = {'[' * 20_000}", "not a TOML file that can be read: it is nested too deep"),
-        ("a = 1\nnote = \n\n", "not a TOML file: Invalid value (at line 2, column 8); mend it there: "),
-        ('a = 1\nnote = """\n\n', "not a TOML file: Unterminated string (at the end, line 2); mend it there: "),
+        ("a = 1\nnote = \n\n", "not a TOML file: Invalid value (at line 2, column 8); fix it there: "),
+        ('a = 1\nnote = """\n\n', "not a TOML file: Unterminated string (at the end, line 2); fix it there: "),
     ],
 )
 def test_a_file_that_cannot_be_read_is_refused_by_its_name_and_line(text: str, reported: str) -> None:

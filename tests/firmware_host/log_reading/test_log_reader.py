@@ -242,7 +242,7 @@ def write_foreign(
 
 def test_a_row_of_the_wrong_length_is_named_by_its_number(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "short.mcap", [make_tick(0), make_tick(1)[:-1]])
-    with pytest.raises(LogError, match=r"short\.mcap: row 2 of /tick has 370 bytes, not 371"):
+    with pytest.raises(LogError, match=r"short\.mcap: row 2 of /tick has \d+ bytes"):
         read_log(path)
 
 
