@@ -1,4 +1,4 @@
-"""A log that fails on purpose, around one that does not. What it refuses is counted and told of in the log."""
+"""A log that fails on purpose, around one that works. Rows that it refuses are counted and reported in the log."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from firmware_host.log.rows import EVENT, EVENT_KIND
 
 
 class FailingRecorder:
-    """A Recording. Owns the count of the rows that it refused."""
+    """A Recording that owns the count of the rows that it refused."""
 
     def __init__(self, recorder: Recording, failures: Failures) -> None:
         self._recorder = recorder
@@ -29,7 +29,7 @@ class FailingRecorder:
             self._unreported += 1
             taken = False
         else:
-            self._tell_of_loss(payload)
+            self._report_loss(payload)
             taken = self._recorder.put(kind_index, payload)
         self._count()
         return taken
@@ -52,8 +52,8 @@ class FailingRecorder:
             return False
         return failure.kind is not FailureKind.INTERMITTENT or self._failures.loses()
 
-    def _tell_of_loss(self, payload: bytes) -> None:
-        """Before the first row after the missing ones, with its stamp."""
+    def _report_loss(self, payload: bytes) -> None:
+        """Report missing rows before the first row after them, with the stamp of that row."""
         if self._unreported:
             (stamp_s,) = STAMP.unpack_from(payload)
             text = f"rows missing here: {self._unreported}, the log was failing on purpose"
@@ -65,5 +65,5 @@ class FailingRecorder:
 
 
 def failing_recorder(recorder: Recording, failures: Failures | None) -> Recording:
-    """The recorder as it is, where nothing may fail."""
+    """Wrap the recorder, unless no failures are allowed."""
     return recorder if failures is None else FailingRecorder(recorder, failures)

@@ -1,6 +1,6 @@
-"""A beat that stalls and a clock on the wall that steps, both on purpose.
+"""A ticker that stalls and a wall clock that steps, both on purpose.
 
-The stall comes where a tick's work would overrun: after it, before the wait for the next deadline.
+The stall comes after a tick's work and before the wait for the next deadline, as if the work took too long.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ SLOW_TICK_S = 0.004  # one and a half ticks
 CLOCK_STEP_S = 3600.0
 
 
-class Beats(Protocol):
+class TickSource(Protocol):
     def wait(self) -> Tick: ...
 
 
 class Stalls:
-    """Owns whether the one long stall of a failure has been."""
+    """Owns whether the single long stall of a failure is over."""
 
     def __init__(self, failures: Failures) -> None:
         self._failures = failures
         self._stalled: Failure | None = None
 
     def next_s(self) -> float:
-        """How long the loop stands still before its next tick."""
+        """The time for which the loop stands still before its next tick."""
         failure = self._failures.of("loop")
         if failure is None or failure is self._stalled:
             return 0.0
@@ -40,11 +40,11 @@ class Stalls:
 
 
 class FailingTicker:
-    """Tells the failures what time it is, once a tick, and the log which of them have ended."""
+    """Updates the failures once a tick, and reports failures that have ended."""
 
     def __init__(
         self,
-        ticker: Beats,
+        ticker: TickSource,
         failures: Failures,
         report: Callable[[float, str], None],
         sleep: Callable[[float], None] = time.sleep,
@@ -65,13 +65,13 @@ class FailingTicker:
         return tick
 
 
-def failing_ticker(ticker: Beats, failures: Failures | None, report: Callable[[float, str], None]) -> Beats:
-    """The ticker as it is, where nothing may fail."""
+def failing_ticker(ticker: TickSource, failures: Failures | None, report: Callable[[float, str], None]) -> TickSource:
+    """Wrap the ticker, unless no failures are allowed."""
     return ticker if failures is None else FailingTicker(ticker, failures, report)
 
 
 class FailingClock:
-    """The clock on the wall."""
+    """A wall clock that steps or stands still."""
 
     def __init__(self, clock: Callable[[], float], failures: Failures) -> None:
         self._clock = clock
@@ -90,5 +90,5 @@ class FailingClock:
 
 
 def failing_clock(clock: Callable[[], float], failures: Failures | None) -> Callable[[], float]:
-    """The clock as it is, where nothing may fail."""
+    """Wrap the clock, unless no failures are allowed."""
     return clock if failures is None else FailingClock(clock, failures)

@@ -1,7 +1,7 @@
-"""What a person can ask of the failures: the methods `fail` and `failures` of the status socket.
+"""The methods `fail` and `failures` of the status socket, which inject failures.
 
-Each failure stands in the log when it begins, with who asked for it, and when it ends; the status says what fails on
-purpose; and `disarm` ends every failure first, so that it reaches the drives whatever was made to fail.
+The log reports each failure when it begins, with the sender of the request, and when it ends. The status lists active
+failures. `disarm` ends every failure first, so that it always reaches the drives.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Method = Callable[[dict[str, Any], Caller], Any]
 
 
 def failures_of(configuration: Configuration) -> Failures | None:
-    """None where the configuration does not allow any."""
+    """Make the failures, or return None if the configuration does not allow any."""
     return Failures(configuration.bus) if configuration.failures.allowed else None
 
 
 def with_failures(methods: Methods, failures: Failures | None, report: Report, clock: Callable[[], float]) -> Methods:
-    """The methods of a daemon, and those that make it fail; the others as they are where nothing may."""
+    """Add the methods that inject failures; without failures they only refuse."""
     if failures is None:
         nothing = {"allowed": False, "failing": [], "table": []}
         return {**methods, "fail": _refuse, "failures": lambda params, caller: nothing}
@@ -52,7 +52,7 @@ class FailureCalls:
         self._clock = clock
 
     def fail(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
-        """Make `component` fail as `kind` says for `for_s`; kind "ok" ends it, also for "all". What fails then."""
+        """Make `component` fail as `kind` says for `for_s`; kind "ok" ends it. Returns the active failures."""
         component, kind = params["component"], params["kind"]
         if kind == OK:
             self._end(component)
@@ -76,7 +76,7 @@ class FailureCalls:
             self._report(self._clock(), end_text(each))
 
     def failures(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
-        """What fails, and all that could."""
+        """The active failures, and all possible ones."""
         families = self._failures.families
         table = [
             {"component": name, "family": families[name], "kind": kind, "does": does}
@@ -96,7 +96,7 @@ class FailureCalls:
         }
 
     def in_status(self, report: dict[str, Any]) -> dict[str, Any]:
-        """The status with what fails, and a warning for whoever reads only those."""
+        """Add the active failures to the status, also as warnings."""
         failing = self._failing()
         warnings = [failing_text(each) for each in failing]
         return report | {"failing": failing, "warnings": report["warnings"] + warnings}

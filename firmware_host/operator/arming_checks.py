@@ -1,7 +1,7 @@
-"""What stands between this robot and torque, line by line: the list of `mudskipper check` and of a refused `arm`.
+"""The checks before arming, line by line: the list of `mudskipper check` and of a refused `arm`.
 
-A line fails where a fault stands that blocks arming; the faults' own sentences and advice are shown. Lines that are
-`mandatory` hold also when a person arms by force.
+A line fails if a present fault of its part blocks arming, and shows the fault's message and advice. A `mandatory` line
+also blocks arming by force.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> d
 
 
 def _drive_lines(health: DriveHealth, state: DriveState) -> dict[str, str]:
-    """What is known of a drive, its joint and its watchdog."""
+    """The lines of a drive, its joint and its watchdog."""
     joint = health.joint
     if not state.heard:
         return {f"drive.{joint}": _unheard_text(state)}

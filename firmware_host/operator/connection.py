@@ -1,4 +1,4 @@
-"""One client of the status socket: what it has sent and not yet fetched, how fast it may ask, how long it may take."""
+"""One client of the status socket: its buffers, its request rate and its time limit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import msgpack
 
 from firmware_host.operator.rights import Level, Peer
-from firmware_host.operator.rpc import LONGEST_REQUEST, SHAPE, TOO_LONG, GarbledError, make_unpacker
+from firmware_host.operator.rpc import LONGEST_REQUEST, SHAPE, TOO_LONG, MalformedError, make_unpacker
 
 READ_BYTES = LONGEST_REQUEST
 WRITE_BYTES = 64 * 1024  # at once
@@ -21,7 +21,7 @@ NOTHING = object()
 
 
 class Caller(NamedTuple):
-    """Who asks: connections are numbered from the start on, since descriptors are used again."""
+    """The sender of a request. Connections are numbered since the start, since descriptors are reused."""
 
     connection: int
     peer: Peer
@@ -54,32 +54,32 @@ class Client:
         self.caller = caller
         self.budget = RequestBudget()
         self.outgoing = bytearray()
-        self.closing = False  # told off: no more is read or answered
-        self.ended = False  # it has hung up: what it asked before still counts
+        self.closing = False  # rejected: nothing more is read or answered
+        self.ended = False  # disconnected: its earlier requests still count
         self.watched = 0  # what epoll looks for
         self._unpacker = make_unpacker(READ_BYTES)
-        self._received = self._read = 0  # bytes: all, and those of whole messages
-        self._begun_s = inf  # when the rest of a request began to be waited for
+        self._received = self._read = 0  # bytes in total, and bytes of complete messages
+        self._begun_s = inf  # since when the rest of a request is missing
 
     def receive(self) -> None:
-        """Raises OSError, or GarbledError for a request that is too long."""
+        """Raises OSError, or MalformedError for a request that is too long."""
         data = self.connection.recv(READ_BYTES)
         self.ended = not data
         self._received += len(data)
         try:
             self._unpacker.feed(data)
         except msgpack.BufferFull:
-            raise GarbledError(TOO_LONG) from None
+            raise MalformedError(TOO_LONG) from None
 
     def next_message(self, now_s: float) -> Any:
-        """Or NOTHING. Raises GarbledError for what is too long or no MessagePack."""
+        """Return the next message or NOTHING; raises MalformedError if it is too long or no MessagePack."""
         try:
             message = next(self._unpacker, NOTHING)
         except (ValueError, msgpack.UnpackException, RecursionError):
-            raise GarbledError(SHAPE) from None
+            raise MalformedError(SHAPE) from None
         end = self._received if message is NOTHING else self._unpacker.tell()
-        if end - self._read > LONGEST_REQUEST:  # of many short parts: the unpacker bounds but the parts
-            raise GarbledError(TOO_LONG)
+        if end - self._read > LONGEST_REQUEST:  # of many short parts: the unpacker bounds only each part
+            raise MalformedError(TOO_LONG)
         if message is not NOTHING:
             self._read, self._begun_s = end, inf
         elif end > self._read:
@@ -87,14 +87,14 @@ class Client:
         return message
 
     def is_tardy(self, now_s: float) -> bool:
-        """Half a request has waited too long for its other half."""
+        """Whether the rest of a request has been missing for too long."""
         return now_s - self._begun_s > LONGEST_SENDING_S
 
     def send(self, message: list[Any]) -> None:
         self.outgoing += msgpack.packb(message)
 
     def flush(self) -> None:
-        """As much as goes at once. Raises OSError where the client is gone."""
+        """Send as much as fits; raises OSError if the client is gone."""
         if not self.outgoing:
             return
         try:

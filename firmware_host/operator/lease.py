@@ -1,11 +1,10 @@
-"""A dead man's lease: a program that moves the robot promises to be there, and to say so again and again.
+"""The dead-man lease: a program that moves the robot must renew it, or the robot stops.
 
-A lease is for a moment. Who holds it renews it; whose connection ends, or who does not renew in time, has lost it, and
-that stays so until the robot has stopped and its torque is off, where the loop resets the lease: a person arms again.
-One program holds it at a time, and as long as it does nobody else moves the robot, so also while torque is off and
-hands are in the mud; stopping is everybody's at any time. Whoever has a reason may take the robot over: who held the
-lease then stays out until it connects anew, since a program that was overruled must not go on as if nothing had
-happened.
+The lease is lost if its holder disconnects or does not renew it in time. It stays lost until the robot has stopped and
+its torque is off; then the loop resets it, and the robot can be armed again. One program holds the lease at a time.
+Meanwhile no other program moves the robot, also while torque is off and hands may be in the mud; every user may still
+stop it. An operator may take the robot over. The previous holder is then refused until it connects again, since a
+program that was overruled must not continue as if nothing had happened.
 """
 
 from __future__ import annotations
@@ -13,30 +12,30 @@ from __future__ import annotations
 from collections.abc import Hashable
 from math import inf
 
-TAKEN_OVER = "taken over: "  # how a refusal begins that holds for as long as the connection
+TAKEN_OVER = "taken over: "  # prefix of a refusal that lasts as long as the connection
 
 
 class Lease:
-    """Owns who has promised what. A holder is anything that is equal to itself alone and can be named by str()."""
+    """Owns the holder of the lease; any hashable object can hold it, and str() names it in messages."""
 
     def __init__(self) -> None:
-        self._ousted: dict[Hashable, str] = {}  # and by whom
+        self._ousted: dict[Hashable, str] = {}  # previous holders, and who took the robot over
         self.reset()
 
     def reset(self) -> None:
-        """Nobody holds it, and none is lost. Who was ousted stays out."""
+        """Free the lease; programs that were overruled stay refused."""
         self._holder: Hashable | None = None
         self._until_s = inf
         self._lost = False
 
     @property
     def holder(self) -> Hashable | None:
-        """Also the one who lost it."""
+        """The holder, also after it has lost the lease."""
         return self._holder
 
     @property
     def held(self) -> bool:
-        """Or held until just now: `lost` is what tells."""
+        """Whether the lease is held, as of the last `update`."""
         return self._holder is not None and not self._lost
 
     def update(self, now_s: float) -> None:
@@ -47,7 +46,7 @@ class Lease:
         return self._lost or now_s > self._until_s
 
     def refusal(self, caller: Hashable, now_s: float, take_over: bool = False) -> str | None:
-        """Why `caller` may not move the robot at this moment, or None."""
+        """Return why `caller` may not move the robot now, or None."""
         if caller in self._ousted:
             return f"{TAKEN_OVER}{self._ousted[caller]} wanted the robot; begin again when it is free"
         if self.lost(now_s):
@@ -61,7 +60,7 @@ class Lease:
         )
 
     def renew(self, holder: Hashable, now_s: float, for_s: float) -> str | None:
-        """Why it is refused, or None."""
+        """Take or renew the lease; returns why this is refused, or None."""
         self.update(now_s)
         refused = self.refusal(holder, now_s)
         if refused is None:
@@ -69,19 +68,19 @@ class Lease:
         return refused
 
     def oust(self, by: Hashable) -> None:
-        """Nobody holds it any more; who did may not come back."""
+        """Take the lease away from its holder, which stays refused until it connects again."""
         if self.held and by != self._holder:
             self._ousted[self._holder] = str(by)
             self.reset()
 
     def release(self, holder: Hashable) -> str | None:
-        """Why it is refused, or None. A held lease is its holder's; a lost one anybody's who may drive."""
+        """Free the lease; returns why this is refused, or None. Any operator may free a lost lease."""
         if self.held and holder != self._holder:
             return f"{self._holder} holds the lease"
         self.reset()
         return None
 
     def hang_up(self, holder: Hashable) -> None:
-        """The connection of `holder` has ended, whoever that is."""
+        """Handle the end of a connection."""
         self._lost = self._lost or holder == self._holder
         self._ousted.pop(holder, None)

@@ -1,10 +1,10 @@
-"""Who may ask the daemon for what, by what the kernel says of a connection.
+"""Who may use which method of the status socket, by the credentials that the kernel reports for a connection.
 
-SO_PEERCRED and SO_PEERGROUPS (unix(7), Linux 4.13) tell user, process and groups of the other end as they were when it
-connected; nobody can make them up. Three levels: whoever is let in may stop the robot, readers see how it is, operators
-move it. Operators also read; root and the daemon's own user may do everything. The socket's file is open to everybody,
-since one group cannot own it for readers and operators: strangers who may not even stop are turned away here. Names of
-groups are looked up once, at the start: a name service may take its time, and a tick has none.
+SO_PEERCRED and SO_PEERGROUPS (unix(7), Linux 4.13) give user, process and groups of the other end at the time when it
+connected; a client cannot forge them. There are three levels: every user may stop the robot, readers see its state,
+operators move it. Operators also read; root and the daemon's own user may do everything. The file of the socket is open
+to every user, since one group cannot own it for readers and operators; unauthorised users are refused here. Group names
+are resolved once, at the start: a name service may be slow, and a tick cannot wait.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _for_members(what: str, group: Group) -> str:
 
 
 def load_rights(parameters: StatusParameters) -> Rights:
-    """Raises ConfigurationError for a group that does not exist: to find nobody permitted in the field is worse."""
+    """Resolve the configured groups; raises ConfigurationError for a group that does not exist."""
     named = {"read_group": parameters.read_group, "drive_group": parameters.drive_group}
     problems = [
         f"status.{key} = {name!r}: there is no such group; make it with 'groupadd {name}', or leave the key out"
@@ -92,7 +92,7 @@ def _exists(name: str) -> bool:
 
 
 def _find_group(name: str) -> Group:
-    """Without a name, the daemon's own."""
+    """Return the group with this name, or the daemon's own group for an empty name."""
     if name:
         return Group(name, grp.getgrnam(name).gr_gid)
     own = os.getegid()
@@ -103,15 +103,15 @@ def _find_group(name: str) -> Group:
 
 
 def read_peer(connection: socket.socket) -> Peer:
-    """Raises OSError."""
+    """Read the credentials of a connection's other end; raises OSError."""
     pid, uid, gid = CREDENTIALS.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size))
     return Peer(pid, uid, frozenset((gid, *_supplementary_groups(connection))))
 
 
 def _supplementary_groups(connection: socket.socket) -> tuple[int, ...]:
-    """None where there are more than fit, or an old kernel: such a peer is known by its primary group.
+    """Return the supplementary groups; none if they do not fit, or with an old kernel.
 
-    Asking a name service instead could hold a tick for seconds.
+    Such a peer counts with its primary group alone: a name service could block a tick for seconds.
     """
     try:
         answer = connection.getsockopt(socket.SOL_SOCKET, SO_PEERGROUPS, LONGEST_ANSWER)

@@ -1,9 +1,9 @@
-"""MessagePack-RPC as the status socket understands it: what is a request, and what is refused.
+"""MessagePack-RPC as the status socket understands it: it decodes requests and rejects malformed ones.
 
 A request is [0, id, method, params], its answer [1, id, error, result] (the MessagePack-RPC specification). Params are
-a flat map from names to plain values, since that is all the methods take: what is nested, no number, or of an extension
-type is refused here and reaches none of them. The lengths are bounded before anything is allocated: a header of three
-bytes may announce 65535 elements, for which the unpacker makes room at once, and headers can be nested.
+a flat map from names to plain values, which is all that the methods take; nested values, non-finite numbers and
+extension types are refused. Lengths are bounded before memory is allocated: a header of three bytes may announce 65535
+elements, for which the unpacker makes room at once, and headers can be nested.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ LONGEST_METHOD = 64
 MOST_PARAMS = 16
 PARTS = 4  # of a request
 
-NOT_PERMITTED = "not permitted: "  # how a refusal for want of rights begins
-FOR_MEMBERS = "for members of the group "  # and what it says before the group's name
+NOT_PERMITTED = "not permitted: "  # prefix of a refusal for missing rights
+FOR_MEMBERS = "for members of the group "  # precedes the name of the group
 SHAPE = f"a request is [0, id, method, params] in MessagePack, with at most {MOST_PARAMS} params"
 
 TOO_LONG = f"a request has at most {LONGEST_REQUEST} bytes"
 
 
 class RefusedError(Exception):
-    """A request that was understood and will not be done; the text says why."""
+    """The daemon understood a request and refuses it; the text says why."""
 
 
-class GarbledError(Exception):
-    """No request; the text says what one is."""
+class MalformedError(Exception):
+    """A message is not a request; the text describes a request."""
 
 
 def make_unpacker(read_bytes: int) -> msgpack.Unpacker:
-    """For what comes in pieces of at most `read_bytes`."""
+    """Make an unpacker for data that arrives in pieces of at most `read_bytes`."""
     return msgpack.Unpacker(
         max_buffer_size=LONGEST_REQUEST + read_bytes,
         max_array_len=PARTS,
@@ -48,19 +48,19 @@ def make_unpacker(read_bytes: int) -> msgpack.Unpacker:
 
 
 def read_shape(message: Any) -> tuple[int, str, Any]:
-    """Number, method and params. Raises GarbledError."""
+    """Number, method and params. Raises MalformedError."""
     if not isinstance(message, list) or len(message) != PARTS:
-        raise GarbledError(SHAPE)
+        raise MalformedError(SHAPE)
     kind, number, method, params = message
     if type(kind) is not int or kind != REQUEST or type(number) is not int or number < 0:
-        raise GarbledError(SHAPE)
+        raise MalformedError(SHAPE)
     if not isinstance(method, str) or len(method) > LONGEST_METHOD or not isinstance(params, list | dict):
-        raise GarbledError(SHAPE)
+        raise MalformedError(SHAPE)
     return number, method, params
 
 
 def read_params(params: Any) -> dict[str, Any]:
-    """They come as a map, or as the specification's list holding one. Raises RefusedError."""
+    """Return the params, which are a map, or a list that contains one map; raises RefusedError."""
     if isinstance(params, list):
         params = params[0] if params else {}
     if not isinstance(params, dict) or not all(isinstance(key, str) for key in params):

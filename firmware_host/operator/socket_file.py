@@ -1,12 +1,10 @@
-"""The file of a listening Unix socket: open to everybody, replaced where a dead daemon left it behind.
+"""The file of a listening Unix socket: open to every user, and replaced if a dead daemon left it.
 
-Connecting needs the right to write to the file and to enter its folder. Who may ask for what, the kernel's word on who
-connects decides (rights.py), not the file: so a folder that is there keeps its permissions, and one that is made here
-lets everybody in.
+Connecting requires the right to write to the file and to enter its folder. The credentials of a connection decide what
+it may do (rights.py), not the file: an existing folder keeps its permissions, and a new one is open to every user.
 
-Nothing is followed and nothing but a dead socket is removed: not a file, not a symbolic link, not the socket of a
-daemon that lives or merely hangs. A folder that everybody may write to is refused, since there everybody could put
-another socket in this one's place.
+Symbolic links are not followed, and only a dead socket is removed: never a file, a link, or the socket of a daemon that
+lives or hangs. A folder that every user may write to is refused, since any user could replace the socket there.
 """
 
 from __future__ import annotations

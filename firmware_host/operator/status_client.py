@@ -1,4 +1,4 @@
-"""The other end of the status socket, for the command line: standard library and msgpack only, so it starts at once."""
+"""A client of the status socket; it imports only the standard library and msgpack, so that commands start quickly."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from firmware_host.operator.rpc import NOT_PERMITTED, REQUEST
 
 ANSWER_S = 5.0
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
-CLOSED = "it is ending, or made room for somebody else; try again"
-SILENT = "'systemctl status mudskipper' tells more"
+CLOSED = "it is ending, or made room for another client; try again"
+SILENT = "'systemctl status mudskipper' shows more"
 TIMEVAL = struct.Struct("ll")  # seconds and microseconds
 
 
 class NoDaemonError(Exception):
-    """Nobody answers on the socket."""
+    """No daemon answers on the socket."""
 
 
 class DroppedError(NoDaemonError):
-    """A daemon is there, but gives no answer; the text says how that looks."""
+    """A daemon is running, but gives no answer; the text says how."""
 
 
 class NotPermittedError(Exception):
@@ -53,14 +53,14 @@ class StatusClient:
 
     @property
     def daemon_pid(self) -> int:
-        """By the kernel's word on who made the socket."""
+        """The process that created the socket, as the kernel reports it."""
         size = CREDENTIALS.size
         return int(CREDENTIALS.unpack(self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, size))[0])
 
     def call(self, method: str, **params: Any) -> Any:
         """The result.
 
-        Raises CallRefusedError or NotPermittedError with the daemon's sentence, or NoDaemonError where none comes.
+        Raises CallRefusedError or NotPermittedError with the daemon's message, or NoDaemonError if no answer comes.
         """
         self._number += 1
         try:

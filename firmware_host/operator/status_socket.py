@@ -1,10 +1,10 @@
 """MessagePack-RPC over a Unix stream socket, served between two ticks.
 
-The loop calls `serve` once a tick: it never waits, answers at most one request, clients in turn, and gives every client
-bounded buffers, a bounded rate and a bounded time to send a request. Whoever asks faster waits: the kernel keeps the
-rest. Whoever sends something else is told so and disconnected. When there is no room, the user with the most
-connections makes some, so nobody can keep another one out; but never the one who has promised to attend. A method that
-fails answers so and is reported: no report stops a robot.
+The loop calls `serve` once a tick. It never waits, answers at most one request, and takes the clients in turn. Every
+client has bounded buffers, a bounded rate and a bounded time to send a request: faster requests wait in the kernel, and
+malformed ones get an error and end the connection. When all places are taken, the user with the most connections loses
+one, so that no user can exclude another; the holder of the lease is spared. A method that fails answers with an error
+and is logged: no report stops a robot.
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ import msgpack
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.operator.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
 from firmware_host.operator.rights import Peer, Rights, load_rights, read_peer
-from firmware_host.operator.rpc import RESPONSE, GarbledError, read_params, read_shape
-from firmware_host.operator.rpc import RefusedError as RefusedError  # for whoever writes a method
-from firmware_host.operator.socket_file import AlreadyServedError as AlreadyServedError  # for whoever opens one
+from firmware_host.operator.rpc import RESPONSE, MalformedError, read_params, read_shape
+from firmware_host.operator.rpc import RefusedError as RefusedError  # for modules that define methods
+from firmware_host.operator.socket_file import (
+    AlreadyServedError as AlreadyServedError,  # for modules that open a socket
+)
 from firmware_host.operator.socket_file import SocketFile
 
 MOST_CLIENTS = 16
@@ -33,7 +35,7 @@ Methods = Mapping[str, Callable[[dict[str, Any], Caller], Any]]
 
 
 class StatusSocket:
-    """Bound and listening from the start on; `methods`, once set, take the params of a request and who asks."""
+    """Listens from the start on; each of `methods` takes the params of a request and its sender."""
 
     def __init__(
         self,
@@ -42,29 +44,29 @@ class StatusSocket:
         rights: Rights | None = None,
         peer_of: Callable[[socket.socket], Peer] = read_peer,
     ) -> None:
-        """Raises AlreadyServedError, or OSError where the path cannot be bound."""
+        """Raises AlreadyServedError, or OSError if the path cannot be bound."""
         self.path = path
         self.methods = methods
         self.report_bug: Callable[[str], None] = lambda message: None
         self.on_hang_up: Callable[[Caller], None] = lambda caller: None  # may come twice
-        self.spares: Callable[[Caller], bool] = lambda caller: False  # whose end would stop the robot
+        self.spares: Callable[[Caller], bool] = lambda caller: False  # clients whose disconnection would stop the robot
         self._rights = rights or load_rights(StatusParameters())
         self._peer_of = peer_of
         self._file = SocketFile(path, MOST_CLIENTS)
         self._listener = self._file.listener
         self._poll = select.epoll()
         self._poll.register(self._listener.fileno(), select.EPOLLIN)
-        self._clients: dict[int, Client] = {}  # the one that has been still for longest comes first
+        self._clients: dict[int, Client] = {}  # the client that was silent for longest comes first
         self._waiting: dict[int, None] = {}  # in turn: clients that may have a request not yet answered
-        self._accepted = self._garbled = self._not_permitted = self._too_slow = self._made_room = 0
+        self._accepted = self._malformed = self._not_permitted = self._too_slow = self._made_room = 0
 
     @property
     def counters(self) -> dict[str, int]:
-        """All since the start, but for the clients that are there at the moment."""
+        """Counts since the start, and the number of present clients."""
         return {
             "clients": len(self._clients),
             "accepted_clients": self._accepted,
-            "garbled_requests": self._garbled,
+            "malformed_requests": self._malformed,
             "not_permitted": self._not_permitted,
             "dropped_slow_clients": self._too_slow,
             "dropped_for_others": self._made_room,
@@ -108,7 +110,7 @@ class StatusSocket:
             connection.send(msgpack.packb([RESPONSE, None, message, None]))
 
     def _make_room(self, newcomer: Peer) -> None:
-        """The user with the most connections loses the one that is still for longest; among equals the less trusted."""
+        """Drop the longest silent client of the user with the most connections; of equal users, the less privileged."""
         connections = Counter(client.caller.peer.uid for client in self._clients.values())
         connections[newcomer.uid] += 1
 
@@ -130,14 +132,14 @@ class StatusSocket:
             try:
                 client.receive()
                 self._waiting[descriptor] = None
-            except GarbledError as problem:
+            except MalformedError as problem:
                 self._reject(client, str(problem))
             except OSError:
                 return self._drop(descriptor)
         return self._settle(descriptor)
 
     def _answer_next(self, now_s: float) -> None:
-        """Of the first client in turn that has not spent its rate."""
+        """Answer the first client in turn whose request rate permits it."""
         for descriptor in self._waiting:
             if self._clients[descriptor].budget.allows(now_s):
                 del self._waiting[descriptor]
@@ -149,12 +151,12 @@ class StatusSocket:
         try:
             message = client.next_message(now_s)
             request = None if message is NOTHING else read_shape(message)
-        except GarbledError as problem:
+        except MalformedError as problem:
             self._reject(client, str(problem))
         else:
             if request is not None:
                 client.budget.spend()
-                self._waiting[descriptor] = None  # there may be another one behind it
+                self._waiting[descriptor] = None  # another request may follow
                 self._answer(client, *request)
         self._settle(descriptor)
 
@@ -170,21 +172,21 @@ class StatusSocket:
             return client.send([RESPONSE, number, None, self.methods[method](read_params(params), client.caller)])
         except RefusedError as refusal:
             return client.send([RESPONSE, number, str(refusal), None])
-        except Exception as problem:  # noqa: BLE001 - the robot walks on while a report fails
+        except Exception as problem:  # noqa: BLE001 - the robot continues although a report fails
             self.report_bug(f"{method} failed: {type(problem).__name__}: {problem}")
             return client.send([RESPONSE, number, f"{method} failed: this is a bug, the log says more", None])
 
     def _reject(self, client: Client, message: str) -> None:
-        self._garbled += 1
+        self._malformed += 1
         client.send([RESPONSE, None, message, None])
         client.closing = True
 
     def _settle(self, descriptor: int) -> None:
-        """Send what can be sent; drop a client that is told off, does not fetch its answers, or is done with."""
+        """Send pending answers; drop a client that is rejected, too slow, or finished."""
         client = self._clients[descriptor]
         try:
             client.flush()
-        except OSError:  # nobody fetches the answers any more; what was asked before still counts
+        except OSError:  # the client is gone; its earlier requests still count
             client.ended = True
             client.outgoing.clear()
             self._waiting.setdefault(descriptor)

@@ -58,7 +58,7 @@ def test_a_garbled_request_gets_an_error_and_the_door(served: Served, message: b
     assert answers and answers[0][2]
     serve(served)
     assert client.recv(10) == b""
-    assert served.counters["garbled_requests"] == 1
+    assert served.counters["malformed_requests"] == 1
 
 
 def test_an_endless_request_gets_an_error_and_the_door(served: Served) -> None:
@@ -73,7 +73,7 @@ def test_an_endless_request_gets_an_error_and_the_door(served: Served) -> None:
             break
         served.tick()
     serve(served)
-    assert served.counters["garbled_requests"] == 1
+    assert served.counters["malformed_requests"] == 1
 
 
 def test_a_client_that_does_not_fetch_its_answers_is_dropped(served: Served) -> None:
