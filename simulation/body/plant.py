@@ -257,7 +257,8 @@ class Plant:
     def step(self, dt_s: float, torques_nm: Torques) -> None:
         (left, right), body = self.arms, self.body
         left_carriage, right_carriage = body.carriages
-        left.step(dt_s, body.forward_m, body.forward_m_s, *torques_nm.left, left_carriage)
-        right.step(dt_s, body.forward_m, body.forward_m_s, *torques_nm.right, right_carriage)
+        left_sweep_nm, left_lift_nm, right_sweep_nm, right_lift_nm = torques_nm
+        left.step(dt_s, body.forward_m, body.forward_m_s, left_sweep_nm, left_lift_nm, left_carriage)
+        right.step(dt_s, body.forward_m, body.forward_m_s, right_sweep_nm, right_lift_nm, right_carriage)
         if not self.parameters.fixed_base:
             body.step(dt_s, left, right)

@@ -77,6 +77,10 @@ class SimulatedRobot:
                         port.send(answer)
 
     def _measure(self) -> None:
-        plant = self.plant
-        for drive, angle_rad, velocity_rad_s in zip(self.drives, plant.angles_rad, plant.velocities_rad_s, strict=True):
-            drive.measure(angle_rad, velocity_rad_s)
+        """Gives each drive its joint's true motion; without records in between, as this runs in every step."""
+        left, right = self.plant.arms
+        left_sweep, left_adduction, right_sweep, right_adduction = self.drives
+        left_sweep.measure(left.sweep_rad, left.sweep_velocity_rad_s)
+        left_adduction.measure(left.adduction_rad, left.adduction_velocity_rad_s)
+        right_sweep.measure(right.sweep_rad, right.sweep_velocity_rad_s)
+        right_adduction.measure(right.adduction_rad, right.adduction_velocity_rad_s)
