@@ -1,4 +1,4 @@
-"""Command lines as tests give them: in a process of their own, or in this one where they are refused."""
+"""Runs command lines: in a process of their own, or in this one where they are refused."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.waiting import LONGEST_S
 
 
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """In a process of its own, with these variables besides those that are."""
+    """Runs a command in its own process with additional environment variables."""
     command = [sys.executable, "-m", "command_line.main", *arguments]
     return subprocess.run(
         command, capture_output=True, text=True, timeout=LONGEST_S, env=os.environ | environment, check=False
@@ -23,12 +23,12 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The sentence with which a command line is refused as wrong usage."""
+    """Returns the message with which a command line is refused as wrong usage."""
     return _complaint(capsys, exit_codes.USAGE, arguments)
 
 
 def failure(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The sentence with which a command says that it cannot do it."""
+    """Returns the message of a command that failed."""
     return _complaint(capsys, exit_codes.UNHEALTHY, arguments)
 
 
