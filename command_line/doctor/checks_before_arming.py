@@ -59,7 +59,7 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
 
 
 def _pose_items(configuration: Configuration) -> list[dict[str, Any]]:
-    """Of a source at the other end of a wire. Without a pose a robot walks, but its daemon wants the source to open."""
+    """Checks a pose source. A robot walks without a pose, but its daemon requires the configured source to open."""
     if configuration.pose.chosen not in ("natnet", "rail_encoder"):
         return []
     try:

@@ -95,7 +95,7 @@ def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, li
 
 
 def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
-    """Of a status."""
+    """Returns the findings about a status."""
     text = f"runs, version {status['version']}, {status['mode']}"
     if status["version"] == version:
         yield ok("daemon", text)

@@ -111,7 +111,7 @@ def _beside(log: Path, ending: str) -> Path:
 
 
 def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
-    """With what is to be said of it. Raises LogError, also for a picture that nobody could write."""
+    """Reads the walk and prints its limitations. Raises LogError, also for a picture that cannot be written."""
     with watched() as watch:
         walk = read_walk(options.files[0], options.walk, options.files[1:], watch)
     if not os.access(path if path.exists() else path.parent, os.W_OK):

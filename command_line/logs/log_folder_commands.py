@@ -72,7 +72,7 @@ def _configured_folder(path: Path) -> Path | None:
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """Of the summary at the file's end, without reading its rows; nothing is known of a file without one."""
+    """Describes a log by the summary at the file's end, without reading its rows."""
     metadata, duration_s = _summary_of(path)
     return {
         "name": path.name,
@@ -139,7 +139,7 @@ def recover(options: Options) -> int:
 
 
 def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Recovered], list[str]]:
-    """Of files that nobody named, those of living writers are passed over."""
+    """Skips the files of living writers, unless the operator named them."""
     recovered, resisted = [], []
     progress = Progress("", QUIET_S)
     for done, path in enumerate(paths):

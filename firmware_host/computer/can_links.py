@@ -86,7 +86,7 @@ def _number(value: object, otherwise: float) -> float:
 
 
 def read_links(root: Path = Path("/")) -> dict[str, CanLink]:
-    """By name: as iproute2 tells, else as /sys does."""
+    """Returns the links by name, from iproute2, or else from /sys."""
     with suppress(OSError, subprocess.SubprocessError):
         command = ["ip", "-details", "-json", "link", "show"]
         reported = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=True).stdout

@@ -1,4 +1,4 @@
-"""What the facts of the computer mean for the robot: one finding each, with what to do.
+"""Evaluates the facts of the computer for the robot: one finding each, with its remedy.
 
 Only what keeps the robot from working, or its torque from being watched, fails; what makes it late or forgetful warns.
 """
@@ -133,7 +133,7 @@ def examine_interrupts(priority: int, threads: list[Thread]) -> Finding:
 
 
 def examine_storage(root: Path, log: LogParameters, writer: Account, daemon_runs: bool) -> Iterator[Finding]:
-    """Where the logs go."""
+    """Checks the folder of the logs."""
     if not log.enabled:
         yield warn("log", "no log is written", "set log.enabled = true")
         return
@@ -191,7 +191,7 @@ def examine_folder(folder: Path, writer: Account) -> Finding:
 
 
 def folder_of_systemd(folder: Path) -> Path | None:
-    """Where systemd will make the service's StateDirectory, if the folder is to be in that."""
+    """Returns the folder in which systemd will make the service's StateDirectory, if the log folder is in that."""
     return next((place.parent for place in (folder, *folder.parents) if place.parts[-3:] == STATE_FOLDER), None)
 
 

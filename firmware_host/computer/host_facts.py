@@ -1,4 +1,4 @@
-"""What the kernel tells of the computer: read from /proc and /sys below a root that a test may make up.
+"""Reads facts of the computer from /proc and /sys, below a root that a test may replace.
 
 Nothing here judges, and what cannot be read is empty: host_checks.py says what it means. Layouts: proc(5),
 proc_pid_stat(5); threaded interrupts are kernel threads named irq/NUMBER-DEVICE.
@@ -59,7 +59,7 @@ def kernel_text(root: Path) -> str:
 
 
 def process_limits(root: Path, pid: int | None) -> Limits | None:
-    """Of a process, or of this one, which root may exceed."""
+    """Returns the limit of a process, or of this one; root may exceed it."""
     if pid is None and os.geteuid() == 0:
         return Limits(inf, inf, "for root")
     text = read_text(root / "proc" / str(pid or "self") / "limits")
@@ -94,7 +94,7 @@ def governors(root: Path) -> set[str]:
 
 
 def isolated_processors(root: Path) -> set[int]:
-    """Of a list such as 2-3,5."""
+    """Returns the numbers in a list such as 2-3,5."""
     found: set[int] = set()
     for first, last in re.findall(r"(\d+)(?:-(\d+))?", read_text(root / "sys/devices/system/cpu/isolated")):
         found.update(range(int(first), int(last or first) + 1))
@@ -138,6 +138,6 @@ def has_clock_chip(root: Path) -> bool:
 
 
 def clock_is_synchronised() -> bool:
-    """As the kernel was told by whoever disciplines it; only asks."""
+    """Reads the state of the clock from the kernel; changes nothing."""
     state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_BYTES))
     return state not in (TIME_ERROR, REFUSED)

@@ -1,4 +1,4 @@
-"""What the operating system can do for the loop's punctuality, where it is permitted.
+"""Asks the operating system for real-time scheduling and locked memory, where that is permitted.
 
 SCHED_FIFO for this thread alone (children start as ordinary processes), memory locked against paging, one processor,
 no garbage collection while moving. Each that is refused gives a sentence for the operator; the robot runs without.

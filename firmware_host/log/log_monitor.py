@@ -1,4 +1,4 @@
-"""What the log's writer tells against recording: a full, slow or lost disk, rows that were lost, its own death.
+"""Turns the reports of the log's writer into faults: a full, slow or lost disk, lost rows, a dead writer.
 
 None of it stops a robot that moves; a log that cannot be written stands against arming.
 """

@@ -73,7 +73,7 @@ def replay_files(
 def replay_file(
     path: Path, configuration: Configuration | None = None, method: Method | None = None, watch: Watch = unwatched
 ) -> Replay:
-    """By the file's name: our MCAP log, or the authors' CSV. Raises LogError.
+    """Replays our MCAP log or the authors' CSV, by the file's name. Raises LogError.
 
     `method` instead of the configured one.
     """
@@ -91,7 +91,7 @@ def replay_log(
     method: Method | None = None,
     watch: Watch = unwatched,
 ) -> Replay:
-    """With the configuration that the log carries, unless another one is given."""
+    """Uses the configuration that the log carries, unless another one is given."""
     configuration = configuration or configuration_of(path, log.configuration_text)
     parameters = _by_method(configuration.estimation, method)
     drag_n = configuration.adaptation.body_drag_n
@@ -128,7 +128,7 @@ def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator
 
 
 def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
-    """With the paper's torque constant and a weightless arm, unless a configuration is given.
+    """Assumes the paper's torque constant and a weightless arm, unless a configuration is given.
 
     One flipper alone hung from a bench; two carried a body.
     """
