@@ -30,8 +30,8 @@ from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
 from firmware_host.operator.status_client import NoDaemonError, NotPermittedError, StatusClient
 from firmware_host.ticker import Tick, Ticker
-from simulation.body.blocks import on_blocks
 from simulation.devices.drive import SimulatedDriveParameters
+from simulation.harness.blocks import on_blocks
 from simulation.harness.robot import SimulatedRobot
 
 LISTENING_S = 1.0  # ten heartbeats

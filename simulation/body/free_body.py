@@ -37,8 +37,8 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.joint_pd import GRAVITY_M_S2
-from simulation.body.carriage import Carriage, Vector, cross, dot, plate_directions
 from simulation.body.rail_body import BodyMotion, DragPad, DryDrag, Pusher
+from simulation.mud.carriage import Carriage, Vector, cross, dot, plate_directions
 from simulation.mud.clay import ADHESION, BEARING_FACTOR, UNIT_WEIGHT_N_M3, Clay, rate_factor
 from simulation.mud.flipper_contact import NO_CONTACT
 from simulation.mud.track import Track

@@ -22,9 +22,9 @@ from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.records import JointAngles, Joints, Torques
 from simulation.body.bench_mount import BenchMount
-from simulation.body.carriage import Carriage
 from simulation.body.free_body import BodyShape, FreeBody
 from simulation.body.rail_body import Body, BodyMotion, DragPad, RailBody
+from simulation.mud.carriage import Carriage
 from simulation.mud.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
 from simulation.mud.flipper_contact import (
     NO_CONTACT,

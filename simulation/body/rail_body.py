@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from simulation.body.carriage import Carriage, Vector
+from simulation.mud.carriage import Carriage, Vector
 from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.flipper_contact import ContactForce
 from simulation.mud.track import Track

@@ -22,8 +22,8 @@ from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Config
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.ticker import Ticker
-from simulation.body.blocks import on_blocks
 from simulation.devices.pose_broadcast import PoseBroadcast
+from simulation.harness.blocks import on_blocks
 from simulation.harness.robot import SimulatedRobot
 from simulation.harness.world import World, load_world
 from simulation.mud.clay import MUDS

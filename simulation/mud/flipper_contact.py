@@ -16,7 +16,7 @@ from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from simulation.body.carriage import Carriage, carried_attitude, carried_twist
+from simulation.mud.carriage import Carriage, carried_attitude, carried_twist
 from simulation.mud.clay import Clay
 from simulation.mud.plate_contact import PlateContact
 from simulation.mud.rigid_plate import Attitude, PlateSize, Twist, Wrench

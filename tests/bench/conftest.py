@@ -22,7 +22,7 @@ from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
-from simulation.body.blocks import resting_drop_m
+from simulation.harness.blocks import resting_drop_m
 from tests.bench.staged_bench import (
     SKIPPED,
     BenchReport,

@@ -9,9 +9,9 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from simulation.body.blocks import RESTING_RAD
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness import peer
+from simulation.harness.blocks import RESTING_RAD
 from simulation.harness.local_setup import write_local_setup
 
 WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"

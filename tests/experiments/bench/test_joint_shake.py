@@ -17,7 +17,7 @@ from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
-from simulation.body.blocks import on_blocks
+from simulation.harness.blocks import on_blocks
 
 
 class Bench:

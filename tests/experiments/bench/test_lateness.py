@@ -20,8 +20,8 @@ from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
-from simulation.body.blocks import on_blocks
 from simulation.devices.odrive import SimulatedOdrive
+from simulation.harness.blocks import on_blocks
 from simulation.harness.peer import track_of
 from simulation.harness.world import World
 from tests.bench.staged_bench import MOST_MEASURED, BenchReport, StagedBench

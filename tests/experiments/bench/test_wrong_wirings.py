@@ -23,7 +23,7 @@ from experiments.bench.rig import SimulatedRig
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.blocks import on_blocks
+from simulation.harness.blocks import on_blocks
 from tests.bench import (
     test_1_wiring,
     test_2_signs,

@@ -13,7 +13,6 @@ from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
 from control.records import NO_TORQUE, Joints
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.carriage import LEAST_UPRIGHT, carried_attitude, carried_twist
 from simulation.body.free_body import (
     YIELD_M,
     Axes,
@@ -28,6 +27,7 @@ from simulation.body.free_body import (
 from simulation.body.plant import STEP_S, Plant, PlantParameters
 from simulation.body.rail_body import DragPad
 from simulation.harness.lockstep import Lockstep, plant_of
+from simulation.mud.carriage import LEAST_UPRIGHT, carried_attitude, carried_twist
 from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, attitude_of, contact_force, twist_of
 from simulation.mud.rigid_plate import Wrench

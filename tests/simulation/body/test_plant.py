@@ -8,9 +8,9 @@ import pytest
 
 from control.joint_pd import ArmMass
 from control.records import NO_TORQUE, Joints
-from simulation.body.carriage import Carriage
 from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant, PlantParameters
 from simulation.body.rail_body import DRAG_STIFFNESS_N_M
+from simulation.mud.carriage import Carriage
 from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.disturbances import LAB, Disturbances
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, FlipperContact

@@ -13,9 +13,9 @@ from control.bounds import Bounds
 from control.controller import WalkOrder
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import ConfigurationError
-from simulation.body.blocks import on_blocks
 from simulation.body.plant import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
+from simulation.harness.blocks import on_blocks
 from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import (
     FIXED_OF_DRIVE,
