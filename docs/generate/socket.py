@@ -25,11 +25,11 @@ def methods() -> Iterator[str]:
 
 def _parameters(method: SocketMethod) -> Iterator[str]:
     if method.parameters:
-        yield from table(("parameter", "type", "bounds", "default", "meaning"), map(_row, method.parameters))
+        yield from table(("parameter", "type", "unit", "bounds", "default", "meaning"), map(_row, method.parameters))
     else:
         yield ""
 
 
-def _row(parameter: Parameter) -> tuple[str, str, str, str, str]:
+def _row(parameter: Parameter) -> tuple[str, str, str, str, str, str]:
     default = "required" if parameter.required else "" if parameter.default is None else code(parameter.default)
-    return code(parameter.name), str(parameter.type), parameter.bounds, default, parameter.meaning
+    return code(parameter.name), str(parameter.type), parameter.unit, parameter.bounds, default, parameter.meaning

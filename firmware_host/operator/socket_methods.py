@@ -57,6 +57,7 @@ class Parameter(NamedTuple):
     bounds_note: str = ""  # bounds that the configuration sets
     default: bool | int | float | None = None
     required: bool = False
+    null_is_default: bool = False  # else an explicit null is refused
 
     @property
     def bounds(self) -> str:
@@ -66,8 +67,12 @@ class Parameter(NamedTuple):
             return self.bounds_note
         return f"from {self.minimum:.15g} to {self.maximum:.15g}{unit}"
 
-    def read(self, value: Any) -> Any:
-        """Return the value if this parameter accepts it; raises RefusedError otherwise."""
+    def value_in(self, params: Mapping[str, Any]) -> Any:
+        """Return the value in the parameters of a request, or the default; raises RefusedError."""
+        value = params.get(self.name)
+        absent = self.name not in params and not self.required
+        if absent or (value is None and self.null_is_default):
+            return self.default
         if not self._accepts(value):
             bounds = f" {self.bounds}" if self.minimum is not None else ""
             raise RefusedError(f"{self.name} = {value!r:.60}: must be {REQUIREMENTS[self.type]}{bounds}")
@@ -94,18 +99,15 @@ class SocketMethod(NamedTuple):
     parameters: tuple[Parameter, ...] = ()
     answer: str = 'the text "accepted"'
     answer_keys: Mapping[str, str] = {}  # of an answer that is a map, or a list of maps
+    refuses_unknown: bool = False  # else a parameter that the method does not have is ignored
 
     def read(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return every parameter with its value or default; raises RefusedError for one that is not accepted."""
         names = [parameter.name for parameter in self.parameters]
-        for name in params.keys() - names:
-            raise RefusedError(f"there is no parameter {name!r} here; there are: {', '.join(names) or 'none'}")
-        values = {}
-        for parameter in self.parameters:
-            value = params.get(parameter.name)
-            given = parameter.name in params or parameter.required
-            values[parameter.name] = parameter.read(value) if given else parameter.default
-        return values
+        unknown = params.keys() - names
+        if self.refuses_unknown and unknown:
+            raise RefusedError(f"there is no parameter {min(unknown)!r} here; there are: {', '.join(names)}")
+        return {parameter.name: parameter.value_in(params) for parameter in self.parameters}
 
 
 def _angle(joint: str) -> Parameter:
@@ -227,9 +229,11 @@ METHODS: dict[str, SocketMethod] = {
             Parameter(
                 "depth_m",
                 Type.NUMBER,
-                "fixed depth of every stride; without it the depth adapts from adaptation.initial_depth_m on",
+                "fixed depth of every stride; without it, or with null, the depth adapts"
+                " from adaptation.initial_depth_m on",
                 "m",
                 bounds_note="more than 0, at most adaptation.max_depth_m",
+                null_is_default=True,
             ),
             Parameter(
                 "strides",
@@ -246,6 +250,7 @@ METHODS: dict[str, SocketMethod] = {
         Level.DRIVE,
         "Move joints slowly to angles while the robot holds its pose; at least one joint is required.",
         (*map(_angle, JOINTS), *LEASE),
+        refuses_unknown=True,
     ),
     "stop": SocketMethod(Level.ANYONE, "End a walk or a move; a walk ends with the flippers raised."),
     "disarm": SocketMethod(Level.ANYONE, "Switch torque off at once."),

@@ -338,6 +338,18 @@ def test_a_move_to_nowhere_is_refused_with_its_reason(armed: Robot, angles_rad: 
     assert not armed.ask("status")["moving"]
 
 
+def test_other_methods_than_move_ignore_unknown_parameters(robot: Robot) -> None:
+    assert robot.ask("hello", later_version=1) == robot.ask("hello")
+    assert robot.ask("stop", reason="lunch") == "accepted"
+
+
+def test_a_walk_with_a_null_depth_adapts_its_depth(armed: Robot) -> None:
+    assert armed.ask("walk", depth_m=None) == "accepted"
+    assert armed.steps.loop.controller.order.adaptive
+    with pytest.raises(RefusedError, match="strides = None: must be a whole number"):
+        armed.ask("walk", strides=None)
+
+
 def test_nothing_moves_before_the_robot_holds_its_pose(robot: Robot) -> None:
     robot.steps.run_for(1.0)
     with pytest.raises(RefusedError, match="only in hold, so arm first"):
