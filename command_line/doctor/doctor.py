@@ -17,7 +17,14 @@ from command_line import exit_codes
 from command_line.screen import GREEN, RED, YELLOW, coloured
 from firmware_host.computer.can_links import CanLink, examine_bus, read_links
 from firmware_host.computer.findings import Finding, Level, fail, ok, warn
-from firmware_host.computer.host_checks import OURS, Account, examine_clock, examine_host, examine_storage, this_python
+from firmware_host.computer.host_checks import (
+    OURS,
+    Account,
+    examine_clock,
+    examine_host,
+    examine_storage,
+    examine_this_python,
+)
 from firmware_host.computer.host_facts import (
     UNIT,
     clock_is_synchronised,
@@ -49,7 +56,7 @@ def doctor(options: argparse.Namespace) -> int:
         configuration = load_configuration(options.config)
     except ConfigurationError as problem:
         messages = [fail("configuration", message, f"edit {options.config}") for message in problem.problems]
-        return _show([*messages, *this_python(), _clock()], options.json)
+        return _show([*messages, *examine_this_python(), _clock()], options.json)
     socket = options.socket or Path(configuration.status.socket)
     findings = [ok("configuration", str(options.config)), *examine_all(configuration, socket, read_links(ROOT))]
     return _show(findings, options.json)
@@ -67,7 +74,7 @@ def examine_all(configuration: Configuration, socket: Path, links: dict[str, Can
     yield _clock()
     yield from daemon
     yield from _groups(configuration, socket)
-    yield from this_python()
+    yield from examine_this_python()
 
 
 def _clock() -> Finding:

@@ -1,4 +1,4 @@
-"""One line of `mudskipper doctor`: what was found, how good that is, and what to do."""
+"""One line of `mudskipper doctor`: the result of a check, its severity, and what to do."""
 
 from __future__ import annotations
 
@@ -35,3 +35,8 @@ def warn(identity: str, text: str, fix: str) -> Finding:
 
 def fail(identity: str, text: str, fix: str) -> Finding:
     return Finding(identity, Level.FAIL, text, fix)
+
+
+def ok_if(condition: bool, identity: str, text: str, fix: str, otherwise: Level = Level.WARN) -> Finding:
+    """Returns an ok finding where the condition holds, or else one of the other level with its fix."""
+    return ok(identity, text) if condition else Finding(identity, otherwise, text, fix)

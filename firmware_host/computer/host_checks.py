@@ -1,6 +1,7 @@
-"""Evaluates the facts of the computer for the robot: one finding each, with its remedy.
+"""Checks whether the computer suits the robot: one finding for each property, with its fix.
 
-Only what keeps the robot from working, or its torque from being watched, fails; what makes it late or forgetful warns.
+A finding fails only where the robot would not work or its torque would be unsupervised. A property that makes ticks
+late or loses logs is a warning.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import datetime
 from importlib.metadata import packages_distributions
 from math import inf
@@ -15,7 +17,7 @@ from pathlib import Path
 from stat import S_IWGRP, S_IWOTH, S_IWUSR
 from typing import NamedTuple
 
-from firmware_host.computer.findings import Finding, fail, ok, warn
+from firmware_host.computer.findings import Finding, Level, fail, ok, ok_if, warn
 from firmware_host.computer.host_facts import (
     Limits,
     Mount,
@@ -33,18 +35,18 @@ from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import FreeSpace, free_space, unfinished_files
 from firmware_host.operator.counted_nouns import counted
 
-ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less
+ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less memory
 OLDEST_PYTHON = (3, 11)
 EARLIEST_YEAR = 2024  # a clock before that was never set
-VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # gone at power-off, or likely
-UNSYNCED = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs", "fuse"})
-OURS = "mudskipper"
+VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # in memory, or likely so: lost at power-off
+UNSAFE = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs", "fuse"})  # without a journal
+OURS = "mudskipper"  # name of the service, its user, its group and this distribution
 STATE_FOLDER = ("var", "lib", OURS)  # StateDirectory= of the unit
 PACKAGES = ("control", "drivers", "estimation", "simulation")
 
 
 class Account(NamedTuple):
-    """Who will write."""
+    """The user that will write the logs."""
 
     name: str
     uid: int
@@ -52,7 +54,7 @@ class Account(NamedTuple):
 
 
 def examine_host(root: Path, loop: LoopParameters, limits: Limits | None, priority: int | None) -> Iterator[Finding]:
-    """`priority` is what the running loop has; None: none runs."""
+    """`priority` is that of the running loop, None where no daemon runs."""
     yield examine_kernel(is_realtime(root), kernel_text(root))
     yield from examine_limits(loop, limits)
     if priority is not None:
@@ -63,13 +65,9 @@ def examine_host(root: Path, loop: LoopParameters, limits: Limits | None, priori
 
 
 def examine_kernel(realtime: bool, release: str) -> Finding:
-    if realtime:
-        return ok("kernel", f"{release}, real-time")
-    return warn(
-        "kernel",
-        f"{release} is no real-time kernel: ticks may be late",
-        "a kernel with PREEMPT_RT, such as Debian's linux-image-rt-amd64 or -arm64",
-    )
+    text = f"{release}, real-time" if realtime else f"{release} is no real-time kernel: ticks may be late"
+    fix = "a kernel with PREEMPT_RT, such as Debian's linux-image-rt-amd64 or -arm64"
+    return ok_if(realtime, "kernel", text, fix)
 
 
 def examine_limits(loop: LoopParameters, limits: Limits | None) -> Iterator[Finding]:
@@ -77,51 +75,46 @@ def examine_limits(loop: LoopParameters, limits: Limits | None) -> Iterator[Find
         yield warn("limits", "the limits of processes cannot be read", "look into /proc/self/limits")
         return
     if loop.priority:
-        permitted = "permitted" if limits.rtprio >= loop.priority else "not permitted: the loop may be late"
-        text = f"real-time priority {loop.priority} is {permitted} (limit {_number(limits.rtprio)} {limits.whose})"
-        fix = "raise the rtprio limit (LimitRTPRIO= in the unit)"
-        yield ok("realtime", text) if limits.rtprio >= loop.priority else fail("realtime", text, fix)
+        enough = limits.rtprio >= loop.priority
+        permitted = "permitted" if enough else "not permitted: the loop may be late"
+        text = f"real-time priority {loop.priority} is {permitted} (limit {_limit_text(limits.rtprio)} {limits.whose})"
+        yield ok_if(enough, "realtime", text, "raise the rtprio limit (LimitRTPRIO= in the unit)", Level.FAIL)
     if loop.lock_memory:
-        enough = limits.memlock_bytes >= ENOUGH_MEMLOCK_BYTES
-        text = f"{_number(limits.memlock_bytes)} bytes may be locked in memory ({limits.whose})"
+        text = f"{_limit_text(limits.memlock_bytes)} bytes may be locked in memory ({limits.whose})"
         fix = "raise the memlock limit (LimitMEMLOCK=infinity in the unit)"
-        yield ok("memlock", text) if enough else warn("memlock", text, fix)
+        yield ok_if(limits.memlock_bytes >= ENOUGH_MEMLOCK_BYTES, "memlock", text, fix)
 
 
-def _number(value: float) -> str:
+def _limit_text(value: float) -> str:
     return "unlimited" if value == inf else f"{value:.0f}"
 
 
-def examine_priority(wanted: int, has: int) -> Finding:
-    text = f"the running loop has real-time priority {has}"
-    if has >= wanted:
-        return ok("loop.priority", text)
-    return fail("loop.priority", f"{text} instead of {wanted}", "raise the rtprio limit, then restart the daemon")
+def examine_priority(wanted: int, actual: int) -> Finding:
+    text = f"the running loop has real-time priority {actual}" + (f" instead of {wanted}" if actual < wanted else "")
+    fix = "raise the rtprio limit, then restart the daemon"
+    return ok_if(actual >= wanted, "loop.priority", text, fix, Level.FAIL)
 
 
 def examine_governor(names: set[str]) -> Finding:
     if not names:
         return ok("governor", "the processors' clock is not scaled by this kernel")
-    text = ", ".join(sorted(names))
-    if names == {"performance"}:
-        return ok("governor", text)
+    text, fast = ", ".join(sorted(names)), names == {"performance"}
     fix = "'cpupower frequency-set --governor performance', or cpufreq.default_governor=performance for the kernel"
-    return warn("governor", f"{text}: the loop wakes late where the clock is slow", fix)
+    return ok_if(fast, "governor", text if fast else f"{text}: the loop wakes late where the clock is slow", fix)
 
 
 def examine_processor(cpu: int, isolated: set[int], present: int) -> Finding:
-    reported = f"isolated: {', '.join(map(str, sorted(isolated))) or 'none'}"
+    isolation = f"isolated: {', '.join(map(str, sorted(isolated))) or 'none'}"
     if cpu < 0:
-        return ok("processors", f"{present}, the loop runs on any; {reported}")
+        return ok("processors", f"{present}, the loop runs on any; {isolation}")
     if cpu >= present > 0:
         return fail("processors", f"loop.cpu = {cpu}, but there are {present}", "correct loop.cpu")
-    if cpu in isolated:
-        return ok("processors", f"the loop has {cpu} for itself; {reported}")
-    return warn("processors", f"the loop shares {cpu} with everything; {reported}", f"isolcpus={cpu} for the kernel")
+    text = f"the loop has {cpu} for itself" if cpu in isolated else f"the loop shares {cpu} with everything"
+    return ok_if(cpu in isolated, "processors", f"{text}; {isolation}", f"isolcpus={cpu} for the kernel")
 
 
 def examine_interrupts(priority: int, threads: list[Thread]) -> Finding:
-    """A loop above the thread that brings its frames starves itself of them."""
+    """Compares the loop's priority with the threads that receive its frames: above them it would wait in vain."""
     if not threads:
         return ok("interrupts", "no interrupt thread of a CAN adapter")
     text = ", ".join(f"{thread.name} {thread.priority}" for thread in threads)
@@ -141,25 +134,24 @@ def examine_storage(root: Path, log: LogParameters, writer: Account, daemon_runs
     mount = mount_of(root, folder)
     if mount is not None:
         yield examine_mount(mount)
-    place = root / folder.absolute().relative_to("/")
+    below_root = root / folder.absolute().relative_to("/")
     try:
-        yield examine_space(free_space(place), log.min_free_fraction)
+        yield examine_space(free_space(below_root), log.min_free_fraction)
     except OSError as problem:
         yield fail("disk", f"{folder}: {problem.strerror}", "mount it")
-    yield examine_folder(place, writer)
+    yield examine_folder(below_root, writer)
     if not daemon_runs:
-        yield examine_unfinished(place)
+        yield examine_unfinished(below_root)
 
 
 def examine_mount(mount: Mount) -> Finding:
-    text = f"{mount.place} is {mount.kind}"
+    text = f"{mount.point} is {mount.kind}"
     if mount.read_only:
-        return fail(
-            "file_system", f"{text}, read-only", f"'mount -o remount,rw {mount.place}'; look for errors of the disk"
-        )
+        fix = f"'mount -o remount,rw {mount.point}'; look for errors of the disk"
+        return fail("file_system", f"{text}, read-only", fix)
     if mount.kind in VOLATILE:
         return warn("file_system", f"{text}: logs may be gone after power-off", "set log.directory to a disk")
-    if mount.kind in UNSYNCED:
+    if mount.kind in UNSAFE:
         return warn("file_system", f"{text}: it may lose whole logs in a power cut", "use ext4, xfs, btrfs or f2fs")
     return ok("file_system", text)
 
@@ -170,29 +162,29 @@ def examine_space(space: FreeSpace, least_fraction: float) -> Finding:
         return fail("disk", "the disk is full", "free some of it")
     if space.free_fraction < least_fraction:
         fix = "free some of it, or lower log.min_free_fraction"
-        return warn("disk", f"{text}: less than log.min_free_fraction, so old logs are removed", fix)
+        return warn("disk", f"{text}: less than log.min_free_fraction, so old logs are deleted", fix)
     return ok("disk", text)
 
 
 def examine_folder(folder: Path, writer: Account) -> Finding:
-    """The folder, or the nearest that is there: the daemon makes the rest."""
+    """Checks the folder, or its nearest parent that exists: the daemon makes the missing ones."""
     nearest = folder
     try:
         while not nearest.exists():
             nearest = nearest.parent
         writable = may_write(nearest.stat(), writer)
     except PermissionError:
-        return warn("log", f"{folder} cannot be looked into", "run this with sudo")
+        return warn("log", f"{folder} cannot be read", "run this with sudo")
     if writer.name == OURS and not writable and nearest == folder_of_systemd(folder):
         return ok("log", f"{folder}: made when the service starts")
     text = f"{folder}: {'' if writable else 'not '}writable for {writer.name}"
     fix = f"'install -d -o {writer.uid} {folder}', or change log.directory"
-    return ok("log", text) if writable else fail("log", text, fix)
+    return ok_if(writable, "log", text, fix, Level.FAIL)
 
 
 def folder_of_systemd(folder: Path) -> Path | None:
     """Returns the folder in which systemd will make the service's StateDirectory, if the log folder is in that."""
-    return next((place.parent for place in (folder, *folder.parents) if place.parts[-3:] == STATE_FOLDER), None)
+    return next((path.parent for path in (folder, *folder.parents) if path.parts[-3:] == STATE_FOLDER), None)
 
 
 def may_write(status: os.stat_result, writer: Account) -> bool:
@@ -204,45 +196,36 @@ def may_write(status: os.stat_result, writer: Account) -> bool:
 
 
 def examine_unfinished(folder: Path) -> Finding:
-    try:
+    unfinished = 0
+    with suppress(OSError):
         unfinished = len(unfinished_files(folder))
-    except OSError:
-        unfinished = 0
-    if unfinished == 0:
-        return ok("unfinished_logs", "none")
-    text = f"{counted(unfinished, 'log')} cut off, such as by a power cut"
-    return warn("unfinished_logs", text, "'mudskipper log recover'; the daemon does it at its start")
+    text = f"{counted(unfinished, 'log')} cut off, such as by a power cut" if unfinished else "none"
+    return ok_if(not unfinished, "unfinished_logs", text, "'mudskipper log recover'; the daemon does it at its start")
 
 
 def examine_clock(now: datetime, synchronised: bool, chip: bool) -> Finding:
-    """Logs are named after it, and the oldest are freed first."""
-    fix = "'timedatectl set-ntp true', or set it by hand with 'date --set'"
+    """Checks the wall clock: it names the logs, and the quota deletes the oldest names first."""
+    fix = "'timedatectl set-ntp true', or set it yourself with 'date --set'"
     if now.year < EARLIEST_YEAR:
-        return fail("clock", f"it says {now:%Y-%m-%d}: it was never set", fix)
+        return fail("clock", f"it shows {now:%Y-%m-%d}: it was never set", fix)
     text = f"{now:%Y-%m-%d %H:%M} UTC, {'synchronised' if synchronised else 'not synchronised'}"
-    if synchronised and chip:
-        return ok("clock", text)
     if not chip:
-        text += ", and no clock chip keeps it without power"
-        return warn("clock", text, "fit one, or wait for the network before a run")
-    return warn("clock", text, fix)
+        text, fix = f"{text}, and no clock chip keeps it without power", "fit one, or wait for the network before a run"
+    return ok_if(synchronised and chip, "clock", text, fix)
 
 
 def examine_python(version: tuple[int, ...], owners: dict[str, list[str]]) -> Iterator[Finding]:
-    """`owners` are the distributions of each top-level package."""
-    text = ".".join(map(str, version[:3]))
-    if version[:2] >= OLDEST_PYTHON:
-        yield ok("python", text)
-    else:
-        yield fail("python", f"{text} is too old", "install Python 3.11 or newer")
-    strangers = {name: sorted(set(owners.get(name, [])) - {OURS}) for name in PACKAGES}
-    found = [f"{name} of {', '.join(others)}" for name, others in strangers.items() if others]
-    if found:
-        fix = "give the daemon an environment of its own: docs/how-to/install.md"
-        yield fail("packages", f"other software brings packages of the same name: {'; '.join(found)}", fix)
-    else:
-        yield ok("packages", "no other software has packages of the same name")
+    """Checks the interpreter and the import names; `owners` are the distributions of each top-level package."""
+    recent, text = version[:2] >= OLDEST_PYTHON, ".".join(map(str, version[:3]))
+    fix = "install Python 3.11 or newer"
+    yield ok_if(recent, "python", text if recent else f"{text} is too old", fix, Level.FAIL)
+    others = {name: sorted(set(owners.get(name, [])) - {OURS}) for name in PACKAGES}
+    found = [f"{name} of {', '.join(distributions)}" for name, distributions in others.items() if distributions]
+    conflict = f"other software brings packages of the same name: {'; '.join(found)}"
+    fix = "give the daemon an environment of its own: docs/how-to/install.md"
+    text = conflict if found else "no other software has packages of the same name"
+    yield ok_if(not found, "packages", text, fix, Level.FAIL)
 
 
-def this_python() -> Iterator[Finding]:
+def examine_this_python() -> Iterator[Finding]:
     yield from examine_python(tuple(sys.version_info[:3]), {k: list(v) for k, v in packages_distributions().items()})

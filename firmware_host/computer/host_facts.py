@@ -1,7 +1,7 @@
-"""Reads facts of the computer from /proc and /sys, below a root that a test may replace.
+"""Reads properties of the computer from /proc and /sys, below a root that a test may replace.
 
-Nothing here judges, and what cannot be read is empty: host_checks.py says what it means. Layouts: proc(5),
-proc_pid_stat(5); threaded interrupts are kernel threads named irq/NUMBER-DEVICE.
+A file that cannot be read counts as empty; host_checks.py evaluates the values. The layouts are those of proc(5) and
+proc_pid_stat(5). Threaded interrupts are kernel threads named irq/NUMBER-DEVICE.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ TIME_ERROR = 5  # adjtimex(2): the clock is not synchronised
 REFUSED = -1
 TIMEX_BYTES = 256  # struct timex has 208
 CAN_INTERRUPT = re.compile(r"irq/\d+-.*(can|mcp25|spi|xhci|dwc|ehci)", re.IGNORECASE)  # SPI and USB carry adapters
-RT_PRIORITY = 40 - 3  # field of /proc/PID/stat, counted behind the name in its brackets
-NAMES = {"Max realtime priority": "rtprio", "Max locked memory": "memlock"}
+RT_PRIORITY = 40 - 3  # field of /proc/PID/stat, counted after the name in brackets
+LIMIT_LINES = ("Max realtime priority", "Max locked memory")  # in /proc/PID/limits
 UNIT = "etc/systemd/system/mudskipper.service"
 
 
 class Limits(NamedTuple):
-    """inf: unlimited."""
+    """The resource limits of a process; infinite where unlimited."""
 
     rtprio: float
     memlock_bytes: float
-    whose: str
+    whose: str  # "of the daemon", for messages
 
 
 class Thread(NamedTuple):
     name: str
-    priority: int  # SCHED_FIFO or SCHED_RR; 0: neither
+    priority: int  # under SCHED_FIFO or SCHED_RR; 0 under another policy
 
 
 class Mount(NamedTuple):
-    place: str
-    kind: str
+    point: str
+    kind: str  # of file system
     read_only: bool
 
 
 def read_text(path: Path) -> str:
-    """Empty where there is nothing to read."""
+    """Returns the text of a file, empty where it cannot be read."""
     with suppress(OSError):
         return path.read_text(encoding="utf-8", errors="replace").strip()
     return ""
@@ -59,33 +59,28 @@ def kernel_text(root: Path) -> str:
 
 
 def process_limits(root: Path, pid: int | None) -> Limits | None:
-    """Returns the limit of a process, or of this one; root may exceed it."""
+    """Returns the limits of a process, or of this one; root may exceed them."""
     if pid is None and os.geteuid() == 0:
         return Limits(inf, inf, "for root")
     text = read_text(root / "proc" / str(pid or "self") / "limits")
-    found = {}
-    for line in text.splitlines():
-        for name, short in NAMES.items():
-            if line.startswith(name):
-                found[short] = _limit(line.removeprefix(name).split()[0])
-    if len(found) < len(NAMES):
+    rtprio, memlock = (re.search(rf"^{name} +(\S+)", text, re.MULTILINE) for name in LIMIT_LINES)
+    if not rtprio or not memlock:
         return None
-    return Limits(found["rtprio"], found["memlock"], "of the daemon" if pid else "of this shell")
+    return Limits(_limit(rtprio[1]), _limit(memlock[1]), "of the daemon" if pid else "of this shell")
 
 
 def unit_limits(root: Path) -> Limits | None:
-    """That the installed service gives its daemon."""
+    """Returns the limits that the installed service gives its daemon."""
     settings = dict(re.findall(r"^(Limit\w+)=(\S+)$", read_text(root / UNIT), re.MULTILINE))
     if not settings:
         return None
-    rtprio, memlock = (_limit(settings.get(f"Limit{name}", "0")) for name in ("RTPRIO", "MEMLOCK"))
-    return Limits(rtprio, memlock, "in the unit")
+    return Limits(_limit(settings.get("LimitRTPRIO", "0")), _limit(settings.get("LimitMEMLOCK", "0")), "in the unit")
 
 
-def _limit(word: str) -> float:
-    if word in ("unlimited", "infinity"):
+def _limit(text: str) -> float:
+    if text in ("unlimited", "infinity"):
         return inf
-    return float(word) if word.isdigit() else 0.0
+    return float(text) if text.isdigit() else 0.0
 
 
 def governors(root: Path) -> set[str]:
@@ -106,13 +101,9 @@ def processors(root: Path) -> int:
 
 
 def can_interrupts(root: Path) -> list[Thread]:
-    """Threads that carry frames in: those of CAN controllers, and of what these hang on."""
-    found = []
-    for folder in (root / "proc").glob("[0-9]*"):
-        name = read_text(folder / "comm")
-        if CAN_INTERRUPT.match(name):
-            found.append(Thread(name, thread_priority(root, int(folder.name))))
-    return sorted(found)
+    """Returns the threads that receive frames: those of CAN controllers, and of the SPI and USB that carry them."""
+    names = {int(folder.name): read_text(folder / "comm") for folder in (root / "proc").glob("[0-9]*")}
+    return sorted(Thread(name, thread_priority(root, pid)) for pid, name in names.items() if CAN_INTERRUPT.match(name))
 
 
 def thread_priority(root: Path, pid: int) -> int:
@@ -121,15 +112,15 @@ def thread_priority(root: Path, pid: int) -> int:
 
 
 def mount_of(root: Path, folder: Path) -> Mount | None:
-    """The file system that a folder is on, or will be."""
+    """Returns the file system that a folder is on, or will be on."""
     best: Mount | None = None
     for line in read_text(root / "proc/self/mounts").splitlines():
         fields = line.split()
         if len(fields) < 4:
             continue
-        place = fields[1].replace("\\040", " ")
-        if folder.absolute().is_relative_to(place) and (best is None or len(place) >= len(best.place)):
-            best = Mount(place, fields[2], "ro" in fields[3].split(","))
+        point = fields[1].replace("\\040", " ")
+        if folder.absolute().is_relative_to(point) and (best is None or len(point) >= len(best.point)):
+            best = Mount(point, fields[2], "ro" in fields[3].split(","))
     return best
 
 

@@ -1,7 +1,8 @@
 """Asks the operating system for real-time scheduling and locked memory, where that is permitted.
 
-SCHED_FIFO for this thread alone (children start as ordinary processes), memory locked against paging, one processor,
-no garbage collection while moving. Each that is refused gives a sentence for the operator; the robot runs without.
+The loop's thread gets SCHED_FIFO (its children start as ordinary processes), one processor, memory that is locked
+against paging, and no garbage collection while it runs. The robot also runs without a setting that is refused; a
+warning reports it to the operator.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ import sys
 
 MCL_CURRENT, MCL_FUTURE = 1, 2
 PR_SET_TIMERSLACK = 29
-SWITCH_INTERVAL_S = 1e-4  # should any other Python thread ever run, it gives way quickly
+SWITCH_INTERVAL_S = 1e-4  # another Python thread would give way after this time
 
 
 def prepare_loop(priority: int, cpu: int, lock_memory: bool) -> list[str]:
-    """Apply all of it; what could not be had, one sentence each."""
+    """Applies all settings; returns a warning for each that is refused."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1)  # ns, where an ordinary process may be woken 50 us late
     warnings = [_pin(cpu) if cpu >= 0 else "", _lock_memory() if lock_memory else "", _schedule(priority)]
@@ -26,7 +27,7 @@ def prepare_loop(priority: int, cpu: int, lock_memory: bool) -> list[str]:
 
 
 def freeze_garbage() -> None:
-    """A full collection takes several ticks: do it once now, and none while the loop runs."""
+    """Collects garbage once and switches the collection off: a full one takes several ticks."""
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -1,15 +1,18 @@
-"""Tells systemd how the service is: READY=1, WATCHDOG=1, STATUS=…, by one datagram each (man 3 sd_notify).
+"""Reports the state of the service to systemd: READY=1, WATCHDOG=1, STATUS=…, in one datagram each (sd_notify(3)).
 
-Without NOTIFY_SOCKET in the environment, as when started by hand, it does nothing.
+It does nothing where NOTIFY_SOCKET is not in the environment, as when the daemon is started from a terminal.
 """
 
 from __future__ import annotations
 
 import os
 import socket
+from contextlib import suppress
 
 
 class SystemdNotifier:
+    """Owns the socket to systemd."""
+
     def __init__(self, address: str | None = None) -> None:
         address = address if address is not None else os.environ.get("NOTIFY_SOCKET", "")
         self._address = "\0" + address[1:] if address.startswith("@") else address
@@ -19,13 +22,10 @@ class SystemdNotifier:
             self._socket.setblocking(False)
 
     def send(self, *lines: str) -> None:
-        """Never waits: a notice that systemd does not take in time is lost, and the watchdog's next one follows."""
-        if self._socket is None:
-            return
-        try:
-            self._socket.sendto("\n".join(lines).encode(), self._address)
-        except OSError:  # systemd is gone or its queue is full; the loop must not care
-            return
+        """Sends without waiting: a lost notice does no harm, since the watchdog's next one follows."""
+        if self._socket is not None:
+            with suppress(OSError):  # systemd is gone or its queue is full, which must not stop the loop
+                self._socket.sendto("\n".join(lines).encode(), self._address)
 
     def close(self) -> None:
         if self._socket is not None:
