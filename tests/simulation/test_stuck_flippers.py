@@ -77,8 +77,8 @@ def test_where_flippers_come_out_in_time_no_tick_is_waited(configuration: Config
     paper, _ = walking(replace(configuration, recovery=RecoveryParameters(attempts=0)), mud(2.6), 0.03)
     robot, _ = walking(configuration, mud(2.6), 0.03)
     for each in (paper, robot):
-        each.run_for(3.5)
-    assert robot.robot.plant.body_m == paper.robot.plant.body_m > 0.1
+        each.run_for(5.0)
+    assert robot.robot.plant.body_m == paper.robot.plant.body_m > 0.2
     assert robot.robot.plant.angles_rad == paper.robot.plant.angles_rad
     assert repr(robot.loop.learning.strides) == repr(paper.loop.learning.strides)
 
@@ -94,7 +94,7 @@ def test_without_attempts_swing_begins_with_the_flippers_in_the_mud(configuratio
     assert not any(stride.estimate.released for stride in robot.loop.learning.strides)
 
 
-@pytest.mark.parametrize("kilopascal", [6.0, 9.0])
+@pytest.mark.parametrize("kilopascal", [6.0, 7.5, 9.0])
 def test_in_stiff_mud_it_frees_itself_and_walks_on(configuration: Configuration, kilopascal: float) -> None:
     """And the body goes forward meanwhile, by at least half of a stride's 12 cm."""
     robot, recorder = walking(configuration, mud(kilopascal), 0.05)

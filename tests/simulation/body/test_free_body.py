@@ -395,7 +395,7 @@ def test_a_free_body_s_joints_have_the_configured_height(configuration: Configur
 def test_a_walk_of_a_free_body_hardly_depends_on_the_step_of_the_simulation(
     configuration: Configuration, walking: Lockstep, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.0005)
+    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.00025)
     fine = Lockstep(configuration, Track([(9.0, MUDS["48.5"])]), plant=plant_of(configuration, free_body=True))
     fine.arm()
     fine.walk(WalkOrder(0.03, adaptive=False))

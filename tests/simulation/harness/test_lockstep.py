@@ -178,7 +178,7 @@ def test_a_walk_hardly_depends_on_the_step_of_the_simulation(
     configuration: Configuration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     coarse = make_walking(configuration, 1, 4.5).robot.plant.body_m
-    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.0005)
+    monkeypatch.setattr("simulation.harness.robot.STEP_S", 0.00025)
     fine = make_walking(configuration, 1, 4.5).robot.plant.body_m
     assert coarse > 0.2
     assert fine == pytest.approx(coarse, rel=0.03)
