@@ -2,7 +2,7 @@
 
 python-can opens the interface (`socketcan` on the robot, `slcan` for a serial adapter, `virtual` in tests,
 `mudskipper_local` between processes without CAN) and carries the frames, except on socketcan: see socketcan_port.py.
-Its Message objects stay in this module. Its `Bus.state` is always active on socketcan, so the state comes from error
+Its `Bus.state` is always active on socketcan, so the state comes from error
 frames. Each frame is sent once. The kernel's cyclic transmission (BCM) is never used, because it would feed the drives'
 watchdogs with an old command after this process has died.
 """
@@ -53,7 +53,7 @@ class CanPort(Protocol):
 
 
 class PythonCanPort(PortHealth):
-    """A CanPort over any python-can interface."""
+    """Sends and receives through any python-can interface."""
 
     def __init__(self, bus: can.BusABC) -> None:
         super().__init__()
@@ -81,24 +81,17 @@ class PythonCanPort(PortHealth):
             if message.is_error_frame:  # first: its class bits look like a drive's id
                 self.on_error_frame(message.arbitration_id, bytes(message.data))
             else:
-                frames.append(_as_frame(message, clock_s))
+                frames.append(frame_from(message, clock_s))
                 if self.state is BusState.OFF:
                     self.on_frame(message.is_rx)
         return frames
 
     def _drained(self) -> bool:
-        """Whether a `recv` without a frame means that none has arrived."""
+        """Returns whether a `recv` without a frame means that none has arrived."""
         return True
 
     def send(self, frame: Frame) -> None:
-        message = can.Message(
-            arbitration_id=frame.arbitration_id,
-            data=frame.data,
-            is_extended_id=frame.is_extended,
-            is_remote_frame=frame.is_remote,
-            is_fd=frame.is_fd,
-            bitrate_switch=frame.bit_rate_switch,
-        )
+        message = message_from(frame)
         try:
             if frame.is_fd and self._bus.protocol is can.CanProtocol.CAN_20:
                 raise ValueError("the interface was not opened for CAN FD")
@@ -112,7 +105,7 @@ class PythonCanPort(PortHealth):
 
 
 class SlcanPort(PythonCanPort):
-    """A CanPort over a serial adapter that speaks the LAWICEL protocol, as python-can's slcan interface does."""
+    """Uses a serial adapter that speaks the LAWICEL protocol, through python-can's slcan interface."""
 
     def __init__(self, bus: Any) -> None:  # slcanBus; its module complains where pyserial is missing
         super().__init__(bus)
@@ -132,21 +125,34 @@ class SlcanPort(PythonCanPort):
         return self._serial.in_waiting == 0
 
 
-def _as_frame(message: can.Message, clock_s: float) -> Frame:
+def frame_from(message: can.Message, clock_s: float = 0.0) -> Frame:
+    """Converts a message of python-can. `clock_s` is the monotonic clock minus the wall clock, which stamped it."""
     return Frame(
-        message.arbitration_id,
-        bytes(message.data),
-        message.is_remote_frame,
-        False,
-        message.is_extended_id,
-        message.timestamp + clock_s,
-        message.is_fd,
-        message.bitrate_switch,
+        arbitration_id=message.arbitration_id,
+        data=bytes(message.data),
+        is_remote=message.is_remote_frame,
+        is_error=message.is_error_frame,
+        is_extended=message.is_extended_id,
+        stamp_s=message.timestamp + clock_s,
+        is_fd=message.is_fd,
+        bit_rate_switch=message.bitrate_switch,
+    )
+
+
+def message_from(frame: Frame) -> can.Message:
+    return can.Message(
+        arbitration_id=frame.arbitration_id,
+        data=frame.data,
+        is_remote_frame=frame.is_remote,
+        is_error_frame=frame.is_error,
+        is_extended_id=frame.is_extended,
+        is_fd=frame.is_fd,
+        bitrate_switch=frame.bit_rate_switch,
     )
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> CanPort:
-    """Raises python-can's own errors where the interface does not open: see firmware_host/buses.py."""
+    """Opens an interface; raises python-can's own errors where it does not open: see firmware_host/buses.py."""
     logging.getLogger("can").setLevel(logging.WARNING)  # at level debug it would format every frame
     bus = can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
     if isinstance(bus, SocketcanBus):

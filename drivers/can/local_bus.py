@@ -26,7 +26,8 @@ from time import time
 
 import can
 
-from drivers.can.frames import FD_FORMAT, FD_FRAME_LAYOUT, FLAGS_BYTE, FRAME_LAYOUT, Frame, decode_frame, encode_frame
+from drivers.can.can_port import frame_from, message_from
+from drivers.can.frames import FD_FORMAT, FD_FRAME_LAYOUT, FLAGS_BYTE, FRAME_LAYOUT, decode_frame, encode_frame
 
 FRAME_BYTES, FD_FRAME_BYTES = FRAME_LAYOUT.size, FD_FRAME_LAYOUT.size
 CHUNK_BYTES = 65536
@@ -51,7 +52,7 @@ class LocalLink:
         self._arrived: deque[bytes] = deque()
         self._listener = _new_socket()
         self._epoll = select.epoll()
-        self._doorbell = select.epoll()  # the listener alone, for senders
+        self._joining = select.epoll()  # reports nodes that want to join, and no frames: `send` polls only this
         self._waiting = os.eventfd(0, os.EFD_NONBLOCK)  # readable while frames wait in `_arrived`
         try:
             self._join(folder)
@@ -64,7 +65,7 @@ class LocalLink:
 
     def send(self, data: bytes) -> None:
         """Sends one encoded frame to every other node that has room."""
-        if self._doorbell.poll(0, 1):
+        if self._joining.poll(0, 1):
             self._accept()
         for peer in tuple(self._peers.values()):
             try:
@@ -74,7 +75,7 @@ class LocalLink:
             except OSError:
                 self._read_last(peer)
             else:
-                if written != len(data):  # never observed; all following bytes would be garbage
+                if written != len(data):  # never observed; all following bytes would be misread
                     self._drop(peer)
 
     def receive(self, timeout_s: float | None = 0.0) -> bytes | None:
@@ -97,7 +98,7 @@ class LocalLink:
         for peer in tuple(self._peers.values()):
             self._drop(peer)
         self._listener.close()
-        self._doorbell.close()
+        self._joining.close()
         self._epoll.close()
         os.close(self._waiting)
 
@@ -111,7 +112,7 @@ class LocalLink:
             self._listener.listen(BACKLOG_NODES)
         for descriptor in (self._listener.fileno(), self._waiting):
             self._epoll.register(descriptor, select.EPOLLIN)
-        self._doorbell.register(self._listener.fileno(), select.EPOLLIN)
+        self._joining.register(self._listener.fileno(), select.EPOLLIN)
 
     def _connect(self, path: Path) -> None:
         connection = _new_socket()
@@ -170,6 +171,7 @@ class LocalLink:
             pass
 
     def _split(self, peer: Peer, stream: bytes) -> None:
+        """Queues the complete frames of a peer's stream, and stores the incomplete last one."""
         begin, end = 0, _end_of_frame(stream, 0)
         frames: list[bytes] = []
         while end <= len(stream):
@@ -182,7 +184,7 @@ class LocalLink:
 
 
 class LocalBus(can.BusABC):
-    """Opened as `can.Bus(interface="mudskipper_local", channel="demo")`."""
+    """Implements python-can's bus: `can.Bus(interface="mudskipper_local", channel="demo")` opens one."""
 
     def __init__(
         self,
@@ -212,19 +214,10 @@ class LocalBus(can.BusABC):
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Never waits: without room in a node's buffer the frame is lost for that node."""
-        frame = Frame(
-            arbitration_id=msg.arbitration_id,
-            data=bytes(msg.data),
-            is_remote=msg.is_remote_frame,
-            is_error=msg.is_error_frame,
-            is_extended=msg.is_extended_id,
-            is_fd=msg.is_fd,
-            bit_rate_switch=msg.bitrate_switch,
-        )
-        self._link.send(encode_frame(frame))
+        self._link.send(encode_frame(frame_from(msg)))
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        """Filters by itself, because can.BusABC would treat a filtered frame like an empty bus."""
+        """Applies the filters here, because can.BusABC would treat a filtered frame like an empty bus."""
         while (data := self._link.receive(timeout)) is not None:
             message = self._decode(data)
             if self._matches_filters(message):
@@ -236,18 +229,10 @@ class LocalBus(can.BusABC):
         try:
             frame = decode_frame(data)
         except ValueError as error:
-            raise can.CanOperationError(f"Garbage on the {self.channel_info}: {error}") from error
-        return can.Message(
-            timestamp=time(),
-            arbitration_id=frame.arbitration_id,
-            is_extended_id=frame.is_extended,
-            is_remote_frame=frame.is_remote,
-            is_error_frame=frame.is_error,
-            data=frame.data,
-            is_fd=frame.is_fd,
-            bitrate_switch=frame.bit_rate_switch,
-            channel=self._channel,
-        )
+            raise can.CanOperationError(f"Malformed bytes on the {self.channel_info}: {error}") from error
+        message = message_from(frame)
+        message.timestamp, message.channel = time(), self._channel
+        return message
 
     def shutdown(self) -> None:
         super().shutdown()
@@ -255,7 +240,7 @@ class LocalBus(can.BusABC):
 
 
 def _end_of_frame(stream: bytes, begin: int) -> int:
-    """Returns where the frame ends that begins here; beyond the stream where its length has not arrived yet."""
+    """Returns the end of the frame that begins at `begin`; it may lie beyond the bytes that have arrived."""
     if begin + FLAGS_BYTE < len(stream) and stream[begin + FLAGS_BYTE] & FD_FORMAT:
         return begin + FD_FRAME_BYTES
     return begin + FRAME_BYTES

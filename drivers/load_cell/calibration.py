@@ -11,9 +11,9 @@ from __future__ import annotations
 import json
 from math import hypot, isfinite, sqrt
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from drivers.load_cell.line_formats import newtons_per
+from drivers.load_cell.line_formats import NEWTONS
 
 LEAST_SPAN = 20.0  # standard errors between the readings of two weights
 LEAST_DIFFERENCE_N = 0.05
@@ -109,7 +109,7 @@ def calibration_of_unit(unit: str, scale: float | None) -> LoadCellCalibration |
 
     Returns None where neither the unit nor `scale` is known.
     """
-    newtons = scale if scale is not None else newtons_per(unit)
+    newtons = scale if scale is not None else NEWTONS.get(unit.lower())
     return None if newtons is None else LoadCellCalibration(unit, 1.0 / newtons)
 
 
@@ -118,24 +118,16 @@ def write_calibration(path: Path, calibration: LoadCellCalibration) -> None:
 
 
 def read_calibration(path: Path) -> LoadCellCalibration:
-    """Raises CalibrationError, OSError."""
+    """Reads a calibration file; raises CalibrationError for another file, and OSError."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as problem:
         raise CalibrationError(f"{path}: not a calibration, since it is not JSON: {problem}") from problem
-    return _checked(path, document)
-
-
-def _checked(path: Path, document: Any) -> LoadCellCalibration:
     names = LoadCellCalibration._fields
     if not isinstance(document, dict) or set(document) != set(names) or not isinstance(document["unit"], str):
         raise CalibrationError(f"{path}: a calibration has the keys {', '.join(names)}, and no others")
     for name in names[1:]:
-        if (
-            isinstance(document[name], bool)
-            or not isinstance(document[name], int | float)
-            or not isfinite(document[name])
-        ):
+        if type(document[name]) not in (int, float) or not isfinite(document[name]):
             raise CalibrationError(f"{path}: {name} = {document[name]!r}: must be a number")
     if document["per_newton"] == 0.0:
         raise CalibrationError(f"{path}: per_newton = 0: must not be zero")

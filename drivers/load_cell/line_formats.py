@@ -14,7 +14,7 @@ from math import isfinite
 from typing import NamedTuple
 
 GRAVITY_M_S2 = 9.80665
-NEWTONS = {  # per unit of weight or force
+NEWTONS = {  # per unit of weight or force; counts and mV/V need a calibration
     "n": 1.0,
     "mn": 1e-3,
     "kn": 1e3,
@@ -126,8 +126,3 @@ def find_format(lines: Sequence[bytes]) -> LineFormat | None:
         if readable > most:
             best, most = line_format, readable
     return best
-
-
-def newtons_per(unit: str) -> float | None:
-    """Returns None for counts and mV/V, which need a calibration."""
-    return NEWTONS.get(unit.lower())

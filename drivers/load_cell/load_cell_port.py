@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import NEWTONS, LineFormat, Reading, printable
-from drivers.load_cell.sample_clock import LineClock
-from drivers.serial.serial_line import Arrivals, SerialLine
+from drivers.load_cell.sample_clock import SampledLine
+from drivers.serial.serial_line import Arrivals
 
 
 class Sample(NamedTuple):
@@ -22,7 +22,7 @@ class Sample(NamedTuple):
 
 
 class LoadCellPort:
-    """Owns its serial line, its clock and the counters, which only grow."""
+    """Reads samples of force. Owns its serial line and the counters, which only grow."""
 
     def __init__(
         self,
@@ -32,56 +32,21 @@ class LoadCellPort:
         calibration: LoadCellCalibration,
         open_device: Callable[[str, int], Any] | None = None,
     ) -> None:
-        """Raises SerialLineError where it does not open."""
-        self.path, self.baud = path, baud
+        """Opens the line; raises SerialLineError where it does not open."""
         self.line_format, self.calibration = line_format, calibration
         self.lines = self.malformed_lines = self.overloads = 0
         self.last_malformed = ""
-        self.clock = LineClock(baud)
-        self.line = SerialLine(path, baud, open_device=open_device)
-        self._heard_s: float | None = None
-
-    @property
-    def is_there(self) -> bool:
-        return self.line.is_there
-
-    @property
-    def unpluggings(self) -> int:
-        return self.line.unpluggings
-
-    @property
-    def last_problem(self) -> str:
-        return "" if self.line.problem is None else str(self.line.problem)
-
-    @property
-    def rate_hz(self) -> float | None:
-        return self.clock.rate_hz
+        self.line = SampledLine(path, baud, open_device)
 
     @property
     def arrivals(self) -> Arrivals:
         return self.line.arrivals(lambda line: self.line_format.decode(line) is not None)
 
-    @property
-    def recent_lines(self) -> list[bytes]:
-        return list(self.line.recent)
-
-    def silent_for_s(self, now_s: float) -> float:
-        return 0.0 if self._heard_s is None else now_s - self._heard_s
-
     def read(self, now_s: float) -> list[Sample]:
         """Returns all samples that have arrived, oldest first; never waits."""
-        if self._heard_s is None:
-            self._heard_s = now_s
-        if self.line.reopen(now_s):
-            self.clock.reset()
-        return self._samples(self.line.read(now_s), now_s)
-
-    def _samples(self, lines: list[bytes], now_s: float) -> list[Sample]:
-        if not lines:
-            return []
-        self._heard_s = now_s
+        self.line.reopen(now_s)
         samples = []
-        for line, stamp_s in zip(lines, self.clock.stamps_s(len(lines), now_s), strict=True):
+        for stamp_s, line in self.line.read_stamped(now_s):
             reading = self.line_format.decode(line)
             self._count(line, reading)
             if reading is not None:

@@ -12,6 +12,10 @@ period is measured again.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from drivers.serial.serial_line import SerialLine
 
 GAIN = 0.05  # of the difference between arrival and expectation
 GAP = 3.0  # periods
@@ -38,7 +42,7 @@ class LineClock:
 
     @property
     def rate_hz(self) -> float | None:
-        """The rate of the lines, once enough have arrived."""
+        """The rate of the lines; None until enough have arrived."""
         return None if self.period_s is None else 1.0 / self.period_s
 
     def _measure_again(self) -> None:
@@ -82,3 +86,21 @@ class LineClock:
             self._measure_again()
             return arrived_s
         return min(expected_s + GAIN * late_s, now_s)
+
+
+class SampledLine(SerialLine):
+    """A serial line whose device measures at a steady rate. Owns its clock."""
+
+    def __init__(self, path: str, baud: int, open_device: Callable[[str, int], Any] | None = None) -> None:
+        """Opens the line; raises SerialLineError where it does not open."""
+        self.clock = LineClock(baud)
+        super().__init__(path, baud, open_device=open_device)
+
+    def reset(self) -> None:
+        super().reset()
+        self.clock.reset()
+
+    def read_stamped(self, now_s: float) -> list[tuple[float, bytes]]:
+        """Returns all complete lines, oldest first, each with the time at which it was measured."""
+        lines = self.read(now_s)
+        return list(zip(self.clock.stamps_s(len(lines), now_s), lines, strict=True))

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 from control.bounds import Bounds
-from drivers.load_cell.sample_clock import LineClock
+from drivers.load_cell.sample_clock import SampledLine
 from drivers.serial.encoder_counts import EncoderCounts
-from drivers.serial.serial_line import Arrivals, SerialLine
+from drivers.serial.serial_line import Arrivals
 
 
 @dataclass(frozen=True)
@@ -31,23 +31,18 @@ class StagePosition(NamedTuple):
 
 
 class StageEncoder:
-    """Owns its serial line, its clock and its counts."""
+    """Reads the positions. Owns its serial line and its counts."""
 
     def __init__(self, settings: StageEncoderSettings, open_device: Callable[[str, int], Any] | None = None) -> None:
-        """Raises SerialLineError where it does not open."""
+        """Opens the line; raises SerialLineError where it does not open."""
         self.settings = settings
-        self.line = SerialLine(settings.path, settings.baud, open_device=open_device)
-        self.clock = LineClock(settings.baud)
+        self.line = SampledLine(settings.path, settings.baud, open_device)
         self.counts = EncoderCounts(settings.metres_per_count, settings.label)
         self._heard_s: float | None = None
 
     @property
-    def is_there(self) -> bool:
-        return self.line.is_there
-
-    @property
     def breaks(self) -> int:
-        """How often the zero of the positions may have changed."""
+        """The number of times that the zero of the positions may have changed."""
         return self.line.unpluggings + self.counts.jumps
 
     @property
@@ -55,25 +50,18 @@ class StageEncoder:
         return "" if self.line.problem is None else self.line.problem.why
 
     @property
-    def rate_hz(self) -> float | None:
-        return self.clock.rate_hz
-
-    @property
     def arrivals(self) -> Arrivals:
         return self.line.arrivals(lambda line: self.counts.decode(line) is not None)
 
     def silent_for_s(self, now_s: float) -> float:
-        """How long no count has arrived."""
+        """Returns for how long no count has arrived."""
         return 0.0 if self._heard_s is None else now_s - self._heard_s
 
     def read(self, now_s: float) -> list[StagePosition]:
         """Returns all positions that have arrived, oldest first; never waits."""
         if self.line.reopen(now_s):
-            self.clock.reset()
             self.counts.reset()
-        lines = self.line.read(now_s)
-        stamps_s = self.clock.stamps_s(len(lines), now_s)
-        accepted = [(stamp_s, self.counts.accept(line, stamp_s)) for line, stamp_s in zip(lines, stamps_s, strict=True)]
+        accepted = [(stamp_s, self.counts.accept(line, stamp_s)) for stamp_s, line in self.line.read_stamped(now_s)]
         positions = [StagePosition(stamp_s, position_m) for stamp_s, position_m in accepted if position_m is not None]
         if positions or self._heard_s is None:
             self._heard_s = now_s

@@ -200,14 +200,14 @@ def _describe_cell(port: LoadCellPort, encoder: StageEncoder | None) -> dict[str
     if encoder is not None:
         position = asdict(encoder.settings) | {
             "counts": encoder.counts.accepted,
-            "rate_hz": encoder.rate_hz,
+            "rate_hz": encoder.line.clock.rate_hz,
             "garbled_lines": encoder.counts.malformed,
             "breaks": encoder.breaks,
         }
     return {
-        "port": port.path,
+        "port": port.line.path,
         "format": port.line_format.name,
-        "rate_hz": port.rate_hz,
+        "rate_hz": port.line.clock.rate_hz,
         "lines": port.lines,
         "garbled_lines": port.malformed_lines,
         "last_garbled": port.last_malformed,

@@ -50,7 +50,7 @@ class CellSettings:
 def prepare_cell(bench: TrialBench, settings: StageSettings, cell: CellSettings) -> None:
     """Find the format of the lines, check the encoder, calibrate, check the rate. Raises BenchError."""
     port, operator = bench.recorder.port, bench.operator
-    operator.report(f"listening to {port.path} at {port.baud} baud")
+    operator.report(f"listening to {port.line.path} at {port.line.baud} baud")
     port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
     examine_encoder(bench.recorder, operator, settings)
     port.calibration = find_calibration(bench, cell)
@@ -64,13 +64,13 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
     """Return the name of the format that reads the lines; `name` is the wanted one or "auto". Raises BenchError."""
     port = recorder.port
     recorder.listen(LISTENING_S)
-    if not port.recent_lines:
+    if not port.line.recent:
         recorder.listen(STARTING_S)
-    arrivals, lines = port.arrivals, port.recent_lines
+    arrivals, lines = port.arrivals, list(port.line.recent)
     if not lines:
         raise BenchError(
-            f"nothing arrives on {port.path} at {port.baud} baud: check the amplifier's power and cable, that it sends "
-            "without being asked, and that this is its port"
+            f"nothing arrives on {port.line.path} at {port.line.baud} baud: check the amplifier's power and cable, "
+            "that it sends without being asked, and that this is its port"
         )
     if arrivals.text < TEXT_FRACTION:
         raise BenchError(wrong_baud(port.line, recorder, "--baud", "a load cell's amplifier"))
@@ -111,10 +111,11 @@ def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageS
             f"the lines on {path} are not {expected}, but such as {_quote(list(encoder.line.recent))}: give their "
             f"first characters as --position-label, make the counter send its count alone, {OR_WITHOUT}"
         )
-    between_m = settings.speed_m_s / (encoder.rate_hz or 1.0)
+    rate_hz = encoder.line.clock.rate_hz or 0.0
+    between_m = settings.speed_m_s / (rate_hz or 1.0)
     if LEAST_POSITIONS * between_m > settings.depth_m:
         operator.report(
-            f"the encoder sends {encoder.rate_hz or 0.0:.0f} lines/s, one per {1000.0 * between_m:.1f} mm of travel: "
+            f"the encoder sends {rate_hz:.0f} lines/s, one per {1000.0 * between_m:.1f} mm of travel: "
             f"make it send faster, for at least {LEAST_POSITIONS} lines in an insertion"
         )
 
@@ -187,7 +188,7 @@ def find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibrati
 
 def _unit_of_lines(port: LoadCellPort) -> str:
     """Return the unit in most lines, or counts."""
-    readings = [port.line_format.decode(line) for line in port.recent_lines]
+    readings = [port.line_format.decode(line) for line in port.line.recent]
     units = Counter(reading.unit for reading in readings if reading is not None and reading.unit)
     return units.most_common(1)[0][0] if units else COUNTS
 
@@ -227,7 +228,7 @@ def _read_weight(recorder: CellRecorder) -> list[float]:
 
 def check_rate(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
     """Warn of an amplifier that is too slow for the stroke. Raises BenchError where the operator stops."""
-    rate_hz = recorder.port.rate_hz
+    rate_hz = recorder.port.line.clock.rate_hz
     if rate_hz is None:
         raise BenchError("too few lines arrive to measure their rate: check the amplifier")
     duration_s = settings.depth_m / settings.speed_m_s

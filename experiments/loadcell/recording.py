@@ -121,20 +121,20 @@ class CellRecorder:
 
     def await_port(self) -> None:
         """Wait for an adapter that was unplugged. Raises BenchError after ABSENCE_S."""
-        if self.port.is_there:
+        if self.port.line.is_there:
             return
-        self.report(f"the load cell is unplugged ({self.port.last_problem}): plug {self.port.path} in again")
+        self.report(f"the load cell is unplugged ({self.port.line.problem}): plug {self.port.line.path} in again")
         end_s = self.clock.now_s() + ABSENCE_S
-        while not self.port.is_there:
+        while not self.port.line.is_there:
             if self.clock.now_s() > end_s:
-                raise BenchError(f"the load cell did not come back: {self.port.last_problem}")
+                raise BenchError(f"the load cell did not come back: {self.port.line.problem}")
             self.poll()
         self.report("the load cell is connected again")
 
     def tare(self) -> Tare:
         """Raises BenchError where no samples arrive."""
         forces_n = self._steady_forces_n()
-        if len(forces_n) < 4 and not self.port.is_there:
+        if len(forces_n) < 4 and not self.port.line.is_there:
             forces_n = self._steady_forces_n()
         if len(forces_n) < 4:
             raise BenchError(self._silence())
@@ -148,7 +148,7 @@ class CellRecorder:
         if self.port.overloads and self.port.arrivals.readable > 0.5:
             return "the load cell reports an overload with nothing on it: check its mounting and its wires"
         return (
-            f"no samples arrive from {self.port.path}: check the amplifier's power and cable, and that it sends "
+            f"no samples arrive from {self.port.line.path}: check the amplifier's power and cable, and that it sends "
             "without being asked"
         )
 
@@ -157,12 +157,12 @@ class CellRecorder:
         self.await_port()
         self.drain()
         port = self.port
-        garbled, drop_outs, unpluggings = port.malformed_lines, port.clock.drop_outs, port.unpluggings
+        garbled, drop_outs, unpluggings = port.malformed_lines, port.line.clock.drop_outs, port.line.unpluggings
         before = _counted(self.encoder)
         samples, begin_s = list[Sample](), self.clock.now_s()
         contact = _Contact(noise_n)
         end_s = begin_s + patience_s
-        while self.clock.now_s() < end_s and port.is_there:
+        while self.clock.now_s() < end_s and port.line.is_there:
             fresh = self.poll()
             samples += fresh
             if contact.handle(fresh):
@@ -173,8 +173,8 @@ class CellRecorder:
         return Stretch(
             samples,
             port.malformed_lines - garbled,
-            port.clock.drop_outs - drop_outs,
-            port.unpluggings - unpluggings,
+            port.line.clock.drop_outs - drop_outs,
+            port.line.unpluggings - unpluggings,
             PositionStretch(positions, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
         )
 
@@ -190,7 +190,7 @@ def likeness(forces_n: Sequence[float]) -> float:
 
 def _counted(encoder: StageEncoder | None) -> tuple[int, int, int]:
     """Return the numbers of garbled lines, drop-outs and breaks."""
-    return (0, 0, 0) if encoder is None else (encoder.counts.malformed, encoder.clock.drop_outs, encoder.breaks)
+    return (0, 0, 0) if encoder is None else (encoder.counts.malformed, encoder.line.clock.drop_outs, encoder.breaks)
 
 
 class _Contact:

@@ -165,7 +165,7 @@ def _encoder_problem(recorder: CellRecorder) -> str:
     encoder = recorder.encoder
     if encoder is None:
         return ""
-    if not encoder.is_there:
+    if not encoder.line.is_there:
         return f"the stage's encoder is unplugged ({encoder.last_problem}): plug {encoder.settings.path} in again"
     if encoder.silent_for_s(recorder.clock.now_s()) > SILENT_S:
         return f"no count arrives from the stage's encoder on {encoder.settings.path}: check its power and cable"
@@ -190,7 +190,7 @@ def _make_entry(
         "zero_before_n": before.force_n,
         "zero_after_n": after.force_n,
         "noise_n": before.noise_n,
-        "rate_hz": recorder.port.rate_hz,
+        "rate_hz": recorder.port.line.clock.rate_hz,
         "samples": len(stretch.samples),
         "garbled_lines": stretch.garbled_lines,
         "drop_outs": stretch.drop_outs,
@@ -205,7 +205,7 @@ def _make_position_entry(name: str, recorder: CellRecorder, stretch: PositionStr
     return {
         "file": name,
         "places": len(stretch.positions),
-        "rate_hz": None if encoder is None else encoder.rate_hz,
+        "rate_hz": None if encoder is None else encoder.line.clock.rate_hz,
         "garbled_lines": stretch.garbled_lines,
         "drop_outs": stretch.drop_outs,
         "breaks": stretch.breaks,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.load_cell.line_formats import LineFormat, Reading, find_format, newtons_per
+from drivers.load_cell.line_formats import LineFormat, Reading, find_format
 from drivers.serial.serial_line import text_fraction
 
 
@@ -81,9 +81,3 @@ def test_noise_is_hardly_text() -> None:
     assert text_fraction([b"ST,GS,+1.0kg", b"12\t13\r"]) == 1.0
     assert text_fraction([b"\x00\xff\xe0\x80"]) == 0.0
     assert text_fraction([]) == 0.0
-
-
-def test_weights_are_newtons_and_counts_are_not() -> None:
-    assert newtons_per("kg") == 9.80665
-    assert newtons_per("mN") == 0.001
-    assert newtons_per("counts") is None

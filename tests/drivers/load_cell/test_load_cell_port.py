@@ -50,13 +50,12 @@ def test_every_line_becomes_a_sample_of_the_force(cable: Cable) -> None:
     samples = cable.run(2.0)
     assert len(samples) >= 157  # of 160: the first may be cut, the last are on their way
     assert {round(sample.force_n, 4) for sample in samples} == {FORCE_N}
-    assert cable.port.rate_hz == pytest.approx(80.0, rel=0.02)
-    assert cable.port.malformed_lines == cable.port.unpluggings == 0
+    assert cable.port.line.clock.rate_hz == pytest.approx(80.0, rel=0.02)
+    assert cable.port.malformed_lines == cable.port.line.unpluggings == 0
 
 
 def test_reading_never_waits_where_nothing_comes(cable: Cable) -> None:
     assert cable.port.read(1.0) == []
-    assert cable.port.silent_for_s(3.0) == 2.0
 
 
 def test_malformed_lines_are_counted_and_the_last_one_is_stored(tmp_path: Path) -> None:
@@ -74,12 +73,12 @@ def test_an_amplifier_that_is_unplugged_is_opened_again_when_it_is_back(cable: C
     cable.run(1.0)
     cable.amplifier.unplug()
     assert cable.run(1.0) == []
-    assert not cable.port.is_there
-    assert "no serial port" in cable.port.last_problem
+    assert not cable.port.line.is_there
+    assert "no serial port" in str(cable.port.line.problem)
     cable.amplifier.plug_in()
     samples = cable.run(2.0)
-    assert cable.port.is_there
-    assert cable.port.unpluggings == 1
+    assert cable.port.line.is_there
+    assert cable.port.line.unpluggings == 1
     assert len(samples) > 80
     assert samples[0].stamp_s > 2.0
 
@@ -88,7 +87,7 @@ def test_a_drop_out_is_a_gap_in_the_stamps(tmp_path: Path) -> None:
     cable = Cable(tmp_path, drop_out_rate_hz=1.0, drop_out_s=0.3)
     stamps_s = [sample.stamp_s for sample in cable.run(10.0)]
     gaps = [after - before for before, after in zip(stamps_s, stamps_s[1:], strict=False) if after - before > 0.2]
-    assert 2 < len(gaps) - 1 <= cable.port.clock.drop_outs <= len(gaps)  # the first comes before the rate is known
+    assert 2 < len(gaps) - 1 <= cable.port.line.clock.drop_outs <= len(gaps)  # the first comes before the rate is known
     cable.close()
 
 

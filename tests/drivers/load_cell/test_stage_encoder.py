@@ -50,7 +50,7 @@ def test_positions_are_stamped_with_their_times_except_for_a_constant_delay(rail
     late_s = [place.stamp_s - place.position_m / SPEED_M_S for place in positions]
     assert len(positions) > 190
     assert max(late_s) - min(late_s) < 0.002
-    assert rail.encoder.rate_hz == pytest.approx(100.0, rel=0.01)
+    assert rail.encoder.line.clock.rate_hz == pytest.approx(100.0, rel=0.01)
 
 
 def test_malformed_counts_are_counted_and_give_no_position(tmp_path: Path) -> None:
@@ -65,7 +65,7 @@ def test_malformed_counts_are_counted_and_give_no_position(tmp_path: Path) -> No
 def test_an_encoder_that_was_unplugged_reports_that_its_zero_changed(rail: Rail) -> None:
     rail.run(1.0)
     rail.counter.unplug()
-    assert rail.run(1.0) == [] and not rail.encoder.is_there
+    assert rail.run(1.0) == [] and not rail.encoder.line.is_there
     assert rail.encoder.last_problem == "No such file or directory"
     rail.counter.plug_in()
     positions = rail.run(1.5)

@@ -82,7 +82,7 @@ def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make: 
     (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
     assert recorded.positions is None and len(recorded.forces_n) > 400
     assert (laboratory.folder / laboratory.notebook.entries[recorded.key]["position"]["file"]).exists()
-    assert laboratory.encoder is not None and laboratory.encoder.is_there
+    assert laboratory.encoder is not None and laboratory.encoder.line.is_there
 
 
 def test_an_unplugged_encoder_is_asked_for_and_then_left_out(make: Make) -> None:

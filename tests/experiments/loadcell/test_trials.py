@@ -257,7 +257,7 @@ def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> Non
     laboratory.at(0.02, laboratory.bench.amplifier.unplug)
     laboratory.at(3.0, laboratory.bench.amplifier.plug_in)
     assert laboratory.recorder.tare().samples > 60
-    assert laboratory.port.unpluggings == 1
+    assert laboratory.port.line.unpluggings == 1
 
 
 def test_the_manual_stage_prompts_for_every_step() -> None:
@@ -278,5 +278,5 @@ def test_a_port_is_closed_while_other_rates_are_tried(make: Make) -> None:
     laboratory = make(amplifier=AmplifierParameters(baud=57600))
     with pytest.raises(BenchError):
         examine_lines(laboratory.recorder, "auto")
-    again = LoadCellPort(laboratory.port.path, 57600, laboratory.port.line_format, COUNTS)
+    again = LoadCellPort(laboratory.port.line.path, 57600, laboratory.port.line_format, COUNTS)
     again.close()
