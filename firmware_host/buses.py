@@ -14,7 +14,7 @@ from drivers.can.reopening_port import NotOpenError, ReopeningPort
 from firmware_host.configuration.configuration import BusParameters
 
 Port = TypeVar("Port", bound=CanPort)
-WORDS = {
+CAUSES = {
     errno.ENODEV: "there is no such interface; plug it in, or correct its channel in the configuration",
     errno.ENOENT: "there is no such device; plug it in, or correct its channel in the configuration",
     errno.EACCES: "this user may not use it; join the group that owns it, such as dialout",
@@ -24,20 +24,20 @@ WORDS = {
 
 
 class BusError(NotOpenError):
-    """A bus does not open; the text names it and says why."""
+    """A bus does not open; the message names the bus and the cause."""
 
 
 def open_bus(name: str, bus: BusParameters) -> CanPort:
-    """Raises BusError."""
+    """Open one bus; raises BusError."""
     try:
         return open_port(bus.interface, bus.channel, bus.options)
     except (can.CanError, OSError, ValueError, TypeError, ImportError) as problem:
-        why = WORDS.get(_error_number(problem), str(problem))
-        raise BusError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {why}") from problem
+        cause = CAUSES.get(_error_number(problem), str(problem))
+        raise BusError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {cause}") from problem
 
 
 def _error_number(problem: BaseException | None) -> int:
-    """Of the operating system, where it is at the root of it."""
+    """Return the operating system's error number behind an exception of a CAN library, or 0."""
     while problem is not None:
         number = problem.errno if isinstance(problem, OSError) else getattr(problem, "error_code", None)
         if number:
@@ -47,12 +47,12 @@ def _error_number(problem: BaseException | None) -> int:
 
 
 def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, CanPort]:
-    """All of them, by name, or BusError and none."""
+    """Open every bus, by name; if one fails, closes the others and raises BusError."""
     return _all_or_none(buses, open_bus)
 
 
 def reopening_ports(buses: Mapping[str, BusParameters], wait: bool) -> dict[str, ReopeningPort]:
-    """The same, but of those that are opened again where they vanish. With `wait` they may be missing at first."""
+    """Open every bus as a port that can reopen after it was unplugged; with `wait` it may be missing at first."""
     return _all_or_none(buses, lambda name, bus: ReopeningPort(partial(open_bus, name, bus), wait))
 
 

@@ -1,6 +1,6 @@
-"""Detects every fault that a tick can show: of the joints and drives, the buses, the loop, the pose and the log.
+"""Detects the faults of one tick: of joints and drives, buses, loop, pose and log.
 
-The result is data. The latch decides how long a fault is present, and the modes decide how the robot reacts.
+It only detects. The latch decides how long a fault is present, and the modes decide how the robot reacts.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from firmware_host.loop_monitor import LoopMonitor
 from firmware_host.ticker import Tick
 
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
-REFUSED_TICKS = 3  # in a row, in each of which one bus lost a command
-BUS_TROUBLE_S = 2.0  # after the last error frame
-POSE_FORGOTTEN_S = 10.0  # after this time a motion capture counts as switched off on purpose
-BROKEN = frozenset({FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK})  # detected in single ticks, but lasting
+REFUSED_TICKS = 3  # consecutive ticks in which one bus failed to send a command
+BUS_TROUBLE_S = 2.0  # how long a bus warning outlasts the last error frame
+POSE_FORGOTTEN_S = 10.0  # a pose source that is silent for longer counts as switched off on purpose
+BROKEN = frozenset(
+    {FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK}
+)  # detected in single ticks, but lasting until torque is off
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
 EXPLAINED = frozenset({FaultKind.DRIVE_ERROR, FaultKind.DRIVE_DISARMED})  # by the drive's own error text
-
-
 BUS_FAULTS = {
     BusState.WARNING: FaultKind.BUS_WARNING,
     BusState.PASSIVE: FaultKind.BUS_PASSIVE,
@@ -47,14 +47,14 @@ class MonitorInput(NamedTuple):
     states: DriveStates
     body: BodyPose
     sent: LimitedTorques  # in the tick before
-    freeing: bool  # a recovery pulls a flipper at full torque
+    freeing: bool  # a recovery pulls a stuck flipper at full torque
     wall_minus_monotonic_s: float
     log: LogReport
     lost_lease_holder: str  # the program that has lost the lease; empty: none
 
 
 class FaultMonitor:
-    """Owns the monitors of joints, loop and log, and the counts of the ticks before."""
+    """Owns the monitors of joints, loop and log, and the last counts, whose increase is a fault."""
 
     def __init__(self, configuration: Configuration, drives: Drives, period_s: float = PERIOD_S) -> None:
         self._period_s = period_s
@@ -63,14 +63,14 @@ class FaultMonitor:
             JointMonitor(
                 joint,
                 configuration.limits,
-                span,
+                joint_range,
                 configuration.faults,
                 configuration.winding,
                 configuration.drive[joint].current_limit_a,
                 configuration.drive[joint].torque_constant_nm_a,
                 configuration.drive[joint].heartbeat_period_s,
             )
-            for joint, span in zip(JOINTS, configuration.joint_ranges, strict=True)
+            for joint, joint_range in zip(JOINTS, configuration.joint_ranges, strict=True)
         )
         self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
@@ -150,8 +150,8 @@ class FaultMonitor:
             self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
             self._failed_sends[name] = port.failed_sends
             if self._refused_ticks[name] >= REFUSED_TICKS:
-                ticks, why = self._refused_ticks[name], port.last_send_error
-                found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=why))
+                ticks, reason = self._refused_ticks[name], port.last_send_error
+                found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=reason))
 
     def _check_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
@@ -160,12 +160,12 @@ class FaultMonitor:
             self.joints, self._drives.health, monitor_input.states, sent_nm, strict=True
         ):
             facts = JointFacts(
-                tick.now_s,
-                dt_s,
-                mode in ENERGISED,
-                mode in MOVING,
-                torque_nm,
-                monitor_input.freeing or mode not in HELD,
+                now_s=tick.now_s,
+                dt_s=dt_s,
+                energised=mode in ENERGISED,
+                moving=mode in MOVING,
+                torque_nm=torque_nm,
+                may_stand_still=monitor_input.freeing or mode not in HELD,
             )
             found += [_explained(fault, health) for fault in joint.update(facts, state)]
 
@@ -221,7 +221,7 @@ class FaultMonitor:
 
 
 def _explained(fault: Fault, health: DriveHealth) -> Fault:
-    """The fault with the drive's own error text as its reason."""
+    """Return the fault with the drive's own error text as its reason, for kinds that it explains."""
     if fault.kind not in EXPLAINED or not health.errors:
         return fault
     return fault.with_values(reason=health.errors)

@@ -84,10 +84,10 @@ class Loop:
         self._clearing_until_s = NEVER_S
         self._mode_since_s = 0.0
         self._clock, self._wall_clock = clock, wall_clock
-        self._ranges = configuration.joint_ranges
+        self._joint_ranges = configuration.joint_ranges
 
     def tick(self, tick: Tick) -> None:
-        """Read the drives, learn from the mud, choose the mode, control the joints, send, and record."""
+        """Read the drives, learn from the mud, choose the mode, control the joints, send the torques, and record."""
         now_s = tick.now_s
         self.missed_ticks += tick.missed
         self.target = self.controller.target
@@ -98,9 +98,9 @@ class Loop:
         self.health = self._examine(tick, self._end_lost_lease(now_s))
         self._enter(next_mode(self.mode, self._pop_request(), self.health), now_s)
         self.forced = self.forced and self.mode in ENERGISED
-        self._stop_move_on_fault(now_s)
-        wanted = self._control(tick.missed)
-        self.sent = self._limit(wanted)
+        if self.fault and self.controller.moving:
+            self._end_move(now_s, fault_message(self.fault))
+        self.sent = self._limit(self._control(tick.missed))
         self._command(now_s)
         self._record(tick)
 
@@ -108,6 +108,11 @@ class Loop:
     def fault(self) -> Fault | None:
         """The worst present fault that is more than a warning."""
         return self.faults.worst if self.faults.reaction >= Reaction.HOLD else None
+
+    @property
+    def stride_depth_m(self) -> float:
+        """The commanded depth of this stride."""
+        return self.controller.gait.commanded_depth_m
 
     def _adapt_gait(self, now_s: float) -> None:
         """Choose the next stride's depth once a stride, in swing; end an insertion that meets solid mud."""
@@ -118,7 +123,7 @@ class Loop:
             self.recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
 
     def _end_lost_lease(self, now_s: float) -> str:
-        """Return the program that lost the lease, if this is a fault; while torque is off, the lease just ends."""
+        """Return the name of the program that lost the lease, if this is a fault; with torque off it just ends."""
         self.lease.update(now_s)
         if not self.lease.lost(now_s):
             return ""
@@ -127,7 +132,7 @@ class Loop:
             return holder
         self.events.report(now_s, f"lease of {holder} is over")
         self.lease.reset()
-        arms = self.pending_request is Request.ARM  # perhaps for the program that is gone: the fault prevents it
+        arms = self.pending_request is Request.ARM  # the lost program may have sent it: the fault prevents it
         return holder if arms else ""
 
     def _examine(self, tick: Tick, lost_lease_holder: str) -> Health:
@@ -164,17 +169,18 @@ class Loop:
         )
 
     def _all_in_closed_loop(self) -> bool:
-        """While arming only heartbeats count that came since: an older one describes the time before."""
+        """Whether all drives report closed loop; while arming, only in heartbeats that are newer than the request."""
         oldest_s = self._mode_since_s if self.mode is Mode.ARMING else NEVER_S
         return all(state.closed_loop and state.heartbeat_stamp_s > oldest_s for state in self.states)
 
     def _pop_request(self) -> Request:
-        """The request to act on in this tick."""
+        """Return the request to act on in this tick; none arms or walks while the daemon ends."""
         request, self.pending_request = self.pending_request, Request.NONE
         refused = self.ending and request in (Request.ARM, Request.WALK)
         return Request.NONE if refused else request
 
     def _enter(self, mode: Mode, now_s: float) -> None:
+        """Change to this mode, if it is another one: log it, and arm or disarm the drives."""
         if mode is self.mode:
             return
         change = ModeChange(
@@ -194,12 +200,8 @@ class Loop:
             self.drives.disarm(now_s, at_once=True)
         self.mode, self._mode_since_s = mode, now_s
 
-    def _stop_move_on_fault(self, now_s: float) -> None:
-        if self.controller.moving and self.health.reaction >= Reaction.HOLD:
-            self._end_move(now_s, fault_message(self.fault) if self.fault else "a fault is present.")
-
     def _end_move(self, now_s: float, reason: str) -> None:
-        """Hold the joints where they are; outside of hold the mode has ended the move already."""
+        """End a move in hold: the joints stay where they are. Any other mode has ended it already."""
         if self.mode is Mode.HOLD:
             self.controller.end_move()
             self.events.report_end_of_move(now_s, reason)
@@ -211,12 +213,11 @@ class Loop:
         return self.controller.step(step_s, self.mode, self.states, trusted, elapsed_s)
 
     def _limit(self, wanted: Torques) -> LimitedTorques:
-        """Limit the torques, and their slew to that of one tick, however long the last gap was."""
+        """Limit the torques; their slew to that of one tick, even after missed ticks."""
         if self.mode not in MOVING:
             return NOTHING_SENT
-        states = self.fault_monitor.with_winding_heat(self.states)
-        limits, before_nm = self.configuration.limits, self.sent.torques_nm
-        return apply_limits(wanted, before_nm, states, limits, self._ranges, self.period_s)
+        states, limits = self.fault_monitor.with_winding_heat(self.states), self.configuration.limits
+        return apply_limits(wanted, self.sent.torques_nm, states, limits, self._joint_ranges, self.period_s)
 
     def _command(self, now_s: float) -> None:
         """Send the axis states that the mode needs, then the torques.
@@ -241,7 +242,7 @@ class Loop:
             missed_ticks=self.missed_ticks,
             mode=self.mode,
             target=self.target,
-            stride_depth_m=self.controller.gait.commanded_depth_m,
+            stride_depth_m=self.stride_depth_m,
             states=self.states,
             reading=self.learning.reading,
             body=self.body,
@@ -259,7 +260,9 @@ class Loop:
         refused = self._refusal(request, order, forced)
         if refused:
             return refused
-        self._report_request(request, now_s, forced, by)
+        changed = next_mode(self.mode, request, self.health) is not next_mode(self.mode, Request.NONE, self.health)
+        changes = changed or request not in (Request.STOP, Request.DISARM)  # every user may send those at any time
+        self.events.report_request(now_s, request, forced, by, changes)
         if request is Request.STOP and self.controller.moving:
             self._end_move(now_s, f"stop was requested{f' by {by}' if by else ''}.")
         if request is Request.DISARM and self.mode not in ENERGISED:
@@ -283,12 +286,6 @@ class Loop:
         self.events.report(now_s, f"move {path} by {by}")
         self.events.notice = ""
         self.controller.move([angles_rad.get(joint) for joint in JOINTS])
-
-    def _report_request(self, request: Request, now_s: float, forced: bool, by: str) -> None:
-        """Log a request; a stop or disarm that changes nothing is only counted, since every user may send those."""
-        changed = next_mode(self.mode, request, self.health) is not next_mode(self.mode, Request.NONE, self.health)
-        changes = changed or request not in (Request.STOP, Request.DISARM)
-        self.events.report_request(now_s, request, forced, by, changes)
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: bool) -> str | None:
         if self.ending and request in (Request.ARM, Request.WALK):

@@ -21,9 +21,9 @@ from firmware_host.loop import Loop
 from firmware_host.mud_learning import ClosedStride
 
 
-class PresentFault(NamedTuple):
+class AgedFault(NamedTuple):
     fault: Fault
-    age_s: float  # since it was detected first
+    age_s: float  # since it was first detected
 
 
 class BusReport(NamedTuple):
@@ -38,10 +38,10 @@ class BusReport(NamedTuple):
 
 
 class FrameCounts(NamedTuple):
-    """What the drives' messages and commands came to, since the start."""
+    """Counts of rejected frames and commands of all drives, since the start."""
 
-    unknown_frames: int  # of ids that belong to none of the drives
-    malformed_frames: int  # of a drive, with a payload that cannot be decoded
+    unknown_frames: int  # with an id that no drive has
+    malformed_frames: int  # from a drive, with a payload that cannot be decoded
     refused_commands: int  # by the transmit gate
 
 
@@ -51,12 +51,12 @@ class LoopSnapshot(NamedTuple):
     moving: bool  # joints are on their way to a pose that was requested
     may_be_in_mud: bool  # the held pose interrupted a walk
     fault: Fault | None  # the worst present fault that is more than a warning
-    faults: tuple[PresentFault, ...]
+    faults: tuple[AgedFault, ...]
     blocking: tuple[Fault, ...]  # the faults that block arming, unless it is forced
     notice: str  # why the robot stopped, until it is moved again
     unlogged_requests: int
     lease_holder: str | None
-    phase: Phase  # that was commanded while `states` were measured
+    phase: Phase  # commanded while `states` were measured
     stride: int
     depth_m: float  # commanded in this stride
     states: DriveStates
@@ -84,14 +84,14 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
         moving=loop.controller.moving,
         may_be_in_mud=loop.controller.cut_short,
         fault=loop.fault,
-        faults=tuple(PresentFault(fault, faults.age_ticks(fault) * PERIOD_S) for fault in faults.present),
+        faults=tuple(AgedFault(fault, faults.age_ticks(fault) * PERIOD_S) for fault in faults.present),
         blocking=tuple(faults.blocking()),
         notice=loop.events.notice,
         unlogged_requests=loop.events.requests.unlogged,
         lease_holder=str(loop.lease.holder) if loop.lease.held else None,
         phase=loop.target.phase,
         stride=loop.target.stride,
-        depth_m=loop.controller.gait.commanded_depth_m,
+        depth_m=loop.stride_depth_m,
         states=loop.states,
         drives=drives.health,
         buses=tuple(_bus_report(name, port) for name, port in drives.ports.items()),

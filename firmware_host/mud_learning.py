@@ -18,9 +18,9 @@ from estimation.mud_map import MapRow
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.control_setup import choice_text, make_adaptation
 
-FIRM_TICKS = 3  # of a high load end an insertion: one outlier does not
+FIRM_TICKS = 3  # with a high load until an insertion ends: one outlier does not end it
 STORED_STRIDES = 200  # for clients of the status socket
-LARGEST_N_M3 = 1e10  # 10 kN/cm³: a thousand times any mud
+LARGEST_N_M3 = 1e10  # 10 kN/cm³, a thousand times the stiffest mud
 
 
 class ClosedStride(NamedTuple):

@@ -12,7 +12,7 @@ from firmware_host.configuration.configuration import PoseParameters
 
 
 def open_pose(pose: PoseParameters) -> OpenedPose:
-    """Raises PoseSourceError."""
+    """Open the chosen source; raises PoseSourceError."""
     match pose.chosen:
         case "socket":
             return PosePort(Path(pose.socket))

@@ -87,7 +87,7 @@ class StrideRecord:
         plant, loop = self._lockstep.robot.plant, self._lockstep.loop
         self._start_m, self._start_s = plant.body_m, self._lockstep.now_s
         self._furthest_m, self._pushed_back_m, self._recovered = -inf, 0.0, False
-        self._depth_m = loop.controller.gait.commanded_depth_m
+        self._depth_m = loop.stride_depth_m
         self._position_m = plant.body_m + loop.configuration.geometry.flipper_length_m * sin(plant.arms[0].sweep_rad)
 
     def update(self) -> None:
@@ -96,7 +96,7 @@ class StrideRecord:
         if target.stride != self._number:
             self._finish_stride(body_m)
             self._number = target.stride
-        self._depth_m = self._lockstep.loop.controller.gait.commanded_depth_m  # an insertion may end early
+        self._depth_m = self._lockstep.loop.stride_depth_m  # an insertion may end early
         self._recovered = self._recovered or target.phase is Phase.RECOVERY
         if target.phase in AFTER_STANCE:
             self._furthest_m = max(self._furthest_m, body_m)

@@ -1,6 +1,6 @@
-"""What an operator can ask of the running daemon: the methods of the status socket.
+"""The methods of the status socket: what each one does to the running loop, and what it answers.
 
-The table in socket_methods.py says who may use a method and with which parameters; here is what each one does. The
+The table in socket_methods.py says who may use a method and with which parameters. The
 log names the sender of every request that changes something. Methods that set the robot in motion are reserved for
 the holder of the lease, if there is one; methods that end a motion are not.
 """
@@ -30,7 +30,7 @@ Method = Callable[[dict[str, Any], Caller], Any]
 
 
 def validated(name: str, method: Method) -> Method:
-    """The method, called with every parameter of its table, or RefusedError."""
+    """Return the method behind the validation of its parameters, which raises RefusedError."""
     return lambda params, caller: method(METHODS[name].read(params), caller)
 
 
@@ -88,7 +88,7 @@ class OperatorCalls:
             "depth_m": now.depth_m,
             "body_x_m": known(now.body.x_m),
             "pose": now.pose._asdict(),
-            "drives": [_drive_report(now, place, self._clock()) for place in range(len(JOINTS))],
+            "drives": [_drive_report(now, index, self._clock()) for index in range(len(JOINTS))],
             "strides_closed": now.strides_closed,
             "mud": mud_estimate_report(now.mud),
             "loop": loop.timing.summary(),
@@ -161,26 +161,26 @@ class OperatorCalls:
         return self._renew_lease(caller, params["for_s"])
 
     def _renew_lease(self, caller: Caller, for_s: float) -> str:
-        begins, now_s = self._lease.holder != caller, self._clock()
+        is_new, now_s = self._lease.holder != caller, self._clock()
         answer = _accepted(self._lease.renew(caller, now_s, for_s))
-        if begins:
+        if is_new:
             self._loop.events.report(now_s, f"lease taken by {caller}")
         return answer
 
     def release(self, params: dict[str, Any], caller: Caller) -> str:
-        begun = self._lease.holder is not None
+        was_held = self._lease.holder is not None
         answer = _accepted(self._lease.release(caller))
-        if begun:
+        if was_held:
             self._loop.events.report(self._clock(), f"lease released by {caller}")
         return answer
 
     def _as_holder(self, method: Method) -> Method:
-        """The method for the holder of the lease, if there is one.
+        """Return the method, refused to every caller but the holder of the lease if there is one.
 
         Once the order is accepted, `take_over` ends the lease of another program and `lease_s` renews the caller's.
         """
 
-        def held(params: dict[str, Any], caller: Caller) -> str:
+        def call(params: dict[str, Any], caller: Caller) -> str:
             _accepted(self._lease.refusal(caller, self._clock(), params["take_over"]))
             answer: str = method(params, caller)
             if self._lease.held and self._lease.holder != caller:
@@ -190,7 +190,7 @@ class OperatorCalls:
                 self._renew_lease(caller, params["lease_s"])
             return answer
 
-        return held
+        return call
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
         return _accepted(self._loop.request(request, self._clock(), order, forced, str(caller)))
@@ -219,14 +219,14 @@ def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:
     }
 
 
-def _drive_report(now: LoopSnapshot, place: int, now_s: float) -> dict[str, Any]:
-    state, health = now.states[place], now.drives[place]
+def _drive_report(now: LoopSnapshot, index: int, now_s: float) -> dict[str, Any]:
+    state, health = now.states[index], now.drives[index]
     return {
-        "joint": JOINTS[place],
+        "joint": JOINTS[index],
         "angle_rad": known(state.angle_rad),
         "velocity_rad_s": known(state.velocity_rad_s),
         "current_a": known(state.current_a),
-        "torque_command_nm": now.sent.torques_nm[place],
+        "torque_command_nm": now.sent.torques_nm[index],
         "closed_loop": state.closed_loop,
         "errors": health.active_errors,
         "temperature_c": known(state.temperature_c),
@@ -234,7 +234,7 @@ def _drive_report(now: LoopSnapshot, place: int, now_s: float) -> dict[str, Any]
         "firmware": health.firmware or None,
         "hardware": health.hardware or None,
         "watchdog_s": known(health.watchdog_s),
-        "winding_c": round(now.winding_temperatures_c[place], 1),
+        "winding_c": round(now.winding_temperatures_c[index], 1),
         "angle_age_s": known(now_s - state.angle_stamp_s),
         "current_age_s": known(now_s - state.current_stamp_s),
         "heartbeat_age_s": known(now_s - state.heartbeat_stamp_s),

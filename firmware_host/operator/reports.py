@@ -1,5 +1,6 @@
-"""What the program knows, as plain dicts of numbers and strings for JSON and MessagePack: units in the names, None for
-a number that is not known.
+"""Converts estimates of the mud into plain dicts for JSON and MessagePack.
+
+Units are in the names; None stands for a number that is not known.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ COEFFICIENTS = ("k_p", "k_s", "k_e")
 
 
 def known(value: float) -> float | None:
+    """Return the number, or None if it is not finite."""
     return value if isfinite(value) else None
 
 
@@ -35,7 +37,7 @@ JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
 
 
 def stride_report(stride: StrideEstimate) -> dict[str, Any]:
-    """A stride as `replay --json` and the status socket tell it; k in N/m³."""
+    """Return a stride as `replay --json` and the status socket report it; k in N/m³."""
     report = {
         JSON_NAMES.get(name, name): known(value) if isinstance(value, float) else value
         for name, value in asdict(stride).items()
@@ -45,14 +47,14 @@ def stride_report(stride: StrideEstimate) -> dict[str, Any]:
 
 
 def coefficient_report(coefficient: Coefficient | Mapped | None) -> dict[str, Any] | None:
-    """What is believed of one coefficient; k in N/m³ at `depth_m`."""
+    """Return the estimate of one coefficient; k in N/m³ at `depth_m`."""
     if coefficient is None:
         return None
     return {name: known(value) if isinstance(value, float) else value for name, value in coefficient._asdict().items()}
 
 
 def mud_estimate_report(mud_estimate: MudEstimate) -> dict[str, Any]:
-    """Both flippers together, and each apart."""
+    """Return the estimate of both flippers together, and of each."""
     together = {name: coefficient_report(getattr(mud_estimate, name)) for name in COEFFICIENTS}
     apart = {
         flipper: {name: coefficient_report(getattr(mud_estimate.of(flipper), name)) for name in COEFFICIENTS}
@@ -62,7 +64,7 @@ def mud_estimate_report(mud_estimate: MudEstimate) -> dict[str, Any]:
 
 
 def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
-    """Along the track, one row for each piece of it that a stride told of."""
+    """Return one row for each piece of the track that a stride has measured."""
     return [
         {"place_m": row.position_m} | {name: coefficient_report(getattr(row, name)) for name in COEFFICIENTS}
         for row in rows
@@ -70,5 +72,5 @@ def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
 
 
 def check_item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:
-    """One line of `mudskipper check`: fine, or what to do."""
+    """Return one line of `mudskipper check`, with the fix if it is not ok."""
     return {"id": identity, "ok": ok, "text": text, "fix": "" if ok else fix}
