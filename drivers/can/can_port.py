@@ -18,9 +18,9 @@ from typing import Any, Protocol
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from drivers.can.error_frames import BusState as BusState  # re-exported for users of a port
 from drivers.can.frames import Frame
 from drivers.can.port_health import MOST_FRAMES_PER_READ as MOST_FRAMES_PER_READ
+from drivers.can.port_health import BusState as BusState  # re-exported for users of a port
 from drivers.can.port_health import PortHealth
 from drivers.can.slcan_serial import SlcanSerial
 from drivers.can.socketcan_port import SocketcanPort

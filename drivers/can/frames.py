@@ -60,7 +60,7 @@ def _encode_fd(frame: Frame, word: int) -> bytes:
 
 
 def decode_frame(data: bytes) -> Frame:
-    """Raises ValueError for bytes that are no frame."""
+    """Decodes 16 or 72 bytes; raises ValueError for bytes that are no frame."""
     if len(data) == FD_FRAME_LAYOUT.size:
         return _decode_fd(data)
     if len(data) != FRAME_LAYOUT.size:

@@ -2,7 +2,7 @@
 
 It serves tests, and walks in lockstep that are faster than real time. Frames pass as objects; the sender encodes their
 payloads and the receiver decodes them as on any bus. A test can make a port fail: it sets the port's `state`, makes it
-refuse frames to send (`full`), or injects an error frame, which only this port receives, as from its own controller.
+refuse frames to send (`full`), or passes an error frame to its `on_error_frame`, as the port's own controller would.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ LONGEST_QUEUE = 4096  # an unread port loses its oldest frames, like a controlle
 
 
 class MockPort(PortHealth):
-    """A CanPort."""
+    """Implements CanPort on a bus within this process."""
 
     def __init__(self, bus: MockBus) -> None:
         super().__init__()
@@ -41,10 +41,6 @@ class MockPort(PortHealth):
         for port in self._bus.ports:
             if port is not self:
                 port.queue.append(frame)
-
-    def inject_error(self, class_bits: int, data: bytes = bytes(8)) -> None:
-        """Lets the port receive one of SocketCAN's error frames."""
-        self.on_error_frame(class_bits, data)
 
     def open_peer(self) -> MockPort:
         """Opens another node on the same bus."""

@@ -22,7 +22,7 @@ class NotOpenError(Exception):
 
 
 class ReopeningPort:
-    """A CanPort. Owns its inner port, which is None while it does not open."""
+    """Implements CanPort. Owns its inner port, which is None while it does not open."""
 
     def __init__(self, open_port: Callable[[], CanPort], wait: bool) -> None:
         """`open_port` may raise NotOpenError; with `wait`, the port then starts as off instead of raising it."""
@@ -31,7 +31,7 @@ class ReopeningPort:
         self._awaits_frame = False
         self._due_s: float | None = None  # when to try again
         self._failed_before = self._errors_before = self._lost_before = 0  # of the closed ports
-        self._ids: Iterable[int] | None = None  # that the drives listen to
+        self._ids: Iterable[int] | None = None  # the ids that the drives listen to
         self.state = BusState.OFF
         self.failed_sends = self.error_frames = self.lost_frames = 0
         self.last_error = self.last_send_error = ""

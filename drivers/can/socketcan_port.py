@@ -21,7 +21,6 @@ from collections.abc import Iterable
 from can.interfaces.socketcan import SocketcanBus
 
 from control.records import NEVER_S
-from drivers.can.error_frames import BusState
 from drivers.can.frames import (
     DATA_MAX_BYTES,
     ERROR_FLAG,
@@ -35,7 +34,7 @@ from drivers.can.frames import (
     decode_frame,
     encode_frame,
 )
-from drivers.can.port_health import MOST_FRAMES_PER_READ, PortHealth
+from drivers.can.port_health import MOST_FRAMES_PER_READ, BusState, PortHealth
 
 SO_TIMESTAMPNS, SO_RXQ_OVFL = 35, 40  # asm-generic/socket.h
 STAMP, COUNT = struct.Struct("@ll"), struct.Struct("@I")  # in native layout: struct timespec, __u32
@@ -49,7 +48,7 @@ ALL_EXTENDED_BITS = EXTENDED_MASK | REMOTE_FLAG
 
 
 class SocketcanPort(PortHealth):
-    """A CanPort. Owns the socket's mode, and the kernel's last count of lost frames."""
+    """Sends and receives on the socket. Owns its mode, and the kernel's last count of lost frames."""
 
     def __init__(self, bus: SocketcanBus) -> None:
         super().__init__()
@@ -110,7 +109,7 @@ class SocketcanPort(PortHealth):
         return Frame(identifier, b"" if is_remote else payload[:length], is_remote, False, is_extended, stamp_s)
 
     def _on_long_frame(self, encoded: bytes, stamp_s: float) -> Frame | None:
-        """A CAN FD frame; anything else counts as a failed read."""
+        """Returns a CAN FD frame, or None for anything else, which counts as a failed read."""
         try:
             frame = decode_frame(encoded)
         except ValueError as problem:
@@ -119,7 +118,7 @@ class SocketcanPort(PortHealth):
         return frame._replace(stamp_s=stamp_s)
 
     def _on_overflow(self, value: bytes) -> None:
-        """The kernel counts from the socket's opening, modulo 2³²."""
+        """Counts lost frames from the kernel's count, which begins at the socket's opening, modulo 2³²."""
         (count,) = COUNT.unpack(value)
         self.lost_frames += (count - self._kernel_count) % COUNT_RANGE
         self._kernel_count = count

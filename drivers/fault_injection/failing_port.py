@@ -40,7 +40,7 @@ ONE_FLOAT = Struct("<f")
 
 
 class FailingPort:
-    """A CanPort. Owns the delayed frames and the frozen payloads."""
+    """Wraps a CanPort. Owns the delayed frames and the frozen payloads."""
 
     def __init__(self, name: str, port: CanPort, drives: Mapping[str, DriveParameters], failures: Failures) -> None:
         self._bus = f"bus.{name}"
@@ -114,7 +114,7 @@ class FailingPort:
 
     @property
     def _due_s(self) -> float:
-        """When nothing fails any more, all delayed frames arrive at once."""
+        """The time up to which delayed frames arrive: without a failure all arrive at once."""
         return self._failures.now_s if self._failures.failing else inf
 
     def _after_failures(self, frame: Frame) -> Frame | None:

@@ -14,7 +14,7 @@ FAR_M = 100.0  # random positions that look plausible
 
 
 class FailingPose:
-    """A PoseSource. Owns the delayed poses, and the frozen one."""
+    """Wraps a PoseSource. Owns the delayed poses, and the frozen one."""
 
     def __init__(self, pose: PoseSource, failures: Failures) -> None:
         self._pose = pose

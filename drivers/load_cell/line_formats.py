@@ -55,7 +55,7 @@ class LineFormat:
     """
 
     def __init__(self, name: str) -> None:
-        """Raises ValueError for an unknown format."""
+        """Compiles the format; raises ValueError for an unknown one."""
         self.name = name
         self._column = 0
         self._pattern = re.compile("")

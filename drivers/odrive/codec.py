@@ -28,7 +28,7 @@ class Message:
         return self._struct.pack(*values)
 
     def decode(self, data: bytes) -> tuple[Any, ...]:
-        """Raises MalformedMessageError where the payload is shorter or longer than the layout."""
+        """Returns the values; raises MalformedMessageError for a payload that is shorter or longer than the layout."""
         try:
             return self._struct.unpack(data)
         except error as problem:

@@ -43,7 +43,7 @@ GATE_DRIVER_FAULT = 0x20
 
 
 class Odrive:
-    """A DriveType."""
+    """Describes the ODrive protocol, as DriveType requires."""
 
     parameters = OdriveParameters
     example_error = GATE_DRIVER_FAULT

@@ -17,8 +17,15 @@ then sections that each begin with an i32 count, and from 4.1 on with the i32 by
 
 and ends with u32 time code, u32 part of it, f64 seconds of the software (before 2.7 f32); from 3.0 on the ticks at
 which the cameras' shutters were half through, the images had arrived and the frame was sent, u64 each; from 4.1 on two
-u32 of a precision time; u16 flags, i32 zero. Versions before 2.6 are not supported,
-because they do not report whether a body is tracked.
+u32 of a precision time; u16 flags, i32 zero. Versions before 2.6 are not supported, because they do not report whether
+a body is tracked. The description of models (5): i32 descriptions, each i32 kind, from 4.1 on i32 bytes that follow:
+
+    marker set (0)     its name and a zero byte, i32 markers, each a name and a zero byte
+    rigid body (1)     its name and a zero byte, i32 id, i32 parent, f32 x y z; from 3.0 on i32 markers, 12 bytes of a
+                       position and 4 of a label each, from 4.0 on a name and a zero byte each
+
+Other kinds are skipped by their size. Before 4.1 they do not contain it, so there the reader stops at the first of
+them; Motive sends marker sets and rigid bodies first.
 
 No library is used: those on PyPI build an object for every marker, block or start their own threads, and raise in the
 middle of a truncated packet. The best maintained one, natnet, serves the tests as a reference.
@@ -27,6 +34,7 @@ middle of a truncated packet. The best maintained one, natnet, serves the tests 
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from math import isfinite
 from struct import Struct
 from typing import NamedTuple
@@ -46,6 +54,7 @@ MODELS_CHANGED = 0x02
 VECTOR_BYTES = 12
 MARKER_BYTES = 20  # of a rigid body before 3.0: its position, id and size
 CHANNEL_VALUE_BYTES = 4
+MARKER_SET, RIGID_BODY = 0, 1  # kinds of description
 
 
 class NatNetVersion(NamedTuple):
@@ -106,7 +115,7 @@ def message_of(packet: bytes) -> int:
 
 
 def decode_server_info(packet: bytes) -> ServerInfo:
-    """Raises MalformedPacketError."""
+    """Decodes a server's information; raises MalformedPacketError."""
     try:
         name = packet[HEADER.size : HEADER.size + NAME_BYTES].partition(b"\0")[0].decode(errors="replace")
         major, minor = SERVER_VERSIONS.unpack_from(packet, HEADER.size + NAME_BYTES)[4:6]
@@ -116,6 +125,14 @@ def decode_server_info(packet: bytes) -> ServerInfo:
     except DECODING_ERRORS as problem:
         raise MalformedPacketError(str(problem)) from None
     return ServerInfo(name, NatNetVersion(major, minor), ticks_per_s)
+
+
+def _read_count(packet: bytes, offset: int) -> tuple[int, int]:
+    """Returns a count, and the offset of the bytes after it."""
+    (count,) = INTEGER.unpack_from(packet, offset)
+    if count < 0:
+        raise MalformedPacketError("a negative count")
+    return count, offset + INTEGER.size
 
 
 class FrameLayout:
@@ -154,10 +171,8 @@ class FrameLayout:
 
     def _begin_section(self, packet: bytes, offset: int) -> tuple[int, int]:
         """Returns the number of items in a section, and where the first one begins."""
-        (count,) = INTEGER.unpack_from(packet, offset)
-        if count < 0:
-            raise MalformedPacketError("a negative count")
-        return count, offset + INTEGER.size * (2 if self.has_sizes else 1)
+        count, offset = _read_count(packet, offset)
+        return count, offset + INTEGER.size * self.has_sizes
 
     def _skip(self, packet: bytes, offset: int) -> int:
         """Returns the end of a section that contains its size."""
@@ -230,7 +245,49 @@ class FrameLayout:
 
 
 def _rigid_body(numbers: tuple[float, ...], mean_error_m: float, flags: int) -> RigidBody:
-    identity, x_m, y_m, z_m, *quaternion = numbers
+    identity, x_m, y_m, z_m, qx, qy, qz, qw = numbers
     tracked = bool(flags & TRACKED) and isfinite(x_m + y_m + z_m)
-    qx, qy, qz, qw = quaternion
     return RigidBody(int(identity), (x_m, y_m, z_m), (qx, qy, qz, qw), mean_error_m, tracked)
+
+
+def decode_bodies(packet: bytes, version: NatNetVersion) -> dict[str, int]:
+    """Returns the streaming ids of rigid bodies by name. Raises MalformedPacketError."""
+    try:
+        return dict(_bodies(packet, version))
+    except DECODING_ERRORS as problem:
+        raise MalformedPacketError(str(problem)) from None
+
+
+def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
+    has_sizes = version >= (4, 1)
+    count, offset = _read_count(packet, HEADER.size)
+    for _ in range(count):
+        (kind,) = INTEGER.unpack_from(packet, offset)
+        offset += INTEGER.size
+        size, offset = _read_count(packet, offset) if has_sizes else (0, offset)
+        if kind == RIGID_BODY:
+            yield _name(packet, offset)
+        elif not has_sizes and kind != MARKER_SET:
+            return
+        offset = offset + size if has_sizes else _end_of(packet, offset, kind, version)
+
+
+def _name(packet: bytes, offset: int) -> tuple[str, int]:
+    end = packet.index(0, offset)
+    (identity,) = INTEGER.unpack_from(packet, end + 1)
+    return packet[offset:end].decode(errors="replace"), identity
+
+
+def _end_of(packet: bytes, offset: int, kind: int, version: NatNetVersion) -> int:
+    """Returns the end of a description that does not contain its size."""
+    offset = packet.index(0, offset) + 1
+    if kind == RIGID_BODY:
+        offset += TWO_INTEGERS.size + VECTOR_BYTES
+        if version < (3, 0):
+            return offset
+    markers, offset = _read_count(packet, offset)
+    if kind == RIGID_BODY:
+        offset += (VECTOR_BYTES + INTEGER.size) * markers
+    for _ in range(markers if kind == MARKER_SET or version >= (4, 0) else 0):
+        offset = packet.index(0, offset) + 1
+    return offset

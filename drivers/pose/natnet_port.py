@@ -29,12 +29,11 @@ from drivers.pose.natnet_codec import (
     FrameLayout,
     MalformedPacketError,
     RigidBody,
+    decode_bodies,
     decode_server_info,
     message_of,
 )
-from drivers.pose.natnet_models import decode_bodies
-from drivers.pose.natnet_parameters import NatNetParameters, parse_version
-from drivers.pose.natnet_sockets import NatNetSockets
+from drivers.pose.natnet_sockets import NatNetParameters, NatNetSockets, parse_version
 from drivers.pose.pose_port import STALE_S, PoseReport, PoseSourceError
 from drivers.pose.pose_timing import LeastDelay, PoseForecast
 from drivers.pose.track_axis import Direction
@@ -45,10 +44,10 @@ NO_NETWORK = "the service may use no network: add AF_INET to RestrictAddressFami
 
 
 class NatNetPort:
-    """A PoseSource. Owns the server's reports, and the recent positions."""
+    """Implements PoseSource. Owns the server's reports, and the recent positions."""
 
     def __init__(self, parameters: NatNetParameters, direction: Direction, origin_m: float = 0.0) -> None:
-        """x is the position along `direction`, a unit vector in the cameras' frame. Raises PoseSourceError."""
+        """Opens the sockets; raises PoseSourceError. `direction` is that of x, a unit vector in the cameras' frame."""
         self.parameters = parameters
         self._direction, self._origin_m = direction, origin_m
         self.poses = self.malformed = self.lost = 0
@@ -103,7 +102,7 @@ class NatNetPort:
             self.malformed += 1
 
     def _on_message(self, packet: bytes, now_s: float) -> None:
-        """Raises MalformedPacketError."""
+        """Handles a packet of the server; raises MalformedPacketError."""
         message = message_of(packet)
         if message == FRAME:
             self._heard_s = now_s

@@ -1,4 +1,4 @@
-"""The UDP sockets of a NatNet client: one joins the multicast group, if there is one, and one sends requests.
+"""The configuration and the UDP sockets of a NatNet client: one joins the multicast group, one sends requests.
 
 A server that does not multicast sends its frames to the socket that sent the requests. Nothing here waits.
 """
@@ -10,20 +10,46 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from struct import pack
+from typing import Annotated
 
-from drivers.pose.natnet_codec import LONGEST_PACKET, encode_request
-from drivers.pose.natnet_parameters import NatNetParameters
+from control.bounds import Bounds, Meaning
+from drivers.pose.natnet_codec import LONGEST_PACKET, NEWEST, OLDEST, NatNetVersion, encode_request
 
 MOST_PACKETS_PER_READ = 16  # of each socket; frames at 240 Hz are fewer than one in a tick
 ANY_ADDRESS = "0.0.0.0"
 
 
+@dataclass(frozen=True)
+class NatNetParameters:
+    server: Annotated[str, Meaning("address of the motion-capture computer; empty: no request is sent to it")] = ""
+    interface: Annotated[str, Meaning("where frames arrive, by name or address; empty: any")] = ""
+    group: Annotated[str, Meaning("multicast address of the frames; empty: unicast to this computer")] = "239.255.42.99"
+    port: Annotated[int, Bounds(1, 65535), Meaning("of the multicast frames", "UDP port")] = 1511
+    command_port: Annotated[int, Bounds(1, 65535), Meaning("at which the server takes requests", "UDP port")] = 1510
+    version: Annotated[str, Meaning("of the protocol, such as 4.1; empty: the server reports it")] = ""
+    body: Annotated[str, Meaning("name of the rigid body; empty: chosen by body_id")] = ""
+    body_id: Annotated[int, Bounds(0, 2**31 - 1), Meaning("streaming id of the rigid body; 0: the first one", "id")] = 0
+    latency_s: Annotated[float, Bounds(0.0, 0.2), Meaning("of every frame, in addition to what the frame reports")] = (
+        0.0
+    )
+
+
+def parse_version(text: str) -> NatNetVersion | None:
+    """Returns None for a text that is no version, and for unsupported versions."""
+    major, dot, minor = text.partition(".")
+    if not (dot and major.isdecimal() and minor.isdecimal() and len(text) < 8):
+        return None
+    version = NatNetVersion(int(major), int(minor))
+    return version if OLDEST <= version <= NEWEST else None
+
+
 class NatNetSockets:
-    """Owns the sockets of one client."""
+    """Exchanges packets with the server. Owns the sockets of one client."""
 
     def __init__(self, parameters: NatNetParameters) -> None:
-        """Raises OSError."""
+        """Opens the sockets; raises OSError."""
         self._server = (parameters.server, parameters.command_port)
         self._sockets: list[socket.socket] = []
         try:
@@ -61,7 +87,7 @@ class NatNetSockets:
 
 
 def _udp_socket(interface: str) -> socket.socket:
-    """Raises OSError."""
+    """Opens a socket that never waits, on the named interface; raises OSError."""
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     opened.setblocking(False)
     if interface and not is_address(interface):
@@ -92,7 +118,7 @@ def _address_of(interface: str) -> str:
 
 
 def is_address(text: str) -> bool:
-    """Whether a text is an IPv4 address."""
+    """Returns whether a text is an IPv4 address."""
     try:
         ipaddress.IPv4Address(text)
     except ValueError:

@@ -88,7 +88,7 @@ class PosePort:
     """Receives poses at `path`. A pose older than STALE_S does not count."""
 
     def __init__(self, path: Path) -> None:
-        """Raises PoseSourceError."""
+        """Opens the socket; raises PoseSourceError where it cannot."""
         self._path = path
         self._socket = _listen(path)
         self.poses = self.malformed_messages = 0

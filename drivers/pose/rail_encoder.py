@@ -33,7 +33,7 @@ class RailEncoderParameters:
 
 
 class RailEncoder:
-    """A PoseSource. Owns its serial line, its counts, and the newest pose."""
+    """Implements PoseSource. Owns its serial line, its counts, and the newest pose."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class RailEncoder:
         origin_m: float = 0.0,
         open_device: Callable[[str, int], Any] | None = None,
     ) -> None:
-        """`origin_m` is the counter's position where x is zero. Raises PoseSourceError."""
+        """Opens the device; raises PoseSourceError. `origin_m` is the counter's position where x is zero."""
         self.parameters = parameters
         device = parameters.device
         try:

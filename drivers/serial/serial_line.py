@@ -56,7 +56,7 @@ class SerialLine:
         retry_s: float = RETRY_S,
         open_device: Callable[[str, int], Any] | None = None,
     ) -> None:
-        """Raises SerialLineError where it does not open."""
+        """Opens the device; raises SerialLineError where it does not open."""
         self.path, self.baud = path, baud
         self.unpluggings = 0
         self.problem: SerialLineError | None = None  # the newest one

@@ -24,7 +24,7 @@ from control.monitors.winding import WindingParameters
 from control.records import JOINTS, Joints, same_for_both
 from drivers.drive import DriveParameters, WatchdogEndpoints
 from drivers.fault_injection.failures import FailureParameters
-from drivers.pose.natnet_parameters import NatNetParameters
+from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters

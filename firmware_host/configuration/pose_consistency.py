@@ -5,8 +5,7 @@ from __future__ import annotations
 import ipaddress
 from collections.abc import Iterator
 
-from drivers.pose.natnet_parameters import parse_version
-from drivers.pose.natnet_sockets import is_address
+from drivers.pose.natnet_sockets import is_address, parse_version
 from drivers.pose.track_axis import parse_axis
 from firmware_host.configuration.configuration import PoseParameters
 from firmware_host.configuration.toml_records import shown

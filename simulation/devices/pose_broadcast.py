@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from drivers.pose.natnet_parameters import parse_version
+from drivers.pose.natnet_sockets import parse_version
 from drivers.pose.pose_port import PoseSender
 from drivers.pose.track_axis import AXES, parse_axis
 from firmware_host.configuration.configuration import PoseParameters

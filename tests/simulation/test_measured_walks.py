@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.records import JointAngles, Phase
-from drivers.pose.natnet_parameters import NatNetParameters
 from drivers.pose.natnet_port import NatNetPort
+from drivers.pose.natnet_sockets import NatNetParameters
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.recorded_states import recorded_states
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from command_line.doctor.checks_before_arming import _pose_items
-from drivers.pose.natnet_parameters import NatNetParameters
+from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose

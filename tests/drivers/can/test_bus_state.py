@@ -195,12 +195,12 @@ def test_any_sixteen_bytes_raise_nothing_and_every_frame_counts(
 def test_a_mock_port_fails_as_the_test_sets_it() -> None:
     bus = MockBus()
     port, other = bus.open(), bus.open()
-    port.inject_error(0x204, bytes.fromhex("00 10 00 00 00 00 00 80"))
+    port.on_error_frame(0x204, bytes.fromhex("00 10 00 00 00 00 00 80"))
     assert (port.state, port.error_frames) == (BusState.PASSIVE, 1)
     assert port.last_error == "receive passive, 0 transmit and 128 receive errors"
     assert (other.state, other.error_frames) == (BusState.ACTIVE, 0)
-    port.inject_error(0x040)
-    port.inject_error(0x204, bytes.fromhex("00 40 00 00 00 00 00 00"))
+    port.on_error_frame(0x040, bytes(8))
+    port.on_error_frame(0x204, bytes.fromhex("00 40 00 00 00 00 00 00"))
     assert port.state is BusState.OFF
     port.full = True
     port.send(ENCODER)

@@ -122,7 +122,7 @@ def test_counts_only_grow_over_all_the_ports_there_were() -> None:
 def test_a_bus_off_that_the_controller_recovers_from_by_itself_is_left_alone() -> None:
     adapter = Adapter()
     port = ReopeningPort(adapter.open, wait=False)
-    adapter.opened[0].inject_error(BUS_OFF)
+    adapter.opened[0].on_error_frame(BUS_OFF, bytes(8))
     run(port, 0.0, 0.5 * RETRY_S)
     adapter.opened[0].state = BusState.ACTIVE
     run(port, 0.5 * RETRY_S, 5.0 * RETRY_S)
@@ -132,11 +132,11 @@ def test_a_bus_off_that_the_controller_recovers_from_by_itself_is_left_alone() -
 def test_a_controller_that_stays_out_of_the_bus_counts_as_off_however_often_it_is_opened() -> None:
     adapter = Adapter()
     port = ReopeningPort(adapter.open, wait=False)
-    adapter.opened[0].inject_error(BUS_OFF)
+    adapter.opened[0].on_error_frame(BUS_OFF, bytes(8))
     now_s = run(port, 0.0, 5.0, lambda: len(adapter.opened) == 3)
     assert now_s < 5.0
     assert state_of(port) is BusState.OFF
-    adapter.opened[-1].inject_error(0x004, bytes((0, 0x08, 0, 0, 0, 0, 0, 0)))
+    adapter.opened[-1].on_error_frame(0x004, bytes((0, 0x08, 0, 0, 0, 0, 0, 0)))
     port.receive()
     assert state_of(port) is BusState.WARNING
 

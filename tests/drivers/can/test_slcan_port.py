@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from control.records import NEVER_S
 from drivers.can.can_port import CanPort, SlcanPort, open_port
-from drivers.can.error_frames import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
+from drivers.can.port_health import BusState
 from drivers.can.slcan_serial import SlcanSerial
 from simulation.devices.slcan_adapter import SlcanAdapter, decode_line, encode_line
 from tests.waiting import wait_until

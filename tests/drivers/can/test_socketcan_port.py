@@ -20,9 +20,8 @@ from hypothesis import strategies as st
 from benchmarks.speed.can_paths import StandIn, open_bus, open_pair
 from control.records import JOINTS, NEVER_S
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
-from drivers.can.error_frames import BusState
 from drivers.can.frames import Frame, encode_frame
-from drivers.can.port_health import MOST_FRAMES_PER_READ
+from drivers.can.port_health import MOST_FRAMES_PER_READ, BusState
 from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPort
 from drivers.drive_types import make_drives
 from drivers.odrive.drives import OdriveDrives

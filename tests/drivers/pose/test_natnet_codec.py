@@ -22,11 +22,11 @@ from drivers.pose.natnet_codec import (
     MalformedPacketError,
     MotionFrame,
     NatNetVersion,
+    decode_bodies,
     decode_server_info,
     encode_request,
     message_of,
 )
-from drivers.pose.natnet_models import decode_bodies
 from simulation.devices.natnet_server import (
     TICKS_PER_S,
     FrameTimes,

@@ -17,8 +17,8 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import BodyPose, StrideEstimate
-from drivers.pose.natnet_parameters import NatNetParameters
 from drivers.pose.natnet_port import NatNetPort
+from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.pose_port import PoseReport
 from drivers.pose.rail_encoder import RailEncoderParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters

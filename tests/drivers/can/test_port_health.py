@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.can.error_frames import BusState, decode_error_frame, next_state
+from drivers.can.port_health import BusState, decode_error_frame, next_state
 
 ACTIVE, WARNING, PASSIVE, OFF = BusState
 
