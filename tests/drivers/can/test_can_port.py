@@ -1,9 +1,7 @@
 """A port over python-can: what passes, what is counted, and that nothing waits or raises."""
 
-import errno
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import can
 import pytest
@@ -90,18 +88,15 @@ def test_a_frame_says_when_it_was_on_the_bus(port: CanPort, other: can.BusABC) -
     assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the clock on the wall is read a moment later
 
 
-@pytest.mark.parametrize("frame", FRAMES)
-def test_frames_come_in_unchanged(port: CanPort, other: can.BusABC, frame: Frame) -> None:
-    other.send(as_message(frame))
-    assert unstamped(port) == [frame]
-
-
-@pytest.mark.parametrize("frame", FRAMES)
-def test_frames_go_out_unchanged(port: CanPort, other: can.BusABC, frame: Frame) -> None:
-    port.send(frame)
-    message = other.recv(0.0)
-    assert message is not None
-    assert message.equals(as_message(frame), timestamp_delta=None, check_channel=False, check_direction=False)
+def test_frames_pass_unchanged_and_in_order_in_both_directions(port: CanPort, other: can.BusABC) -> None:
+    for frame in FRAMES:
+        other.send(as_message(frame))
+        port.send(frame)
+    assert unstamped(port) == FRAMES
+    for frame in FRAMES:
+        message = other.recv(0.0)
+        assert message is not None
+        assert message.equals(as_message(frame), timestamp_delta=None, check_channel=False, check_direction=False)
     assert other.recv(0.0) is None
 
 
@@ -110,13 +105,6 @@ def test_error_frames_are_counted_and_not_passed_on(port: CanPort, other: can.Bu
         other.send(as_message(frame))
     assert unstamped(port) == [Frame(0x009, b"\x01")]
     assert port.error_frames == 1
-
-
-def test_frames_keep_their_order(port: CanPort, other: can.BusABC) -> None:
-    sent = [Frame(number, bytes([number])) for number in range(100)]
-    for frame in sent:
-        other.send(as_message(frame))
-    assert unstamped(port) == sent
 
 
 def test_nothing_is_waited_for() -> None:
@@ -136,14 +124,6 @@ def test_what_one_read_leaves_the_next_one_takes(port: CanPort, other: can.BusAB
     assert len(port.receive()) == MOST_FRAMES_PER_READ
     left = [(MOST_FRAMES_PER_READ + number) % 1000 for number in range(5)]
     assert [frame.arbitration_id for frame in port.receive()] == left
-
-
-def test_failed_sends_are_counted_and_do_not_raise() -> None:
-    port = PythonCanPort(FakeBus(can.CanOperationError("No buffer space available", errno.ENOBUFS)))
-    port.send(Frame(1))
-    port.send(Frame(2))
-    assert port.failed_sends == 2
-    assert "No buffer space" in port.last_send_error
 
 
 def test_a_failed_receive_is_counted_and_does_not_raise() -> None:
@@ -166,15 +146,6 @@ def test_garbage_does_not_hide_the_good_frames_after_it() -> None:
     port = PythonCanPort(Noisy())
     assert len(port.receive()) == 3
     assert port.error_frames == 27
-
-
-def test_ports_talk_over_the_local_bus(tmp_path: Path) -> None:
-    first, second = (open_port("mudskipper_local", str(tmp_path), {}) for _ in range(2))
-    for frame in FRAMES:
-        first.send(frame)
-    assert unstamped(second) == FRAMES
-    first.close()
-    second.close()
 
 
 def test_options_reach_the_interface() -> None:

@@ -14,10 +14,6 @@ GOLDEN = [
     (Frame(0x18FEF100, b"\xff", is_extended=True), "00f1fe98 01 000000 ff00000000000000"),
     (Frame(0x009, is_remote=True), "09000040 00 000000 0000000000000000"),
     (Frame(0x040, bytes(8), is_error=True), "40000020 08 000000 0000000000000000"),
-]
-
-
-GOLDEN += [
     (Frame(0x123, b"\x11\x22", is_fd=True), "23010000 02 04 0000 1122" + 62 * "00"),
     (
         Frame(0x18FEF100, bytes(range(64)), is_extended=True, is_fd=True, bit_rate_switch=True),

@@ -40,19 +40,19 @@ def test_a_force_is_what_was_loaded() -> None:
     assert reported.force_n(81000.0 - 42000.0 * 2.5) == pytest.approx(2.5)
 
 
-def test_the_same_weight_twice_is_refused() -> None:
-    with pytest.raises(CalibrationError, match="must differ"):
-        calibrate("counts", weigh(2.0, readings(2.0, 1)), weigh(2.0, readings(2.0, 2)))
-
-
-def test_a_weight_that_the_cell_does_not_feel_is_refused() -> None:
-    with pytest.raises(CalibrationError, match="hardly changed"):
-        calibrate("counts", weigh(0.0, readings(0.0, 1)), weigh(4.9, readings(0.0, 2)))
-
-
-def test_too_few_readings_are_refused() -> None:
-    with pytest.raises(CalibrationError, match="only 3"):
-        weigh(0.0, [1.0, 2.0, 3.0])
+@pytest.mark.parametrize(
+    ("light", "heavy", "refused"),
+    [
+        ((2.0, readings(2.0, 1)), (2.0, readings(2.0, 2)), "must differ"),
+        ((0.0, readings(0.0, 1)), (4.9, readings(0.0, 2)), "hardly changed"),
+        ((0.0, readings(0.0, 1)), (4.9, [1.0, 2.0, 3.0]), "only 3"),
+    ],
+)
+def test_weights_that_determine_no_span_are_refused(
+    light: tuple[float, list[float]], heavy: tuple[float, list[float]], refused: str
+) -> None:
+    with pytest.raises(CalibrationError, match=refused):
+        calibrate("counts", weigh(*light), weigh(*heavy))
 
 
 def test_a_drift_and_an_inverted_cell_are_reported() -> None:

@@ -54,10 +54,6 @@ def test_every_line_becomes_a_sample_of_the_force(cable: Cable) -> None:
     assert cable.port.malformed_lines == cable.port.line.unpluggings == 0
 
 
-def test_reading_never_waits_where_nothing_comes(cable: Cable) -> None:
-    assert cable.port.read(1.0) == []
-
-
 def test_malformed_lines_are_counted_and_the_last_one_is_stored(tmp_path: Path) -> None:
     cable = Cable(tmp_path, garbled_fraction=0.25)
     samples = cable.run(4.0)
@@ -113,11 +109,3 @@ def test_the_unit_of_a_line_is_converted(tmp_path: Path) -> None:
     cable.port.calibration = LoadCellCalibration("N", 1.0)
     assert cable.run(1.0)[-1].force_n == pytest.approx(FORCE_N, abs=1e-3)
     cable.close()
-
-
-def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
-    for _ in range(100):
-        cable.amplifier.waiting = b"\xff" * 60
-        cable.amplifier.deliver()
-        cable.port.read(1.0)
-    assert cable.port.malformed_lines > 20

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings, StagePosition
-from drivers.serial.serial_line import SerialLineError
 from simulation.test_rig.emulated_instruments import EmulatedStageEncoder, StageEncoderParameters
 
 pytest.importorskip("serial", reason="pyserial is not installed")
@@ -78,15 +77,3 @@ def test_one_that_says_nothing_is_silent(tmp_path: Path) -> None:
     rail.run(2.0)
     assert rail.encoder.silent_for_s(rail.now_s) > 1.9
     rail.close()
-
-
-def test_another_baud_rate_is_no_text(tmp_path: Path) -> None:
-    rail = Rail(tmp_path, baud=9600)
-    assert rail.run(2.0) == []
-    assert rail.encoder.arrivals.text < 0.5 and rail.encoder.arrivals.readable == 0.0
-    rail.close()
-
-
-def test_a_missing_port_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(SerialLineError, match="no serial port"):
-        StageEncoder(StageEncoderSettings(str(tmp_path / "nothing"), 1e-5))

@@ -60,13 +60,6 @@ def test_there_is_no_pose_without_a_message_or_without_a_socket(port: PosePort) 
     assert NoPose().read(1.0).stamp_s == NEVER_S
 
 
-def test_a_reset_forgets_the_pose(port: PosePort, sender: PoseSender) -> None:
-    sender.send(0.0, 0.1)
-    port.read(1.0)
-    port.reset()
-    assert port.read(1.0).stamp_s == NEVER_S
-
-
 @pytest.mark.parametrize("data", [b"", bytes(15), bytes(17), bytes(200), struct.pack("<dd", 1.0, float("inf"))])
 def test_garbage_is_counted_and_the_last_pose_stays(
     port: PosePort, sender: PoseSender, path: Path, data: bytes

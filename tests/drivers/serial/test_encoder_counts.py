@@ -14,11 +14,19 @@ def test_a_labelled_count_is_a_position(line: bytes) -> None:
     assert EncoderCounts(-1e-3, "x", origin_m=1.0).accept(line, 0.0) == pytest.approx(-1.25)
 
 
-@pytest.mark.parametrize("line", [b"250", b"x250.5", b"y:250", b"x", b"", b"x 2 5", b"\xff"])
+@pytest.mark.parametrize(
+    "line", [b"250", b"x2.5", b"y:250", b"x", b"", b"x 2 5", b"x0x10", b"x" + b"1" * 16, b"x-", b"\xff"]
+)
 def test_what_is_no_count_is_malformed(line: bytes) -> None:
     counts = EncoderCounts(1e-3, "x")
     assert counts.accept(line, 0.0) is None
     assert (counts.accepted, counts.malformed) == (0, 1)
+
+
+def test_a_label_is_no_pattern_and_may_be_left_out() -> None:
+    assert EncoderCounts(1e-3, "p.").accept(b"p. 250", 0.0) == pytest.approx(0.25)
+    assert EncoderCounts(1e-3, "p.").accept(b"px 250", 0.0) is None
+    assert EncoderCounts(1e-3).accept(b" +250 ", 0.0) == pytest.approx(0.25)
 
 
 def test_a_jump_is_accepted_once_it_stays_and_is_counted() -> None:
