@@ -45,7 +45,7 @@ TICKS_A_SECOND = 380
         (ValueError("bitrate is needed"), "bitrate is needed"),
     ],
 )
-def test_a_bus_that_does_not_open_is_one_clear_sentence(
+def test_the_error_of_a_bus_that_does_not_open_names_bus_and_cause(
     problem: Exception, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*arguments: object) -> None:
@@ -58,7 +58,7 @@ def test_a_bus_that_does_not_open_is_one_clear_sentence(
     assert "\n" not in str(caught.value)
 
 
-def test_the_operating_system_s_word_is_found_behind_a_library_s(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_operating_system_s_error_is_found_behind_a_library_s(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> None:
         try:
             raise FileNotFoundError(errno.ENOENT, "No such file or directory")
@@ -78,7 +78,7 @@ class Opened:
         self.closed = True
 
 
-def test_where_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_when_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     first = Opened()
 
     def open_left_alone(interface: str, channel: str, options: object) -> Opened:
@@ -92,7 +92,7 @@ def test_where_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.M
     assert first.closed
 
 
-def test_with_waiting_every_bus_is_there_and_says_what_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_bus_that_is_waited_for_is_off_and_reports_its_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> None:
         raise OSError(errno.ENODEV, "No such device")
 
@@ -155,7 +155,7 @@ def robot(configuration: Configuration) -> Lockstep:
     return Lockstep(configuration, Track([(5.0, MUDS["48.5"])]))
 
 
-def test_a_bus_that_vanishes_in_operation_is_a_fault_and_when_it_is_back_the_robot_is_disarmed(
+def test_an_unplugged_bus_is_a_fault_and_the_robot_stays_disarmed_after_it_returns(
     robot: Lockstep,
 ) -> None:
     plug = Plug(robot)
@@ -200,7 +200,7 @@ def test_a_frame_that_was_never_sent_is_counted(robot: Lockstep) -> None:
 
 
 @pytest.mark.parametrize("wait", [True, False])
-def test_a_daemon_without_its_bus_waits_where_it_is_told_to_and_else_ends_with_status_1(
+def test_a_daemon_without_its_bus_waits_if_configured_and_else_exits_with_1(
     short_folder: Path, tmp_path: Path, wait: bool
 ) -> None:
     path = write_local_setup(short_folder, tmp_path / "logs")

@@ -46,7 +46,7 @@ def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lo
     assert robot.loop.events.notice == ""  # it would say if they had stayed in the mud
 
 
-def test_a_shutdown_that_nobody_wants_does_nothing(robot: Lockstep) -> None:
+def test_without_a_request_the_shutdown_does_nothing(robot: Lockstep) -> None:
     assert not Shutdown().step(robot.loop, robot.now_s)
     robot.run_for(0.1)
     assert robot.loop.mode is Mode.HOLD
@@ -103,7 +103,7 @@ def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pyt
     assert "Traceback" not in said
 
 
-def test_a_bug_in_the_log_does_not_keep_the_drives_from_their_end(robot: Lockstep) -> None:
+def test_a_bug_in_the_log_does_not_prevent_idling_the_drives(robot: Lockstep) -> None:
     def broken(number: int, row: bytes) -> bool:
         raise DeliberateBugError
 
@@ -135,7 +135,7 @@ class Notices(SystemdNotifier):
 
 
 @pytest.mark.parametrize(("missed", "fed"), [(0, True), (1, True), (2, False)])
-def test_only_a_loop_that_makes_more_than_it_misses_feeds_the_watchdog(missed: int, fed: bool) -> None:
+def test_a_loop_that_misses_most_ticks_does_not_feed_the_watchdog(missed: int, fed: bool) -> None:
     notices = Notices()
     feed = WatchdogFeed(notices)
     for number in range(NOTIFY_TICKS):

@@ -49,7 +49,7 @@ def test_the_methods_own_sweeps_are_within_limits_and_reach(example_text: str) -
         ("max_sweep_deg = 75.0", "adaptation.gait.max_sweep_deg = 75.0: must be "),
     ],
 )
-def test_what_cannot_be_is_refused_with_key_value_and_bound(example_text: str, adaptation: str, problem: str) -> None:
+def test_impossible_gait_keys_are_refused_with_key_value_and_bound(example_text: str, adaptation: str, problem: str) -> None:
     assert any(problem in each for each in problems_of(example_text, adaptation=adaptation))
 
 
@@ -61,7 +61,7 @@ def test_a_sweep_beyond_the_joints_limits_is_refused(example_text: str) -> None:
     assert problems_of(example_text, limits=limits, adaptation="max_sweep_deg = 48.0") == []
 
 
-def test_a_sweep_over_which_not_even_the_least_depth_is_reached_is_refused(example_text: str) -> None:
+def test_a_sweep_that_cannot_reach_the_least_depth_is_refused(example_text: str) -> None:
     reached_m = FlipperGeometry().deepest_m(60.0)
     assert reached_m < 0.025
     assert problems_of(example_text, adaptation="min_depth_m = 0.025\nmax_sweep_deg = 60.0") == [
@@ -69,7 +69,7 @@ def test_a_sweep_over_which_not_even_the_least_depth_is_reached_is_refused(examp
     ]
 
 
-def test_an_adduction_limit_above_a_pose_that_may_be_chosen_is_refused(example_text: str) -> None:
+def test_an_adduction_limit_that_excludes_a_possible_pose_is_refused(example_text: str) -> None:
     """At 3 cm a wide sweep needs the steepest arm: 5 cos β + 12 cos α sin β - 6.45 = 3 with β = 43.1° over ±45°."""
     adaptation = "max_depth_m = 0.03\nmin_depth_m = 0.02\nmax_sweep_deg = 45.0"
     limits = "adduction_min_deg = -40.0"
@@ -78,7 +78,7 @@ def test_an_adduction_limit_above_a_pose_that_may_be_chosen_is_refused(example_t
     ]
 
 
-def test_the_other_methods_do_not_mind(example_text: str) -> None:
+def test_other_methods_ignore_the_keys_of_the_gait_method(example_text: str) -> None:
     text = example_text.replace("[adaptation]\n", "[adaptation]\nmin_sweep_deg = 60.0\n")
     assert parse_configuration(text).adaptation.method == "default"
 
@@ -105,7 +105,7 @@ def test_firm_mud_is_walked_faster_than_by_choosing_depth_alone(configuration: C
     assert all(stride.estimate.released for stride in swift.loop.learning.strides)
 
 
-def test_strides_of_changing_sweep_still_tell_every_coefficient(configuration: Configuration) -> None:
+def test_strides_with_changing_sweep_still_measure_every_coefficient(configuration: Configuration) -> None:
     lockstep = walked(configuration, 2000.0, "gait")
     estimates = [stride.estimate for stride in lockstep.loop.learning.strides]
     assert all(each.k_p.valid and each.k_e.valid and each.k_s.valid for each in estimates)
@@ -113,7 +113,7 @@ def test_strides_of_changing_sweep_still_tell_every_coefficient(configuration: C
     assert max(reported) < 1.5 * min(reported)  # a fifth by depth (the k-law is not the clay's), and noise
 
 
-def test_a_fixed_depth_is_walked_as_configured_whatever_the_method(configuration: Configuration) -> None:
+def test_a_walk_of_fixed_depth_does_not_depend_on_the_method(configuration: Configuration) -> None:
     """Target for target, as without the method."""
 
     def targets(method: Method) -> list[GaitTarget]:

@@ -49,7 +49,7 @@ def test_the_weakest_mud_shears_most_easily() -> None:
     assert mean_k_s("10.3N") < mean_k_s("12.5N")
 
 
-def test_the_motor_that_gave_all_it_had_is_told_and_leaves_a_bound() -> None:
+def test_a_saturated_motor_is_reported_and_gives_a_lower_bound() -> None:
     (stride,) = first_strokes("stiffest")
     assert stride.k_s.valid
     assert stride.k_s.at_least
@@ -57,7 +57,7 @@ def test_the_motor_that_gave_all_it_had_is_told_and_leaves_a_bound() -> None:
     assert stride.stance == "saturated"
 
 
-def test_the_stiffest_mud_bears_the_largest_forces() -> None:
+def test_the_stiffest_mud_supports_the_largest_forces() -> None:
     (stiffest,) = first_strokes("stiffest")
     for label in ("10.3N", "12N", "12.5N"):
         for stride in first_strokes(label):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from control.faults import FaultKind
-from control.modes import Mode, Request
+from control.modes import Mode
 from firmware_host.loop_events import LoopEvents, ModeChange
 from tests.recorded_events import EventRecorder
 
@@ -26,14 +26,14 @@ def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False
     return ModeChange(before, after, FAULT if faulty else None, rested, up)
 
 
-def test_a_change_of_mode_is_told_with_its_cause(events: LoopEvents, recorder: EventRecorder) -> None:
+def test_a_change_of_mode_is_logged_with_its_cause(events: LoopEvents, recorder: EventRecorder) -> None:
     events.report_mode_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
     assert recorder.texts == ["mode walking to stopping: Anna held the lease and did not renew it."]
     assert events.notice.startswith("stopped by lease_lost: Anna held the lease and did not renew it. ")
 
 
 @pytest.mark.parametrize("mode", [Mode.ARMING, Mode.WALKING])
-def test_a_notice_stands_until_the_robot_is_moved_again(events: LoopEvents, mode: Mode) -> None:
+def test_a_notice_stays_until_the_robot_is_moved_again(events: LoopEvents, mode: Mode) -> None:
     events.report_end_of_move(1.0, "stop was asked for.")
     events.report_mode_change(2.0, change(Mode.HOLD, Mode.IDLE))
     assert events.notice == "the joints stopped on their way: stop was asked for."
@@ -48,7 +48,7 @@ def test_a_notice_stands_until_the_robot_is_moved_again(events: LoopEvents, mode
         (change(Mode.STOPPING, Mode.HOLD, up=False), "the flippers did not come out of the mud"),
     ],
 )
-def test_what_a_person_should_know_is_in_the_log_as_well(
+def test_a_notice_is_also_in_the_log(
     events: LoopEvents, recorder: EventRecorder, changed: ModeChange, notice: str
 ) -> None:
     events.report_mode_change(1.0, changed)
@@ -62,12 +62,3 @@ def test_what_a_person_should_know_is_in_the_log_as_well(
 def test_usual_changes_and_faults_without_torque_leave_no_notice(events: LoopEvents, changed: ModeChange) -> None:
     events.report_mode_change(1.0, changed)
     assert events.notice == ""
-
-
-def test_a_reset_forgets_the_notice_and_which_requests_were_told(events: LoopEvents, recorder: EventRecorder) -> None:
-    for _ in range(2):
-        events.report_end_of_move(1.0, "a fault stands.")
-        events.report_request(1.0, Request.STOP, False, "anna", True)
-        events.reset()
-    assert (events.notice, events.requests.unlogged) == ("", 0)
-    assert recorder.about("request") == ["request stop by anna"] * 2

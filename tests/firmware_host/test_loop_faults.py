@@ -175,7 +175,7 @@ def ticks_until(robot: Lockstep, name: str, longest: int) -> int:
 
 
 @pytest.mark.parametrize("name", CAUSES)
-def test_every_cause_is_met_by_its_reaction_within_its_ticks(at: Copied, name: str) -> None:
+def test_every_cause_leads_to_its_reaction_within_its_bound(at: Copied, name: str) -> None:
     for moment in ("holding", "stance", "stopping"):
         robot, kind = at(moment), FAULT_KINDS[name]
         CAUSES[name](robot)
@@ -185,7 +185,7 @@ def test_every_cause_is_met_by_its_reaction_within_its_ticks(at: Copied, name: s
             assert robot.loop.sent.torques_nm == NO_TORQUE
 
 
-def test_a_drive_that_starts_anew_is_told_within_its_ticks_and_needs_a_clear(at: Copied) -> None:
+def test_a_drive_that_restarts_is_a_fault_until_it_is_cleared(at: Copied) -> None:
     robot = at("stance")
     robot.robot.drives[1].restart(robot.now_s)
     ticks_until(robot, "drive_restarted", FaultKind.DRIVE_RESTARTED.bound_ticks)
@@ -199,7 +199,7 @@ def test_a_drive_that_starts_anew_is_told_within_its_ticks_and_needs_a_clear(at:
     assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 
-def test_a_drive_that_somebody_else_arms_is_told_within_its_ticks(at: Copied) -> None:
+def test_a_drive_that_another_program_arms_is_a_fault(at: Copied) -> None:
     robot = at("idle")
     drive = robot.robot.drives[1]
     drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
@@ -209,7 +209,7 @@ def test_a_drive_that_somebody_else_arms_is_told_within_its_ticks(at: Copied) ->
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
 
 
-def test_a_place_that_is_lost_is_told_within_its_ticks_and_the_walk_goes_on(at: Copied) -> None:
+def test_a_lost_pose_is_a_fault_that_does_not_end_the_walk(at: Copied) -> None:
     robot = at("stance")
     pose = robot.loop.pose
     assert isinstance(pose, SimulatedPose)
@@ -295,7 +295,7 @@ def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, m
     assert all(not drive.energised for drive in robot.robot.drives)
 
 
-def test_a_soft_stop_in_mud_that_keeps_the_flippers_ends_in_time_as_well(at: Copied) -> None:
+def test_a_soft_stop_ends_in_time_even_if_the_mud_holds_the_flippers(at: Copied) -> None:
     robot = at("stance")
     for arm in robot.robot.plant.arms:
         arm.track = Track([(5.0, Clay("40 kPa", 40e3))])
@@ -305,7 +305,7 @@ def test_a_soft_stop_in_mud_that_keeps_the_flippers_ends_in_time_as_well(at: Cop
     assert robot.robot.plant.angles_rad[1] < -UP_RAD
 
 
-def test_a_worse_fault_in_a_soft_stop_is_heeded_at_once(at: Copied) -> None:
+def test_a_worse_fault_in_a_soft_stop_takes_effect_at_once(at: Copied) -> None:
     robot = at("stance")
     altered(bus_voltage_v=17.0)(robot)
     robot.run_for(0.2)
@@ -315,7 +315,7 @@ def test_a_worse_fault_in_a_soft_stop_is_heeded_at_once(at: Copied) -> None:
     assert mode_of(robot) is Mode.FAULT
 
 
-def test_a_fault_that_ends_with_its_cause_ends_by_itself_but_nobody_arms(at: Copied) -> None:
+def test_a_fault_that_ends_with_its_cause_does_not_arm_the_robot_again(at: Copied) -> None:
     robot = at("holding")
     altered(bus_voltage_v=17.0)(robot)
     assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, 4.0)
@@ -333,7 +333,7 @@ def test_a_fault_that_ends_with_its_cause_ends_by_itself_but_nobody_arms(at: Cop
 
 
 @pytest.mark.parametrize("name", ["drive_silent", "encoder_jump", "drive_disarmed"])
-def test_what_a_person_must_clear_stands_until_then_and_against_force(at: Copied, name: str) -> None:
+def test_a_fault_that_must_be_cleared_stays_until_then_even_against_force(at: Copied, name: str) -> None:
     robot = at("stance")
     usual = robot.robot.drives[1].parameters
     CAUSES[name](robot)
@@ -350,7 +350,7 @@ def test_what_a_person_must_clear_stands_until_then_and_against_force(at: Copied
     assert sum(text.startswith(f"fault {name} ") for text in texts_of(robot)) == 1
 
 
-def test_a_clear_does_not_reach_into_the_time_after_it(at: Copied) -> None:
+def test_a_clear_does_not_apply_to_faults_after_the_next_arming(at: Copied) -> None:
     robot = at("idle")
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     robot.step()
@@ -365,7 +365,7 @@ def test_a_clear_does_not_reach_into_the_time_after_it(at: Copied) -> None:
     assert mode_of(robot) is Mode.FAULT
 
 
-def test_a_bug_stands_until_a_restart(at: Copied) -> None:
+def test_a_bug_stays_a_fault_until_a_restart(at: Copied) -> None:
     robot = at("holding")
     gains = robot.loop.controller.gains
     robot.loop.controller.gains = replace(gains, sweep_stiffness_nm_rad=float("nan"))
@@ -394,7 +394,7 @@ def unread(configuration: Configuration) -> Lockstep:
     return robot
 
 
-def test_force_is_logged_with_all_that_it_overrules(unread: Lockstep) -> None:
+def test_arming_by_force_logs_every_overruled_fault(unread: Lockstep) -> None:
     refused = unread.loop.request(Request.ARM, unread.now_s)
     assert refused is not None and "right_sweep" in refused
     assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
@@ -414,7 +414,7 @@ def test_force_ends_with_the_torque(unread: Lockstep) -> None:
     assert unread.loop.request(Request.ARM, unread.now_s) is not None
 
 
-def test_force_that_came_to_nothing_leaves_nothing_behind(unread: Lockstep) -> None:
+def test_a_disarmed_request_by_force_leaves_no_trace(unread: Lockstep) -> None:
     assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
     unread.loop.request(Request.DISARM, unread.now_s)
     unread.step()
@@ -424,7 +424,7 @@ def test_force_that_came_to_nothing_leaves_nothing_behind(unread: Lockstep) -> N
     assert mode_of(unread) is Mode.IDLE
 
 
-def test_force_where_nothing_is_to_be_overruled_is_none(at: Copied) -> None:
+def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
     robot = at("idle")
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
@@ -433,7 +433,7 @@ def test_force_where_nothing_is_to_be_overruled_is_none(at: Copied) -> None:
 
 
 @pytest.mark.parametrize("name", ["drive_silent", "voltage_under", "motor_hot", "current_stale", "joint_position"])
-def test_what_is_mandatory_is_never_overruled(at: Copied, name: str) -> None:
+def test_mandatory_faults_are_never_overruled(at: Copied, name: str) -> None:
     robot = at("idle")
     CAUSES[name](robot)
     ticks_until(robot, name, FAULT_KINDS[name].bound_ticks)
@@ -453,7 +453,7 @@ def hold_by_a_fault(robot: Lockstep) -> None:
     unmute(robot, 1)
 
 
-def test_a_stop_during_a_fault_that_holds_lifts_the_flippers(at: Copied) -> None:
+def test_a_stop_during_a_fault_with_hold_raises_the_flippers(at: Copied) -> None:
     robot = at("stance")
     hold_by_a_fault(robot)
     assert mode_of(robot) is Mode.HOLD
@@ -466,7 +466,7 @@ def test_a_stop_during_a_fault_that_holds_lifts_the_flippers(at: Copied) -> None
     assert all(abs(robot.robot.plant.angles_rad[joint]) < UP_RAD for joint in (1, 3))
 
 
-def test_a_fault_that_holds_is_over_by_itself_and_then_the_robot_walks_again_when_told(at: Copied) -> None:
+def test_a_fault_with_hold_ends_by_itself_and_the_robot_walks_on_request(at: Copied) -> None:
     robot = at("stance")
     hold_by_a_fault(robot)
     assert robot.loop.request(Request.WALK, robot.now_s, WALK) is not None
@@ -491,7 +491,7 @@ def test_warnings_change_no_torque(at: Copied) -> None:
     assert {"voltage_low", "bus_warning", "clock_step"} <= {fault.name for fault in warned.loop.faults.present}
 
 
-def test_a_robot_that_nobody_needs_lets_go_by_itself(configuration: Configuration) -> None:
+def test_a_robot_without_requests_disarms_by_itself(configuration: Configuration) -> None:
     motion = replace(configuration.motion, longest_hold_s=1.0)
     robot = make_robot(replace(configuration, motion=motion))
     robot.arm()
@@ -537,7 +537,7 @@ def test_a_walk_with_a_labs_disturbances_is_no_fault(configuration: Configuratio
     assert faults_reported(robot) == []
 
 
-def test_disarm_is_obeyed_in_every_moment_of_a_fault(at: Copied) -> None:
+def test_disarm_works_during_every_kind_of_fault(at: Copied) -> None:
     for name in ("voltage_under", "bus_refuses", "current_stale"):
         robot = at("stance")
         CAUSES[name](robot)

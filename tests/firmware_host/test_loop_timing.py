@@ -27,11 +27,11 @@ def test_a_duration_beyond_the_buckets_keeps_its_maximum() -> None:
     assert histogram.percentile_us(0.5) == pytest.approx(3.0 * LONGEST_US)
 
 
-def test_an_empty_histogram_says_nothing() -> None:
+def test_an_empty_histogram_is_all_zeros() -> None:
     assert Histogram().summary() == {"p50": 0.0, "p99": 0.0, "max": 0.0}
 
 
-def test_missed_ticks_lower_the_rate_that_is_told() -> None:
+def test_missed_ticks_lower_the_reported_rate() -> None:
     timing = LoopTiming()
     for number in range(381):
         if number % 10 != 9:

@@ -72,20 +72,20 @@ def test_strides_of_both_flippers_are_numbered_through(learning: MudLearning) ->
     assert learning.strides_closed == 6
 
 
-def test_a_fixed_depth_is_what_was_ordered_whatever_the_mud_tells(learning: MudLearning) -> None:
+def test_a_fixed_depth_does_not_depend_on_the_mud(learning: MudLearning) -> None:
     controller = MadeUpController(WalkOrder(0.045, adaptive=False))
     learning.reading = MudReading(strides=(stride(k_p=Estimate(1e9, 1.0, 100, True)),))
     step(learning, controller)
     assert controller.gait.next_depth_m == 0.045
 
 
-def test_without_a_stride_nothing_is_learned_or_said(learning: MudLearning) -> None:
+def test_without_a_stride_nothing_is_learned(learning: MudLearning) -> None:
     controller = MadeUpController(WalkOrder(0.03))
     assert step(learning, controller) == ([], [])
     assert learning.faults == []
 
 
-def test_only_strides_of_late_are_kept_but_all_are_counted(learning: MudLearning) -> None:
+def test_only_the_latest_strides_are_stored_but_all_are_counted(learning: MudLearning) -> None:
     controller = MadeUpController(WalkOrder(0.03, adaptive=False))
     for index in range(STORED_STRIDES + 50):
         learning.reading = MudReading(strides=(stride("left", index),))
@@ -95,7 +95,7 @@ def test_only_strides_of_late_are_kept_but_all_are_counted(learning: MudLearning
     assert learning.strides[-1].number == STORED_STRIDES + 49
 
 
-def test_a_new_walk_keeps_the_strides_before_it(learning: MudLearning) -> None:
+def test_a_new_walk_preserves_earlier_strides(learning: MudLearning) -> None:
     learning.reading = MudReading(strides=(stride(),))
     step(learning, MadeUpController(WalkOrder(0.03, adaptive=False)))
     learning.reset(0.03)
@@ -120,7 +120,7 @@ def firm_ticks(learning: MudLearning, order: WalkOrder, phase: Phase, loads: lis
     return reported
 
 
-def test_an_insertion_ends_at_a_load_that_stays_and_not_at_one_odd_sample(learning: MudLearning) -> None:
+def test_an_insertion_ends_at_a_lasting_load_but_not_at_an_outlier(learning: MudLearning) -> None:
     adaptive = WalkOrder(0.03, adaptive=True)
     assert firm_ticks(learning, adaptive, Phase.INSERTION, [True] * 4) == [False] * (FIRM_TICKS - 1) + [True, True]
     learning.reset(0.03)
@@ -130,11 +130,11 @@ def test_an_insertion_ends_at_a_load_that_stays_and_not_at_one_odd_sample(learni
 @pytest.mark.parametrize(
     ("adaptive", "phase"), [(False, Phase.INSERTION), (True, Phase.STANCE), (True, Phase.EXTRACTION)]
 )
-def test_only_an_insertion_whose_depth_is_chosen_is_ended(learning: MudLearning, adaptive: bool, phase: Phase) -> None:
+def test_only_adaptive_insertions_end_early(learning: MudLearning, adaptive: bool, phase: Phase) -> None:
     assert not any(firm_ticks(learning, WalkOrder(0.03, adaptive=adaptive), phase, [True] * 10))
 
 
-def test_the_end_of_an_insertion_is_told_once(learning: MudLearning) -> None:
+def test_the_early_end_of_an_insertion_is_logged_once(learning: MudLearning) -> None:
     controller = MadeUpController(WalkOrder(0.03))
     load = NO_LOAD._replace(adduction_torque_nm=10.0)
     learning.reading = MudReading(left=load, right=load)
@@ -147,14 +147,14 @@ def test_the_end_of_an_insertion_is_told_once(learning: MudLearning) -> None:
 
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
 @pytest.mark.parametrize("value", [nan, inf, -inf, LARGEST_N_M3, -1.01 * LARGEST_N_M3])
-def test_a_coefficient_that_no_mud_has_is_told(learning: MudLearning, name: str, value: float) -> None:
+def test_a_coefficient_beyond_any_mud_is_a_fault(learning: MudLearning, name: str, value: float) -> None:
     learning.reading = MudReading(strides=(stride("right", 7, **{name: Estimate(value, 1e5, 100, True)}),))
     (fault,) = learning.faults
     assert fault == FaultKind.ESTIMATE_WILD.fault("right", stride=7)
 
 
 @pytest.mark.parametrize("std_error", [nan, inf, LARGEST_N_M3])
-def test_a_doubt_that_is_no_number_is_told_as_well(learning: MudLearning, std_error: float) -> None:
+def test_a_std_error_that_is_not_finite_is_a_fault(learning: MudLearning, std_error: float) -> None:
     learning.reading = MudReading(strides=(stride(k_s=Estimate(2e6, std_error, 100, True)),))
     assert [fault.name for fault in learning.faults] == ["estimate_wild"]
 
@@ -168,12 +168,12 @@ def test_a_doubt_that_is_no_number_is_told_as_well(learning: MudLearning, std_er
         Estimate(-1e4, 1e5, 100, True),  # within its doubt of none
     ],
 )
-def test_what_is_within_bounds_or_not_valid_is_no_nonsense(learning: MudLearning, estimate: Estimate) -> None:
+def test_coefficients_within_bounds_or_invalid_are_no_fault(learning: MudLearning, estimate: Estimate) -> None:
     learning.reading = MudReading(strides=(stride(k_e=estimate),))
     assert learning.faults == []
 
 
-def test_nonsense_never_leads_out_of_the_depths_that_may_be_chosen(
+def test_wild_coefficients_never_lead_to_a_depth_out_of_bounds(
     learning: MudLearning, configuration: Configuration
 ) -> None:
     """What is known of the mud does not believe it; a depth is chosen all the same."""

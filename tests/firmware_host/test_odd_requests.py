@@ -37,14 +37,27 @@ for _ in range(900):
         [],
         5,
         None,
+        {"a": 1},
+        [1, 2, 3],
+        [2, "m", []],
+        [0, "x", "echo", {}],
+        [0, 1, 5, {}],
+        [0, 1, "echo", 5],
     ],
     ids=lambda message: str(message)[:40],
 )
-def test_what_is_no_request_is_told_what_one_is(served: Served, message: Any) -> None:
+def test_a_malformed_request_is_answered_with_the_expected_shape(served: Served, message: Any) -> None:
     client = connect(served)
     ((_, number, error, result),) = ask(served, client, msgpack.packb(message))
     assert (number, result) == (None, None) and error.startswith("a request is [0, id, method, params]")
     assert not is_open(client)
+
+
+@pytest.mark.parametrize("data", [b"\xc1", b"GET / HTTP/1.1\r\n\r\n"])
+def test_bytes_that_are_no_messagepack_end_the_connection(served: Served, data: bytes) -> None:
+    client = connect(served)
+    assert ask(served, client, data)[0][2]
+    assert not is_open(client) and served.counters["malformed_requests"] == 1
 
 
 @pytest.mark.parametrize(
@@ -52,7 +65,7 @@ def test_what_is_no_request_is_told_what_one_is(served: Served, message: Any) ->
     [nan, inf, -inf, [1], NESTED, {"b": 1}, b"raw", msgpack.ExtType(5, b"abc"), msgpack.Timestamp(1, 2)],
     ids=lambda value: f"{type(value).__name__} {str(value)[:3]}",
 )
-def test_a_param_that_is_no_plain_value_is_refused_by_its_name(served: Served, value: Any) -> None:
+def test_a_param_that_is_no_plain_value_is_refused_with_its_name(served: Served, value: Any) -> None:
     reached: list[Any] = []
     served.methods = {"note": lambda params, caller: reached.append(params)}
     client = connect(served)
@@ -80,7 +93,7 @@ def test_params_that_are_no_map_from_names_are_refused(served: Served, params: A
 @pytest.mark.parametrize(
     "header", [b"\xdc\x20\x00", b"\xdd\x00\x00\x20\x00", b"\xde\x20\x00", b"\x81\xa1a", b"\x94"], ids=bytes.hex
 )
-def test_a_few_bytes_that_announce_much_take_no_memory(served: Served, header: bytes) -> None:
+def test_headers_that_announce_long_data_take_no_memory(served: Served, header: bytes) -> None:
     """A thousand nested headers, each for 8192 elements, would make an unbounded unpacker take 65 MB."""
     clients = [connect(served) for _ in range(8)]
     serve(served, 10)
@@ -101,7 +114,7 @@ def tree(depth: int) -> Any:
 
 
 @pytest.mark.parametrize("depth", [2, 3])
-def test_a_request_of_many_short_parts_is_too_long_as_well(served: Served, depth: int) -> None:
+def test_a_long_request_of_many_short_parts_is_refused(served: Served, depth: int) -> None:
     data = msgpack.packb([0, 1, "echo", tree(depth)])
     assert len(data) > LONGEST_REQUEST
     client = connect(served)

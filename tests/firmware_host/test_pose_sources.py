@@ -59,7 +59,7 @@ def problems_of(example_text: str, section: str) -> list[str]:
         (ENCODER + 'device = "/dev/ttyACM0"\nmetres_per_count = -0.00001', "rail_encoder"),
     ],
 )
-def test_these_sections_choose_a_source(example_text: str, section: str, chosen: str) -> None:
+def test_the_pose_section_chooses_the_source(example_text: str, section: str, chosen: str) -> None:
     assert pose_of(example_text, section).chosen == chosen
 
 
@@ -98,7 +98,7 @@ def test_these_sections_choose_a_source(example_text: str, section: str, chosen:
         (ENCODER + "baud = 9600", "pose.rail_encoder.baud: there is no such key"),
     ],
 )
-def test_what_does_not_go_together_is_refused_by_key_value_and_bound(
+def test_invalid_pose_sections_are_refused_with_key_and_value(
     example_text: str, section: str, reported: str
 ) -> None:
     assert any(message.startswith(reported) for message in problems_of(example_text, section))
@@ -119,7 +119,7 @@ def test_an_axis_is_a_unit_vector() -> None:
     assert parse_axis("--x") is parse_axis("") is parse_axis(3) is parse_axis(["x", 0, 0]) is None
 
 
-def test_what_is_chosen_is_opened(example_text: str, short_folder: Path) -> None:
+def test_the_chosen_source_is_opened(example_text: str, short_folder: Path) -> None:
     assert isinstance(open_pose(PoseParameters()), NoPose)
     with closing(open_pose(PoseParameters(socket=str(short_folder / "pose")))) as pose:
         assert isinstance(pose, PosePort)
@@ -154,7 +154,7 @@ def test_a_rail_encoder_is_opened(example_text: str, tmp_path: Path) -> None:
         open_pose(pose_of(example_text, section))
 
 
-def test_the_daemon_refuses_what_it_cannot_open_in_one_sentence(
+def test_the_daemon_exits_with_a_message_if_the_source_does_not_open(
     short_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("serial", reason="pyserial is not installed")
@@ -205,7 +205,7 @@ def pose_line(robot: Lockstep) -> dict[str, Any]:
     return line
 
 
-def test_check_tells_of_the_source_and_of_its_trouble_but_lets_arm(robot: Lockstep) -> None:
+def test_check_reports_trouble_of_the_pose_source_without_blocking_arming(robot: Lockstep) -> None:
     source = robot.loop.pose = MadeUpSource()
     line = pose_line(robot)
     assert line["ok"] and line["text"] == "camera: 12 poses, 3 malformed messages, 4 without the body"

@@ -53,7 +53,7 @@ def flood(clients: list[socket.socket], data: bytes) -> None:
 
 
 @pytest.mark.parametrize("data", [ECHO * 20, ECHO * 20 + ECHO[:3], ECHO[:3], STOP * 20], ids=str)
-def test_a_stop_amid_fifteen_floods_waits_no_longer_than_there_are_clients(
+def test_a_stop_among_flooding_clients_is_served_within_one_turn(
     served: Served, monkeypatch: pytest.MonkeyPatch, data: bytes
 ) -> None:
     stopped = allow_everybody(served, monkeypatch)
@@ -78,7 +78,7 @@ def test_a_stop_amid_fifteen_floods_waits_no_longer_than_there_are_clients(
     assert longest <= 1 + MOST_CLIENTS  # a tick to be let in, then its turn
 
 
-def test_a_request_too_many_waits_until_its_time_comes(served: Served) -> None:
+def test_requests_beyond_the_rate_wait_and_none_is_lost(served: Served) -> None:
     fast, other = connect(served), connect(served, READER)
     serve(served, 4)
     fast.sendall(ECHO * 400)
@@ -95,7 +95,7 @@ def test_a_request_too_many_waits_until_its_time_comes(served: Served) -> None:
     assert ask(served, other, msgpack.packb([0, 1, "status", {}]))
 
 
-def test_the_rate_of_one_is_not_taken_from_the_others(served: Served) -> None:
+def test_each_client_has_its_own_rate(served: Served) -> None:
     fast, other = connect(served), connect(served)
     serve(served, 4)
     fast.sendall(ECHO * 300)
@@ -106,7 +106,7 @@ def test_the_rate_of_one_is_not_taken_from_the_others(served: Served) -> None:
     assert len(list(unpacked(other.recv(4096)))) == 1
 
 
-def test_half_a_request_is_waited_for_only_so_long(served: Served) -> None:
+def test_a_client_that_does_not_complete_a_request_is_dropped(served: Served) -> None:
     slow, idle = connect(served), connect(served)
     serve(served, 4)
     slow.sendall(ECHO + ECHO[:4])
@@ -124,7 +124,7 @@ def test_half_a_request_is_waited_for_only_so_long(served: Served) -> None:
     assert ask(served, idle, ECHO)  # who asks nothing may stay
 
 
-def test_a_client_that_has_asked_may_be_idle_for_as_long_as_it_likes(served: Served) -> None:
+def test_an_idle_client_stays_connected(served: Served) -> None:
     client = connect(served)
     assert ask(served, client, ECHO)
     served.now_s += 1e6
@@ -132,7 +132,7 @@ def test_a_client_that_has_asked_may_be_idle_for_as_long_as_it_likes(served: Ser
     assert ask(served, client, ECHO)
 
 
-def test_a_request_in_two_halves_is_answered_where_the_second_comes_in_time(served: Served) -> None:
+def test_a_request_in_two_parts_is_answered_if_the_second_is_in_time(served: Served) -> None:
     client = connect(served)
     for _ in range(3):  # each has its own time
         assert ask(served, client, ECHO[:4]) == []
@@ -150,7 +150,7 @@ def test_a_request_in_two_halves_is_answered_where_the_second_comes_in_time(serv
         (Peer(1, 1, frozenset()), None),  # the daemon's own user
     ],
 )
-def test_each_may_do_what_is_theirs(served: Served, peer: Peer, allowed: set[str] | None) -> None:
+def test_each_level_permits_its_methods(served: Served, peer: Peer, allowed: set[str] | None) -> None:
     methods = ["hello", "stop", "disarm", "status", "strides", "map", "check"]
     methods += ["arm", "walk", "clear", "lease", "release", "reset_timing", "fail"]
     served.methods = {method: METHODS["echo"] for method in methods}
@@ -169,7 +169,7 @@ def test_a_refusal_says_which_group_to_join(served: Served) -> None:
     assert driving.startswith(NOT_PERMITTED) and "'adduser YOU pilots'" in driving
 
 
-def test_one_user_s_connections_keep_nobody_else_out(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_user_s_connections_do_not_exclude_other_users(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     stopped = allow_everybody(served, monkeypatch)
     operator, reader = connect(served, OPERATOR), connect(served, READER)
     strangers = []
@@ -184,7 +184,7 @@ def test_one_user_s_connections_keep_nobody_else_out(served: Served, monkeypatch
     assert served.counters["clients"] == MOST_CLIENTS
 
 
-def test_among_users_with_as_many_the_newcomer_s_own_makes_room(served: Served) -> None:
+def test_among_users_with_equal_connections_the_newcomer_s_user_loses_one(served: Served) -> None:
     gone: list[Caller] = []
     served.on_hang_up = gone.append
     others = [connect(served, READER) for _ in range(MOST_CLIENTS // 2)]  # still for longest
@@ -196,7 +196,7 @@ def test_among_users_with_as_many_the_newcomer_s_own_makes_room(served: Served) 
     assert is_open(late) and [caller.connection for caller in gone] == [1 + len(others)]  # told of, as any that ends
 
 
-def test_where_every_client_is_another_user_the_least_trusted_goes(served: Served) -> None:
+def test_among_single_connections_the_least_privileged_is_dropped(served: Served) -> None:
     operator = connect(served, OPERATOR)
     others = [connect(served, Peer(9, 2000 + place, frozenset())) for place in range(MOST_CLIENTS - 1)]
     serve(served, MOST_CLIENTS)
@@ -206,7 +206,7 @@ def test_where_every_client_is_another_user_the_least_trusted_goes(served: Serve
     assert served.counters["dropped_for_others"] == 1
 
 
-def test_a_stranger_who_may_not_even_stop_is_turned_away_with_a_sentence(short_folder: Path) -> None:
+def test_a_user_without_rights_is_refused_with_a_message(short_folder: Path) -> None:
     strict = Served(short_folder / "strict", RIGHTS._replace(anyone_may_stop=False))
     stranger, reader, operator = (connect(strict, peer) for peer in (STRANGER, READER, OPERATOR))
     serve(strict)
@@ -218,7 +218,7 @@ def test_a_stranger_who_may_not_even_stop_is_turned_away_with_a_sentence(short_f
     strict.close()
 
 
-def test_the_one_who_has_promised_to_attend_makes_no_room(served: Served) -> None:
+def test_the_holder_of_the_lease_is_never_dropped_for_a_newcomer(served: Served) -> None:
     served.spares = lambda caller: caller.connection == 1
     clients = [connect(served, OPERATOR) for _ in range(MOST_CLIENTS)]  # the first one is still for longest
     serve(served, MOST_CLIENTS)
@@ -227,7 +227,7 @@ def test_the_one_who_has_promised_to_attend_makes_no_room(served: Served) -> Non
     assert [is_open(client) for client in clients[:3]] == [True, False, True]
 
 
-def test_a_hang_up_is_told_with_its_caller(served: Served) -> None:
+def test_a_disconnection_is_reported_with_its_caller(served: Served) -> None:
     gone: list[Caller] = []
     served.on_hang_up = gone.append
     served.methods = {"whoami": lambda params, caller: str(caller)}
@@ -244,7 +244,7 @@ def test_a_hang_up_is_told_with_its_caller(served: Served) -> None:
     assert {caller.connection for caller in gone} == {1, 2, 3}
 
 
-def test_a_hang_up_is_told_at_once_although_much_is_still_to_be_answered(served: Served) -> None:
+def test_a_disconnection_is_reported_before_its_requests_are_answered(served: Served) -> None:
     gone: list[Caller] = []
     served.on_hang_up = gone.append
     client = connect(served)

@@ -32,7 +32,7 @@ def put_numbers(recorder: FailingRecorder, numbers: range) -> list[bool]:
 
 
 @pytest.mark.parametrize(("kind", "alive"), [("off", False), ("stuck", True)])
-def test_a_failing_log_takes_no_row_and_tells_afterwards_how_many_are_missing(kind: str, alive: bool) -> None:
+def test_a_failing_log_refuses_rows_and_then_logs_their_number(kind: str, alive: bool) -> None:
     kept, failures = KeepingRecorder(), Failures(())
     recorder = FailingRecorder(kept, failures)
     assert put_numbers(recorder, range(2)) == [True, True]
@@ -45,7 +45,7 @@ def test_a_failing_log_takes_no_row_and_tells_afterwards_how_many_are_missing(ki
     assert (recorder.dropped, recorder.writer_alive) == (5, True)
 
 
-def test_an_intermittent_log_loses_about_half_and_tells_each_gap() -> None:
+def test_an_intermittent_log_loses_about_half_and_logs_each_gap() -> None:
     kept, failures = KeepingRecorder(), Failures(())
     recorder = FailingRecorder(kept, failures)
     failures.begin("log", "intermittent", 0.0)
@@ -64,7 +64,7 @@ def test_a_writer_that_died_by_itself_stays_dead() -> None:
 
 
 @pytest.mark.parametrize(("kind", "alive"), [("off", False), ("stuck", True), ("intermittent", True)])
-def test_the_log_s_report_tells_what_fails_and_what_it_lost(kind: str, alive: bool) -> None:
+def test_the_report_of_a_failing_log_shows_failure_and_lost_rows(kind: str, alive: bool) -> None:
     kept, failures = KeepingRecorder(), Failures(())
     recorder = FailingRecorder(kept, failures)
     assert recorder.report() == kept.report()._replace(dropped=2)

@@ -53,7 +53,7 @@ def bench() -> Bench:
     return Bench(Failures(("left", "right")))
 
 
-def test_a_failure_begins_bounded_and_is_told_before_it_does(bench: Bench) -> None:
+def test_a_failure_is_bounded_and_reported_before_it_begins(bench: Bench) -> None:
     (failing,) = bench.fail("log", "off")
     assert failing == {
         "component": "log",
@@ -64,7 +64,7 @@ def test_a_failure_begins_bounded_and_is_told_before_it_does(bench: Bench) -> No
     assert bench.reported == [(10.0, "failing on purpose: log off for 2 s, asked by uid 1000 (process 7)", False)]
 
 
-def test_what_fails_is_shown_in_the_status(bench: Bench) -> None:
+def test_active_failures_are_in_the_status(bench: Bench) -> None:
     assert bench.methods["status"]({}, MIA) == {"warnings": ["hot"], "mode": "idle", "failing": []}
     bench.fail("left_sweep", "off", for_s=1.5)
     bench.now_s += 0.5
@@ -73,7 +73,7 @@ def test_what_fails_is_shown_in_the_status(bench: Bench) -> None:
     assert [each["component"] for each in report["failing"]] == ["left_sweep"]
 
 
-def test_one_or_all_can_be_ended_by_hand_and_each_end_is_told(bench: Bench) -> None:
+def test_one_or_all_failures_can_be_ended_and_each_end_is_reported(bench: Bench) -> None:
     for component in ("pose", "log", "loop"):
         bench.fail(component, "stuck")
     assert [each["component"] for each in bench.fail("log", "ok")] == ["pose", "loop"]
@@ -85,7 +85,7 @@ def test_one_or_all_can_be_ended_by_hand_and_each_end_is_told(bench: Bench) -> N
     ]
 
 
-def test_ending_what_does_not_fail_is_fine_and_told_nowhere(bench: Bench) -> None:
+def test_ending_an_inactive_failure_is_accepted_and_not_reported(bench: Bench) -> None:
     assert bench.fail("pose", "ok") == [] and bench.fail("all", "ok") == []
     assert bench.reported == []
 
@@ -127,13 +127,13 @@ def test_the_list_holds_all_that_can_fail(bench: Bench) -> None:
         ({"component": "two\nlines", "kind": "off"}, "component = .*: must be"),
     ],
 )
-def test_nonsense_is_refused_with_a_sentence(bench: Bench, params: dict[str, Any], said: str) -> None:
+def test_invalid_failures_are_refused_with_a_message(bench: Bench, params: dict[str, Any], said: str) -> None:
     with pytest.raises(RefusedError, match=said):
         bench.methods["fail"](params, MIA)
     assert bench.failures is not None and not bench.failures.failing and bench.reported == []
 
 
-def test_where_it_is_not_allowed_nothing_fails_and_the_key_is_named() -> None:
+def test_forbidden_failures_are_refused_with_the_key() -> None:
     bench = Bench(None)
     with pytest.raises(RefusedError, match=r"failures\.allowed = true"):
         bench.fail("pose", "off")

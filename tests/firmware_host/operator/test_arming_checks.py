@@ -39,7 +39,7 @@ def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> di
     return lines
 
 
-def test_of_a_robot_that_is_ready_every_line_is_good(ready: Lockstep) -> None:
+def test_every_line_of_a_ready_robot_is_ok(ready: Lockstep) -> None:
     lines = lines_of(ready)
     assert all(item["ok"] and not item["fix"] for item in lines.values())
     expected = {"configuration", "loop", "log", "bus.left", "bus.right"}
@@ -51,7 +51,7 @@ def test_of_a_robot_that_is_ready_every_line_is_good(ready: Lockstep) -> None:
     assert "380" in lines["loop"]["text"]
 
 
-def test_a_line_fails_exactly_where_its_fault_blocks_arming(ready: Lockstep) -> None:
+def test_a_line_fails_exactly_if_its_fault_blocks_arming(ready: Lockstep) -> None:
     for kind in FaultKind:
         fault = kind.fault(SUBJECTS.get(kind.part, ""))
         lines = lines_of(ready, kind)
@@ -79,7 +79,7 @@ def test_the_check_and_a_refused_arm_agree(ready: Lockstep, forced: bool) -> Non
         assert refused == (fault_message(fault) if against else None)
 
 
-def test_of_several_faults_in_one_line_those_that_block_are_told_and_each_advice_once(ready: Lockstep) -> None:
+def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) -> None:
     line = lines_of(ready, "drive_late", "drive_silent", "drive_version", "heartbeat_silent")["drive.left_sweep"]
     blocking = [
         kind.fault("left_sweep")
@@ -89,7 +89,7 @@ def test_of_several_faults_in_one_line_those_that_block_are_told_and_each_advice
     assert line["fix"] == "; ".join(map(what_to_do, blocking[:2]))
 
 
-def test_a_mandatory_fault_beside_one_that_is_not_makes_the_line_mandatory(ready: Lockstep) -> None:
+def test_one_mandatory_fault_makes_its_line_mandatory(ready: Lockstep) -> None:
     lines = lines_of(ready, "watchdog_unknown", "watchdog_off")
     assert lines["watchdog.left_sweep"]["mandatory"]
     assert not lines_of(ready, "watchdog_unknown")["watchdog.left_sweep"]["mandatory"]
@@ -100,7 +100,7 @@ def test_warnings_of_the_computer_are_lines_that_block_nothing(ready: Lockstep) 
     assert (line["ok"], line["text"]) == (True, "warning: no real-time priority")
 
 
-def test_a_drive_that_was_not_heard_is_a_mandatory_line_with_what_is_missing(configuration: Configuration) -> None:
+def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configuration: Configuration) -> None:
     robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
     silent = robot.robot.drives[2]
     silent.cyclic_frames = lambda now_s: iter(())  # type: ignore[method-assign]
@@ -115,7 +115,7 @@ def test_a_drive_that_was_not_heard_is_a_mandatory_line_with_what_is_missing(con
     assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
 
 
-def test_a_drive_that_never_tells_its_temperature_is_said_to_be_guarded_by_its_currents(
+def test_a_drive_without_temperature_is_reported_but_does_not_block_arming(
     configuration: Configuration,
 ) -> None:
     robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))

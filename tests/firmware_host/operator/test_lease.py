@@ -7,7 +7,7 @@ from firmware_host.operator.lease import Lease
 HALF_S = 0.5
 
 
-def test_nothing_is_lost_where_nothing_was_promised() -> None:
+def test_without_a_lease_nothing_is_lost() -> None:
     lease = Lease()
     assert not lease.held and not lease.lost(1e9)
     lease.hang_up("anna")
@@ -23,14 +23,14 @@ def test_a_lease_that_is_renewed_in_time_is_never_lost() -> None:
     assert lease.held and lease.holder == "anna"
 
 
-def test_the_last_promise_counts_also_where_it_is_a_shorter_one() -> None:
+def test_a_renewal_replaces_the_earlier_deadline() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, 5.0)
     lease.renew("anna", 11.0, HALF_S)
     assert not lease.lost(11.5) and lease.lost(11.51)
 
 
-def test_a_late_renewal_does_not_bring_it_back() -> None:
+def test_a_late_renewal_does_not_restore_the_lease() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     refused = lease.renew("anna", 10.6, HALF_S)
@@ -38,7 +38,7 @@ def test_a_late_renewal_does_not_bring_it_back() -> None:
     assert lease.lost(10.7) and lease.lost(0.0) and not lease.held
 
 
-def test_a_holder_that_hangs_up_has_lost_it_at_once() -> None:
+def test_a_holder_that_disconnects_loses_the_lease_at_once() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     lease.hang_up("ben")
@@ -47,7 +47,7 @@ def test_a_holder_that_hangs_up_has_lost_it_at_once() -> None:
     assert lease.lost(10.1)
 
 
-def test_a_holder_that_has_released_it_may_hang_up() -> None:
+def test_a_holder_may_disconnect_after_its_release() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     assert lease.release("anna") is None
@@ -55,7 +55,7 @@ def test_a_holder_that_has_released_it_may_hang_up() -> None:
     assert not lease.lost(1e9) and not lease.held
 
 
-def test_a_second_one_is_told_who_holds_it() -> None:
+def test_a_second_program_is_refused_with_the_holder_s_name() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     reported = lease.renew("ben", 10.1, HALF_S) or ""
@@ -66,7 +66,7 @@ def test_a_second_one_is_told_who_holds_it() -> None:
     assert lease.lost(10.51)  # which was not renewed by that
 
 
-def test_a_lost_one_is_released_by_anybody_and_then_free() -> None:
+def test_any_program_may_release_a_lost_lease() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     lease.hang_up("anna")
@@ -76,15 +76,7 @@ def test_a_lost_one_is_released_by_anybody_and_then_free() -> None:
     assert lease.renew("ben", 10.2, HALF_S) is None
 
 
-def test_reset_forgets_all() -> None:
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
-    assert lease.lost(11.0)
-    lease.reset()
-    assert not lease.lost(12.0) and lease.holder is None
-
-
-def test_only_its_holder_moves_the_robot_and_where_there_is_none_anybody() -> None:
+def test_only_the_holder_moves_the_robot_if_there_is_one() -> None:
     lease = Lease()
     assert lease.refusal("anna", 10.0) is lease.refusal("ben", 10.0) is None
     lease.renew("anna", 10.0, HALF_S)
@@ -95,7 +87,7 @@ def test_only_its_holder_moves_the_robot_and_where_there_is_none_anybody() -> No
     assert lease.refusal("ben", 10.7) is None
 
 
-def test_whoever_was_ousted_stays_out_until_it_connects_anew() -> None:
+def test_an_ousted_program_is_refused_until_it_connects_again() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     assert lease.refusal("ben", 10.1, take_over=True) is None
@@ -112,7 +104,7 @@ def test_whoever_was_ousted_stays_out_until_it_connects_anew() -> None:
     assert not lease.lost(99.0) and lease.renew("anna", 99.0, 1.0) is None
 
 
-def test_nobody_ousts_oneself() -> None:
+def test_a_holder_cannot_oust_itself() -> None:
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     lease.oust("anna")

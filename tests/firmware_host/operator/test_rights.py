@@ -48,7 +48,7 @@ def peer_in_groups(listener: socket.socket, groups: list[int]) -> tuple[int, Pee
     return child, peer
 
 
-def test_a_peer_is_who_the_kernel_says_it_is(listener: socket.socket) -> None:
+def test_the_kernel_identifies_the_peer(listener: socket.socket) -> None:
     with socket.socket(socket.AF_UNIX) as client:
         client.connect(listener.getsockname())
         connection, _ = listener.accept()
@@ -64,7 +64,7 @@ def test_supplementary_groups_of_another_user_s_process_count(listener: socket.s
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a process as many groups")
 @pytest.mark.parametrize("count", [256, 257, 2000])
-def test_a_user_of_too_many_groups_is_known_by_the_primary_one(listener: socket.socket, count: int) -> None:
+def test_a_user_of_too_many_groups_has_only_the_primary_one(listener: socket.socket, count: int) -> None:
     groups = list(range(5000, 5000 + count))
     _, peer = peer_in_groups(listener, groups)
     assert peer.groups == {NOBODY, *(groups if count <= 256 else [])}
@@ -90,13 +90,13 @@ def test_a_reader_does_not_drive_and_a_driver_reads() -> None:
     assert named.refusal("status", Level.DRIVE) is None
 
 
-def test_a_method_that_nobody_thought_of_is_for_operators() -> None:
+def test_an_unknown_method_is_reserved_for_operators() -> None:
     own = load_rights(StatusParameters())
     assert own.refusal("dance", Level.READ) is not None
     assert own.refusal("dance", Level.DRIVE) is None
 
 
-def test_groups_that_do_not_exist_are_refused_all_at_once_by_key_and_value() -> None:
+def test_unknown_groups_are_all_refused_with_key_and_value() -> None:
     with pytest.raises(ConfigurationError) as caught:
         load_rights(StatusParameters(read_group="no such", drive_group="nor this"))
     reading, driving = caught.value.problems
@@ -104,7 +104,7 @@ def test_groups_that_do_not_exist_are_refused_all_at_once_by_key_and_value() -> 
     assert driving.startswith("status.drive_group = 'nor this': there is no such group")
 
 
-def test_no_name_is_looked_up_once_a_daemon_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_group_name_is_looked_up_after_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
     own = load_rights(StatusParameters(read_group=ANY_GROUP.gr_name))
 
     def slow(*arguments: object) -> None:
@@ -119,7 +119,7 @@ def test_no_name_is_looked_up_once_a_daemon_runs(monkeypatch: pytest.MonkeyPatch
     assert own.refusal("arm", Level.READ) is not None
 
 
-def test_only_strangers_who_may_not_stop_are_turned_away() -> None:
+def test_only_users_who_may_not_even_stop_are_refused_a_connection() -> None:
     wide, strict = load_rights(StatusParameters()), load_rights(StatusParameters(anyone_may_stop=False))
     assert [wide.refusal_to_connect(level) for level in Level] == [None, None, None]
     refused, *others = (strict.refusal_to_connect(level) for level in Level)

@@ -18,7 +18,7 @@ def leave_behind(path: Path) -> None:
 
 
 @pytest.mark.parametrize("umask", [0o000, 0o027, 0o777])
-def test_everybody_may_connect_whatever_the_umask(short_folder: Path, umask: int) -> None:
+def test_every_user_may_connect_under_every_umask(short_folder: Path, umask: int) -> None:
     before = os.umask(umask)
     try:
         made = SocketFile(short_folder / "run" / "s", 4)
@@ -31,7 +31,7 @@ def test_everybody_may_connect_whatever_the_umask(short_folder: Path, umask: int
     assert not made.path.exists()
 
 
-def test_its_folder_is_made_and_nobody_is_waited_for(short_folder: Path) -> None:
+def test_the_folder_is_made_and_the_listener_does_not_block(short_folder: Path) -> None:
     made = SocketFile(short_folder / "one" / "two" / "s", 4)
     assert not made.listener.getblocking()
     made.close()
@@ -44,7 +44,7 @@ def test_a_second_daemon_is_refused(short_folder: Path) -> None:
     first.close()
 
 
-def test_a_daemon_that_hangs_with_its_queue_full_is_not_replaced(short_folder: Path) -> None:
+def test_a_hanging_daemon_with_a_full_queue_is_not_replaced(short_folder: Path) -> None:
     first = SocketFile(short_folder / "s", 0)
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as waiting:
         waiting.connect(str(first.path))
@@ -79,7 +79,7 @@ def test_a_symbolic_link_is_not_followed(short_folder: Path, target: str) -> Non
     assert link.is_symlink() and (short_folder / "dead").is_socket() and (short_folder / "file").is_file()
 
 
-def test_a_folder_in_which_everybody_may_replace_it_is_refused(short_folder: Path) -> None:
+def test_a_folder_that_every_user_may_write_to_is_refused(short_folder: Path) -> None:
     folder = short_folder / "open"
     folder.mkdir()
     folder.chmod(0o777)
@@ -89,7 +89,7 @@ def test_a_folder_in_which_everybody_may_replace_it_is_refused(short_folder: Pat
     SocketFile(folder / "s", 4).close()
 
 
-def test_the_file_of_a_daemon_that_came_after_is_not_removed(short_folder: Path) -> None:
+def test_the_file_of_a_later_daemon_is_not_removed(short_folder: Path) -> None:
     first = SocketFile(short_folder / "s", 4)
     first.path.unlink()
     second = SocketFile(short_folder / "s", 4)

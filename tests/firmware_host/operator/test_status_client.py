@@ -43,39 +43,39 @@ def answer(ends: Ends, *messages: Any) -> Any:
     return client.call("status")
 
 
-def test_an_answer_to_an_earlier_request_is_passed_over(ends: Ends) -> None:
+def test_an_answer_to_an_earlier_request_is_skipped(ends: Ends) -> None:
     """A Ctrl-C may have kept it from being read."""
     assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"
 
 
-def test_a_refusal_keeps_its_sentence(ends: Ends) -> None:
+def test_a_refusal_has_the_daemon_s_message(ends: Ends) -> None:
     with pytest.raises(CallRefusedError, match="^arm first$"):
         answer(ends, [rpc.RESPONSE, 1, "arm first", None])
 
 
-def test_a_refusal_for_want_of_rights_is_told_apart(ends: Ends) -> None:
+def test_a_refusal_for_missing_rights_has_its_own_type(ends: Ends) -> None:
     with pytest.raises(NotPermittedError, match="^join$"):
         answer(ends, [rpc.RESPONSE, 1, f"{rpc.NOT_PERMITTED}join", None])
 
 
-def test_a_rejection_without_a_number_is_for_whoever_asks(ends: Ends) -> None:
+def test_a_rejection_without_a_number_answers_the_current_request(ends: Ends) -> None:
     with pytest.raises(CallRefusedError, match=r"a request is \[0"):
         answer(ends, [rpc.RESPONSE, None, rpc.SHAPE, None])
 
 
 @pytest.mark.parametrize("message", [5, None, [1, 2], "x" * 5000, {"a": 1}])
-def test_what_is_no_answer_comes_from_no_daemon_of_ours(ends: Ends, message: Any) -> None:
+def test_a_malformed_answer_means_another_program(ends: Ends, message: Any) -> None:
     with pytest.raises(NoDaemonError, match="no mudskipper daemon"):
         answer(ends, message)
 
 
-def test_silence_is_no_absent_daemon(ends: Ends) -> None:
+def test_a_silent_daemon_is_distinguished_from_an_absent_one(ends: Ends) -> None:
     with pytest.raises(DroppedError, match="does not answer: 'systemctl status"):
         answer(ends)
 
 
 @pytest.mark.parametrize("before", [0, 1])
-def test_a_connection_that_the_daemon_has_closed_is_said_to_be_closed(ends: Ends, before: int) -> None:
+def test_a_connection_that_the_daemon_closed_is_reported(ends: Ends, before: int) -> None:
     client, connection = ends
     for _ in range(before):
         answer(ends, [rpc.RESPONSE, 1, None, "new"])
@@ -84,7 +84,7 @@ def test_a_connection_that_the_daemon_has_closed_is_said_to_be_closed(ends: Ends
         client.call("status")
 
 
-def test_a_sentence_before_the_door_closes_is_read(ends: Ends) -> None:
+def test_a_message_before_the_connection_closes_is_read(ends: Ends) -> None:
     client, connection = ends
     connection.sendall(msgpack.packb([rpc.RESPONSE, None, f"{rpc.NOT_PERMITTED}join", None]))
     connection.close()

@@ -20,7 +20,7 @@ def test_a_request_is_answered_by_its_number(served: Served) -> None:
     assert ask(served, client, msgpack.packb([0, 7, "echo", {"a": 1}])) == [[1, 7, None, {"a": 1}]]
 
 
-def test_params_may_stand_in_the_list_of_the_specification(served: Served) -> None:
+def test_params_may_be_inside_a_list(served: Served) -> None:
     client = connect(served)
     assert ask(served, client, msgpack.packb([0, 7, "echo", [{"a": 1}]])) == [[1, 7, None, {"a": 1}]]
     assert ask(served, client, msgpack.packb([0, 8, "echo", []])) == [[1, 8, None, {}]]
@@ -47,21 +47,7 @@ def test_requests_sent_together_are_answered_one_a_tick_in_order(served: Served)
     assert sum(answered) == 5 and max(answered) == 1
 
 
-@pytest.mark.parametrize(
-    "message",
-    [b"\xc1", b"GET / HTTP/1.1\r\n\r\n", msgpack.packb({"a": 1}), msgpack.packb([1, 2, 3]), msgpack.packb([2, "m", []]),
-     msgpack.packb([0, "x", "echo", {}]), msgpack.packb([0, 1, 5, {}]), msgpack.packb([0, 1, "echo", 5])],
-)  # fmt: skip
-def test_a_garbled_request_gets_an_error_and_the_door(served: Served, message: bytes) -> None:
-    client = connect(served)
-    answers = ask(served, client, message)
-    assert answers and answers[0][2]
-    serve(served)
-    assert client.recv(10) == b""
-    assert served.counters["malformed_requests"] == 1
-
-
-def test_an_endless_request_gets_an_error_and_the_door(served: Served) -> None:
+def test_an_endless_request_is_rejected(served: Served) -> None:
     client = connect(served)
     client.setblocking(False)
     header = b"\xdb" + (2 * LONGEST_REQUEST).to_bytes(4, "big")
@@ -87,13 +73,7 @@ def test_a_client_that_does_not_fetch_its_answers_is_dropped(served: Served) -> 
     assert served.counters["dropped_slow_clients"] == 1
 
 
-def test_a_slow_client_still_gets_a_long_answer_whole(served: Served) -> None:
-    client = connect(served)
-    ((_, _, _, result),) = ask(served, client, msgpack.packb([0, 1, "long", {}]))
-    assert len(result) == 300_000
-
-
-def test_a_newcomer_takes_the_place_of_the_client_that_was_still_for_longest(served: Served) -> None:
+def test_a_newcomer_replaces_the_client_that_was_silent_for_longest(served: Served) -> None:
     clients = [connect(served) for _ in range(MOST_CLIENTS)]
     serve(served, MOST_CLIENTS + 2)
     assert ask(served, clients[0], msgpack.packb([0, 1, "echo", {}]))
@@ -103,21 +83,7 @@ def test_a_newcomer_takes_the_place_of_the_client_that_was_still_for_longest(ser
     assert ask(served, clients[0], msgpack.packb([0, 3, "echo", {}]))
 
 
-def test_a_busy_client_does_not_delay_the_others(served: Served) -> None:
-    busy, other = connect(served), connect(served)
-    serve(served)
-    for number in range(200):
-        busy.sendall(msgpack.packb([0, number, "echo", {}]))
-        serve(served, 2)
-        busy.recv(4096)
-    busy.sendall(b"".join(msgpack.packb([0, number, "echo", {}]) for number in range(50)))
-    other.sendall(msgpack.packb([0, 1, "echo", {}]))
-    serve(served, 3)
-    other.setblocking(False)
-    assert list(unpacked(other.recv(4096))) == [[1, 1, None, {}]]
-
-
-def test_a_wish_counts_although_its_client_has_hung_up(served: Served) -> None:
+def test_a_request_counts_although_its_client_has_disconnected(served: Served) -> None:
     done: list[str] = []
     served.methods = METHODS | {"disarm": lambda params, caller: done.append("disarm")}
     busy, gone = connect(served), connect(served)
@@ -130,7 +96,7 @@ def test_a_wish_counts_although_its_client_has_hung_up(served: Served) -> None:
     assert len(served._clients) == 1
 
 
-def test_a_client_that_has_no_more_to_ask_still_gets_a_long_answer_whole(served: Served) -> None:
+def test_a_client_that_stopped_sending_still_gets_a_long_answer(served: Served) -> None:
     client = connect(served)
     client.sendall(msgpack.packb([0, 1, "long", {}]))
     client.shutdown(socket.SHUT_WR)
@@ -146,18 +112,6 @@ def test_a_client_that_has_no_more_to_ask_still_gets_a_long_answer_whole(served:
     assert served._clients == {}
 
 
-def test_many_short_requests_at_once_are_all_answered(served: Served) -> None:
-    client = connect(served)
-    client.sendall(b"".join(msgpack.packb([0, number, "echo", {}]) for number in range(600)))
-    client.setblocking(False)
-    received = bytearray()
-    for _ in range(2000):
-        served.tick()
-        with contextlib.suppress(BlockingIOError):
-            received += client.recv(65536)
-    assert [number for _, number, _, _ in unpacked(bytes(received))] == list(range(600))
-
-
 def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
     said: list[str] = []
     served.report_bug = said.append
@@ -166,27 +120,9 @@ def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
     assert "bug" in error and said == ["broken failed: KeyError: 'missing'"]
 
 
-def test_a_client_that_vanishes_with_a_request_under_way_does_no_harm(served: Served) -> None:
-    client = connect(served)
-    client.sendall(msgpack.packb([0, 1, "long", {}]))
-    client.close()
-    serve(served)
-    assert ask(served, connect(served), msgpack.packb([0, 2, "echo", {}]))
-
-
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=200))
-def test_no_bytes_make_it_raise(served: Served, garbage: bytes) -> None:
-    client = connect(served)
-    client.sendall(garbage)
-    serve(served, 4)
-    client.close()
-    serve(served, 3)
-
-
 VALID = [msgpack.packb([0, number, "echo", {"a": number}]) for number in range(4)]
 ODD = st.one_of(
-    st.binary(max_size=60),
+    st.binary(max_size=200),
     st.builds(lambda data, place: data[: place % len(data)], st.sampled_from(VALID), st.integers(0, 99)),
     st.builds(
         lambda data, place, byte: data[: place % len(data)] + bytes([byte]) + data[place % len(data) + 1 :],
@@ -199,7 +135,7 @@ ODD = st.one_of(
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(ODD, max_size=4), st.integers(0, 4), st.integers(0, 200))
-def test_valid_requests_are_answered_whatever_comes_after(
+def test_valid_requests_are_answered_before_any_garbage(
     served: Served, odd: list[bytes], valid: int, cut: int
 ) -> None:
     client, reference = connect(served), connect(served)
