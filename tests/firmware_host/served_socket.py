@@ -1,4 +1,4 @@
-"""A status socket with a clock of its own, and clients that the kernel takes for whom a test wants."""
+"""A status socket with its own clock, and clients with the credentials that a test chooses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ METHODS: dict[str, Callable[[dict[str, Any], Caller], Any]] = {
 
 
 RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
-OPERATOR, READER, STRANGER = (
+OPERATOR, READER, OTHER_USER = (
     Peer(500, 1000, frozenset({1000, 71})),
     Peer(501, 1001, frozenset({1001, 70})),
     Peer(502, 1002, frozenset({1002})),
@@ -59,7 +59,7 @@ def serve(served: Served, ticks: int = 6) -> None:
 
 
 def ask(served: Served, client: socket.socket, data: bytes) -> list[Any]:
-    """Everything that comes back within a few ticks."""
+    """Send the data and return all answers of a few ticks."""
     client.sendall(data)
     serve(served)
     client.setblocking(False)

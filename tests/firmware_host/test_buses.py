@@ -1,4 +1,4 @@
-"""Buses that do not open, vanish, or come later: what the daemon says, and that it stays disarmed."""
+"""Buses that do not open, vanish, or appear later: the messages, and that the robot stays disarmed."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_a_missing_bus_that_is_waited_for_is_off_and_reports_its_cause(monkeypat
 
 
 class Plug:
-    """Of the left adapter of a robot in lockstep."""
+    """Unplugs the left adapter of a robot in lockstep and plugs it in again."""
 
     def __init__(self, robot: Lockstep) -> None:
         drives = robot.loop.drives
@@ -116,9 +116,9 @@ class Plug:
         self.port = ReopeningPort(lambda: self._open(wire), wait=True)
         self.wire = wire
         drives.ports["left"] = self.port
-        for place, (port, receivers) in enumerate(drives._receivers):
+        for index, (port, receivers) in enumerate(drives._receivers):
             if port is wire:
-                drives._receivers[place] = (self.port, receivers)
+                drives._receivers[index] = (self.port, receivers)
         for outlet in drives.gate._outlets:
             if outlet._port is wire:
                 outlet._port = self.port

@@ -1,4 +1,4 @@
-"""How the daemon ends: asked, or by a bug, with the drives idle either way."""
+"""The daemon ends on request or by a bug; the drives are idle in both cases."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class DeliberateBugError(Exception):
 
 
 def caught(problem: Exception) -> Exception:
-    """With the traceback of having been raised."""
+    """Return the exception with a traceback."""
     try:
         raise problem
     except DeliberateBugError:

@@ -1,4 +1,4 @@
-"""What a tick shows beyond one joint's signals: buses, gate, arming, what drives tell of themselves, pose and trust."""
+"""The fault monitor beyond single joints: buses, gate, arming, drive health, pose, and trust in encoders."""
 
 from __future__ import annotations
 
@@ -48,23 +48,23 @@ class HealthyDrives:
 
 
 class Bench:
-    """Owns a fault watch, the drives' ends of two buses, and the ticks."""
+    """Owns a fault monitor, the drives' ends of two buses, and the ticks."""
 
     def __init__(self, configuration: Configuration) -> None:
         self.ports: dict[str, MockPort] = {name: MockBus().open() for name in configuration.bus}
         self.drives = HealthyDrives(self.ports)
-        self.watch = FaultMonitor(configuration, cast(Drives, self.drives))
+        self.monitor = FaultMonitor(configuration, cast(Drives, self.drives))
         self.tick_number = 0
 
     @property
     def now_s(self) -> float:
         return START_S + self.tick_number * PERIOD_S
 
-    def states(self, place: int = -1, **changes: Any) -> DriveStates:
-        """Of the next tick: healthy ones that have just come, but for one joint."""
+    def states(self, index: int = -1, **changes: Any) -> DriveStates:
+        """Return fresh, healthy states of the next tick, with changes to one joint."""
         now_s = self.now_s + PERIOD_S
         well = DriveState(0.1, 0.0, now_s, 0.0, now_s, True, 0, now_s, 25.0, now_s, 24.0)
-        a, b, c, d = (well._replace(**changes) if joint == place else well for joint in range(4))
+        a, b, c, d = (well._replace(**changes) if joint == index else well for joint in range(4))
         return Joints(a, b, c, d)
 
     def tick(self, mode: Mode = Mode.HOLD, states: DriveStates | None = None, **changes: Any) -> list[Fault]:
@@ -72,7 +72,7 @@ class Bench:
         self.tick_number += 1
         sent = LimitedTorques(NO_TORQUE, False, True)
         monitor_input = MonitorInput(mode, START_S, states, BodyPose(), sent, False, 0.0, HEALTHY, "")
-        return self.watch.update(Tick(self.now_s, 0.0, self.tick_number, 0), monitor_input._replace(**changes))
+        return self.monitor.update(Tick(self.now_s, 0.0, self.tick_number, 0), monitor_input._replace(**changes))
 
 
 @pytest.fixture
@@ -90,9 +90,9 @@ def test_healthy_ticks_have_no_fault(bench: Bench, mode: Mode) -> None:
         assert bench.tick(mode) == []
 
 
-@pytest.mark.parametrize("place", range(4))
-def test_a_fault_of_a_joint_names_that_joint(bench: Bench, place: int) -> None:
-    assert reported(bench.tick(states=bench.states(place, angle_rad=2.0))) == [("joint_position", JOINTS[place])]
+@pytest.mark.parametrize("index", range(4))
+def test_a_fault_of_a_joint_names_that_joint(bench: Bench, index: int) -> None:
+    assert reported(bench.tick(states=bench.states(index, angle_rad=2.0))) == [("joint_position", JOINTS[index])]
 
 
 def test_joints_have_their_own_ranges(bench: Bench) -> None:
@@ -150,7 +150,7 @@ def test_two_consecutive_ticks_of_lost_commands_are_no_fault(bench: Bench) -> No
 def test_commands_lost_before_the_reset_do_not_count(configuration: Configuration) -> None:
     bench = Bench(configuration)
     bench.ports["left"].failed_sends = 99
-    bench.watch.reset()
+    bench.monitor.reset()
     for _ in range(10):
         assert bench.tick() == []
 
@@ -227,7 +227,7 @@ def test_a_duplicate_node_id_is_reported_while_it_lasts(bench: Bench) -> None:
         assert reported(bench.tick()) == [("duplicate_node_id", "left_adduction")]
 
 
-# the body's place
+# pose
 
 
 def test_a_pose_that_was_never_measured_is_no_fault(bench: Bench) -> None:
@@ -254,23 +254,23 @@ def test_a_lost_lease_names_its_holder(bench: Bench) -> None:
 
 def test_encoders_without_a_fault_are_trusted(bench: Bench) -> None:
     bench.tick()
-    assert bench.watch.trusted == (True, True, True, True)
+    assert bench.monitor.trusted == (True, True, True, True)
     bench.tick(states=bench.states(1, angle_rad=2.0))
-    assert bench.watch.trusted[2:] == (True, True)
+    assert bench.monitor.trusted[2:] == (True, True)
 
 
-@pytest.mark.parametrize("place", range(4))
-def test_an_encoder_that_is_silent_is_trusted_again_with_its_next_message(bench: Bench, place: int) -> None:
+@pytest.mark.parametrize("index", range(4))
+def test_an_encoder_that_is_silent_is_trusted_again_with_its_next_message(bench: Bench, index: int) -> None:
     bench.tick()
-    bench.tick(states=bench.states(place, angle_stamp_s=bench.now_s - 0.02))
-    assert bench.watch.trusted == tuple(joint != place for joint in range(4))
+    bench.tick(states=bench.states(index, angle_stamp_s=bench.now_s - 0.02))
+    assert bench.monitor.trusted == tuple(joint != index for joint in range(4))
     bench.tick()
-    assert bench.watch.trusted == (True, True, True, True)
+    assert bench.monitor.trusted == (True, True, True, True)
 
 
 def test_a_silent_current_does_not_affect_trust_in_the_encoder(bench: Bench) -> None:
     assert reported(bench.tick(states=bench.states(0, current_stamp_s=0.0))) == [("current_silent", "left_sweep")]
-    assert bench.watch.trusted == (True, True, True, True)
+    assert bench.monitor.trusted == (True, True, True, True)
 
 
 def test_an_encoder_that_jumped_is_not_trusted_until_torque_is_off(bench: Bench) -> None:
@@ -278,9 +278,9 @@ def test_an_encoder_that_jumped_is_not_trusted_until_torque_is_off(bench: Bench)
     assert reported(bench.tick(states=bench.states(2, angle_rad=0.5))) == [("encoder_jump", "right_sweep")]
     for _ in range(100):
         assert bench.tick(Mode.DAMPING, bench.states(2, angle_rad=0.5)) == []
-        assert bench.watch.trusted == (True, True, False, True)
+        assert bench.monitor.trusted == (True, True, False, True)
     bench.tick(Mode.FAULT, bench.states(2, angle_rad=0.5))
-    assert bench.watch.trusted == (True, True, True, True)
+    assert bench.monitor.trusted == (True, True, True, True)
 
 
 # heat
@@ -288,11 +288,11 @@ def test_an_encoder_that_jumped_is_not_trusted_until_torque_is_off(bench: Bench)
 
 def test_the_limits_see_the_windings_heat_once_it_matters(bench: Bench) -> None:
     states = bench.states()
-    assert bench.watch.with_winding_heat(states) is states
-    bench.watch.joints[1].winding.temperature_c = 75.0
-    reported_c = [state.temperature_c for state in bench.watch.with_winding_heat(states)]
+    assert bench.monitor.with_winding_heat(states) is states
+    bench.monitor.joints[1].winding.temperature_c = 75.0
+    reported_c = [state.temperature_c for state in bench.monitor.with_winding_heat(states)]
     assert reported_c == [30.0, 75.0, 30.0, 30.0]
-    assert bench.watch.with_winding_heat(states)[1]._replace(temperature_c=25.0) == states[1]
+    assert bench.monitor.with_winding_heat(states)[1]._replace(temperature_c=25.0) == states[1]
 
 
 def test_a_joint_must_follow_its_torque_in_a_walk_but_not_in_a_recovery(bench: Bench) -> None:
@@ -311,9 +311,7 @@ def test_a_joint_must_follow_its_torque_in_a_walk_but_not_in_a_recovery(bench: B
 
 
 @pytest.mark.parametrize("state", [BusState.WARNING, BusState.PASSIVE])
-def test_bus_warnings_end_without_error_frames_but_bus_off_stays(
-    bench: Bench, state: BusState
-) -> None:
+def test_bus_warnings_end_without_error_frames_but_bus_off_stays(bench: Bench, state: BusState) -> None:
     bench.ports["left"].state = state
     for _ in range(int(BUS_TROUBLE_S / PERIOD_S) - 1):
         assert bench.tick()

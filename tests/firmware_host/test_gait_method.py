@@ -1,4 +1,4 @@
-"""The method "gait" from the configuration to the robot's walk: what is refused, and what it brings."""
+"""The method "gait", from the validation of its configuration to the robot's walk."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from simulation.mud.track import Track
 
 
 def problems_of(text: str, **sections: str) -> list[str]:
-    """With the method "gait", and lines added to the sections that are named."""
+    """Return the problems of the method "gait" with these lines in these sections."""
     adaptation = 'method = "gait"\n' + sections.pop("adaptation", "")
     for section, lines in {"adaptation": adaptation, **sections}.items():
         for key in [line.split(" = ")[0] for line in lines.splitlines()]:
@@ -49,7 +49,9 @@ def test_the_methods_own_sweeps_are_within_limits_and_reach(example_text: str) -
         ("max_sweep_deg = 75.0", "adaptation.gait.max_sweep_deg = 75.0: must be "),
     ],
 )
-def test_impossible_gait_keys_are_refused_with_key_value_and_bound(example_text: str, adaptation: str, problem: str) -> None:
+def test_impossible_gait_keys_are_refused(
+    example_text: str, adaptation: str, problem: str
+) -> None:
     assert any(problem in each for each in problems_of(example_text, adaptation=adaptation))
 
 
@@ -114,7 +116,7 @@ def test_strides_with_changing_sweep_still_measure_every_coefficient(configurati
 
 
 def test_a_walk_of_fixed_depth_does_not_depend_on_the_method(configuration: Configuration) -> None:
-    """Target for target, as without the method."""
+    """The targets equal those of the default method."""
 
     def targets(method: Method) -> list[GaitTarget]:
         adaptation = replace(AdaptationParameters(), method=method)

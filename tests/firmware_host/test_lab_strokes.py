@@ -1,4 +1,4 @@
-"""What the default method says of the authors' own mud: first strokes of equal trials agree, stronger mud reads so.
+"""The default method on the authors' own measurements: equal trials agree, and stronger mud gets larger coefficients.
 
 The strength labels are the lab's. The stiffest log differs from the others: its flipper was sent 3 cm into the mud,
 theirs 1.7 cm (by their angles, and by where the force begins), and its sweep motor gave all it had. A bound on k_s in

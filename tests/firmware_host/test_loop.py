@@ -1,4 +1,4 @@
-"""The loop on simulated drives: what a tick does with requests, garbage and trouble."""
+"""The loop on simulated drives: requests, garbage on the bus, missed ticks, and the log."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Make = Callable[..., Lockstep]
 
 
 class ListRecorder(NullRecorder):
-    """Keeps every row."""
+    """Records rows in a list."""
 
     def __init__(self) -> None:
         self.health = HEALTHY
@@ -60,7 +60,7 @@ def recorder_of(robot: Lockstep) -> ListRecorder:
     return recorder
 
 
-def stranger_on(robot: Lockstep, bus: str) -> MockPort:
+def open_peer(robot: Lockstep, bus: str) -> MockPort:
     port = robot.loop.drives.ports[bus]
     assert isinstance(port, MockPort)
     return port._bus.open()
@@ -76,7 +76,7 @@ def torque_frames(port: MockPort) -> list[Frame]:
 
 def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Configuration) -> None:
     robot = Lockstep(configuration, FIRM)
-    listener = stranger_on(robot, "left")
+    listener = open_peer(robot, "left")
     robot.robot.advance = lambda until_s: None  # type: ignore[method-assign] # drives without power
     robot.run_for(1.0)
     assert robot.loop.mode is Mode.BOOT
@@ -137,7 +137,7 @@ def test_disarm_ends_torque_at_once_in_every_phase(robot: Lockstep, walked_s: fl
 
 
 def test_disarm_idles_drives_even_before_all_are_heard(configuration: Configuration) -> None:
-    """A daemon that starts anew beside a running motor and a dead one."""
+    """The daemon restarts while one motor runs and another is dead."""
     robot = Lockstep(configuration, FIRM)
     running = robot.robot.drives[0]
     running.energised = True
@@ -161,7 +161,7 @@ def test_a_drive_found_in_closed_loop_is_idled_before_all_are_heard(configuratio
 
 def test_clear_transmits_nothing_before_all_are_heard(configuration: Configuration) -> None:
     robot = Lockstep(configuration, FIRM)
-    listeners = [stranger_on(robot, bus) for bus in ("left", "right")]
+    listeners = [open_peer(robot, bus) for bus in ("left", "right")]
     assert robot.loop.request(Request.CLEAR, robot.now_s) is not None
     assert [listener.receive() for listener in listeners] == [[], []]
 
@@ -253,7 +253,7 @@ def test_clearing_does_not_help_while_the_cause_lasts(configuration: Configurati
 def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:
     robot.arm()
     robot.loop.controller.gains = replace(robot.loop.controller.gains, sweep_stiffness_nm_rad=float("nan"))
-    listener = stranger_on(robot, "left")
+    listener = open_peer(robot, "left")
     robot.run_for(0.1)
     assert robot.loop.mode is Mode.FAULT
     assert robot.loop.fault is not None and robot.loop.fault.name == "torque_not_finite"
@@ -272,7 +272,7 @@ def test_firmware_of_another_family_is_not_armed(configuration: Configuration, m
 
 def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Configuration) -> None:
     quiet, noisy = Lockstep(configuration, FIRM), Lockstep(configuration, FIRM)
-    garbage = stranger_on(noisy, "left")
+    garbage = open_peer(noisy, "left")
     for robot in (quiet, noisy):
         robot.arm()
         robot.walk(WalkOrder(0.03))

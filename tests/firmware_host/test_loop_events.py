@@ -1,4 +1,4 @@
-"""What the loop tells: every sentence into the log, and the notice for whoever asks for the status later."""
+"""The events of the loop: messages in the log, and the notice in the status."""
 
 from __future__ import annotations
 

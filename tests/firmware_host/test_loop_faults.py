@@ -1,6 +1,6 @@
-"""The whole program when something fails: how soon it reacts, what it does to the joints, and that it stays disarmed.
+"""The whole loop under faults: reaction time, joint motion, and that it stays disarmed.
 
-Robots are walked into each phase once and copied from there, so that every failure meets the same moment.
+One robot walks through all phases and is copied in each, so that every failure begins in the same state.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from simulation.mud.track import Track
 from tests.recorded_events import EventRecorder
 
 WALK = WalkOrder(0.03, adaptive=False)
-MOMENTS = ("holding", "raising", "insertion", "stance", "extraction", "swing", "stopping")
+STAGES = ("holding", "raising", "insertion", "stance", "extraction", "swing", "stopping")
 SHARED = {id(each): each for each in vars(codec).values() if isinstance(each, Message)}  # constants, by identity
 UP_RAD = 0.12
 Cause = Callable[[Lockstep], None]
@@ -62,8 +62,8 @@ def until_phase(robot: Lockstep, phase: Phase, and_for_s: float) -> None:
 
 
 @pytest.fixture(scope="module")
-def moments(configuration: Configuration) -> dict[str, Lockstep]:
-    """One robot in each of them."""
+def stages(configuration: Configuration) -> dict[str, Lockstep]:
+    """Return copies of one robot, one in each stage of a walk."""
     robot = make_robot(configuration)
     robot.run_for(2.0)
     found = {"idle": copy_of(robot)}
@@ -84,35 +84,35 @@ def moments(configuration: Configuration) -> dict[str, Lockstep]:
 
 
 @pytest.fixture
-def at(moments: dict[str, Lockstep]) -> Copied:
-    return lambda moment: copy_of(moments[moment])
+def at(stages: dict[str, Lockstep]) -> Copied:
+    return lambda stage: copy_of(stages[stage])
 
 
 # causes
 
 
-def mute(robot: Lockstep, place: int, *messages: Message) -> None:
+def mute(robot: Lockstep, index: int, *messages: Message) -> None:
     """A drive sends everything but these; without any it sends nothing."""
-    drive = robot.robot.drives[place]
+    drive = robot.robot.drives[index]
     everything, silent = drive.cyclic_frames, {message.command for message in messages}
     drive.cyclic_frames = lambda now_s: (  # type: ignore[method-assign]
         frame for frame in everything(now_s) if silent and frame.arbitration_id & 0x1F not in silent
     )
 
 
-def unmute(robot: Lockstep, place: int) -> None:
-    del robot.robot.drives[place].cyclic_frames
+def unmute(robot: Lockstep, index: int) -> None:
+    del robot.robot.drives[index].cyclic_frames
 
 
 def muted(*messages: Message) -> Cause:
     return lambda robot: mute(robot, 1, *messages)
 
 
-def altered(place: int = 1, /, **changes: float) -> Cause:
-    """What a drive measures, or tells of itself."""
+def altered(index: int = 1, /, **changes: float) -> Cause:
+    """Change what a drive measures."""
 
     def alter(robot: Lockstep) -> None:
-        drive = robot.robot.drives[place]
+        drive = robot.robot.drives[index]
         drive.parameters = replace(drive.parameters, **changes)  # type: ignore[arg-type]
 
     return alter
@@ -176,11 +176,11 @@ def ticks_until(robot: Lockstep, name: str, longest: int) -> int:
 
 @pytest.mark.parametrize("name", CAUSES)
 def test_every_cause_leads_to_its_reaction_within_its_bound(at: Copied, name: str) -> None:
-    for moment in ("holding", "stance", "stopping"):
-        robot, kind = at(moment), FAULT_KINDS[name]
+    for stage in ("holding", "stance", "stopping"):
+        robot, kind = at(stage), FAULT_KINDS[name]
         CAUSES[name](robot)
         ticks_until(robot, name, kind.bound_ticks)
-        assert mode_of(robot) in AFTER[kind.reaction], moment
+        assert mode_of(robot) in AFTER[kind.reaction], stage
         if kind.reaction is Reaction.DRIVES_IDLE:
             assert robot.loop.sent.torques_nm == NO_TORQUE
 
@@ -219,12 +219,10 @@ def test_a_lost_pose_is_a_fault_that_does_not_end_the_walk(at: Copied) -> None:
     assert mode_of(robot) is Mode.WALKING
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize("joint", [0, 3])
-def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(
-    at: Copied, moment: str, joint: int
-) -> None:
-    robot = at(moment)
+def test_a_drive_that_falls_silent_leads_to_damping_and_then_to_idle_drives(at: Copied, stage: str, joint: int) -> None:
+    robot = at(stage)
     mute(robot, joint)
     ticks: dict[Mode, int] = {}
     for tick in range(1, 20):
@@ -249,10 +247,10 @@ def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copie
     assert mode_of(robot) is Mode.FAULT
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_damping_never_speeds_a_joint_up(at: Copied, moment: str) -> None:
-    """From the third tick on, which the slew limit takes to let go of the torque before."""
-    robot = at(moment)
+@pytest.mark.parametrize("stage", STAGES)
+def test_damping_never_speeds_a_joint_up(at: Copied, stage: str) -> None:
+    """This begins with the third tick: the slew limit needs two to end the previous torque."""
+    robot = at(stage)
     mute(robot, 1, codec.GET_ENCODER_ESTIMATES)
     ticks = 0
     while mode_of(robot) is not Mode.FAULT:
@@ -284,9 +282,9 @@ def test_a_joint_whose_encoder_jumped_gets_no_torque_until_the_drives_are_idle(a
     assert any(each[2] for each in torques)  # the other joints are braked
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
-def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, moment: str) -> None:
-    robot = at(moment)
+@pytest.mark.parametrize("stage", STAGES)
+def test_after_a_soft_stop_the_flippers_are_up_and_the_drives_idle(at: Copied, stage: str) -> None:
+    robot = at(stage)
     altered(bus_voltage_v=17.0)(robot)
     ticks_until(robot, "voltage_under", FaultKind.VOLTAGE_UNDER.bound_ticks)
     assert robot.run_until(lambda: mode_of(robot) is Mode.FAULT, SOFT_STOP_S + 0.2)
@@ -384,7 +382,7 @@ def test_a_bug_stays_a_fault_until_a_restart(at: Copied) -> None:
 
 @pytest.fixture
 def unread(configuration: Configuration) -> Lockstep:
-    """A robot with a drive whose watchdog nobody could read."""
+    """A robot with a drive whose watchdog settings cannot be read."""
     robot = make_robot(configuration)
     drive = robot.robot.drives[2]
     assert isinstance(drive, SimulatedOdrive)
@@ -447,7 +445,7 @@ def test_mandatory_faults_are_never_overruled(at: Copied, name: str) -> None:
 
 
 def hold_by_a_fault(robot: Lockstep) -> None:
-    """The currents of one drive are lost for five ticks, more than it takes, less than what stops."""
+    """Lose the currents of one drive for five ticks: enough for a hold, too few for a stop."""
     mute(robot, 1, codec.GET_IQ)
     ticks_until(robot, "current_stale", FaultKind.CURRENT_STALE.bound_ticks)
     unmute(robot, 1)
@@ -506,7 +504,7 @@ def test_a_robot_without_requests_disarms_by_itself(configuration: Configuration
 
 
 def faults_reported(robot: Lockstep) -> list[str]:
-    """Since it was ready to be armed."""
+    """Return the faults since the robot was ready to arm."""
     texts = texts_of(robot)
     return [text for text in texts[texts.index("request arm") :] if text.startswith("fault ")]
 

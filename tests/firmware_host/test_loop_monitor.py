@@ -1,4 +1,4 @@
-"""The loop's own beat under made-up clocks: what is told of missed ticks, and that a good beat tells nothing."""
+"""The monitor of the loop's timing under synthetic clocks."""
 
 from collections.abc import Iterable
 
@@ -13,11 +13,11 @@ from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LoopMonitor
 from firmware_host.ticker import Tick, Ticker
 
 START_S = 5000.0
-DISTANCE_S = 1.7e9  # of the clock on the wall
+OFFSET_S = 1.7e9  # from the monotonic clock to the wall clock
 
 
 class Clock:
-    """Owns a made-up time in which a ticker sleeps."""
+    """Owns a synthetic time in which a ticker sleeps."""
 
     def __init__(self) -> None:
         self.now_s = START_S
@@ -29,14 +29,14 @@ class Clock:
         self.now_s += duration_s
 
 
-def watched(busy_s: Iterable[float]) -> list[list[Fault]]:
-    """What is told at each beat of the real ticker, after work of `busy_s` before each."""
+def run_monitor(busy_s: Iterable[float]) -> list[list[Fault]]:
+    """Return the faults of each tick, with work of `busy_s` before it."""
     clock = Clock()
-    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
+    ticker, monitor = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
     reported = []
     for each in busy_s:
         clock.now_s += each
-        reported.append(watch.update(ticker.wait(), DISTANCE_S))
+        reported.append(monitor.update(ticker.wait(), OFFSET_S))
     return reported
 
 
@@ -45,19 +45,19 @@ def names(reported: Iterable[Fault]) -> list[str]:
 
 
 def missing(ticks: int) -> float:
-    """Work for so long that as many deadlines are missed."""
+    """Return a duration of work that misses this number of ticks."""
     return (ticks + 1.5) * PERIOD_S
 
 
 def after_missing(ticks: int) -> list[list[str]]:
-    """At the beat after so many missed ones, in the middle of a good run, and at those that follow."""
-    reported = watched([0.001] * 200 + [missing(ticks)] + [0.001] * 250)
+    """Return the faults of the tick after this number of missed ones, and of the ticks that follow."""
+    reported = run_monitor([0.001] * 200 + [missing(ticks)] + [0.001] * 250)
     assert reported[:200] == [[]] * 200
     return [names(each) for each in reported[200:]]
 
 
 def test_regular_ticks_are_never_a_fault() -> None:
-    assert not any(watched([0.0, *[0.0025] * 1000]))
+    assert not any(run_monitor([0.0, *[0.0025] * 1000]))
 
 
 @pytest.mark.parametrize("ticks", [1, 2, 4])
@@ -86,9 +86,9 @@ def test_a_stall_is_forgotten_after_the_ticks_of_a_mean() -> None:
 
 @pytest.mark.parametrize(("fraction", "expected"), [(0.0, False), (0.09, False), (0.12, True), (1.0, True)])
 def test_a_mean_rate_that_is_too_low_is_a_lag(fraction: float, expected: bool) -> None:
-    watch = LoopMonitor(FaultBounds())
+    monitor = LoopMonitor(FaultBounds())
     reported = [
-        watch.update(Tick(START_S + tick * PERIOD_S * (1.0 + fraction), 0.0, tick, 0), DISTANCE_S)
+        monitor.update(Tick(START_S + tick * PERIOD_S * (1.0 + fraction), 0.0, tick, 0), OFFSET_S)
         for tick in range(300)
     ]
     assert not any(reported[:MEAN_TICKS])  # a mean of fewer says nothing
@@ -98,16 +98,16 @@ def test_a_mean_rate_that_is_too_low_is_a_lag(fraction: float, expected: bool) -
 def test_single_missed_ticks_make_a_lag_once_they_are_more_than_a_tenth() -> None:
     def lags(every: int) -> bool:
         busy_s = [missing(1) if tick % every == 0 else 0.001 for tick in range(1, 500)]
-        return "loop_lagging" in {name for each in watched(busy_s) for name in names(each)}
+        return "loop_lagging" in {name for each in run_monitor(busy_s) for name in names(each)}
 
     assert lags(8)
     assert not lags(12)
 
 
 def stepped(step_s: float) -> list[list[str]]:
-    watch = LoopMonitor(FaultBounds())
+    monitor = LoopMonitor(FaultBounds())
     return [
-        names(watch.update(Tick(START_S + tick * PERIOD_S, 0.0, tick, 0), DISTANCE_S + step_s * (tick >= 50)))
+        names(monitor.update(Tick(START_S + tick * PERIOD_S, 0.0, tick, 0), OFFSET_S + step_s * (tick >= 50)))
         for tick in range(100)
     ]
 
@@ -124,29 +124,29 @@ def test_a_small_step_of_the_wall_clock_is_no_fault(step_s: float) -> None:
 
 def test_a_drifting_wall_clock_is_no_fault() -> None:
     """500 ppm, the most that ntpd lets a clock slew by."""
-    watch = LoopMonitor(FaultBounds())
+    monitor = LoopMonitor(FaultBounds())
     for tick in range(20000):
         now_s = START_S + tick * PERIOD_S
-        assert not watch.update(Tick(now_s, 0.0, tick, 0), DISTANCE_S + 500e-6 * now_s)
+        assert not monitor.update(Tick(now_s, 0.0, tick, 0), OFFSET_S + 500e-6 * now_s)
 
 
 @given(st.lists(st.floats(0.0, 0.05), max_size=150))
 def test_every_missed_tick_is_reported(busy_s: list[float]) -> None:
     clock = Clock()
-    ticker, watch = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
+    ticker, monitor = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
     for each in busy_s:
         clock.now_s += each
         tick = ticker.wait()
-        reported = names(watch.update(tick, DISTANCE_S))
+        reported = names(monitor.update(tick, OFFSET_S))
         assert reported or not tick.missed
 
 
 def crawled(period_ticks: float, beats: int = 40) -> list[str]:
-    """All names told of a loop whose beats come every so many ticks."""
-    watch, found = LoopMonitor(FaultBounds()), []
+    """Return the names of all faults of a loop with this period."""
+    monitor, found = LoopMonitor(FaultBounds()), []
     for number in range(beats):
         now_s = START_S + number * period_ticks * PERIOD_S
-        found += names(watch.update(Tick(now_s, 0.0, number, 0), DISTANCE_S))
+        found += names(monitor.update(Tick(now_s, 0.0, number, 0), OFFSET_S))
     return found
 
 
@@ -157,11 +157,11 @@ def test_a_loop_below_a_third_of_its_rate_is_crawling() -> None:
 
 def test_a_crawling_loop_is_reported_within_its_bound() -> None:
     for period_ticks in (4.05, 7.0, 12.0):
-        watch = LoopMonitor(FaultBounds())
+        monitor = LoopMonitor(FaultBounds())
         passed = next(
             number * period_ticks
             for number in range(100)
             if "loop_crawling"
-            in names(watch.update(Tick(START_S + number * period_ticks * PERIOD_S, 0.0, number, 0), DISTANCE_S))
+            in names(monitor.update(Tick(START_S + number * period_ticks * PERIOD_S, 0.0, number, 0), OFFSET_S))
         )
         assert passed <= max(FaultKind.LOOP_CRAWLING.bound_ticks, CRAWL_TICKS * period_ticks)

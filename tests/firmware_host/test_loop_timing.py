@@ -1,4 +1,4 @@
-"""The loop's figures agree with numpy's on the same durations."""
+"""The timing statistics agree with numpy on the same durations."""
 
 from __future__ import annotations
 

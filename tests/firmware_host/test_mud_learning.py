@@ -1,4 +1,4 @@
-"""What the loop learns of strides that somebody else estimated: numbers, depths, and nonsense."""
+"""Learning from synthetic strides: their numbers, the chosen depths, and wild coefficients."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def stride(flipper: str = "left", index: int = 0, **changes: Any) -> StrideEstim
 
 
 @dataclass
-class MadeUpGait:
-    """As much of a gait as learning touches."""
+class FakeGait:
+    """The part of a gait that learning uses."""
 
     commanded_depth_m: float = 0.03
     next_depth_m: float = 0.03
@@ -43,9 +43,9 @@ class MadeUpGait:
 
 
 @dataclass
-class MadeUpController:
+class FakeController:
     order: WalkOrder
-    gait: MadeUpGait = field(default_factory=MadeUpGait)
+    gait: FakeGait = field(default_factory=FakeGait)
     target: GaitTarget = GaitTarget(Phase.INSERTION, 0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -56,13 +56,13 @@ def learning(configuration: Configuration) -> MudLearning:
     return made
 
 
-def step(learning: MudLearning, controller: MadeUpController) -> tuple[list[Any], list[str]]:
+def step(learning: MudLearning, controller: FakeController) -> tuple[list[Any], list[str]]:
     closed, messages = learning.step(controller)  # type: ignore[arg-type]
     return list(closed), messages
 
 
 def test_strides_of_both_flippers_are_numbered_through(learning: MudLearning) -> None:
-    controller = MadeUpController(WalkOrder(0.04, adaptive=False))
+    controller = FakeController(WalkOrder(0.04, adaptive=False))
     numbers = []
     for index in range(3):
         learning.reading = MudReading(strides=(stride("left", index), stride("right", index)))
@@ -73,20 +73,20 @@ def test_strides_of_both_flippers_are_numbered_through(learning: MudLearning) ->
 
 
 def test_a_fixed_depth_does_not_depend_on_the_mud(learning: MudLearning) -> None:
-    controller = MadeUpController(WalkOrder(0.045, adaptive=False))
+    controller = FakeController(WalkOrder(0.045, adaptive=False))
     learning.reading = MudReading(strides=(stride(k_p=Estimate(1e9, 1.0, 100, True)),))
     step(learning, controller)
     assert controller.gait.next_depth_m == 0.045
 
 
 def test_without_a_stride_nothing_is_learned(learning: MudLearning) -> None:
-    controller = MadeUpController(WalkOrder(0.03))
+    controller = FakeController(WalkOrder(0.03))
     assert step(learning, controller) == ([], [])
     assert learning.faults == []
 
 
 def test_only_the_latest_strides_are_stored_but_all_are_counted(learning: MudLearning) -> None:
-    controller = MadeUpController(WalkOrder(0.03, adaptive=False))
+    controller = FakeController(WalkOrder(0.03, adaptive=False))
     for index in range(STORED_STRIDES + 50):
         learning.reading = MudReading(strides=(stride("left", index),))
         step(learning, controller)
@@ -97,7 +97,7 @@ def test_only_the_latest_strides_are_stored_but_all_are_counted(learning: MudLea
 
 def test_a_new_walk_preserves_earlier_strides(learning: MudLearning) -> None:
     learning.reading = MudReading(strides=(stride(),))
-    step(learning, MadeUpController(WalkOrder(0.03, adaptive=False)))
+    step(learning, FakeController(WalkOrder(0.03, adaptive=False)))
     learning.reset(0.03)
     assert len(learning.strides) == learning.strides_closed == 1
 
@@ -106,9 +106,9 @@ def test_a_new_walk_preserves_earlier_strides(learning: MudLearning) -> None:
 
 
 def firm_ticks(learning: MudLearning, order: WalkOrder, phase: Phase, loads: list[bool]) -> list[bool]:
-    """In which ticks the gait was told to end its insertion."""
+    """Return in which ticks the gait was requested to end its insertion."""
     target = GaitTarget(phase, 0, 0.0, 0.0, 0.02, 0.1)
-    controller = MadeUpController(order, target=target)
+    controller = FakeController(order, target=target)
     limit_nm = learning.adaptation.largest_insertion_nm
     reported = []
     for firm in loads:
@@ -135,14 +135,14 @@ def test_only_adaptive_insertions_end_early(learning: MudLearning, adaptive: boo
 
 
 def test_the_early_end_of_an_insertion_is_logged_once(learning: MudLearning) -> None:
-    controller = MadeUpController(WalkOrder(0.03))
+    controller = FakeController(WalkOrder(0.03))
     load = NO_LOAD._replace(adduction_torque_nm=10.0)
     learning.reading = MudReading(left=load, right=load)
     reported = [message for _ in range(10) for message in step(learning, controller)[1]]
     assert reported == ["insertion ended at 0.0300 m: solid mud"]
 
 
-# nonsense
+# wild coefficients
 
 
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
@@ -176,8 +176,8 @@ def test_coefficients_within_bounds_or_invalid_are_no_fault(learning: MudLearnin
 def test_wild_coefficients_never_lead_to_a_depth_out_of_bounds(
     learning: MudLearning, configuration: Configuration
 ) -> None:
-    """What is known of the mud does not believe it; a depth is chosen all the same."""
-    controller = MadeUpController(WalkOrder(0.03))
+    """The estimate of the mud rejects them; a depth is still chosen."""
+    controller = FakeController(WalkOrder(0.03))
     estimator = learning.estimator
     for index, value in enumerate((nan, inf, -inf, 1e300, -1e300, 0.0)):
         wild = Estimate(value, abs(value), 100, True)

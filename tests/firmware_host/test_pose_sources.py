@@ -1,4 +1,4 @@
-"""Where the body's place comes from: as configured, as opened, and as a person is told of it."""
+"""The source of the body's pose: its configuration, opening, and report."""
 
 from __future__ import annotations
 
@@ -98,9 +98,7 @@ def test_the_pose_section_chooses_the_source(example_text: str, section: str, ch
         (ENCODER + "baud = 9600", "pose.rail_encoder.baud: there is no such key"),
     ],
 )
-def test_invalid_pose_sections_are_refused_with_key_and_value(
-    example_text: str, section: str, reported: str
-) -> None:
+def test_invalid_pose_sections_are_refused_with_key_and_value(example_text: str, section: str, reported: str) -> None:
     assert any(message.startswith(reported) for message in problems_of(example_text, section))
 
 
@@ -172,7 +170,7 @@ def test_the_daemon_exits_with_a_message_if_the_source_does_not_open(
     assert main(["--config", str(path)]) == EXIT_CONFIGURATION
 
 
-class MadeUpSource:
+class LostSource:
     """A source that was lost, and can be opened again once."""
 
     def __init__(self) -> None:
@@ -206,7 +204,7 @@ def pose_line(robot: Lockstep) -> dict[str, Any]:
 
 
 def test_check_reports_trouble_of_the_pose_source_without_blocking_arming(robot: Lockstep) -> None:
-    source = robot.loop.pose = MadeUpSource()
+    source = robot.loop.pose = LostSource()
     line = pose_line(robot)
     assert line["ok"] and line["text"] == "camera: 12 poses, 3 malformed messages, 4 without the body"
     source.reported = source.reported._replace(trouble="it is dark.", what_to_do="switch on the light")
@@ -215,7 +213,7 @@ def test_check_reports_trouble_of_the_pose_source_without_blocking_arming(robot:
 
 
 def test_a_source_is_opened_again_only_while_the_torque_is_off(robot: Lockstep) -> None:
-    source = MadeUpSource()
+    source = LostSource()
     robot.arm()
     reopen_pose(robot.loop, source, robot.now_s)
     assert source.gone

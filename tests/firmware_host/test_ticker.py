@@ -1,4 +1,4 @@
-"""The beat keeps its grid whatever the ticks do, on a clock made for it."""
+"""The ticker keeps its absolute deadlines, shown on a synthetic clock."""
 
 from __future__ import annotations
 

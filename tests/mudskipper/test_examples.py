@@ -14,7 +14,7 @@ from control.records import Phase
 from firmware_host.log.log_file import LogFile
 from firmware_host.log_reading.log_reader import read_log
 from firmware_host.log_reading.replay import replay_file
-from tests.firmware_host.made_up_rows import OPENING
+from tests.firmware_host.synthetic_rows import OPENING
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 

@@ -16,7 +16,7 @@ from command_line.screen import size_text
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
 from firmware_host.log_reading.log_reader import read_log
-from tests.firmware_host.made_up_rows import OPENING, make_ticks
+from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.folders import EXAMPLE_CONFIGURATION
 
 

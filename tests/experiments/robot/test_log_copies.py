@@ -22,7 +22,7 @@ from firmware_host.log_reading.log_reader import read_log, read_logs
 from firmware_host.log_reading.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
-from tests.firmware_host.made_up_rows import OPENING, make_ticks
+from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.recorded_walks import walk_and_hold
 
 SEGMENT_TICKS = 380

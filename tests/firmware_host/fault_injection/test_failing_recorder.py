@@ -1,4 +1,4 @@
-"""A log that fails on purpose: what it refuses is counted, and told of in the log."""
+"""A log that fails on purpose counts the refused rows and reports their number."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from firmware_host.log.rows import EVENT, EVENT_KIND
 
 
 class KeepingRecorder(NullRecorder):
-    """Keeps the texts of events, and lost two rows of its own."""
+    """Stores the texts of events, and has lost two rows by itself."""
 
     def __init__(self) -> None:
         self.dropped = 2

@@ -1,4 +1,4 @@
-"""A beat that stalls and a clock that steps, with a clock that the test turns."""
+"""A ticker that stalls and a wall clock that steps, on a synthetic clock."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from firmware_host.fault_injection.failing_time import (
 from firmware_host.ticker import Tick, Ticker
 
 
-class TurnedClock:
+class SyntheticClock:
     def __init__(self) -> None:
         self.now_s = 100.0
 
@@ -31,7 +31,7 @@ class TurnedClock:
 
 class Bench:
     def __init__(self) -> None:
-        self.clock, self.failures = TurnedClock(), Failures(())
+        self.clock, self.failures = SyntheticClock(), Failures(())
         self.reported: list[tuple[float, str]] = []
         ticker = Ticker(PERIOD_S, self.clock.read, self.clock.sleep)
         report = lambda now_s, text: self.reported.append((now_s, text))  # noqa: E731
@@ -83,7 +83,7 @@ def test_the_end_of_a_failure_is_reported_in_its_tick(bench: Bench) -> None:
 
 
 def test_a_stuck_clock_continues_afterwards() -> None:
-    wall, failures = TurnedClock(), Failures(())
+    wall, failures = SyntheticClock(), Failures(())
     clock = FailingClock(wall.read, failures)
     assert clock() == 100.0
     failures.begin("clock", "stuck", 0.0, 1.0)
@@ -96,7 +96,7 @@ def test_a_stuck_clock_continues_afterwards() -> None:
 
 
 def test_a_clock_steps_by_an_hour_and_back() -> None:
-    wall, failures = TurnedClock(), Failures(())
+    wall, failures = SyntheticClock(), Failures(())
     clock = FailingClock(wall.read, failures)
     failures.begin("clock", "garbage", 0.0, 1.0)
     assert clock() == 100.0 + CLOCK_STEP_S
@@ -105,6 +105,6 @@ def test_a_clock_steps_by_an_hour_and_back() -> None:
 
 
 def test_time_that_may_not_fail_is_not_wrapped() -> None:
-    ticker, clock = Ticker(), TurnedClock().read
+    ticker, clock = Ticker(), SyntheticClock().read
     assert failing_ticker(ticker, None, lambda now_s, text: None) is ticker
     assert failing_clock(clock, None) is clock

@@ -1,4 +1,4 @@
-"""What a person can ask of the failures, and what stands in log and status of them."""
+"""The methods that inject failures, and their traces in log and status."""
 
 from __future__ import annotations
 

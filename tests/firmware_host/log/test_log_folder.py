@@ -27,7 +27,7 @@ from firmware_host.log.log_folder import (
     stored_files,
     unfinished_files,
 )
-from tests.firmware_host.made_up_rows import OPENING
+from tests.firmware_host.synthetic_rows import OPENING
 
 
 def make_files(folder: Path, place: str, *names: str) -> list[Path]:

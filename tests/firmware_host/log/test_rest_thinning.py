@@ -5,7 +5,7 @@ from __future__ import annotations
 from control.modes import Mode
 from firmware_host.log.rest_thinning import RestThinning
 from firmware_host.log.rows import TICK
-from tests.firmware_host.made_up_rows import make_event, make_ticks
+from tests.firmware_host.synthetic_rows import make_event, make_ticks
 
 REST_HZ, FULL_S = 10.0, 1.0  # every 38th tick; 380 in full
 

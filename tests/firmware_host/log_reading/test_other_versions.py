@@ -15,7 +15,7 @@ from firmware_host.log.rows import EVENT, ROW_KINDS, STRIDE, TICK
 from firmware_host.log.schema import RowKind, read_definition
 from firmware_host.log_reading.log_reader import Log, log_summary, read_log, read_logs
 from firmware_host.log_reading.recovery import recover_log
-from tests.firmware_host.made_up_rows import OPENING, encode_row
+from tests.firmware_host.synthetic_rows import OPENING, encode_row
 from tests.folders import ROOT
 
 OLD_LOG = ROOT / "tests/fixtures/walk_0_1.mcap"

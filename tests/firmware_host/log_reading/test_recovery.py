@@ -20,7 +20,7 @@ from firmware_host.log.rows import TICK
 from firmware_host.log_reading import salvage as log_salvage
 from firmware_host.log_reading.log_reader import LogError, read_log
 from firmware_host.log_reading.recovery import recover_all, recover_log
-from tests.firmware_host.made_up_rows import OPENING, make_event, make_ticks
+from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.waiting import LONGEST_S
 
 CHUNK = 100  # ticks

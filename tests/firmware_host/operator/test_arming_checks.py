@@ -1,4 +1,4 @@
-"""The list of `mudskipper check`: every fault that stands against arming is a line of it, and none that does not."""
+"""The list of `mudskipper check` fails in exactly the lines whose faults block arming."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ SUBJECTS = {"drive": "left_sweep", "watchdog": "left_sweep", "joint": "left_swee
 
 @pytest.fixture(scope="module")
 def ready(configuration: Configuration) -> Lockstep:
-    """A robot with nothing against it. Tests give it faults and take them away."""
+    """A robot that may be armed; tests add faults and remove them."""
     robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
     robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.present, 3.0)
     return robot
 
 
 def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> dict[str, dict[str, Any]]:
-    """With these faults alone."""
+    """Return the lines of a robot with only these faults."""
     faults = [FAULT_KINDS[name].fault(SUBJECTS.get(FAULT_KINDS[name].part, "")) for name in names]
     robot.loop.faults.reset()
     robot.loop.faults.update(faults, False)

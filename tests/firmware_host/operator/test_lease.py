@@ -1,4 +1,4 @@
-"""A lease is lost by silence or by hanging up, and stays lost until somebody ends that."""
+"""A lease is lost by silence or disconnection, and stays lost until it is released or reset."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whoever asks is named in the log; under a lease only its holder moves the robot, and everybody stops it."""
+"""The methods of the socket: the log names each sender, and the lease decides who may move the robot."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BEN = Caller(2, Peer(78, 1001, frozenset({71})), Level.DRIVE)
 
 
 class Robot:
-    """A simulated one, with its calls."""
+    """A simulated robot with the methods of its socket."""
 
     def __init__(self, configuration: Configuration) -> None:
         self.events = EventRecorder()
@@ -174,9 +174,7 @@ def test_every_user_stops_the_robot_despite_a_lease(armed: Robot, method: str, m
 
 
 @pytest.mark.parametrize(("method", "params"), [*MOTIONS, ("walk", {"lease_s": 0.5})])
-def test_a_take_over_ends_the_lease_of_the_previous_holder(
-    armed: Robot, method: str, params: dict[str, Any]
-) -> None:
+def test_a_take_over_ends_the_lease_of_the_previous_holder(armed: Robot, method: str, params: dict[str, Any]) -> None:
     armed.ask("lease", for_s=0.5)
     assert armed.ask(method, BEN, take_over=True, **params) == "accepted"
     assert armed.events.about("lease of") == ["lease of uid 1000 (process 77) taken over by uid 1001 (process 78)"]

@@ -1,4 +1,4 @@
-"""Who may do what follows from what the kernel says of a process, and from groups looked up at the start."""
+"""Rights follow from the credentials that the kernel gives, and from groups looked up at the start."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A socket's file appears with its permissions, goes with its daemon, and replaces nothing that lives."""
+"""A socket's file has its permissions from the start, is removed by its daemon, and replaces no live socket."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The client gives each answer to its own request, and tells a closed door from an absent daemon."""
+"""The client matches answers to requests, and distinguishes a closed connection from an absent daemon."""
 
 from __future__ import annotations
 

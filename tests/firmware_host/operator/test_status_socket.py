@@ -1,4 +1,4 @@
-"""The status socket answers what it understands, tells others off, and never holds the loop."""
+"""The status socket answers valid requests, rejects others, and never blocks the loop."""
 
 from __future__ import annotations
 
@@ -123,9 +123,9 @@ def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
 VALID = [msgpack.packb([0, number, "echo", {"a": number}]) for number in range(4)]
 ODD = st.one_of(
     st.binary(max_size=200),
-    st.builds(lambda data, place: data[: place % len(data)], st.sampled_from(VALID), st.integers(0, 99)),
+    st.builds(lambda data, index: data[: index % len(data)], st.sampled_from(VALID), st.integers(0, 99)),
     st.builds(
-        lambda data, place, byte: data[: place % len(data)] + bytes([byte]) + data[place % len(data) + 1 :],
+        lambda data, index, byte: data[: index % len(data)] + bytes([byte]) + data[index % len(data) + 1 :],
         st.sampled_from(VALID),
         st.integers(0, 99),
         st.integers(0, 255),
@@ -135,9 +135,7 @@ ODD = st.one_of(
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(ODD, max_size=4), st.integers(0, 4), st.integers(0, 200))
-def test_valid_requests_are_answered_before_any_garbage(
-    served: Served, odd: list[bytes], valid: int, cut: int
-) -> None:
+def test_valid_requests_are_answered_before_any_garbage(served: Served, odd: list[bytes], valid: int, cut: int) -> None:
     client, reference = connect(served), connect(served)
     data = b"".join(VALID[:valid] + odd)
     answers = ask(served, client, data[:cut]) if cut else []

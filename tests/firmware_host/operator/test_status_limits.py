@@ -1,4 +1,4 @@
-"""Nobody takes the status socket from the others: not by speed, slowness, number, size, or odd requests."""
+"""No client excludes others from the status socket by speed, slowness, or number."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from firmware_host.operator.status_socket import MOST_CLIENTS
 from tests.firmware_host.served_socket import (
     METHODS,
     OPERATOR,
+    OTHER_USER,
     READER,
     RIGHTS,
-    STRANGER,
     Served,
     ask,
     connect,
@@ -32,8 +32,8 @@ ECHO = msgpack.packb([0, 1, "echo", {}])
 STOP = msgpack.packb([0, 2, "stop", {}])
 
 
-def allow_everybody(served: Served, monkeypatch: pytest.MonkeyPatch) -> list[Caller]:
-    """To echo as to stop. Returns who stopped the robot."""
+def allow_every_user(served: Served, monkeypatch: pytest.MonkeyPatch) -> list[Caller]:
+    """Permit `echo` to every user; returns the list of callers that stopped the robot."""
     stopped: list[Caller] = []
     monkeypatch.setitem(SOCKET_METHODS, "echo", SOCKET_METHODS["stop"])
     served.methods = METHODS | {"stop": lambda params, caller: stopped.append(caller)}
@@ -41,7 +41,7 @@ def allow_everybody(served: Served, monkeypatch: pytest.MonkeyPatch) -> list[Cal
 
 
 def flood(clients: list[socket.socket], data: bytes) -> None:
-    """As much as each can send; the answers are thrown away."""
+    """Send as much as each client can; the answers are discarded."""
     for client in clients:
         client.setblocking(False)
         with contextlib.suppress(OSError):
@@ -56,8 +56,8 @@ def flood(clients: list[socket.socket], data: bytes) -> None:
 def test_a_stop_among_flooding_clients_is_served_within_one_turn(
     served: Served, monkeypatch: pytest.MonkeyPatch, data: bytes
 ) -> None:
-    stopped = allow_everybody(served, monkeypatch)
-    flooding = [connect(served, STRANGER) for _ in range(MOST_CLIENTS - 1)]
+    stopped = allow_every_user(served, monkeypatch)
+    flooding = [connect(served, OTHER_USER) for _ in range(MOST_CLIENTS - 1)]
     serve(served, MOST_CLIENTS)
     longest = 0
     for _ in range(20):
@@ -143,7 +143,7 @@ def test_a_request_in_two_parts_is_answered_if_the_second_is_in_time(served: Ser
 @pytest.mark.parametrize(
     ("peer", "allowed"),
     [
-        (STRANGER, {"hello", "stop", "disarm"}),
+        (OTHER_USER, {"hello", "stop", "disarm"}),
         (READER, {"hello", "stop", "disarm", "status", "strides", "map", "check"}),
         (OPERATOR, None),
         (Peer(1, 0, frozenset({0})), None),
@@ -162,7 +162,7 @@ def test_each_level_permits_its_methods(served: Served, peer: Peer, allowed: set
 
 def test_a_refusal_says_which_group_to_join(served: Served) -> None:
     served.methods = METHODS | {"status": METHODS["echo"]}
-    client = connect(served, STRANGER)
+    client = connect(served, OTHER_USER)
     ((_, _, reading, _),) = ask(served, client, msgpack.packb([0, 1, "status", {}]))
     ((_, _, driving, _),) = ask(served, client, ECHO)
     assert reading.startswith(NOT_PERMITTED) and "'adduser YOU viewers'" in reading
@@ -170,11 +170,11 @@ def test_a_refusal_says_which_group_to_join(served: Served) -> None:
 
 
 def test_one_user_s_connections_do_not_exclude_other_users(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    stopped = allow_everybody(served, monkeypatch)
+    stopped = allow_every_user(served, monkeypatch)
     operator, reader = connect(served, OPERATOR), connect(served, READER)
-    strangers = []
+    others = []
     for _ in range(4 * MOST_CLIENTS):
-        strangers.append(connect(served, STRANGER))
+        others.append(connect(served, OTHER_USER))
         served.tick()
     assert is_open(operator) and is_open(reader)  # although they were still for longest
     late = connect(served, Peer(9, 1009, frozenset()))
@@ -193,12 +193,12 @@ def test_among_users_with_equal_connections_the_newcomer_s_user_loses_one(served
     late = connect(served, OPERATOR)
     serve(served, 2)
     assert all(map(is_open, others)) and [is_open(client) for client in own] == [False] + [True] * (len(own) - 1)
-    assert is_open(late) and [caller.connection for caller in gone] == [1 + len(others)]  # told of, as any that ends
+    assert is_open(late) and [caller.connection for caller in gone] == [1 + len(others)]  # reported like any other end
 
 
 def test_among_single_connections_the_least_privileged_is_dropped(served: Served) -> None:
     operator = connect(served, OPERATOR)
-    others = [connect(served, Peer(9, 2000 + place, frozenset())) for place in range(MOST_CLIENTS - 1)]
+    others = [connect(served, Peer(9, 2000 + index, frozenset())) for index in range(MOST_CLIENTS - 1)]
     serve(served, MOST_CLIENTS)
     connect(served, Peer(9, 3000, frozenset()))
     serve(served, 2)
@@ -208,10 +208,10 @@ def test_among_single_connections_the_least_privileged_is_dropped(served: Served
 
 def test_a_user_without_rights_is_refused_with_a_message(short_folder: Path) -> None:
     strict = Served(short_folder / "strict", RIGHTS._replace(anyone_may_stop=False))
-    stranger, reader, operator = (connect(strict, peer) for peer in (STRANGER, READER, OPERATOR))
+    other_user, reader, operator = (connect(strict, peer) for peer in (OTHER_USER, READER, OPERATOR))
     serve(strict)
-    ((_, number, refused, result),) = unpacked(stranger.recv(65536))
-    assert (number, result) == (None, None) and not is_open(stranger)
+    ((_, number, refused, result),) = unpacked(other_user.recv(65536))
+    assert (number, result) == (None, None) and not is_open(other_user)
     assert refused.startswith(f"{NOT_PERMITTED}this robot is for members of the group viewers. Have root run")
     assert is_open(reader) and is_open(operator)
     assert (strict.counters["clients"], strict.counters["not_permitted"]) == (2, 1)

@@ -1,4 +1,4 @@
-"""What is no request, or asks with something that no method takes, is refused in a sentence and costs nothing."""
+"""Malformed requests and parameters are refused with a message, within bounded memory."""
 
 from __future__ import annotations
 
@@ -109,8 +109,8 @@ def test_headers_that_announce_long_data_take_no_memory(served: Served, header: 
 
 
 def tree(depth: int) -> Any:
-    """Of params within params, each short."""
-    return {str(place): tree(depth - 1) for place in range(MOST_PARAMS)} if depth else "x" * 20
+    """Return nested params, each of them short."""
+    return {str(index): tree(depth - 1) for index in range(MOST_PARAMS)} if depth else "x" * 20
 
 
 @pytest.mark.parametrize("depth", [2, 3])
