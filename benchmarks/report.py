@@ -1,4 +1,4 @@
-"""The frame of every benchmark: it parses the arguments, measures, and prints one JSON object or a table and a verdict.
+"""Runs every benchmark: it parses the arguments, measures, and prints one JSON object, or tables and a verdict.
 
 A benchmark of figures does not judge them: it ends with status 0, and its verdict says whether its bar was reached. A
 benchmark that looks for defects ends with status 1 where its bar is missed. One line on a terminal shows the progress.
@@ -9,10 +9,12 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+
+from experiments.reports.text_tables import table
 
 FAST_FOLDER = Path("/dev/shm")  # spares the disk
 
@@ -31,7 +33,6 @@ def run_benchmark(
     parser: argparse.ArgumentParser,
     arguments: Sequence[str] | None,
     measure: Callable[[argparse.Namespace, Path], dict[str, Any]],
-    text_of: Callable[[dict[str, Any]], str],
     finds_defects: bool = False,
 ) -> int:
     """Runs `measure` with the options and an empty folder, prints its report, and returns the exit status."""
@@ -39,8 +40,40 @@ def run_benchmark(
     with TemporaryDirectory(prefix="mud-", dir=FAST_FOLDER if FAST_FOLDER.is_dir() else None) as folder:
         report = {"benchmark": parser.prog.split(".")[-1]} | measure(options, Path(folder))
     Progress(1.0).clear()
-    print(json.dumps(report) if options.json else f"{text_of(report)}\n{report['verdict']}")
+    print(json.dumps(report) if options.json else "\n".join([*report_lines(report), report["verdict"]]))
     return 1 if finds_defects and not report["reached"] else 0
+
+
+def report_lines(report: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yields the figures of a report: records with equal keys as one table, any other value on a line of its own."""
+    for name, value in report.items():
+        rows = record_rows(value)
+        if rows:
+            yield f"{prefix}{name}:\n{table(rows)}\n"
+        elif isinstance(value, dict) and any(isinstance(inner, dict | list) for inner in value.values()):
+            yield from report_lines(value, f"{prefix}{name} ")
+        elif name != "verdict":
+            yield f"{prefix}{name}: {cell_text(value)}"
+
+
+def record_rows(records: Any) -> list[list[str]]:
+    """Returns the rows of a table, head first; none where the value is not a collection of records with equal keys."""
+    named = records if isinstance(records, dict) else dict(enumerate(records if isinstance(records, list) else [], 1))
+    values = list(named.values())
+    if not values or not all(isinstance(value, dict) and value.keys() == values[0].keys() for value in values):
+        return []
+    if any(isinstance(inner, dict) for value in values for inner in value.values()):
+        return []
+    return [["", *values[0]], *([str(name), *map(cell_text, value.values())] for name, value in named.items())]
+
+
+def cell_text(value: Any) -> str:
+    """Writes a value on one line."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {cell_text(inner)}" for name, inner in value.items()) or "none"
+    if isinstance(value, list):
+        return "; ".join(map(cell_text, value)) or "none"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def evaluated(report: dict[str, Any], bar: str, reached: bool) -> dict[str, Any]:

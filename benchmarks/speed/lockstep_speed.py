@@ -18,7 +18,6 @@ from typing import Any
 from benchmarks.example_robot import load_example
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from control.controller import WalkOrder
-from experiments.reports.text_tables import table
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 
@@ -41,21 +40,6 @@ def walk_once(longest_s: float) -> dict[str, Any]:
     }
 
 
-def text_of(report: dict[str, Any]) -> str:
-    head = ["round", "simulated s", "elapsed s", "times real time", "end of track"]
-    rows = [
-        [
-            str(number),
-            f"{walk['simulated_s']:.1f}",
-            f"{walk['elapsed_s']:.2f}",
-            f"{walk['times']:.1f}",
-            "reached" if walk["arrived"] else "not reached",
-        ]
-        for number, walk in enumerate(report["rounds"], 1)
-    ]
-    return "\n".join([table([head, *rows]), "", f"median {report['median_times']:.1f} times"])
-
-
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     progress, rounds = Progress(options.rounds), []
     for number in range(options.rounds):
@@ -70,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.speed.lockstep_speed", __doc__)
     parser.add_argument("--rounds", type=int, default=5, help="walks, of which the median counts")
     parser.add_argument("--longest", type=float, default=300.0, metavar="SECONDS", help="simulated, of one walk")
-    return run_benchmark(parser, arguments, measure, text_of)
+    return run_benchmark(parser, arguments, measure)
 
 
 if __name__ == "__main__":

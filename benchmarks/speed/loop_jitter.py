@@ -19,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
@@ -28,9 +27,8 @@ from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PosePort
-from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
-from firmware_host.computer.realtime import SWITCH_INTERVAL_S, prepare_loop
+from firmware_host.computer.realtime import prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
@@ -49,7 +47,6 @@ TURN_S = 5.0
 SETTLING_S = 2.0  # of walking, until the first stride has begun
 LONGEST_STEP_S = 15.0  # for the robot's process to start, or for a mode to come about
 TIMER_ABSTIME = 1
-PYTHON_SWITCH_INTERVAL_S = 0.005  # Python's own
 FRACTIONS = {"p50": 0.50, "p99": 0.99, "p99.9": 0.999}
 
 
@@ -172,35 +169,6 @@ def simulated_robot(configuration_path: Path) -> Iterator[None]:
         robot.wait()
 
 
-@contextmanager
-def busy_thread() -> Iterator[None]:
-    """Python code that never ends."""
-    ended = Event()
-
-    def count() -> None:
-        number = 0
-        while not ended.is_set():
-            number += 1
-
-    thread = Thread(target=count)
-    thread.start()
-    yield
-    ended.set()
-    thread.join()
-
-
-def measure_gil(seconds: float) -> dict[str, Any]:
-    """Measures the bare loop next to a second thread, at Python's switch interval and at ours."""
-    report: dict[str, Any] = {}
-    for name, interval_s in (("5 ms", PYTHON_SWITCH_INTERVAL_S), ("0.1 ms", SWITCH_INTERVAL_S)):
-        sys.setswitchinterval(interval_s)
-        punctuality = Punctuality()
-        with busy_thread():
-            BareLoop().run(seconds, punctuality)
-        report[name] = punctuality.report()
-    return report
-
-
 def measure(seconds: float) -> dict[str, Any]:
     real, bare, turn_s = Punctuality(), Punctuality(), min(TURN_S, seconds)
     rounds = max(1, round(seconds / turn_s))
@@ -230,33 +198,8 @@ def ratios(real: dict[str, Any], bare: dict[str, Any]) -> dict[str, float]:
     }
 
 
-def text_of(report: dict[str, Any]) -> str:
-    rows = [["late by us", "p50", "p99", "p99.9", "max", "ticks", "missed"]]
-    rows += [_row("the daemon's loop", report["loop"]), _row("bare clock_nanosleep", report["bare"])]
-    rows += [_row(f"  and a busy thread, {name}", turn) for name, turn in report.get("gil", {}).items()]
-    work, over = report["loop"]["work_us"], report["ratios"]
-    return "\n".join(
-        [
-            table(rows),
-            "",
-            f"loop over bare: {over['p50']:.2f} at the median, {over['p99']:.2f} at p99",
-            f"a tick's work after a sleep: p50 {work['p50']:.0f}, p99 {work['p99']:.0f}, max {work['max']:.0f} us",
-            f"{report['faults']} turns ended in a fault; {report['dropped_rows']} rows dropped",
-            *(f"warning: {warning}" for warning in report["warnings"]),
-        ]
-    )
-
-
-def _row(name: str, figures: dict[str, Any]) -> list[str]:
-    late = figures["late_us"]
-    return [name, *(f"{late[key]:.0f}" for key in (*FRACTIONS, "max")), str(figures["ticks"]), str(figures["missed"])]
-
-
 def measure_all(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    report: dict[str, Any] = {"seconds": options.seconds, "bar_ratio": BAR_RATIO}
-    if options.show_gil:
-        report["gil"] = measure_gil(min(TURN_S, options.seconds))
-    report |= measure(options.seconds)
+    report: dict[str, Any] = {"seconds": options.seconds, "bar_ratio": BAR_RATIO} | measure(options.seconds)
     report["ratios"] = ratios(report["loop"], report["bare"])
     bar = f"median lateness at most {BAR_RATIO:g} times the bare loop's"
     return evaluated(report, bar, report["ratios"]["p50"] <= BAR_RATIO)
@@ -265,8 +208,7 @@ def measure_all(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.speed.loop_jitter", __doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help=f"of each loop, in turns of {TURN_S:g} s")
-    parser.add_argument("--show-gil", action="store_true", help="also the bare loop next to a second, busy thread")
-    return run_benchmark(parser, arguments, measure_all, text_of)
+    return run_benchmark(parser, arguments, measure_all)
 
 
 if __name__ == "__main__":

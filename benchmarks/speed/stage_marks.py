@@ -1,6 +1,6 @@
-"""Where a tick's time goes: the clock is read whenever a tick enters a stage, which lasts until the next one begins.
+"""Measures the stages of a tick: the clock is read whenever a tick enters a stage, which lasts until the next begins.
 
-The loop's own methods are wrapped while the marks are attached, so the loop knows nothing of it. What marking costs is
+The loop's own methods are wrapped while the marks are attached, so the loop knows nothing of it. The cost of marking is
 measured, to be taken off.
 """
 
@@ -15,18 +15,17 @@ from typing import Any
 from firmware_host.loop import Loop
 
 CALIBRATION_CALLS = 20000
-MEANINGS = {
-    "read": "drain the buses, decode",
-    "pose": "simulated here",
-    "estimate": "both flippers",
-    "adapt": "no stride closes",
-    "mode": "examine, request, next mode",
-    "controller": "gait, inverse kinematics, PD",
-    "limits": "",
-    "command": "encode and send four torques",
-    "record": "row packing and the pipe",
-}
-STAGES = tuple(MEANINGS)  # in their order
+STAGES = (  # in their order
+    "read",  # drain the buses, decode
+    "pose",  # simulated here
+    "estimate",  # both flippers
+    "adapt",  # no stride closes
+    "mode",  # examine, request, next mode
+    "controller",  # gait, inverse kinematics, PD
+    "limits",
+    "command",  # encode and send four torques
+    "record",  # row packing and the pipe
+)
 
 
 class StageMarks:
@@ -65,7 +64,7 @@ class StageMarks:
 
 
 def marking_cost_s(marks: StageMarks) -> float:
-    """What one mark adds to the stage that it begins and to the one that it ends."""
+    """Returns the time that one mark adds to the stage that it begins and to the one that it ends."""
 
     def nothing(argument: object) -> None:
         return None

@@ -6,7 +6,7 @@ gravity, inertia and noise, so surface, stance and extraction are found as on a 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from random import Random
 from typing import NamedTuple
 
@@ -103,11 +103,3 @@ def later(samples: Iterable[Sample], seconds: float) -> list[Sample]:
 
 def _later(joint: DriveState, seconds: float) -> DriveState:
     return joint._replace(angle_stamp_s=joint.angle_stamp_s + seconds, current_stamp_s=joint.current_stamp_s + seconds)
-
-
-def held(samples: Sequence[Sample], ticks: int) -> list[Sample]:
-    """As seen where a message lasts that many ticks."""
-    return [
-        samples[tick - tick % ticks]._replace(now_s=sample.now_s, phase=sample.phase)
-        for tick, sample in enumerate(samples)
-    ]

@@ -19,7 +19,7 @@ from drivers.can.can_port import CanPort
 from drivers.drive_types import make_drives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.recorder import NullRecorder, Recording
+from firmware_host.log.recorder import Recording
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
@@ -68,7 +68,6 @@ class Samples:
         self.whole_closing: list[float] = []  # of those, the ones that close a stride
         self.stages: dict[str, list[float]] = {stage: [] for stage in STAGES}
         self.adapt_closing: list[float] = []
-        self.record_unrecorded: list[float] = []
 
 
 class TimedWalk:
@@ -92,7 +91,7 @@ class TimedWalk:
         self.samples = Samples()
 
     def warm_up(self) -> None:
-        """Walk for a while; the second half of it counts the frames."""
+        """Walks for a while; the second half of it counts the frames."""
         self.walk.arm()
         self.walk.walk(WalkOrder(self.walk.loop.configuration.adaptation.initial_depth_m))
         self.walk.run_for(WARM_UP_S / 2.0)
@@ -102,7 +101,7 @@ class TimedWalk:
         freeze_garbage()
 
     def run_blocks(self) -> None:
-        """One block of each kind."""
+        """Runs one block of each kind."""
         for _ in range(BLOCK_TICKS):
             duration_s, closing = self._tick()
             self.samples.whole.append(duration_s)
@@ -110,17 +109,12 @@ class TimedWalk:
                 self.samples.whole_closing.append(duration_s)
         with self.marks.attached():
             for _ in range(BLOCK_TICKS):
-                self._keep_stages(*self._marked_tick())
-            self.walk.loop.recorder = NullRecorder()
-            for _ in range(BLOCK_TICKS):
-                stages, _ = self._marked_tick()
-                self.samples.record_unrecorded.append(stages["record"])
-        self.walk.loop.recorder = self.recorder
+                self._add_stages(*self._marked_tick())
         if self.walk.loop.mode is not Mode.WALKING:
             raise RuntimeError(f"the robot does not walk any more: {self.walk.loop.fault}")
 
     def _tick(self) -> tuple[float, bool]:
-        """Duration of one whole tick, and whether it closed a stride."""
+        """Returns the duration of one whole tick, and whether it closed a stride."""
         walk = self.walk
         walk.tick_number += 1
         walk.robot.advance(walk.now_s)
@@ -137,7 +131,7 @@ class TimedWalk:
         durations_s = (max(0.0, end_s - start_s - self.marking_s) for start_s, end_s in pairwise(moments_s))
         return dict(zip(STAGES, durations_s, strict=True)), closing
 
-    def _keep_stages(self, stages: dict[str, float], closing: bool) -> None:
+    def _add_stages(self, stages: dict[str, float], closing: bool) -> None:
         for stage, duration_s in stages.items():
             if closing and stage == "adapt":
                 self.samples.adapt_closing.append(duration_s)
@@ -151,7 +145,6 @@ class TimedWalk:
             "whole_closing_us": summary_us(samples.whole_closing) | {"ticks": len(samples.whole_closing)},
             "stages_us": {stage: summary_us(durations_s) for stage, durations_s in samples.stages.items()},
             "adapt_closing_us": summary_us(samples.adapt_closing) | {"ticks": len(samples.adapt_closing)},
-            "record_unrecorded_us": summary_us(samples.record_unrecorded),
             "marking_us": round(1e6 * self.marking_s, 3),
             "frames_received": round(self.traffic.received / ticks, 2),
             "frames_sent": round(self.traffic.sent / ticks, 2),

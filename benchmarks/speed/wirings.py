@@ -1,15 +1,58 @@
-"""The five kinds of buses between the simulated robot and the loop, each with its two ends."""
+"""Makes the five kinds of buses between the simulated robot and the loop, each with its two ends.
+
+SocketCAN is python-can's SocketcanBus on one end of a datagram pair, so no CAN is needed; a frame's path through the
+kernel's CAN code and the driver is in no figure. The options of a CAN_RAW socket, such as filters, have no effect.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import socket
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from unittest.mock import patch
 
-from benchmarks.speed.can_paths import Kind, open_bus, open_pair
+import can
+from can.interfaces.socketcan import SocketcanBus, constants, socketcan
+
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.mock_bus import MockBus
 from drivers.can.socketcan_port import SocketcanPort
+
+
+class CanSocket(socket.socket):
+    """Stands in for a CAN_RAW socket: accepts its options and stores them."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.can_options: dict[int, Any] = {}
+
+    def setsockopt(self, level: int, number: int, value: Any, *more: Any) -> None:
+        if level == constants.SOL_CAN_RAW:
+            self.can_options[number] = value
+        else:
+            super().setsockopt(level, number, value, *more)
+
+
+def open_pair(kind: type[CanSocket] = CanSocket) -> tuple[CanSocket, CanSocket]:
+    ends = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    a, b = (kind(end.family, end.type, end.proto, end.detach()) for end in ends)
+    return a, b
+
+
+@contextmanager
+def in_place_of_can(near: socket.socket) -> Iterator[None]:
+    """Gives this socket to the next bus that python-can opens."""
+    with patch.object(socketcan, "create_socket", lambda: near), patch.object(socketcan, "bind_socket"):
+        yield
+
+
+def open_bus(near: socket.socket) -> SocketcanBus:
+    with in_place_of_can(near):
+        bus = can.Bus(interface="socketcan", channel="can0")
+    assert isinstance(bus, SocketcanBus)
+    return bus
 
 
 class Wiring(NamedTuple):
@@ -19,42 +62,34 @@ class Wiring(NamedTuple):
     loop: dict[str, CanPort]
 
 
-def python_can_wiring(interface: str, buses: Iterable[str], folder: Path) -> Wiring:
-    robot: dict[str, CanPort] = {}
-    loop: dict[str, CanPort] = {}
-    for name in buses:
-        robot[name] = open_port(interface, str(folder / name), {})
-        loop[name] = open_port(interface, str(folder / name), {})
-    return Wiring(robot, loop)
+PortPair = tuple[CanPort, CanPort]  # the robot's end and the loop's
 
 
-def virtual_wiring(buses: Iterable[str], folder: Path) -> Wiring:
-    return python_can_wiring("virtual", buses, folder)
+def python_can_pair(interface: str, channel: Path) -> PortPair:
+    return open_port(interface, str(channel), {}), open_port(interface, str(channel), {})
 
 
-def mock_wiring(buses: Iterable[str], folder: Path) -> Wiring:
-    mocks = {name: MockBus() for name in buses}
-    robot = {name: mock.open() for name, mock in mocks.items()}
-    return Wiring(dict(robot), {name: mock.open() for name, mock in mocks.items()})
+def mock_pair(channel: Path) -> PortPair:
+    bus = MockBus()
+    return bus.open(), bus.open()
 
 
-def local_wiring(buses: Iterable[str], folder: Path) -> Wiring:
-    return python_can_wiring("mudskipper_local", buses, folder)
+def socketcan_pair(kind: type[PythonCanPort] | type[SocketcanPort]) -> PortPair:
+    far, near = open_pair()
+    return SocketcanPort(open_bus(far)), kind(open_bus(near))
 
 
-def socketcan_wiring(kind: Kind, buses: Iterable[str]) -> Wiring:
-    robot: dict[str, CanPort] = {}
-    loop: dict[str, CanPort] = {}
-    for name in buses:
-        far, near = open_pair()
-        robot[name], loop[name] = SocketcanPort(open_bus(far)), kind(open_bus(near))
-    return Wiring(robot, loop)
-
-
-VARIANTS: dict[str, Callable[[Iterable[str], Path], Wiring]] = {
-    "virtual": virtual_wiring,
-    "mock": mock_wiring,
-    "local": local_wiring,
-    "socketcan": lambda buses, folder: socketcan_wiring(SocketcanPort, buses),
-    "socketcan by python-can": lambda buses, folder: socketcan_wiring(PythonCanPort, buses),
+VARIANTS: dict[str, Callable[[Path], PortPair]] = {
+    "virtual": lambda channel: python_can_pair("virtual", channel),
+    "mock": mock_pair,
+    "local": lambda channel: python_can_pair("mudskipper_local", channel),
+    "socketcan": lambda channel: socketcan_pair(SocketcanPort),
+    "socketcan by python-can": lambda channel: socketcan_pair(PythonCanPort),
 }
+
+
+def make_wiring(variant: str, buses: Iterable[str], folder: Path) -> Wiring:
+    pairs = {name: VARIANTS[variant](folder / name) for name in buses}
+    return Wiring(
+        {name: robot for name, (robot, _) in pairs.items()}, {name: loop for name, (_, loop) in pairs.items()}
+    )

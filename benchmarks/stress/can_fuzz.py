@@ -30,7 +30,6 @@ from drivers.can.mock_bus import MockBus, MockPort
 from drivers.drive_types import make_drives
 from drivers.odrive import codec
 from drivers.odrive.codec import arbitration_id
-from experiments.reports.text_tables import table
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
@@ -261,29 +260,11 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return evaluated({"parts": parts}, bar, clean and flat)
 
 
-def text_of(report: dict[str, Any]) -> str:
-    head = ["", "frames", "exceptions", "forbidden", "sent", "refused", "growth KiB", "s"]
-    rows = [
-        [
-            name,
-            f"{part['frames']}",
-            f"{part['exceptions']}",
-            f"{len(part['forbidden'])}",
-            f"{part['frames_sent']}",
-            f"{part['refused_by_the_gate']}",
-            f"{part['growth_kib']:+.0f}",
-            f"{part['seconds']:.0f}",
-        ]
-        for name, part in report["parts"].items()
-    ]
-    return table([head, *rows])
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.can_fuzz", __doc__)
     parser.add_argument("--frames", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, text_of, finds_defects=True)
+    return run_benchmark(parser, arguments, measure, finds_defects=True)
 
 
 if __name__ == "__main__":

@@ -196,15 +196,6 @@ def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
     }
 
 
-def text_of(report: dict[str, Any]) -> str:
-    lines = [
-        f"{kind:15} {count:6} files, {report['accepted'][kind]:6} accepted" for kind, count in report["kinds"].items()
-    ]
-    lines += [f"{what:18} {count}" for what, count in report["tried"].items()]
-    lines.append(f"longest {report['longest_ms']:.0f} ms ({report['longest_kind']}), most {report['most_kib']:.0f} KiB")
-    return "\n".join([*lines, *report["first_bugs"]])
-
-
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     count = options.configurations
     return report_of(fuzz(count, options.seed, folder, Progress(count)), options.seed)
@@ -214,7 +205,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.configuration_fuzz", __doc__)
     parser.add_argument("--configurations", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, text_of)
+    return run_benchmark(parser, arguments, measure)
 
 
 if __name__ == "__main__":

@@ -205,14 +205,6 @@ def try_many(count: int, seed: int, folder: Path, progress: Progress) -> dict[st
     }
 
 
-def text_of(report: dict[str, Any]) -> str:
-    lines = [f"{count:6}  {outcome}" for outcome, count in sorted(report["outcomes"].items())]
-    lines += [f"{len(report['wrong']):6}  wrong"]
-    lines += [f"log {case['number']} ({case['how']}): {case['complaint']}" for case in report["wrong"][:5]]
-    lines += [f"slowest {report['slowest_s']} s, memory at most {report['peak_in_log_sizes']} log sizes more"]
-    return "\n".join(lines)
-
-
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     (folder / "active").mkdir()
     report = try_many(options.logs, options.seed, folder, Progress(options.logs))
@@ -224,7 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.corrupted_logs", __doc__)
     parser.add_argument("--logs", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, text_of, finds_defects=True)
+    return run_benchmark(parser, arguments, measure, finds_defects=True)
 
 
 if __name__ == "__main__":

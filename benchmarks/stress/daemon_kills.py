@@ -1,4 +1,4 @@
-"""How long motors exert torque after the daemon was killed or stopped: SIGKILL and SIGSTOP, in each phase of the gait.
+"""Measures how long motors exert torque after SIGKILL or SIGSTOP of the daemon, in each phase of the gait.
 
 Daemon and simulated robot are processes on local buses, on which a third node listens. The drives report their currents
 every 2 ms of their own time, so the number of reports of a current after the kill is the time to zero torque, on a busy
@@ -9,7 +9,6 @@ robot again; the third node checks that as well.
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import subprocess
 import sys
@@ -20,15 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
-from benchmarks.stress.log_kills import start
+from benchmarks.stress.local_robot import LONGEST_WAIT_S, LocalRobot
 from control.records import JOINTS
 from drivers.odrive import codec
-from experiments.reports.text_tables import table
 from firmware_host.buses import open_ports
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import WATCHDOG_S
 
 REPORTED_S = SimulatedDriveParameters(0).current_period_s
@@ -36,12 +33,11 @@ TOLERANCE_S = 0.01  # between the kill and the robot's reading of what was sent 
 WINDOW_S = 4.0 * WATCHDOG_S  # of listening
 PHASES = ("insertion", "stance", "extraction", "swing", "hold")
 SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
-LONGEST_WAIT_S = 60.0
 ATTEMPTS = 5  # at a walk, which may fail on a busy machine
 
 
 class Listener:
-    """Owns a node on each bus, and for how long each drive has reported a current."""
+    """Owns a node on each bus, and counts the reports of current from each drive."""
 
     def __init__(self, configuration_path: Path) -> None:
         configuration = load_configuration(configuration_path)
@@ -70,7 +66,7 @@ class Listener:
             self.closed_loop[joint] = codec.HEARTBEAT.decode(data)[1] == codec.AxisState.CLOSED_LOOP
 
     def listen_for(self, drive_time_s: float) -> None:
-        """Listens for a duration by the drives' own messages."""
+        """Listens for a duration that the drives' own messages measure."""
         deadline_s = time.monotonic() + LONGEST_WAIT_S
         end = max(self.reported.values()) + round(drive_time_s / REPORTED_S)
         while min(self.reported.values()) < end and time.monotonic() < deadline_s:
@@ -82,22 +78,13 @@ class Listener:
             port.close()
 
 
-class Session:
+class Session(LocalRobot):
     """Owns a robot, its daemon and the listening node."""
 
     def __init__(self, folder: Path) -> None:
-        self._socket = folder / "mudskipper.sock"
-        configuration = write_local_setup(folder, folder / "logs")
-        self._robot = start("simulation.harness.peer", configuration)
-        self.daemon = start("firmware_host.daemon", configuration)
-        self.listener = Listener(configuration)
-
-    def call(self, method: str, **params: Any) -> Any:
-        client = StatusClient(self._socket)
-        try:
-            return client.call(method, **params)
-        finally:
-            client.close()
+        super().__init__(folder)
+        self.daemon = self.start_daemon()
+        self.listener = Listener(self.configuration)
 
     def wait_for(self, *modes_or_phases: str) -> bool:
         """Returns whether one of them was reached before a fault."""
@@ -125,10 +112,7 @@ class Session:
 
     def end(self) -> None:
         self.listener.close()
-        for process in (self.daemon, self._robot):
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        super().end()
 
 
 def kill_once(folder: Path, number: signal.Signals, phase: str) -> dict[str, Any] | None:
@@ -174,16 +158,6 @@ def kill_many(count: int, folder: Path, progress: Progress) -> tuple[list[dict[s
     return rounds, invalid_walks
 
 
-def text_of(report: dict[str, Any]) -> str:
-    rows = [
-        [made["signal"], made["phase"], f"{1e3 * made['pushed_s']:.0f}", "yes" if made["idle"] else "no"]
-        for made in report["rounds"]
-    ]
-    again = sum(made["moved_again"] for made in report["rounds"])
-    lines = [table([["signal", "phase", "ms to zero torque", "idle"], *rows]), ""]
-    return "\n".join([*lines, f"{again} moved again when woken; {report['invalid_walks']} walks invalid"])
-
-
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     rounds, invalid_walks = kill_many(options.kills, folder, Progress(options.kills))
     longest_s = max((made["pushed_s"] for made in rounds), default=0.0)
@@ -192,7 +166,7 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         and longest_s <= WATCHDOG_S + TOLERANCE_S
         and all(made["idle"] and not made["moved_again"] for made in rounds)
     )
-    bar = f"zero torque within the watchdogs' {1e3 * WATCHDOG_S:g} ms and {1e3 * TOLERANCE_S:g} on the way, for good"
+    bar = f"zero torque within the watchdogs' {1e3 * WATCHDOG_S:g} ms and {1e3 * TOLERANCE_S:g} in transit, for good"
     report = {"rounds": rounds, "invalid_walks": invalid_walks, "longest_s": longest_s, "watchdog_s": WATCHDOG_S}
     return evaluated(report, bar, reached)
 
@@ -200,7 +174,7 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.daemon_kills", __doc__)
     parser.add_argument("--kills", type=int, default=40)
-    return run_benchmark(parser, arguments, measure, text_of)
+    return run_benchmark(parser, arguments, measure)
 
 
 if __name__ == "__main__":

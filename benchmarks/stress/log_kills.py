@@ -1,4 +1,4 @@
-"""The rows that a log loses when its writer, the daemon, or all processes are killed: SIGKILL, then recovery.
+"""Counts the rows that a log loses when its writer, the daemon, or all processes are killed and the log is recovered.
 
 A real daemon records a simulated robot with short segments, every tick of it. After each kill the next daemon or the
 recovery command recovers the folder, and three independent readers open every log of the run: ours, rosbags and
@@ -16,48 +16,31 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
+from benchmarks.stress.local_robot import LONGEST_WAIT_S, LocalRobot, kill_session, wait_for
 from benchmarks.stress.resources import children_of
 from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
 from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.log_reading.recovery import recover_all
-from firmware_host.operator.status_client import NoDaemonError, StatusClient
-from simulation.harness.local_setup import write_local_setup
 
 BAR_S = 1.0  # of rows at a log's end
-LONGEST_WAIT_S = 30.0
 VICTIMS = ("daemon", "writer", "both", "all")  # all: the whole session, with a recovery that may be running
 
 
-def write_setup(folder: Path) -> Path:
-    path = write_local_setup(folder, folder / "logs")
-    text = path.read_text(encoding="utf-8")
-    path.write_text(text.replace("[log]\n", "[log]\nsegment_s = 1.5\nrest_hz = 0.0\n"), encoding="utf-8")
-    return path
-
-
-def start(module: str, configuration: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", module, "--config", str(configuration)]
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen(command, start_new_session=True, stdout=quiet, stderr=quiet)
-
-
-def wait_for_log(folder: Path, known: set[str]) -> None:
+def wait_for_log(robot: LocalRobot, known: set[str]) -> None:
     """Waits until the daemon answers and a file of its run exists."""
-    deadline_s = time.monotonic() + LONGEST_WAIT_S
-    while time.monotonic() < deadline_s:
-        with suppress(NoDaemonError, OSError):
-            StatusClient(folder / "mudskipper.sock").close()
-            if {path.name for path in log_files(folder / "logs", ACTIVE)} - known:
-                return
-        time.sleep(0.02)
-    raise RuntimeError("the daemon did not start")
+
+    def is_recording() -> bool:
+        robot.call("hello")
+        return bool({path.name for path in log_files(robot.logs, ACTIVE)} - known)
+
+    if not wait_for(is_recording):
+        raise RuntimeError("the daemon did not start")
 
 
 def kill(victim: str, daemon: subprocess.Popen[bytes]) -> float:
@@ -76,23 +59,21 @@ def kill(victim: str, daemon: subprocess.Popen[bytes]) -> float:
         daemon.send_signal(signal.SIGTERM)  # which it must still obey
     daemon.wait(LONGEST_WAIT_S)
     for writer in writers:
-        _wait_for_end(writer)
+        wait_for(lambda process=writer: _has_ended(process))  # type: ignore[misc]
     return killed_s
 
 
-def _wait_for_end(process: int) -> None:
-    deadline_s = time.monotonic() + LONGEST_WAIT_S
-    while time.monotonic() < deadline_s and Path(f"/proc/{process}").exists():
-        with suppress(OSError):
-            if ") Z" in Path(f"/proc/{process}/stat").read_text(encoding="utf-8"):
-                return
-        time.sleep(0.02)
+def _has_ended(process: int) -> bool:
+    try:
+        return ") Z" in Path(f"/proc/{process}/stat").read_text(encoding="utf-8")
+    except OSError:
+        return True
 
 
 def examine(paths: Sequence[Path], seen_s: float, killed_s: float) -> dict[str, Any]:
     """Returns the content of one run's logs, and their problems. A log without a tick lost all since it was seen."""
     logs = [read_log(path) for path in paths]
-    problems = [f"{path.name} is not whole" for path, log in zip(paths, logs, strict=True) if not log.complete]
+    problems = [f"{path.name} is incomplete" for path, log in zip(paths, logs, strict=True) if not log.complete]
     problems += [complaint for path, log in zip(paths, logs, strict=True) if (complaint := _by_others(path, log))]
     numbers = np.concatenate([log.ticks["tick"].astype(np.int64) for log in logs] or [np.zeros(0, np.int64)])
     missed = np.concatenate([log.ticks["missed_ticks"].astype(np.int64) for log in logs] or [np.zeros(0, np.int64)])
@@ -127,19 +108,18 @@ def _by_others(path: Path, log: Log) -> str:
     return "" if rows == by_rosbags == by_mcap_ros2 else f"{path.name}: {rows}, {by_rosbags}, {by_mcap_ros2} rows"
 
 
-def kill_once(folder: Path, configuration: Path, victim: str, after_s: float) -> dict[str, Any]:
-    logs = folder / "logs"
+def kill_once(robot: LocalRobot, victim: str, after_s: float) -> dict[str, Any]:
+    logs = robot.logs
     known = {path.name for path in log_files(logs, ACTIVE, DONE)}
     known |= {path.name for path in unfinished_files(logs)}
-    daemon = start("firmware_host.daemon", configuration)
+    daemon = robot.start_daemon()
     try:
-        wait_for_log(folder, known)
+        wait_for_log(robot, known)
         seen_s = time.monotonic()
         time.sleep(after_s)
         killed_s = kill(victim, daemon)
     finally:
-        with suppress(ProcessLookupError):
-            os.killpg(daemon.pid, signal.SIGKILL)
+        kill_session(daemon)
     complaints: list[str] = []
     recover_all(logs, complaints.append)
     paths = [path for path in log_files(logs, DONE) if path.name not in known]
@@ -153,17 +133,15 @@ def kill_once(folder: Path, configuration: Path, victim: str, after_s: float) ->
 
 def kill_many(count: int, seed: int, folder: Path, progress: Progress) -> list[dict[str, Any]]:
     chance = random.Random(seed)
-    configuration = write_setup(folder)
-    robot = start("simulation.harness.peer", configuration)
+    robot = LocalRobot(folder, "segment_s = 1.5\nrest_hz = 0.0\n")
     kills = []
     try:
         for number in range(count):
             victim = VICTIMS[number % len(VICTIMS)]
             progress.show(number, f"kills, now the {victim}")
-            kills.append(kill_once(folder, configuration, victim, chance.uniform(0.0, 4.0)))
+            kills.append(kill_once(robot, victim, chance.uniform(0.0, 4.0)))
     finally:
-        robot.kill()
-        robot.wait()
+        robot.end()
     return kills
 
 
@@ -180,12 +158,6 @@ def sums_of(kills: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def text_of(report: dict[str, Any]) -> str:
-    lines = [f"{name:16} {value}" for name, value in report["sums"].items()]
-    lines += [f"{kill['victim']}: {problem}" for kill in report["rounds"] for problem in kill["problems"]]
-    return "\n".join(lines)
-
-
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     rounds = kill_many(options.kills, options.seed, folder, Progress(options.kills))
     sums = sums_of(rounds)
@@ -198,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.log_kills", __doc__)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, text_of, finds_defects=True)
+    return run_benchmark(parser, arguments, measure, finds_defects=True)
 
 
 if __name__ == "__main__":

@@ -18,11 +18,9 @@ from typing import Any
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from benchmarks.stress.soaked_daemon import soak_daemon
 from benchmarks.stress.soaked_loop import soak_loop
-from experiments.reports.text_tables import table
 
 BAR_KIB = 1024.0
 WARM_UP_FRACTION = 0.2  # of the readings
-SHOWN = 12  # readings in the table
 
 
 def evaluated_part(part: dict[str, Any]) -> dict[str, Any]:
@@ -34,22 +32,6 @@ def evaluated_part(part: dict[str, Any]) -> dict[str, Any]:
     sound = not (part["bugs"] or part["dropped"] or part["ticks_missing"] or part["files_not_whole"])
     sound = sound and growth_kib < BAR_KIB and max(left.values()) <= 0 and largest_log <= part["quota_bytes"]
     return part | {"growth_kib": growth_kib, "left": left, "largest_log_bytes": largest_log, "sound": sound}
-
-
-def part_text(name: str, part: dict[str, Any]) -> str:
-    every = max(1, len(part["readings"]) // SHOWN)
-    keys = ("at_s", "resident_kib", "descriptors", "threads", "writer_kib", "writer_descriptors", "log_bytes")
-    rows = [[f"{reading[key]:.0f}" for key in keys] for reading in part["readings"][::every]]
-    asked = sum(part["asked"].values())
-    lines = [
-        table([[key.replace("_", " ") for key in keys], *rows]),
-        f"{name}: {part['strides']} strides, {sum(part['faults'].values())} faults of {len(part['faults'])} kinds, "
-        f"{asked} requests, {part['refused']} refused",
-        f"grew by {part['growth_kib']:.0f} KiB after the warm-up; left over: {part['left']}",
-        f"{part['dropped']} rows dropped, {part['ticks_missing']} ticks missing in {part['files']} files of "
-        f"{part['ticks_in_files']} ticks; {len(part['bugs'])} bugs",
-    ]
-    return "\n".join([*lines, *part["bugs"]])
 
 
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
@@ -66,16 +48,12 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return evaluated(report, bar, all(part["sound"] for part in parts.values()))
 
 
-def text_of(report: dict[str, Any]) -> str:
-    return "\n\n".join(part_text(name, report[name]) for name in report["parts"])
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.soak", __doc__)
     parser.add_argument("--hours", type=float, default=1.0, help="simulated, in lockstep; 0: none")
     parser.add_argument("--real-time-minutes", type=float, default=0.0, metavar="MINUTES", help="of the daemon")
     parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, text_of)
+    return run_benchmark(parser, arguments, measure)
 
 
 if __name__ == "__main__":

@@ -244,19 +244,6 @@ def reached(report: dict[str, Any]) -> bool:
     )
 
 
-def text_of(report: dict[str, Any]) -> str:
-    kinds = ", ".join(f"{count} {kind}" for kind, count in report["kinds"].items())
-    us = report["serve_us"]
-    lines = [
-        f"{report['streams']} streams in {report['seconds']:g} s: {kinds}",
-        f"{report['answers']} answers; of {report['valid_requests']} valid requests {report['unanswered']} unanswered",
-        f"{report['most_calls_a_tick']} a tick at most; the reference client waited {report['longest_wait_ticks']}",
-        f"a tick's service {us['median']:.0f} us median, {us['p99']:.0f} p99, {us['longest']:.0f} longest",
-        f"memory grew by {report['growth_kib']:.0f} KiB in the second half; {len(report['bugs'])} bugs",
-    ]
-    return "\n".join([*lines, *report["bugs"]])
-
-
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     report = fuzz(options.streams, options.seed, folder, Progress(options.streams))
     bar = f"every valid request answered, one a tick, no bug, memory growth below {BAR_KIB:.0f} KiB"
@@ -267,7 +254,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = new_parser("benchmarks.stress.socket_fuzz", __doc__)
     parser.add_argument("--streams", type=int, default=200_000)
     parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, text_of, finds_defects=True)
+    return run_benchmark(parser, arguments, measure, finds_defects=True)
 
 
 if __name__ == "__main__":

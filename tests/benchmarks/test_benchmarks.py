@@ -16,10 +16,8 @@ from typing import Any
 import pytest
 
 from benchmarks.behaviour import differences
-from benchmarks.report import Progress, evaluated, new_parser, run_benchmark, summary_us, verdict
+from benchmarks.report import Progress, evaluated, new_parser, report_lines, run_benchmark, summary_us, verdict
 from benchmarks.speed import lockstep_speed
-from benchmarks.speed.estimator_cost import fit_rows, measure_fits
-from benchmarks.speed.fit_libraries import FITS
 from benchmarks.speed.stage_marks import STAGES
 from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
@@ -66,7 +64,7 @@ def test_only_a_benchmark_that_looks_for_defects_fails_where_its_bar_is_missed(
         return evaluated({"figure": 1}, "fast", reached)
 
     parser = new_parser("benchmarks.speed.any", "Measures nothing.")
-    assert run_benchmark(parser, ["--json"], measure, lambda report: "", finds_defects) == status
+    assert run_benchmark(parser, ["--json"], measure, finds_defects) == status
     assert json.loads(capsys.readouterr().out).items() >= {"benchmark": "any", "figure": 1, "reached": reached}.items()
 
 
@@ -75,22 +73,18 @@ def test_tick_time() -> None:
     report = report_of("tick_time", "--seconds", "1")
     assert report["bar_us"] == 200.0
     assert set(report["variants"]) == set(VARIANTS)
-    assert set(report["socketcan"]) == {"python_can_us", "own_us", "ratio", "bar_ratio", "reached"}
-    assert report["socketcan"]["bar_ratio"] == 2.0
     for figures in report["variants"].values():
         assert set(figures["stages_us"]) == set(STAGES)
         assert all(set(stage) == SUMMARY for stage in figures["stages_us"].values())
         assert set(figures["whole_us"]) == SUMMARY | {"ticks"}
-        assert set(figures["record_unrecorded_us"]) == SUMMARY
         assert figures.keys() >= {"whole_closing_us", "adapt_closing_us", "marking_us", "dropped_rows"}
         assert figures["frames_received"] == pytest.approx(4 * (2 / 0.002 + 4 / 0.1) / 380.0, abs=0.1)
         assert figures["frames_sent"] == 4.0
 
 
 def test_loop_jitter() -> None:
-    report = report_of("loop_jitter", "--seconds", "0.5", "--show-gil")
+    report = report_of("loop_jitter", "--seconds", "0.5")
     assert set(report["ratios"]) == {"p50", "p99"}
-    assert set(report["gil"]) == {"5 ms", "0.1 ms"}
     for loop in (report["loop"], report["bare"]):
         assert set(loop["late_us"]) == {"p50", "p99", "p99.9", "max"}
         assert loop["ticks"] > 0
@@ -205,50 +199,23 @@ def test_log_kills_ends_with_a_status_for_its_bar(
     assert json.loads(capsys.readouterr().out)["reached"] is (status == 0)
 
 
-@pytest.fixture(scope="module")
-def estimator_cost() -> dict[str, Any]:
-    return report_of("estimator_cost", "--strides", "2", "--memory-strides", "2")
-
-
-def test_estimator_cost(estimator_cost: dict[str, Any]) -> None:
+def test_estimator_cost() -> None:
     """A stride of 1.58 s has 600 ticks; the law that was put in comes out, so every fit was at work."""
-    report = estimator_cost
+    report = report_of("estimator_cost", "--strides", "2", "--memory-strides", "2")
     phases = {"insertion", "stance", "extraction", "swing"}
     for figures in report["methods"].values():
         assert sum(figures["samples"].values()) == pytest.approx(1.58 * 380.0, abs=2.0)
         assert set(figures["sample_us"]) == set(figures["close_us"]) == set(figures["samples"]) == phases
         assert figures.keys() >= {"sample_mean_us", "close_total_us"}
     assert report["methods"]["default"]["k_n_cm3"] == pytest.approx({"k_p": 1.0, "k_s": 0.6, "k_e": 0.7}, rel=0.1)
-    assert 0.0 < report["repeats"]["fraction"] < 1.0
     assert report["memory"].keys() == {"strides", "held_bytes", "peak_bytes", "growth_bytes"}
-    assert report.keys() >= {"stroke_us", "bar_sample_us", "bar_close_us"}
-
-
-def test_every_library_finds_the_same_slope(estimator_cost: dict[str, Any]) -> None:
-    """All are least squares of the same samples; the robust one weights one or two of them less."""
-    fits = estimator_cost["fits"]
-    assert set(fits) == set(FITS)
-    k_n_cm3 = fits["our LineFit"]["k_n_cm3"]
-    for figures in fits.values():
-        assert figures["sample_us"] > 0.0
-        assert figures["k_n_cm3"] == pytest.approx(k_n_cm3, rel=0.002)
-
-
-def test_a_library_that_is_not_installed_is_said_to_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "padasip", None)
-    monkeypatch.setitem(sys.modules, "padasip.filters", None)
-    for slow in ("filterpy KalmanFilter", "statsmodels RecursiveLS"):
-        monkeypatch.delitem(FITS, slow)
-    fits = measure_fits(1, Progress(1.0), 0.0)["fits"]
-    assert fits["padasip FilterRLS"] is None
-    assert fits["numpy.linalg.lstsq"] is not None
-    assert ["padasip FilterRLS", "not installed", "", ""] in fit_rows(fits, 110)
+    assert report.keys() >= {"bar_sample_us", "bar_close_us"}
 
 
 def test_an_operator_gets_a_table_that_ends_in_the_verdict(capsys: pytest.CaptureFixture[str]) -> None:
     lockstep_speed.main(["--rounds", "1", "--longest", "0.1"])
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split()[0] == "round"
+    assert "rounds:" in lines
     assert lines[-1].startswith("at least 8 times faster than real time: ")
 
 
@@ -288,3 +255,9 @@ def test_behaviour_reports_every_difference_and_accepts_new_names() -> None:
     found = list(differences(old, new, {"place_m": "position_m"}, frozenset({"version"})))
     assert found == [".came: added", ".gone: missing", ".rows: 1 entries, before 2", ".rows[0].a: 1.0, before 1"]
     assert list(differences({"place_m": 1}, {"place_m": 1}, {"place_m": "position_m"}, frozenset())) == []
+
+
+def test_a_report_is_printed_as_tables_of_records_and_lines_of_figures() -> None:
+    report = {"seed": 1, "walks": [{"m": 0.5, "bugs": []}], "part": {"us": {"p99": 2}, "kinds": {"a": {"n": 1}}}}
+    expected = ["seed: 1", "walks:\n   m    bugs\n1  0.5  none\n", "part us: p99 2", "part kinds:\n   n\na  1\n"]
+    assert list(report_lines(report | {"verdict": "good"})) == expected

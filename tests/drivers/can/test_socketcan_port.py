@@ -17,7 +17,7 @@ from can.interfaces.socketcan import constants
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.speed.can_paths import StandIn, open_bus, open_pair
+from benchmarks.speed.wirings import CanSocket, open_bus, open_pair
 from control.records import JOINTS, NEVER_S
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.frames import Frame, encode_frame
@@ -39,7 +39,7 @@ GOLDEN = {  # the 16 bytes of struct can_frame, written down by hand
 }
 
 
-class KernelSocket(StandIn):
+class KernelSocket(CanSocket):
     """Returns what the test sets before the frames that have arrived; it raises an exception that the test sets."""
 
     def __init__(self, *arguments: Any) -> None:
@@ -285,7 +285,7 @@ def test_without_wishes_everything_is_heard(bench: Bench) -> None:
 def test_a_kernel_that_refuses_filters_only_lets_unknown_ids_through(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(self: StandIn, level: int, number: int, value: Any, *more: Any) -> None:
+    def refuse(self: CanSocket, level: int, number: int, value: Any, *more: Any) -> None:
         raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
 
     monkeypatch.setattr(KernelSocket, "setsockopt", refuse)
