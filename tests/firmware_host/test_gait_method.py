@@ -49,9 +49,7 @@ def test_the_methods_own_sweeps_are_within_limits_and_reach(example_text: str) -
         ("max_sweep_deg = 75.0", "adaptation.gait.max_sweep_deg = 75.0: must be "),
     ],
 )
-def test_impossible_gait_keys_are_refused(
-    example_text: str, adaptation: str, problem: str
-) -> None:
+def test_impossible_gait_keys_are_refused(example_text: str, adaptation: str, problem: str) -> None:
     assert any(problem in each for each in problems_of(example_text, adaptation=adaptation))
 
 
