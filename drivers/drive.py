@@ -3,7 +3,7 @@
 Four drives, one for each joint, are commanded together as `Drives`: read their states, send torques, arm, disarm. A
 `DriveHealth` contains what a drive reports about itself, as opposed to its joint. A `DriveType` describes one protocol:
 the parameters that the configuration states, the drives that speak it, and how to read its frames without commanding a
-drive, as the bench and the fault injection do. drivers/drive_types.py lists the types that exist.
+drive, which the checks of the wiring and the fault injection need. drivers/drive_types.py lists the types that exist.
 
 Only `Drives` send commands on the drives' buses. Every frame passes a gate (drivers/transmit_gate.py), which refuses
 and counts any command that the limits forbid.
@@ -69,12 +69,12 @@ class DriveHealth(NamedTuple):
     supported_firmware: str = ""  # major and minor version whose messages the codec knows
     firmware_supported: bool = False  # False also while the version is unknown
     hardware: str = ""
-    watchdog_s: float = UNKNOWN  # its time-out as the drive has it: NaN until it was read back, 0 where it is off
-    watchdog_advice: str = ""  # what makes an unknown watchdog known
-    watchdog_expired: bool = False  # it is among the active errors or the reason of the last disarming
+    watchdog_s: float = UNKNOWN  # its time-out, read back from the drive: NaN until then, 0 where it is off
+    watchdog_advice: str = ""  # how to make an unknown watchdog known
+    watchdog_expired: bool = False  # among the active errors, or the reason of the last disarming
     restarts: int = 0  # since the start; only grows
     duplicate_id: bool = False  # two drives seem to send under this id
-    busy_state: str = ""  # what the drive does that this program did not ask for, such as a calibration
+    busy_state: str = ""  # an activity that this program did not ask for, such as a calibration
     active_errors: str = ""
     errors: str = ""  # active errors and the reason of the last disarming
 
@@ -91,7 +91,7 @@ class Drives(Protocol):
 
     @property
     def heard(self) -> bool:
-        """Whether every drive has sent every signal that control depends on at least once."""
+        """Returns whether every drive has sent every signal that control depends on at least once."""
 
     @property
     def refused_commands(self) -> int:
@@ -104,16 +104,16 @@ class Drives(Protocol):
         """Reads all frames that have arrived; returns the newest of every signal."""
 
     def send(self, torques_nm: Torques, elapsed_s: float) -> None:
-        """Commands all torques, `elapsed_s` after the ones before, which bounds by how much they may differ."""
+        """Commands all torques. They may differ from the ones before by the slew rate times `elapsed_s`."""
 
     def send_torque(self, joint: str, torque_nm: float) -> None:
         """Commands one joint alone, within the step that the last `send` allowed."""
 
     def arm(self, now_s: float, at_once: bool = False) -> None:
-        """Prepares the drives `at_once`; later calls ask those that do not follow torque yet to do so."""
+        """Prepares all drives when `at_once`, else prepares and enables those that do not follow torque yet."""
 
     def disarm(self, now_s: float, at_once: bool = False) -> None:
-        """Commands zero torque and idle: all drives `at_once`, later those that still follow torque."""
+        """Commands zero torque and idle: to all drives when `at_once`, else to those that still follow torque."""
 
     def force_idle(self, repeats: int) -> None:
         """Commands zero torque and idle to every drive, `repeats` times. Never raises."""
@@ -121,7 +121,7 @@ class Drives(Protocol):
     def clear_errors(self) -> None: ...
 
     def request_settings(self, now_s: float) -> None:
-        """Asks for firmware version and watchdog, now and then: they may change, and a restart forgets them."""
+        """Asks for firmware version and watchdog, every few seconds: a restart forgets them, and they may change."""
 
     def close(self) -> None: ...
 
@@ -143,7 +143,7 @@ class DriveType(Protocol):
 
     @property
     def example_error(self) -> int:
-        """The flags of an error that takes the torque, for fault injection."""
+        """The flags of an error on which the drive switches its torque off, for fault injection."""
 
     @property
     def command(self) -> FrameRate:
@@ -165,7 +165,7 @@ class DriveType(Protocol):
         """Returns the content of a frame by its id; None for frames of another kind than the protocol uses."""
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        """The payload of a frame that carries `error` with these error flags added, from a drive that is `idle`.
+        """Returns the payload of a frame that reports errors, with these error flags added and the drive set to `idle`.
 
         A payload that cannot be decoded is returned unchanged.
         """

@@ -1,4 +1,4 @@
-"""The only path from the program to the drives' wires: a frame that is not in the tables of the gate does not pass.
+"""The transmit gate, the only path from the program to the drives: it passes only the frames that its tables list.
 
 Each drive has a table in the bytes of its protocol: payloads that may always leave (idle, the configured limits, the
 reading of a parameter), payloads that may leave while the gate is open (following torque), and how a torque command is
@@ -22,7 +22,7 @@ from control.records import NEVER_S
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 
-ROUNDING_NM = 1e-6  # binary32 represents 5 N·m to within a quarter of that
+ROUNDING_NM = 1e-6  # binary32 rounds a torque of 5 N·m by less than a quarter of this
 
 
 class FrameKind(NamedTuple):
@@ -42,13 +42,13 @@ class GateTable(NamedTuple):
     decode_torque: Callable[[bytes], float]  # in N·m; NaN for a payload that is not exactly one torque command
     always: Mapping[int, frozenset[bytes]]
     while_open: Mapping[int, frozenset[bytes]]
-    checks: Mapping[int, Callable[[bytes], bool]]  # whether a payload may always leave, where a set cannot list it
+    checks: Mapping[int, Callable[[bytes], bool]]  # return whether a payload may leave, where a set cannot list it
     requests: frozenset[Frame]  # remote frames that may always leave
     kind: FrameKind = FrameKind()
 
 
 class TransmitGate:
-    """Owns whether torque may leave at all; closed until it is opened. `refused` only grows."""
+    """Decides whether torque may leave; it is closed until it is opened. `refused` counts frames and only grows."""
 
     def __init__(self, limits: JointLimits) -> None:
         self.is_open = False
@@ -77,7 +77,7 @@ class TransmitGate:
         self.is_open = False
 
     def allow_step(self, elapsed_s: float) -> None:
-        """Announces a torque for each drive, `elapsed_s` after the one before."""
+        """Sets the largest step of the next torques: the slew rate times `elapsed_s`, the time since the last ones."""
         self._step_nm = self._torque_rate_nm_s * elapsed_s + ROUNDING_NM
 
     def torque_problem(self, torque_nm: float, before_nm: float) -> str:
@@ -101,7 +101,7 @@ class GatedPort:
     """The gated path to one bus. Owns the torque that left last for each drive on it."""
 
     def __init__(self, gate: TransmitGate, port: CanPort, tables: Iterable[GateTable]) -> None:
-        """Raises ValueError where the tables want frames of different kinds."""
+        """Joins the tables of the drives on one bus; raises ValueError where they want frames of different kinds."""
         self._gate = gate
         self._port = port
         self._tables = {table.torque_id: table for table in tables}

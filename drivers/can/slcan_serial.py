@@ -32,7 +32,7 @@ class SlcanSerial:
 
     @property
     def in_waiting(self) -> int:
-        """Raises OSError (EIO) where the adapter was unplugged."""
+        """The number of bytes that wait; raises OSError (EIO) where the adapter was unplugged."""
         if self._position == len(self._arrived):
             self._fetch()
         return len(self._arrived) - self._position
@@ -52,7 +52,7 @@ class SlcanSerial:
         return self._arrived[begin : self._position]
 
     def write(self, line: bytes) -> None:
-        """Raises BlockingIOError and writes nothing of this line while the kernel's buffer is full."""
+        """Writes a line; raises BlockingIOError and writes nothing of it while the kernel's buffer is full."""
         self._has_written = True
         if self._unsent:
             self._unsent = self._unsent[os.write(self._file, self._unsent) :]

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from random import Random
 from struct import Struct
@@ -19,7 +20,6 @@ from drivers.can.can_port import BusState, CanPort
 from drivers.can.frames import DATA_MAX_BYTES, STANDARD_MASK, Frame
 from drivers.drive import DriveParameters, DriveType
 from drivers.drive_types import type_of
-from drivers.fault_injection.delay_line import DelayLine
 from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
 
 NO_NODE = -1
@@ -37,6 +37,31 @@ STATES = {
     FailureKind.BUS_OFF: BusState.OFF,
 }
 ONE_FLOAT = Struct("<f")
+
+
+class DelayLine:
+    """Delays frames. A frame never overtakes another one with the same key."""
+
+    def __init__(self, key: Callable[[Frame], int]) -> None:
+        self._key = key
+        self.waiting: dict[int, deque[tuple[float, Frame]]] = {}
+
+    def put(self, frame: Frame, arrival_s: float) -> None:
+        line = self.waiting.setdefault(self._key(frame), deque())
+        line.append((max(arrival_s, line[-1][0]) if line else arrival_s, frame))
+
+    def holds_back(self, frame: Frame) -> bool:
+        return self._key(frame) in self.waiting
+
+    def pop_arrived(self, now_s: float) -> list[Frame]:
+        """Removes and returns the frames that have arrived by now."""
+        arrived: list[Frame] = []
+        for key, line in list(self.waiting.items()):
+            while line and line[0][0] <= now_s:
+                arrived.append(line.popleft()[1])
+            if not line:
+                del self.waiting[key]
+        return arrived
 
 
 class FailingPort:

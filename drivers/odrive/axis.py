@@ -29,7 +29,7 @@ RESTART_SILENCE_S = 0.3  # three heartbeats
 LONGEST_WATCHDOG_S = 3600.0  # a larger number is no time-out
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
-QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)
+QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)  # in which nothing runs by itself
 
 
 class Version(NamedTuple):
@@ -45,7 +45,7 @@ class Outlet(Protocol):
 
 
 class OdriveAxis:
-    """Owns everything that is known about one drive; every field is the newest that arrived."""
+    """Owns everything that is known about one drive; each field contains the newest value that arrived."""
 
     def __init__(
         self, joint: str, parameters: OdriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints] = ()
@@ -70,7 +70,7 @@ class OdriveAxis:
         self._error_flags = 0
         self.disarm_reason = 0
         self.restarts = 0
-        self._starting = True  # until it has reported a state
+        self._starting = True  # until the drive has reported a state; a restart meanwhile is not counted again
         self._duplicates.reset()
         self._forget_settings()
 
@@ -82,7 +82,7 @@ class OdriveAxis:
         self._watchdog_timeout_s = UNKNOWN
 
     def begin_read(self, now_s: float) -> None:
-        """Announces frames that arrived between the previous call and `now_s`."""
+        """Begins a read: the frames that follow arrived between the previous call and `now_s`."""
         self._read_before_s, self._read_s = self._read_s, now_s
 
     @property
@@ -135,7 +135,7 @@ class OdriveAxis:
         self._health = None
 
     def _on_silence(self) -> None:
-        """Counts a restart if all messages were missing for as long as one, and this program was reading meanwhile."""
+        """Counts a restart if all messages were missing, not one of them alone, while this program was reading."""
         heard_s = max(self._angle_stamp_s, self._current_stamp_s, self._heartbeat_stamp_s)
         if isfinite(heard_s) and self._read_before_s - heard_s > RESTART_SILENCE_S:
             self._on_restart()
@@ -167,7 +167,7 @@ class OdriveAxis:
     def _receive_setting(self, data: bytes, now_s: float) -> None:
         endpoint, value = codec.decode_sdo(data)
         endpoints = self._watchdog_endpoints
-        if endpoints is None:  # this answers another program
+        if endpoints is None:  # the drive answers another program
             return
         if endpoint == endpoints.enable:
             self._watchdog_enabled = codec.decode_sdo_flag(value)
@@ -195,7 +195,7 @@ class OdriveAxis:
 
     @property
     def duplicates(self) -> bool:
-        """Whether two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
+        """Returns whether two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
         return self._duplicates.found
 
     @property

@@ -47,5 +47,5 @@ def _decode_torque(data: bytes) -> float:
 
 
 def _reads_parameter(data: bytes) -> bool:
-    """Whether it reads a parameter of any number: opcode and reserved byte are zero, and no value follows to write."""
+    """Returns whether a payload reads a parameter: opcode and reserved byte are zero, and no value follows to write."""
     return len(data) == READ_BYTES and data[0] == codec.SDO_READ and data[3] == 0

@@ -13,15 +13,15 @@ from math import inf
 
 from control.records import NEVER_S, UNKNOWN
 
-WINDOW_S = 10.0  # in which clocks of 50 ppm drift apart by half a millisecond
-RESTARTED_S = 1.0  # a frame that is later than the least delay by this much comes from a clock that was set
-SPEED_S = 0.016  # for the velocity, two frames of 120 Hz: 0.1 mm of noise makes an error of 9 mm/s
-LONGEST_S = 0.1  # of extrapolation
+WINDOW_S = 10.0  # two clocks that differ by 50 ppm drift apart by half a millisecond in it
+RESTARTED_S = 1.0  # a delay that exceeds the least one by more shows that the sender's clock was set
+VELOCITY_SPAN_S = 0.016  # between the two positions of a velocity, two frames of 120 Hz: 0.1 mm of noise makes 9 mm/s
+LONGEST_EXTRAPOLATION_S = 0.1
 JUMP_M = 0.03  # from frame to frame; the robot cannot move so fast, so the velocity is unknown
 
 
 class LeastDelay:
-    """Owns the least delays of this window and of the one before."""
+    """Estimates the offset of the sender's clock. Owns the least delays of this window and of the one before."""
 
     def __init__(self) -> None:
         self.reset()
@@ -42,7 +42,7 @@ class LeastDelay:
 
 
 class PoseForecast:
-    """Owns the recent positions."""
+    """Extrapolates the position along the track. Owns the recent positions, with their times."""
 
     def __init__(self) -> None:
         self.reset()
@@ -51,21 +51,26 @@ class PoseForecast:
         self._positions: deque[tuple[float, float]] = deque()
 
     def add(self, stamp_s: float, x_m: float) -> bool:
-        """Adds a position; returns whether it is plausible after the previous one, else starts again from it."""
+        """Adds a position; returns whether it is plausible after the previous one. If not, it becomes the first."""
         positions = self._positions
         follows = bool(positions) and stamp_s > positions[-1][0] and abs(x_m - positions[-1][1]) <= JUMP_M
         if not follows:
             positions.clear()
         positions.append((stamp_s, x_m))
-        while len(positions) > 2 and stamp_s - positions[1][0] >= SPEED_S:
+        while len(positions) > 2 and stamp_s - positions[1][0] >= VELOCITY_SPAN_S:
             positions.popleft()
         return follows
 
     def at(self, now_s: float) -> float:
+        """Returns the position in metres at `now_s`; NaN before the first one."""
         if not self._positions:
             return UNKNOWN
         (first_s, first_m), (last_s, last_m) = self._positions[0], self._positions[-1]
-        ahead_s = min(now_s - last_s, LONGEST_S)
-        if last_s - first_s < SPEED_S / 2.0 or last_s - first_s > 2.0 * LONGEST_S or ahead_s <= 0.0:
+        ahead_s = min(now_s - last_s, LONGEST_EXTRAPOLATION_S)
+        if (
+            last_s - first_s < VELOCITY_SPAN_S / 2.0
+            or last_s - first_s > 2.0 * LONGEST_EXTRAPOLATION_S
+            or ahead_s <= 0.0
+        ):
             return last_m
         return last_m + (last_m - first_m) / (last_s - first_s) * ahead_s

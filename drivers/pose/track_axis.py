@@ -12,7 +12,10 @@ def parse_axis(axis: object) -> Direction | None:
     """Returns a unit vector from "x", "-z" or three numbers; None for anything else."""
     if isinstance(axis, str):
         direction = AXES.get(axis.removeprefix("-"))
-        return _inverted(direction) if direction and axis.startswith("-") else direction
+        if direction is None or not axis.startswith("-"):
+            return direction
+        x, y, z = direction
+        return -x, -y, -z
     if not isinstance(axis, list | tuple) or len(axis) != 3:
         return None
     if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in axis):
@@ -20,8 +23,3 @@ def parse_axis(axis: object) -> Direction | None:
     x, y, z = axis
     length = hypot(x, y, z)
     return (x / length, y / length, z / length) if isfinite(length) and length > 0.0 else None
-
-
-def _inverted(direction: Direction) -> Direction:
-    x, y, z = direction
-    return -x, -y, -z

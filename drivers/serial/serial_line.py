@@ -30,7 +30,7 @@ LINE_ENDS = re.compile(rb"[\r\n]+")
 
 
 class Arrivals(NamedTuple):
-    """How many of the recent lines are readable, and the fraction of their bytes that is text."""
+    """The quality of the recent lines, which shows a wrong format or baud rate."""
 
     lines: int
     readable: float  # fraction of the lines
