@@ -211,7 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
     except ModuleNotFoundError as problem:
-        if problem.name not in PICTURE_MODULES:
+        if (problem.name or "").partition(".")[0] not in PICTURE_MODULES:
             raise
         complain("pictures need matplotlib: install mudskipper with its extra 'plots'")
         return exit_codes.UNHEALTHY

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-from matplotlib.axes import Axes  # noqa: E402
-
-from experiments.estimation.evaluation import EstimationReport  # noqa: E402
-from experiments.reports.error_table import ErrorRow  # noqa: E402
-from experiments.reports.mud_names import mud_text  # noqa: E402
+from experiments.estimation.evaluation import EstimationReport
+from experiments.reports.error_table import ErrorRow
+from experiments.reports.mud_names import mud_text
 
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
 COEFFICIENTS = ("k_p", "k_s", "k_e")
@@ -24,8 +21,8 @@ def plot_errors(report: EstimationReport, path: Path) -> None:
     """Draw median and 95th percentile of the error by setup, coefficient, mud and method."""
     errors = report.errors
     setups = list(dict.fromkeys(row.setup for row in errors))
-    size = (4.0 * len(COEFFICIENTS), 2.8 * len(setups))
-    figure, panels = plt.subplots(len(setups), len(COEFFICIENTS), figsize=size, squeeze=False, constrained_layout=True)
+    figure = Figure(figsize=(4.0 * len(COEFFICIENTS), 2.8 * len(setups)), layout="constrained")
+    panels = figure.subplots(len(setups), len(COEFFICIENTS), squeeze=False)
     for row, setup in enumerate(setups):
         for column, name in enumerate(COEFFICIENTS):
             own = [each for each in errors if (each.setup, each.coefficient) == (setup, name)]
@@ -38,7 +35,6 @@ def plot_errors(report: EstimationReport, path: Path) -> None:
     for panel in panels[:, 0]:
         panel.set_ylabel("error (%)")
     figure.savefig(path, dpi=110)
-    plt.close(figure)
 
 
 def _plot_panel(panel: Axes, rows: Sequence[ErrorRow]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 
 from experiments.estimation.boundaries import BoundaryRow
 from experiments.estimation.evaluation import EstimationReport
@@ -15,13 +14,9 @@ from experiments.trials.session import Finding, screen_finding
 
 
 def estimation_finding(report: EstimationReport) -> Finding:
-    return screen_finding(report.experiment, report, estimation_text(report), partial(_plot, report))
-
-
-def _plot(report: EstimationReport, path: Path) -> None:
     from experiments.estimation.plots import plot_errors  # matplotlib takes its time
 
-    plot_errors(report, path)
+    return screen_finding(report.experiment, report, estimation_text(report), partial(plot_errors, report))
 
 
 def estimation_text(report: EstimationReport) -> str:

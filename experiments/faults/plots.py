@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-import numpy as np  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-
-from experiments.faults.evaluation import Cell  # noqa: E402
-from experiments.faults.matrix import FaultsReport, ModeSummary  # noqa: E402
+from experiments.faults.evaluation import Cell
+from experiments.faults.matrix import FaultsReport, ModeSummary
 
 COLUMNS = 2  # panels side by side: there are many faults
 HIGHEST_PERCENT = 100.0
@@ -27,17 +25,15 @@ def plot_faults(report: FaultsReport, path: Path) -> None:
     phases = [phase for phase in report.settings.phases if any(cell.phase == phase for cell in report.cells)]
     columns = min(COLUMNS, len(rows))
     per_panel = -(-len(rows) // columns)
-    figure, panels = plt.subplots(
-        1, columns, figsize=(12.0, 1.6 + 0.22 * per_panel), squeeze=False, constrained_layout=True
-    )
-    for i, panel in enumerate(panels[0]):
+    figure = Figure(figsize=(12.0, 1.6 + 0.22 * per_panel), layout="constrained")
+    panels = figure.subplots(1, columns, squeeze=False)[0]
+    for i, panel in enumerate(panels):
         mesh = _plot_panel(panel, report, rows[i * per_panel : (i + 1) * per_panel], phases)
-    bar = figure.colorbar(mesh, ax=list(panels[0]), pad=0.01, shrink=0.6, aspect=40, extend="max")
+    bar = figure.colorbar(mesh, ax=list(panels), pad=0.01, shrink=0.6, aspect=40, extend="max")
     bar.set_label("slowest reaction, % of its bound; the numbers are ticks of 2.63 ms")
     ok, cells = report.ok, len(report.cells)
     figure.suptitle(f"From the injection to the reaction: {ok} of {cells} cells within every bound", fontsize="medium")
     figure.savefig(path, dpi=110)
-    plt.close(figure)
 
 
 def _plot_panel(panel: Axes, report: FaultsReport, rows: Sequence[ModeSummary], phases: Sequence[str]) -> Any:
@@ -47,7 +43,7 @@ def _plot_panel(panel: Axes, report: FaultsReport, rows: Sequence[ModeSummary], 
             cells = [cell for cell in report.cells if (cell.mode_name, cell.phase) == (row.mode_name, phase)]
             if cells:
                 percent[y, x] = _write_cell(panel, x, y, cells)
-    colours = plt.get_cmap("YlGnBu").with_extremes(bad="#f4f4f4")
+    colours = colormaps["YlGnBu"].with_extremes(bad="#f4f4f4")
     mesh = panel.imshow(percent, cmap=colours, vmin=0.0, vmax=HIGHEST_PERCENT, aspect="auto")
     panel.set_xticks(range(len(phases)), list(phases), rotation=35, ha="left", fontsize="small")
     panel.xaxis.tick_top()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 from experiments.faults.matrix import FaultsReport
 from experiments.reports.text_tables import number, table
@@ -11,14 +10,10 @@ from experiments.trials.session import Ending, Finding, screen_finding
 
 
 def faults_finding(report: FaultsReport) -> Finding:
-    ending = Ending.DONE if report.ok == len(report.cells) else Ending.UNHEALTHY
-    return screen_finding(report.experiment, report, faults_text(report), partial(_plot, report), ending)
-
-
-def _plot(report: FaultsReport, path: Path) -> None:
     from experiments.faults.plots import plot_faults  # matplotlib takes its time
 
-    plot_faults(report, path)
+    ending = Ending.DONE if report.ok == len(report.cells) else Ending.UNHEALTHY
+    return screen_finding(report.experiment, report, faults_text(report), partial(plot_faults, report), ending)
 
 
 def faults_text(report: FaultsReport) -> str:

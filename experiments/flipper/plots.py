@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from control.geometry import FlipperGeometry
 from control.records import Phase
@@ -40,7 +40,8 @@ def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path
     """Draw depth, angles and forces of one stride against time, with the forces by the laws: figure 4."""
     profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
     laws = modelled_forces(profile, geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method)
-    figure, panels = plt.subplots(4, 1, figsize=(7.0, 8.2), sharex=True, constrained_layout=True)
+    figure = Figure(figsize=(7.0, 8.2), layout="constrained")
+    panels = figure.subplots(4, 1, sharex=True)
     _plot_depths(panels[0], profile, stride["surface_m"] or 0.0)
     _plot_angles(panels[1], profile)
     _plot_upward(panels[2], profile, laws)
@@ -57,7 +58,6 @@ def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path
     panels[0].set_title(f"mud {mud_text(trial['mud'])}, trial {trial['trial']}\n", fontsize="medium", loc="left")
     panels[-1].set_xlabel("time (s)")
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
 
 
 def _shade(panel: Axes, profile: StrideProfile) -> None:
@@ -116,7 +116,8 @@ def plot_coefficients(
     """Draw the forces of one trial in each mud, the coefficients, and their comparison with a load cell: figure 5."""
     compared = any(mud.truth for mud in muds)
     rows = 3 if compared else 2
-    figure, panels = plt.subplots(rows, 3, figsize=(11.0, 3.3 * rows + 0.5), constrained_layout=True)
+    figure = Figure(figsize=(11.0, 3.3 * rows + 0.5), layout="constrained")
+    panels = figure.subplots(rows, 3)
     looks = looks_of([mud.mud for mud in muds])
     _plot_curves(panels[0], firsts, looks)
     for column, name in enumerate(COEFFICIENTS):
@@ -128,7 +129,6 @@ def plot_coefficients(
     handles, labels = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 6), fontsize="small")
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
 
 
 Curve = Callable[[StrideProfile], tuple[Floats, Floats]]

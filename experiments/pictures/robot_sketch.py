@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
 
-from experiments.pictures.colours import BODY, FAINT, FLIPPERS, INK, MUD, SURFACE, TRAIL
+from experiments.pictures.colours import BODY, FAINT, FLIPPER_COLOURS, INK, MUD, SURFACE, TRAIL
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.side_view import SideView, view_from_side
 
@@ -38,7 +38,7 @@ def view_of(walk: RecordedWalk, row: int, origin_m: float) -> SideView:
 
 
 def draw_robot(panel: Axes, walk: RecordedWalk, row: int, origin_m: float) -> None:
-    view, colour = view_of(walk, row, origin_m), FLIPPERS[walk.flipper]
+    view, colour = view_of(walk, row, origin_m), FLIPPER_COLOURS[walk.flipper]
     _draw_body(panel, *view.shoulder)
     panel.add_patch(Polygon(view.plate, facecolor=colour, edgecolor=colour, linewidth=1.0, joinstyle="round"))
     panel.plot(*zip(view.shoulder, view.wrist, strict=True), color=INK, linewidth=3.0, solid_capstyle="round")

@@ -8,19 +8,17 @@ from math import ceil, floor, hypot
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image  # comes with matplotlib
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-import numpy as np  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-from PIL import Image  # noqa: E402 - comes with matplotlib
-
-from control.records import Phase  # noqa: E402
-from experiments.pictures.colours import FORCE, INK, OUTCOMES, SURFACE  # noqa: E402
-from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
-from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of  # noqa: E402
-from experiments.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of  # noqa: E402
+from control.records import Phase
+from experiments.pictures.colours import FORCE, INK, OUTCOME_COLOURS, SURFACE
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of
+from experiments.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of
 
 FRAMES_PER_S = 20  # GIF counts in hundredths of a second
 DEEPEST_M, HIGHEST_M, HALF_WIDTH_M = 0.085, 0.135, 0.25
@@ -53,18 +51,15 @@ class Camera:
     def __init__(self, walk: RecordedWalk) -> None:
         self.walk = walk
         height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / (2.0 * HALF_WIDTH_M)
-        self._figure, self._panel = plt.subplots(figsize=(WIDTH_IN, height_in), dpi=DOTS_PER_INCH)
-        self._figure.subplots_adjust(0.0, 0.0, 1.0, 1.0)
+        self._canvas: Any = FigureCanvasAgg(Figure(figsize=(WIDTH_IN, height_in), dpi=DOTS_PER_INCH))
+        self._panel = self._canvas.figure.subplots()
+        self._canvas.figure.subplots_adjust(0.0, 0.0, 1.0, 1.0)
 
     def picture(self, frame: Frame) -> Image.Image:
         self._panel.clear()
         _draw_frame(self._panel, self.walk, *frame)
-        canvas: Any = self._figure.canvas
-        canvas.draw()
-        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-
-    def close(self) -> None:
-        plt.close(self._figure)
+        self._canvas.draw()
+        return Image.fromarray(np.asarray(self._canvas.buffer_rgba())).convert("RGB")
 
 
 def draw_film(walk: RecordedWalk, strides: Sequence[Stride], path: Path, show: Show) -> None:
@@ -79,7 +74,6 @@ def draw_film(walk: RecordedWalk, strides: Sequence[Stride], path: Path, show: S
 
     rest = pictures()
     next(rest).save(film, "GIF", save_all=True, append_images=rest, duration=1000 // FRAMES_PER_S, loop=0)
-    camera.close()
     path.write_bytes(film.getvalue())
 
 
@@ -133,7 +127,7 @@ def _draw_texts(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> No
     name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
     phase = Phase(int(walk.phase[row])).name.lower()
     texts = {
-        0.02: (f"{name} {stride['index']}", OUTCOMES[outcome]),
+        0.02: (f"{name} {stride['index']}", OUTCOME_COLOURS[outcome]),
         0.30: (phase, INK),
         0.48: (f"depth {100.0 * walk.depth_m[row]:.1f} cm", INK),
         0.70: (f"force {hypot(*_force_n(walk, row)):.1f} N", FORCE),

@@ -6,18 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-import numpy as np  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
-
-from experiments.pictures.colours import INK, OUTCOMES  # noqa: E402
-from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
-from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare  # noqa: E402
-from experiments.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of  # noqa: E402
+from experiments.pictures.colours import INK, OUTCOME_COLOURS
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare
+from experiments.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of
 
 DEEPEST_M, HIGHEST_M = 0.106, 0.146  # range of a row below and above the surface
 SPACING_M = 0.235  # from one moment to the next
@@ -36,7 +32,8 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
     farthest_m = max(_farthest_m(walk, stride) for stride in strides)
     width_m = 2.0 * MARGIN_M + SPACING_M * (len(captions) - 1) + farthest_m
     height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / width_m * len(strides) + HEAD_IN + FOOT_IN
-    figure, panels = plt.subplots(len(strides), 1, figsize=(WIDTH_IN, height_in), squeeze=False)
+    figure = Figure(figsize=(WIDTH_IN, height_in))
+    panels = figure.subplots(len(strides), 1, squeeze=False)
     figure.subplots_adjust(0.0, FOOT_IN / height_in, 1.0, 1.0 - HEAD_IN / height_in, hspace=0.0)
     for panel, stride in zip(panels[:, 0], strides, strict=True):
         prepare(panel, -MARGIN_M, width_m - MARGIN_M, DEEPEST_M, HIGHEST_M)
@@ -45,7 +42,6 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
     legend = WITH_POSE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_POSE
     figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
 
 
 def _write_captions(figure: Figure, captions: Sequence[str], width_m: float, height_in: float) -> None:
@@ -77,7 +73,7 @@ def _draw_title(panel: Axes, walk: RecordedWalk, stride: Stride) -> None:
     outcome, corner = outcome_of(stride, walk.geometric_step_m), (0.018 - MARGIN_M, HIGHEST_M - 0.03)
     name = "stride" if outcome is Outcome.UNKNOWN else f"{outcome} stride"
     details = f"number {stride['index']}, {100.0 * stride['depth_m']:.1f} cm deep, at {stride['t_start_s']:.1f} s"
-    title = panel.annotate(name, corner, weight="bold", size=15, color=OUTCOMES[outcome])
+    title = panel.annotate(name, corner, weight="bold", size=15, color=OUTCOME_COLOURS[outcome])
     after: dict[str, Any] = {"xycoords": (title, "data"), "xytext": (10, 0), "textcoords": "offset points"}
     panel.annotate(details, (1, corner[1]), size=12, color=INK, **after)
 

@@ -1,7 +1,7 @@
-"""A walk against time, after the paper's figure 8: forces, coefficients, depth, position and steps, with shaded muds.
+"""Plots forces, coefficients, depth, position and steps of a walk against time, after the paper's figure 8.
 
-The paper's own figure shades the muds that the experimenters had prepared, and so does the demo, which knows its track.
-From a log alone, a mud begins with the stride after which the robot noticed it.
+The paper shades the muds that the experimenters prepared, and so does the demo, which knows its track. A log alone does
+not name the muds: there a mud begins with the stride after which the robot noticed it.
 """
 
 from __future__ import annotations
@@ -11,25 +11,23 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-import numpy as np  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-
-from control.records import FLIPPERS as NAMES  # noqa: E402
-from experiments.pictures.colours import FAINT, FLIPPERS, FORWARD, INK, MUDS, OUTCOMES, SURFACE, UP  # noqa: E402
-from experiments.pictures.recorded_walk import RecordedWalk  # noqa: E402
-from experiments.pictures.stride_choice import Outcome, outcome_of  # noqa: E402
-from experiments.reports.mud_names import mud_label  # noqa: E402
-from simulation.mud.track import Track  # noqa: E402
+from control.records import FLIPPERS as FLIPPER_NAMES
+from experiments.pictures.colours import FAINT, FLIPPER_COLOURS, FORWARD, INK, MUD_SHADES, OUTCOME_COLOURS, SURFACE, UP
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.stride_choice import Outcome, outcome_of
+from experiments.reports.mud_names import mud_label
+from simulation.mud.track import Track
 
 WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120
 COEFFICIENTS = ("k_p", "k_s", "k_e")
-NOTICED = (0, (2, 2))  # dashes
-SHORTEST_S = 0.1
-FULL_VIEW = 1.6  # height of a panel over its largest value; error bars may be cut
+NOTICED_DASHES = (0, (2, 2))
+SHORTEST_S = 0.1  # least length of the time axis
+HEADROOM = 1.6  # top of a panel as a multiple of its largest value; error bars may be cut
 LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "fontsize": "small", "frameon": False}
 STYLE: dict[Any, Any] = {
     "axes.edgecolor": FAINT,
@@ -40,19 +38,17 @@ STYLE: dict[Any, Any] = {
     "xtick.color": INK,
     "ytick.color": INK,
 }
-MudRegion = tuple[float, float, str]  # from, to in s, and its name
-
-
+MudRegion = tuple[float, float, str]  # start and end in s, and the mud's name
 Draw = Callable[[Axes, RecordedWalk], None]
 
 
 def plot_walk(walk: RecordedWalk, path: Path, track: Track | None = None) -> None:
-    """Draw a walk. `track` has the real muds where they are known."""
+    """Draw a walk into a PNG file. `track` holds the true muds where they are known."""
     wanted, regions = _panels(walk), mud_regions(walk, track)
     size = (WIDTH_IN, PANEL_IN * len(wanted) + 0.4)
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(len(wanted), 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
-        panels = axes[:, 0]
+    with rc_context(STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        panels = figure.subplots(len(wanted), 1, sharex=True, squeeze=False)[:, 0]
         for panel, (label, draw) in zip(panels, wanted, strict=True):
             draw(panel, walk)
             panel.set_ylabel(label)
@@ -63,7 +59,6 @@ def plot_walk(walk: RecordedWalk, path: Path, track: Track | None = None) -> Non
         panels[-1].set_title(f"{walk.flipper} flipper, {walk.title}", y=-0.42, loc="right", size=8, color=FAINT)
         figure.align_ylabels()
         figure.savefig(path, dpi=DOTS_PER_INCH)
-        plt.close(figure)
 
 
 def _panels(walk: RecordedWalk) -> list[tuple[str, Draw]]:
@@ -101,9 +96,9 @@ def _arrival_s(walk: RecordedWalk, position_m: float) -> float:
 
 def _shade(panel: Axes, regions: list[MudRegion], noticed_s: list[float]) -> None:
     for number, (start_s, end_s, _) in enumerate(regions):
-        panel.axvspan(start_s, end_s, color=MUDS[number % len(MUDS)], linewidth=0, zorder=0)
+        panel.axvspan(start_s, end_s, color=MUD_SHADES[number % len(MUD_SHADES)], linewidth=0, zorder=0)
     for at_s in noticed_s:
-        panel.axvline(at_s, color=INK, linewidth=1.0, linestyle=NOTICED)
+        panel.axvline(at_s, color=INK, linewidth=1.0, linestyle=NOTICED_DASHES)
 
 
 def _name_muds(panel: Axes, regions: list[MudRegion]) -> None:
@@ -125,14 +120,14 @@ def _plot_forces(panel: Axes, walk: RecordedWalk) -> None:
 
 def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
     """Explain the marks in the panels of coefficients that occur."""
-    for flipper in dict.fromkeys(NAMES[stride["flipper"]] for stride in walk.strides):
-        panel.plot([], [], "o", color=FLIPPERS[flipper], label=flipper)
+    for flipper in dict.fromkeys(FLIPPER_NAMES[stride["flipper"]] for stride in walk.strides):
+        panel.plot([], [], "o", color=FLIPPER_COLOURS[flipper], label=flipper)
     if any(stride[f"{name}_at_least"] for name in COEFFICIENTS for stride in walk.strides):
         panel.plot([], [], "^", color=FAINT, label="lower bound")
     if any(not stride[f"{name}_valid"] for name in COEFFICIENTS for stride in walk.strides):
         panel.plot([], [], "o", color=FAINT, markerfacecolor="white", label="not valid")
     if walk.noticed_s:
-        panel.plot([], [], color=INK, linewidth=1.0, linestyle=NOTICED, label="another mud noticed")
+        panel.plot([], [], color=INK, linewidth=1.0, linestyle=NOTICED_DASHES, label="another mud noticed")
     if panel.get_legend_handles_labels()[0]:
         panel.legend(ncols=5, **LEGEND)
 
@@ -141,7 +136,7 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
     """Draw values as dots, lower bounds as triangles, invalid ones hollow; bars are two standard errors."""
     known = [stride for stride in walk.strides if np.isfinite(stride[name])]
     for stride in known:
-        colour = FLIPPERS[NAMES[stride["flipper"]]]
+        colour = FLIPPER_COLOURS[FLIPPER_NAMES[stride["flipper"]]]
         panel.errorbar(
             stride["stamp_s"],
             stride[name] / 1e6,
@@ -154,13 +149,13 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
             label="_",
         )
     largest = max((stride[name] / 1e6 for stride in known), default=0.0)
-    panel.set_ylim(0.0, FULL_VIEW * largest if largest > 0.0 else 1.0)
+    panel.set_ylim(0.0, HEADROOM * largest if largest > 0.0 else 1.0)
     if name == COEFFICIENTS[0]:
         _explain_coefficients(panel, walk)
 
 
 def _plot_depth(panel: Axes, walk: RecordedWalk) -> None:
-    panel.plot(walk.time_s, 100.0 * walk.depth_m, color=FLIPPERS[walk.flipper], linewidth=1.0, label="measured")
+    panel.plot(walk.time_s, 100.0 * walk.depth_m, color=FLIPPER_COLOURS[walk.flipper], linewidth=1.0, label="measured")
     panel.plot(walk.time_s, 100.0 * walk.depth_command_m, color=INK, linewidth=0.8, label="commanded")
     chosen_m = {s["stamp_s"]: s["chosen_depth_m"] for s in walk.own_strides if np.isfinite(s["chosen_depth_m"])}
     if chosen_m:
@@ -169,7 +164,7 @@ def _plot_depth(panel: Axes, walk: RecordedWalk) -> None:
     stuck_s = [stride["stamp_s"] for stride in walk.own_strides if not stride["released"]]
     if stuck_s:
         stuck_cm = 100.0 * np.interp(stuck_s, walk.time_s, walk.depth_m)
-        panel.plot(stuck_s, stuck_cm, "x", color=OUTCOMES[Outcome.STUCK], markeredgewidth=2.0, label="stuck")
+        panel.plot(stuck_s, stuck_cm, "x", color=OUTCOME_COLOURS[Outcome.STUCK], markeredgewidth=2.0, label="stuck")
     panel.axhline(0.0, color=SURFACE, linewidth=1.0)
     panel.invert_yaxis()
     panel.legend(ncols=4, **LEGEND)
@@ -188,7 +183,7 @@ def _plot_steps(panel: Axes, walk: RecordedWalk) -> None:
         lengths_s = [stride["stamp_s"] - stride["t_start_s"] for stride in own]
         steps_cm = [100.0 * stride["step_m"] for stride in own]
         if own:
-            panel.bar(starts_s, steps_cm, lengths_s, align="edge", color=OUTCOMES[outcome], label=str(outcome))
+            panel.bar(starts_s, steps_cm, lengths_s, align="edge", color=OUTCOME_COLOURS[outcome], label=str(outcome))
     panel.axhline(0.0, color=FAINT, linewidth=0.8)
     if np.isfinite(walk.geometric_step_m):
         step_cm = 100.0 * walk.geometric_step_m

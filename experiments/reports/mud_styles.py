@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib
+from matplotlib import colormaps
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-
-from control.records import Phase  # noqa: E402
+from control.records import Phase
 
 INK, GREY = "#222222", "#8a8a8a"
 PHASE_SHADES = {Phase.INSERTION: "#d6e6f4", Phase.STANCE: "#dcefd9", Phase.EXTRACTION: "#fbe3cc"}  # as in the paper
@@ -23,7 +20,7 @@ LABELS = {"k_p": "$k_p$ penetration", "k_s": "$k_s$ shear", "k_e": "$k_e$ extrac
 
 def looks_of(muds: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return colour, line and marker of each mud, from dark to light."""
-    colours = plt.get_cmap("viridis")
+    colours = colormaps["viridis"]
     fraction = max(len(muds) - 1, 1) / 0.85
     return {
         mud: {"color": colours(i / fraction), "linestyle": LINES[i % len(LINES)], "marker": MARKS[i % len(MARKS)]}

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-import numpy as np  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
-
-from experiments.sweep.sweep import SettledMethod, SweepReport, SweptMud  # noqa: E402
-from experiments.trackway.plots import MARKS, TEXT  # noqa: E402
+from experiments.sweep.sweep import SettledMethod, SweepReport, SweptMud
+from experiments.trackway.plots import MARKS, TEXT
 
 Floats = NDArray[np.float64]
 METHOD_COLOURS = ("white", "tab:red", "tab:cyan", "tab:pink")
@@ -24,9 +21,8 @@ OFFSET = 1.03  # between the methods' dots, as a factor of strength, so that non
 
 def plot_sweep(report: SweepReport, path: Path) -> None:
     """Draw speed over strength and depth with each method's choice, and below it each method's fraction of the best."""
-    figure, (over, below) = plt.subplots(
-        2, 1, figsize=(9.0, 7.2), height_ratios=(2.2, 1.0), sharex=True, constrained_layout=True
-    )
+    figure = Figure(figsize=(9.0, 7.2), layout="constrained")
+    over, below = figure.subplots(2, 1, height_ratios=(2.2, 1.0), sharex=True)
     muds = report.strengths
     strengths_kpa = np.array([mud.strength_pa / 1000.0 for mud in muds])
     colours = dict(zip(report.settings.methods, METHOD_COLOURS * len(muds), strict=False))
@@ -40,7 +36,6 @@ def plot_sweep(report: SweepReport, path: Path) -> None:
         _plot_fraction(below, settled, shifted_kpa, method, colour, 7 if i == 0 else -12 * i)
     _name_sweep_axes(over, below, strengths_kpa)
     figure.savefig(path, dpi=110)
-    plt.close(figure)
 
 
 def _plot_map(figure: Any, panel: Axes, muds: Sequence[SweptMud], strengths_kpa: Floats) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 from experiments.reports.text_tables import number, table
 from experiments.sweep.sweep import SettledMethod, SweepReport
@@ -11,13 +10,9 @@ from experiments.trials.session import Finding, screen_finding
 
 
 def sweep_finding(report: SweepReport) -> Finding:
-    return screen_finding(report.experiment, report, sweep_text(report), partial(_plot, report))
-
-
-def _plot(report: SweepReport, path: Path) -> None:
     from experiments.sweep.plots import plot_sweep  # matplotlib takes its time
 
-    plot_sweep(report, path)
+    return screen_finding(report.experiment, report, sweep_text(report), partial(plot_sweep, report))
 
 
 def sweep_text(report: SweepReport) -> str:

@@ -39,14 +39,11 @@ def run_at_bench(plan: bench.Plan, session: Session) -> Finding:
 
 
 def _finding(report: TrackwayReport, logs: Sequence[Path] = (), walks: Sequence[Figure] = ()) -> Finding:
+    from experiments.trackway.plots import plot_trackway  # matplotlib takes its time
+
     text = trackway_text(report)
-    sections = [Section("Table I", screen=text, figures=[Figure("trackway", WALKS_AND_TABLE, partial(_plot, report))])]
+    table = Figure("trackway", WALKS_AND_TABLE, partial(plot_trackway, report))
+    sections = [Section("Table I", screen=text, figures=[table])]
     if walks:
         sections.append(Section("Walks against time", "The first walk of each gait that counts.", figures=walks))
     return Finding(report, "The trackway: Table I of the paper", sections, text, logs)
-
-
-def _plot(report: TrackwayReport, path: Path) -> None:
-    from experiments.trackway.plots import plot_trackway  # matplotlib takes its time
-
-    plot_trackway(report, path)

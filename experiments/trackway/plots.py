@@ -7,18 +7,15 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-from matplotlib.axes import Axes  # noqa: E402
-from matplotlib.lines import Line2D  # noqa: E402
-
-from experiments.reports.mud_names import mud_label  # noqa: E402
-from experiments.trackway.paper_table import ADAPTIVE, Speed  # noqa: E402
-from experiments.trackway.report import SpeedCell, StrideReport, TrackwayReport  # noqa: E402
-from experiments.trackway.simulation import SimulatedReport  # noqa: E402
-from experiments.trackway.walk import EXTRACTION, SLIPPAGE  # noqa: E402
+from experiments.reports.mud_names import mud_label
+from experiments.trackway.paper_table import ADAPTIVE, Speed
+from experiments.trackway.report import SpeedCell, StrideReport, TrackwayReport
+from experiments.trackway.simulation import SimulatedReport
+from experiments.trackway.walk import EXTRACTION, SLIPPAGE
 
 COLOURS = {"3 cm": "tab:green", "5 cm": "tab:orange", ADAPTIVE: "tab:blue"}  # as in the paper
 OTHERS = ("tab:red", "tab:purple", "tab:brown")
@@ -31,12 +28,9 @@ Value = Callable[[StrideReport], float]
 
 def plot_trackway(report: TrackwayReport, path: Path) -> None:
     """Draw step length and depth along the track, and the speeds next to the paper's."""
-    figure, axes = plt.subplot_mosaic(
-        [["steps", "speeds"], ["depths", "speeds"]],
-        figsize=(12.0, 5.6),
-        width_ratios=(1.5, 1.0),
-        height_ratios=(1.6, 1.0),
-        constrained_layout=True,
+    figure = Figure(figsize=(12.0, 5.6), layout="constrained")
+    axes = figure.subplot_mosaic(
+        [["steps", "speeds"], ["depths", "speeds"]], width_ratios=(1.5, 1.0), height_ratios=(1.6, 1.0)
     )
     colours = _colours(list(report.table))
     _plot_steps(axes["steps"], report, colours)
@@ -46,7 +40,6 @@ def plot_trackway(report: TrackwayReport, path: Path) -> None:
     axes["depths"].set_xlabel("position along the track (cm)")
     _plot_speeds(axes["speeds"], report, colours)
     figure.savefig(path, dpi=110)
-    plt.close(figure)
 
 
 def _plot_steps(panel: Axes, report: TrackwayReport, colours: Mapping[str, str]) -> None:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
@@ -49,7 +49,8 @@ def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[LocatedStride], re
     own = [each for each in strides if each.trial == walk["trial"]]
     begun_s = float(profile.time_s[0])
     borders_s = _borders_s(plan, walk, profile, own, reach_m)
-    figure, panels = plt.subplots(6, 1, figsize=(9.0, 11.0), sharex=True, constrained_layout=True)
+    figure = Figure(figsize=(9.0, 11.0), layout="constrained")
+    panels = figure.subplots(6, 1, sharex=True)
     _plot_position(panels[0], walk, profile, begun_s)
     _plot_force(panels[1], profile, profile.force_x_n, begun_s, "$f_x$ forward (N)")
     upward_n = np.where(profile.phase == Phase.STANCE, np.nan, profile.force_z_n)
@@ -64,7 +65,6 @@ def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[LocatedStride], re
     panels[0].set_xlim(0.0, float(profile.time_s[-1]) - begun_s)
     panels[-1].set_xlabel("time (s)")
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
 
 
 def _borders_s(
@@ -155,7 +155,8 @@ def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[LocatedStride]
 
 def plot_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]], path: Path) -> None:
     """Draw f_x in one stance at each depth, and k_s by method with the load cell's: figure 7."""
-    figure, (forces, bars) = plt.subplots(1, 2, figsize=(11.0, 4.2), width_ratios=(1.0, 1.5), constrained_layout=True)
+    figure = Figure(figsize=(11.0, 4.2), layout="constrained")
+    forces, bars = figure.subplots(1, 2, width_ratios=(1.0, 1.5))
     for depth_cm, trials in walks.items():
         _plot_stance(forces, depth_cm, trials[0])
     forces.axhline(PAPER_DRAG_N / 2.0, color=GREY, linewidth=1.2, linestyle=":",
@@ -167,7 +168,6 @@ def plot_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]], path: Path)
     forces.set_title(f"A   mud {mud_text(soft.mud)}", loc="left", fontsize="medium")
     _plot_bars(bars, soft)
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
 
 
 def _plot_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:

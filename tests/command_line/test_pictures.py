@@ -5,11 +5,10 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -21,7 +20,7 @@ import command_line.logs.log_commands
 import experiments.pictures.stride_film
 from command_line import exit_codes
 from command_line.main import main
-from experiments.pictures.colours import OUTCOMES
+from experiments.pictures.colours import OUTCOME_COLOURS
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
@@ -121,19 +120,18 @@ def test_a_cut_log_is_drawn_as_far_as_it_goes(log: Path, capsys: pytest.CaptureF
 
 
 def drawn(walk: RecordedWalk, path: Path) -> Figure:
-    """The figure that a plot was saved from."""
+    """Return the figure that a plot is saved from."""
     figures: list[Figure] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plt, "close", figures.append)
+        patch.setattr(Figure, "savefig", lambda figure, *arguments, **options: figures.append(figure))
         plot_walk(walk, path)
     return figures[0]
 
 
 @pytest.fixture(scope="module")
-def figure(two_walks: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Figure]:
-    """Of the first walk."""
-    yield drawn(read_walk(two_walks, 1), tmp_path_factory.mktemp("figure") / "walk.png")
-    plt.close("all")
+def figure(two_walks: Path, tmp_path_factory: pytest.TempPathFactory) -> Figure:
+    """The first walk."""
+    return drawn(read_walk(two_walks, 1), tmp_path_factory.mktemp("figure") / "walk.png")
 
 
 def panel(figure: Figure, label: str) -> Axes:
@@ -178,7 +176,7 @@ def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
     bars = dict(zip(labels, handles, strict=True))
     for outcome, stride in ((Outcome.SLIPPING, slipping), (Outcome.STUCK, stuck)):
         (bar,) = bars[outcome].get_children()
-        assert to_hex(bar.get_facecolor()) == OUTCOMES[outcome]
+        assert to_hex(bar.get_facecolor()) == OUTCOME_COLOURS[outcome]
         assert bar.get_x() == pytest.approx(stride["t_start_s"])
 
 
