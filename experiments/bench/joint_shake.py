@@ -18,9 +18,9 @@ from __future__ import annotations
 from math import nan
 
 from control.rate import PERIOD_S
-from control.records import NO_TORQUE, DriveStates, Joints, Torques
+from control.records import NO_TORQUE, DriveStates, Torques
 from experiments.bench.reading import Reading
-from experiments.bench.test_rig import TestRig, joint_index
+from experiments.bench.test_rig import TestRig, joint_index, torque_on
 from experiments.robot.bench_robot import BenchError
 
 FIRST_NM, GROWTH = 0.02, 1.5
@@ -42,7 +42,7 @@ class Shake:
     """A hold law: shakes one joint with growing torque until its angle answers; the others have no torque."""
 
     def __init__(self, index: int, shakes: int, least_rad: float) -> None:
-        self._place = index
+        self._index = index
         self._left = shakes
         self.least_rad = least_rad  # of an answer
         self._ticks = 0
@@ -57,7 +57,7 @@ class Shake:
 
     def __call__(self, held: Torques, states: DriveStates) -> Torques:
         """Return the torques of this tick. Each shake is completed, because the joint is at rest at its end."""
-        angle_rad, tick = states[self._place].angle_rad, self._ticks % (SHAKE_TICKS + REST_TICKS)
+        angle_rad, tick = states[self._index].angle_rad, self._ticks % (SHAKE_TICKS + REST_TICKS)
         if tick == 0:
             self._from_rad = angle_rad
             self.done = self.answered or self._left == 0
@@ -68,8 +68,7 @@ class Shake:
         if self.done or tick >= SHAKE_TICKS:
             return NO_TORQUE
         torque_nm = -self._torque_nm if HALF_TICKS <= tick < 3 * HALF_TICKS else self._torque_nm
-        a, b, c, d = (torque_nm if index == self._place else 0.0 for index in range(4))
-        return Joints(a, b, c, d)
+        return torque_on(self._index, torque_nm)
 
 
 def shake_joint(test_rig: TestRig, joint: str) -> Shake:

@@ -8,7 +8,7 @@ from control.controller import measured_angles
 from control.records import JOINTS, JointAngles, Joints
 from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.stroke_tracking import WALK_DEPTH_M
-from experiments.bench.test_rig import LOOK_S, Sample, TestRig, joint_index
+from experiments.bench.test_rig import POLL_S, Sample, TestRig, joint_index
 
 LEVEL_DEG = 5.0  # error of a hand with a spirit level: 1 cm at the end of an arm
 LEAST_TURN_DEG = 30.0  # a joint turned on purpose moves more
@@ -50,8 +50,8 @@ def check_level_pose(test_rig: TestRig) -> Readings:
 
 def check_turning(test_rig: TestRig, joint: str) -> Readings:
     """Check that the turned joint moves most, and that its limits are within the stops."""
-    seen = [_mean_angles(test_rig.run_for(LOOK_S))]
-    if not test_rig.operator.turn_joint(joint, lambda: seen.extend(map(_angles, test_rig.run_for(LOOK_S)))):
+    seen = [_mean_angles(test_rig.run_for(POLL_S))]
+    if not test_rig.operator.turn_joint(joint, lambda: seen.extend(map(_angles, test_rig.run_for(POLL_S)))):
         yield left_out(f"{joint}: turned by hand")
         return
     test_rig.operator.release_flippers()

@@ -1,4 +1,4 @@
-"""The operator at the bench: allows motion, holds and turns the flippers, and observes which one moves.
+"""The operator at the test rig: allows motion, holds and turns the flippers, and observes which one moves.
 
 No drive knows on which joint it is mounted: its angle, torque and current agree with each other on any joint. So the
 operator's eyes and hands are needed once. The simulated operator observes the mechanics and not the drives.
@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable
 from enum import Enum
 from math import radians
-from typing import Protocol
 
 from control.controller import UP_RAD
 from control.rate import PERIOD_S
@@ -20,7 +19,7 @@ from experiments.robot.bench_robot import CLEAR, LEAVE
 from experiments.robot.prompt import GO_ON, Operator
 from simulation.body.plant import END_STOPS_RAD
 
-WAYS = {"sweep": "swing forward", "adduction": "rise"}
+MOTIONS = {"sweep": "swing forward", "adduction": "rise"}
 TURNING_S = 0.25  # for a simulated hand, from the middle to a stop
 SEEN_RAD = radians(4.0)  # visible motion
 
@@ -35,30 +34,43 @@ class Observation(Enum):
     UNSEEN = "there was no observer"
 
 
-class BenchOperator(Protocol):
+class BenchOperator:
+    """No operator: the robot may move, and checks that need hands or eyes are left out.
+
+    Every method calls `meanwhile` repeatedly while it waits.
+    """
+
     def allows_motion(self, what: str, meanwhile: Callable[[], None]) -> bool:
-        """Ask before anything moves. Every method calls `meanwhile` repeatedly while it waits."""
+        """Ask before anything moves."""
+        return True
 
     def allows_clearing(self, faults: str, meanwhile: Callable[[], None]) -> bool:
-        """Ask whether to clear faults from before the first torque, such as a tripped watchdog."""
+        """Ask whether to clear faults from before the first torque, such as a tripped watchdog.
+
+        Without an operator the cause is unknown, perhaps water or a blocked flipper.
+        """
+        return False
 
     def start_observing(self) -> None:
         """Start before one joint moves; `observe_farthest` follows at its farthest position."""
 
     def observe_farthest(self) -> None: ...
 
-    def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation: ...
+    def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation:
+        return Observation.UNSEEN
 
     def hold_level(self, meanwhile: Callable[[], None]) -> bool:
         """Hold both flippers straight out and level until `release_flippers`. False: there is no operator."""
+        return False
 
     def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
-        """Turn one joint by hand from stop to stop."""
+        """Turn one joint by hand from stop to stop. False: there is no operator."""
+        return False
 
     def release_flippers(self) -> None: ...
 
 
-class PromptedBenchOperator:
+class PromptedBenchOperator(BenchOperator):
     """An operator who is prompted. `sure`: motion is allowed in advance."""
 
     def __init__(self, operator: Operator, sure: bool) -> None:
@@ -76,21 +88,17 @@ class PromptedBenchOperator:
         answers = {CLEAR: "clear it and go on", LEAVE: "end here"}
         return self._operator.ask(f"{faults} Is the cause gone?", answers, meanwhile) == CLEAR
 
-    def start_observing(self) -> None: ...
-
-    def observe_farthest(self) -> None: ...
-
     def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation:
         side, kind = joint.split("_")
-        answers = {GO_ON: "yes", "w": "the other way", "o": "another joint moved", "n": "nothing moved"}
-        observations = {
-            GO_ON: Observation.RIGHT,
-            "w": Observation.OPPOSITE,
-            "o": Observation.OTHER,
-            "n": Observation.NOTHING,
+        answers = {
+            GO_ON: ("yes", Observation.RIGHT),
+            "w": ("the other way", Observation.OPPOSITE),
+            "o": ("another joint moved", Observation.OTHER),
+            "n": ("nothing moved", Observation.NOTHING),
         }
-        question = f"Did the {side} flipper {WAYS[kind]} and come back, and nothing else move?"
-        return observations[self._operator.ask(question, answers, meanwhile)]
+        question = f"Did the {side} flipper {MOTIONS[kind]} and come back, and nothing else move?"
+        choices = {key: text for key, (text, _) in answers.items()}
+        return answers[self._operator.ask(question, choices, meanwhile)][1]
 
     def hold_level(self, meanwhile: Callable[[], None]) -> bool:
         return self._done("Hold both flippers level and straight out, as a spirit level has it.", meanwhile)
@@ -107,33 +115,7 @@ class PromptedBenchOperator:
         return self._operator.ask(what, {GO_ON: "done", "s": "skip"}, meanwhile) == GO_ON
 
 
-class AbsentBenchOperator:
-    """No operator: the robot may move, and checks that need hands or eyes are left out."""
-
-    def allows_motion(self, what: str, meanwhile: Callable[[], None]) -> bool:
-        return True
-
-    def allows_clearing(self, faults: str, meanwhile: Callable[[], None]) -> bool:
-        """Never clear: the cause is unknown, perhaps water or a blocked flipper."""
-        return False
-
-    def start_observing(self) -> None: ...
-
-    def observe_farthest(self) -> None: ...
-
-    def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation:
-        return Observation.UNSEEN
-
-    def hold_level(self, meanwhile: Callable[[], None]) -> bool:
-        return False
-
-    def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
-        return False
-
-    def release_flippers(self) -> None: ...
-
-
-class SimulatedBenchOperator:
+class SimulatedBenchOperator(BenchOperator):
     """An operator who observes and moves the mechanics of a simulated robot."""
 
     def __init__(self, rig: SimulatedRig) -> None:
@@ -143,13 +125,6 @@ class SimulatedBenchOperator:
         self._turning = 0  # index of the joint that is turned along the profile
         self._profile: deque[float] = deque()
         rig.others.append(lambda _: self._hold())
-
-    def allows_motion(self, what: str, meanwhile: Callable[[], None]) -> bool:
-        return True
-
-    def allows_clearing(self, faults: str, meanwhile: Callable[[], None]) -> bool:
-        """Never clear: a test has caused the fault."""
-        return False
 
     def start_observing(self) -> None:
         self._from_rad = self._plant.angles_rad

@@ -35,7 +35,7 @@ from simulation.harness.blocks import on_blocks
 from simulation.harness.robot import SimulatedRobot
 
 LISTENING_S = 1.0  # ten heartbeats
-LOOK_S = 0.001  # between two reads of a bus
+READ_INTERVAL_S = 0.001
 
 
 class Overheard(NamedTuple):
@@ -118,7 +118,7 @@ def listen(ports: Mapping[str, CanPort]) -> Overheard:
     while now_s - begun_s < LISTENING_S:
         for name, port in ports.items():
             frames[name] += port.receive()
-        time.sleep(LOOK_S)
+        time.sleep(READ_INTERVAL_S)
         now_s = time.monotonic()
     return Overheard(now_s - begun_s, frames)
 

@@ -14,9 +14,9 @@ from control.controller import measured_angles
 from control.rate import PERIOD_S
 from control.records import JOINTS, NO_TORQUE, DriveStates, JointAngles, Joints, Torques
 from experiments.bench.joint_shake import answer_reading, idle, shake_joint
-from experiments.bench.operator import WAYS, Observation
+from experiments.bench.operator import MOTIONS, Observation
 from experiments.bench.reading import Reading, Readings, left_out
-from experiments.bench.test_rig import Sample, TestRig, joint_index
+from experiments.bench.test_rig import Sample, TestRig, joint_index, torque_on
 
 STEP_NM = 0.01  # a fifth of the torque that holds an arm of the default mass level
 STEP_S = 0.03  # for the joint to start moving before the next step
@@ -46,8 +46,7 @@ class Nudge:
         if self._ticks % round(STEP_S / PERIOD_S) == 0:
             self.torque_nm += STEP_NM
         self._ticks += 1
-        a, b, c, d = (self.torque_nm if index == self.index else 0.0 for index in range(4))
-        return Joints(a, b, c, d)
+        return torque_on(self.index, self.torque_nm)
 
 
 def check_nudge(test_rig: TestRig, joint: str) -> Readings:
@@ -113,7 +112,7 @@ def check_shown_motion(test_rig: TestRig, joint: str) -> Readings:
     test_rig.switch_off()
     observation = bench_operator.observed_motion(joint, test_rig.run_during_prompt)
     side, kind = joint.split("_")
-    what = f"{joint}: the {side} flipper was observed to {WAYS[kind]}"
+    what = f"{joint}: the {side} flipper was observed to {MOTIONS[kind]}"
     if observation is Observation.UNSEEN:
         yield left_out(what)
         return

@@ -13,9 +13,9 @@ from random import Random
 from statistics import median
 from typing import NamedTuple
 
-from control.records import NO_TORQUE, DriveStates, Joints, Torques
+from control.records import NO_TORQUE, DriveStates, Torques
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.test_rig import Sample, TestRig, joint_index
+from experiments.bench.test_rig import Sample, TestRig, joint_index, torque_on
 
 PULSE_NM = 0.08  # a tenth of the torque limit, and about ten times the noise of the current
 QUARTER_TICKS = 4  # 11 ms: the joint reaches 2 rad/s and moves by 2 degrees
@@ -50,8 +50,7 @@ class Pulses:
     def __call__(self, held: Torques, states: DriveStates) -> Torques:
         pulse_nm = self._pulse_nm(self._tick)
         self._tick += 1
-        a, b, c, d = (pulse_nm if index == self.index else 0.0 for index in range(4))
-        return Joints(a, b, c, d)
+        return torque_on(self.index, pulse_nm)
 
     def _pulse_nm(self, tick: int) -> float:
         for begins, sign in self.schedule:

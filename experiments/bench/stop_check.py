@@ -41,6 +41,7 @@ PUSH_A = 1.5  # in each motor until torque is off: at 0.083 N·m/A more than twi
 PUSH_TICKS = 5  # in which a sweep reaches 4 rad/s and moves 2 degrees
 COASTING_S = 1.5
 COASTING_DEG = 60.0  # from the start to the stops
+BRAKES = "raise the damping in [gains], and see what drives the joints on"
 
 
 def check_soft_stop(test_rig: TestRig) -> Readings:
@@ -64,7 +65,7 @@ def check_soft_stop(test_rig: TestRig) -> Readings:
 def _in_full_stance(test_rig: TestRig, sample: Sample) -> bool:
     full_rad_s = test_rig.configuration.gait.stance_speed_m_s / test_rig.configuration.geometry.flipper_length_m
     in_stance = test_rig.loop.target.phase is Phase.STANCE
-    return in_stance and all(abs(sample.states[index].velocity_rad_s) > FULL_FRACTION * full_rad_s for index in SWEEPS)
+    return in_stance and _is_fast(sample, FULL_FRACTION * full_rad_s)
 
 
 def check_damping(test_rig: TestRig) -> Readings:
@@ -91,18 +92,13 @@ def check_torque_off(test_rig: TestRig) -> Readings:
     test_rig.move([Joints(sweep, adduction, sweep, adduction)])
     test_rig.controller.hold_law = push(test_rig)
     pushed = test_rig.run_for(PUSH_TICKS * PERIOD_S)
-    begun = test_rig.loop.states
+    begun = measured_angles(test_rig.loop.states)
     test_rig.loop.request(Request.DISARM, test_rig.rig.now_s)
     samples = [test_rig.tick() for _ in range(round(COASTING_S / PERIOD_S))]
     for index, joint in enumerate(JOINTS):
         yield from _off_readings(test_rig.configuration.drive[joint], pushed, samples, index)
-    rest_s = PERIOD_S * ticks_until(first_slow(samples), pushed[-1])
-    yield Reading("torque off: until the sweep rests", rest_s, "s", 0.0, COASTING_S, "see what drives it on")
-    for index, side in zip(SWEEPS, ("left", "right"), strict=True):
-        path_deg = degrees(max(abs(sample.states[index].angle_rad - begun[index].angle_rad) for sample in samples))
-        yield Reading(
-            f"torque off: travel of the {side} sweep", path_deg, "deg", 0.0, COASTING_DEG, "see what drives it on"
-        )
+    advice = "see what drives it on"
+    yield from _sweep_readings("torque off", pushed[-1], samples, begun, COASTING_S, COASTING_DEG, advice)
 
 
 def push(test_rig: TestRig) -> HoldLaw:
@@ -134,14 +130,19 @@ def _is_fast(sample: Sample, speed_rad_s: float) -> bool:
 
 
 def _sweep_readings(
-    name: str, last: Sample, samples: Sequence[Sample], begun: JointAngles, longest_s: float, farthest_deg: float
+    name: str,
+    last: Sample,
+    samples: Sequence[Sample],
+    begun: JointAngles,
+    longest_s: float,
+    farthest_deg: float,
+    advice: str = BRAKES,
 ) -> Readings:
     rest_s = PERIOD_S * ticks_until(first_slow(samples), last)
-    brakes = "raise the damping in [gains], and see what drives the joints on"
-    yield Reading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, brakes)
+    yield Reading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, advice)
     for index, side in zip(SWEEPS, ("left", "right"), strict=True):
         path_deg = degrees(max(abs(sample.states[index].angle_rad - begun[index]) for sample in samples))
-        yield Reading(f"{name}: travel of the {side} sweep", path_deg, "deg", 0.0, farthest_deg, brakes)
+        yield Reading(f"{name}: travel of the {side} sweep", path_deg, "deg", 0.0, farthest_deg, advice)
 
 
 def first_slow(samples: Sequence[Sample]) -> Sample | None:

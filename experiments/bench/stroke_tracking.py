@@ -100,10 +100,14 @@ def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: flo
     with test_rig.flippers_raised():
         samples = stroke(test_rig, speed_rad_s)
     gains = "check stiffness and damping in [gains], the drives' limits, and friction of the joint"
+    yield from _tracking_readings(f"{name} stroke", samples, most_deg, gains)
+
+
+def _tracking_readings(motion: str, samples: Sequence[Sample], most_deg: float, advice: str) -> Readings:
     for joint, (max_deg, rms_deg, lag_ms) in tracking(samples).items():
-        yield Reading(f"{joint}: {name} stroke, largest error", max_deg, "deg", 0.0, most_deg, gains)
-        yield Reading(f"{joint}: {name} stroke, error (RMS)", rms_deg, "deg", 0.0, most_deg / 2.0, gains)
-        yield Reading(f"{joint}: {name} stroke, lag", lag_ms, "ms", -LAG_MS, LAG_MS, gains)
+        yield Reading(f"{joint}: {motion}, largest error", max_deg, "deg", 0.0, most_deg, advice)
+        yield Reading(f"{joint}: {motion}, error (RMS)", rms_deg, "deg", 0.0, most_deg / 2.0, advice)
+        yield Reading(f"{joint}: {motion}, lag", lag_ms, "ms", -LAG_MS, LAG_MS, advice)
 
 
 def check_strides(test_rig: TestRig) -> Readings:
@@ -143,11 +147,7 @@ def _walk_readings(test_rig: TestRig, walked: Sequence[Sample]) -> Readings:
     yield Reading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_FRACTION, narrow)
     most_nm = max(abs(torque_nm) for sample in walked for torque_nm in sample.sent_nm)
     yield Reading("walk: largest torque", most_nm, "N·m", 0.0, test_rig.configuration.limits.torque_nm, narrow)
-    for joint, (max_deg, rms_deg, lag_ms) in tracking(walked).items():
-        advice = "compare with the strokes before: mechanics or gains"
-        yield Reading(f"{joint}: walk, largest error", max_deg, "deg", 0.0, WALK_DEG, advice)
-        yield Reading(f"{joint}: walk, error (RMS)", rms_deg, "deg", 0.0, WALK_DEG / 2.0, advice)
-        yield Reading(f"{joint}: walk, lag", lag_ms, "ms", -LAG_MS, LAG_MS, advice)
+    yield from _tracking_readings("walk", walked, WALK_DEG, "compare with the strokes before: mechanics or gains")
     for index, (joint, span) in enumerate(zip(JOINTS, test_rig.configuration.joint_ranges, strict=True)):
         angles = [sample.states[index].angle_rad for sample in walked]
         room_deg = degrees(min(span.max_rad - max(angles), min(angles) - span.min_rad))

@@ -14,7 +14,7 @@ from control.controller import HoldLaw, measured_angles
 from control.faults import Fault, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS, DriveStates, JointAngles, JointTargets, Torques, same_for_all
+from control.records import JOINTS, DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
 from experiments.bench.lateness import Lateness
 from experiments.bench.operator import BenchOperator
 from experiments.bench.rig import Rig
@@ -24,8 +24,8 @@ from firmware_host.ticker import Tick
 
 ARMING_S = 5.0  # longest time for earlier faults to end, and for the drives to enter closed loop
 IDLING_S = 2.0
-LOOK_S = 0.1  # between two looks at the prompt
-GOODBYE_FRAMES = 5  # to each drive, in case some are lost
+POLL_S = 0.1  # interval at which a prompt is checked for an answer
+IDLE_COMMANDS = 5  # to each drive, in case some are lost
 LEVEL: JointAngles = same_for_all(0.0)
 
 
@@ -36,14 +36,14 @@ class Sample(NamedTuple):
     mode: Mode
     states: DriveStates
     aim: JointTargets | None  # commanded before the states were measured
-    sent_nm: Torques
-    limited: bool
+    sent_nm: Torques  # in this tick
+    limited: bool  # a limit cut the torque of this tick
 
 
 class TestRig:
     """Owns the rig and whether its drives have torque."""
 
-    __test__ = False  # no test, in spite of its name
+    __test__ = False  # pytest must not collect it for its name
 
     def __init__(self, rig: Rig, bench_operator: BenchOperator) -> None:
         self.rig = rig
@@ -52,7 +52,7 @@ class TestRig:
         self.loop = rig.loop
         self.drives = rig.loop.drives
         self.controller = rig.loop.controller
-        self._rest: JointAngles = LEVEL  # where the flippers lie without torque
+        self._rest: JointAngles = LEVEL  # joint angles in which the flippers lie without torque
         self.lateness = Lateness()  # of one measurement, while torque is on
         self.lateness_so_far = Lateness()  # of all measurements
 
@@ -61,7 +61,7 @@ class TestRig:
         tick, torque_on = self.rig.wait(), self._torque_on()
         loop.tick(tick)
         if torque_on:
-            self._on_lateness(tick, loop.states)
+            self._update_lateness(tick, loop.states)
         return Sample(tick, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
     def run_for(self, duration_s: float) -> list[Sample]:
@@ -82,43 +82,43 @@ class TestRig:
 
     def run_during_prompt(self) -> None:
         """Run the loop while the operator is asked, so that no frame waits and the drives stay idle."""
-        self.run_for(LOOK_S)
+        self.run_for(POLL_S)
 
     def tick_silently(self) -> Sample:
         """Read the drives for one tick and send nothing."""
         tick = self.rig.wait()
         states = self.drives.read(tick.now_s)
         if self._torque_on():
-            self._on_lateness(tick, states)
+            self._update_lateness(tick, states)
         return Sample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
     def _torque_on(self) -> bool:
         """Return whether a drive reported closed loop before this tick, whatever the mode of the loop."""
         return any(state.closed_loop for state in self.loop.states)
 
-    def _on_lateness(self, tick: Tick, states: DriveStates) -> None:
+    def _update_lateness(self, tick: Tick, states: DriveStates) -> None:
         self.lateness.update(tick, states)
         self.lateness_so_far.update(tick, states)
 
     def _checked(self, sample: Sample) -> Sample:
         fault = self.loop.faults.worst
         if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
-            raise BenchError(f"{fault.name}: {_reported([fault])}")
+            raise BenchError(f"{fault.name}: {_advice([fault])}")
         return sample
 
     def arm(self, law: HoldLaw | None = None) -> None:
         """Arm the robot into HOLD, with a hold law from the first torque on. Raises BenchError."""
         self._wait_until_armable()
         self.controller.hold_law = law
-        against: Sequence[Fault] = ()
+        last_blocking: Sequence[Fault] = ()
         for _ in range(round(ARMING_S / PERIOD_S)):
             blocking = self.loop.faults.blocking()
             if self.loop.mode is Mode.IDLE and not blocking:
                 self._ask_for_torque()  # again, where a fault such as a sinking joint began in the tick of the request
             if self.tick_checked().mode is Mode.HOLD:
                 return
-            against = blocking or against
-        raise BenchError(f"Not all drives entered closed loop within {ARMING_S:g} s. {_reported(against)}".rstrip())
+            last_blocking = blocking or last_blocking
+        raise BenchError(f"Not all drives entered closed loop within {ARMING_S:g} s. {_advice(last_blocking)}".rstrip())
 
     def _ask_for_torque(self) -> None:
         self._rest = measured_angles(self.loop.states)
@@ -127,19 +127,19 @@ class TestRig:
             raise BenchError(f"The robot cannot be armed: {refused}")
 
     def _wait_until_armable(self) -> None:
-        if self._becomes_armable():
+        if self._is_armable_soon():
             return
-        reported = _reported(self.loop.faults.blocking())
-        if reported and self.operator.allows_clearing(reported, self._tick_during_prompt):
+        faults = _advice(self.loop.faults.blocking())
+        if faults and self.operator.allows_clearing(faults, self._tick_during_prompt):
             self.loop.request(Request.CLEAR, self.rig.now_s)
-            if self._becomes_armable():
+            if self._is_armable_soon():
                 return
         silent = ", ".join(joint for joint, state in zip(JOINTS, self.loop.states, strict=True) if not state.heard)
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
         mode = f"it is in {self.loop.mode.name.lower()}."
-        raise BenchError(f"The robot cannot be armed: {reported or (unheard if silent else mode)}")
+        raise BenchError(f"The robot cannot be armed: {faults or (unheard if silent else mode)}")
 
-    def _becomes_armable(self) -> bool:
+    def _is_armable_soon(self) -> bool:
         for _ in range(round(ARMING_S / PERIOD_S)):
             if self.tick().mode is Mode.IDLE and not self.loop.faults.blocking():
                 return True
@@ -147,7 +147,7 @@ class TestRig:
 
     def _tick_during_prompt(self) -> None:
         """Run the loop while the operator is asked about a fault."""
-        for _ in range(round(LOOK_S / PERIOD_S)):
+        for _ in range(round(POLL_S / PERIOD_S)):
             self.tick()
 
     def move(
@@ -177,20 +177,13 @@ class TestRig:
         except BaseException:
             self.switch_off()
             raise
-        self.lower_and_switch_off()
+        self.move([LEVEL, self._rest])
+        self.switch_off()
 
     def hold_present_pose(self) -> None:
         """Hold the present pose of the joints, without a hold law."""
         self.controller.hold_pose(measured_angles(self.loop.states))
         self.controller.hold_law = None
-
-    def lower(self) -> None:
-        """Move the flippers back to where they lay."""
-        self.move([LEVEL, self._rest])
-
-    def lower_and_switch_off(self) -> None:
-        self.lower()
-        self.switch_off()
 
     def switch_off(self) -> None:
         """Switch torque off and wait until every drive reports it. Raises BenchError where one does not."""
@@ -209,13 +202,13 @@ class TestRig:
         self._wait_until_armable()
 
     def force_idle(self) -> None:
-        """Command the drives idle in any state. Never raises, and needs nothing but the drives."""
+        """Command the drives idle in any state, without the loop. Never raises."""
         self.controller.hold_law = None
-        self.drives.force_idle(GOODBYE_FRAMES)
+        self.drives.force_idle(IDLE_COMMANDS)
 
 
 def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:
-    """Return the first of so many true flags in a row; a single one may be noise or a turning point."""
+    """Return the index of the first of `ticks` true flags in a row; a single one may be noise or a turning point."""
     return next((first for first in range(len(flags) - ticks + 1) if all(flags[first : first + ticks])), None)
 
 
@@ -223,5 +216,11 @@ def joint_index(joint: str) -> int:
     return JOINTS.index(joint)
 
 
-def _reported(faults: Sequence[Fault]) -> str:
+def torque_on(index: int, torque_nm: float) -> Torques:
+    """Return a torque for one joint, and none for the others."""
+    a, b, c, d = (torque_nm if other == index else 0.0 for other in range(len(JOINTS)))
+    return Joints(a, b, c, d)
+
+
+def _advice(faults: Sequence[Fault]) -> str:
     return " ".join(fault_advice(fault) for fault in faults)

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from experiments.bench.channels import on_channels
-from experiments.bench.operator import AbsentBenchOperator, BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
+from experiments.bench.operator import BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
@@ -99,7 +99,7 @@ def operator_at(config: pytest.Config) -> BenchOperator:
     if somebody:
         return PromptedBenchOperator(UncapturedOperator(config), config.option.yes)
     if config.option.yes:
-        return AbsentBenchOperator()
+        return BenchOperator()
     raise BenchError(
         "The robot will move, and there is no terminal to ask for permission: run this on a terminal, or with --yes."
     )

@@ -15,7 +15,7 @@ import pytest
 
 from control.records import JOINTS
 from experiments.bench.channels import on_channels
-from experiments.bench.operator import AbsentBenchOperator
+from experiments.bench.operator import BenchOperator
 from experiments.bench.reading import Reading
 from experiments.bench.rig import HardwareRig, SimulatedRig, refuse_beside_daemon
 from experiments.bench.sign_check import check_nudge
@@ -115,7 +115,7 @@ def opened_rig(local_robot: Configuration) -> Iterator[TestRig]:
         rig.close()
         rig = HardwareRig(local_robot)
     rig.close()  # it may have heard no more than the robot's start
-    made = TestRig(rig := HardwareRig(local_robot), AbsentBenchOperator())
+    made = TestRig(rig := HardwareRig(local_robot), BenchOperator())
     yield made
     made.force_idle()
     rig.close()

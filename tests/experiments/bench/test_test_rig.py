@@ -12,7 +12,7 @@ from control.records import JOINTS, NO_TORQUE, Joints
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from experiments.bench.joint_zero_check import check_level_pose, check_turning
-from experiments.bench.operator import AbsentBenchOperator, PromptedBenchOperator, SimulatedBenchOperator
+from experiments.bench.operator import BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
 from experiments.bench.reading import Reading, left_out
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.sign_check import MOST_NM, check_nudge, check_shown_motion, hold_gently
@@ -96,7 +96,7 @@ def test_an_earlier_fault_is_cleared_if_the_operator_says_so(rig: SimulatedRig, 
 def test_an_earlier_fault_remains_without_an_operator(rig: SimulatedRig) -> None:
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
     with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
-        TestRig(rig, AbsentBenchOperator()).arm()
+        TestRig(rig, BenchOperator()).arm()
     assert rig.robot.drives[1].failed
 
 
@@ -124,7 +124,7 @@ def test_the_gentle_hold_law_limits_the_torque(bench: StagedBench) -> None:
 
 
 def test_checks_that_need_an_operator_are_left_out_without_one(configuration: Configuration) -> None:
-    opened_rig = TestRig(SimulatedRig(configuration), AbsentBenchOperator())
+    opened_rig = TestRig(SimulatedRig(configuration), BenchOperator())
     readings = [
         *check_level_pose(opened_rig),
         *check_turning(opened_rig, "left_sweep"),
