@@ -48,23 +48,23 @@ from simulation.devices.drive import Forgery
 
 NO_SPACE = "Nothing can be written to the log: No space left on device."
 REPORTED_S = 0.0  # the failure lasts until its fault is reported
-TURNING = {"insertion": "adduction", "stance": "sweep", "extraction": "adduction", "swing": "sweep"}
+TURNING_JOINT = {"insertion": "adduction", "stance": "sweep", "extraction": "adduction", "swing": "sweep"}
 MOVING = ("hold", *GAIT, "stopping")
 
 
 @dataclass(frozen=True)
 class FailureMode:
-    """One way to cause a fault. `fault` is its kind or another name; the failure ends after `lasts_s`."""
+    """One way to cause a fault. `fault` names a kind of fault, or another failure such as a dead daemon."""
 
     fault: str
     inject: Injector
-    lasts_s: float = 0.5
+    lasts_s: float = 0.5  # then the failure ends
     phases: tuple[str, ...] = EVERYWHERE
     how: str = ""  # distinguishes the modes of one fault
     no_commands: bool = False  # commands do not reach a drive: only its watchdog removes the torque
     ends_daemon: bool = False
     bound_ticks: int | None = None  # where this mode is detected sooner than the kind's bound
-    turns: bool = False  # detected at a turning joint only
+    turns: bool = False  # only a joint that turns in the phase is chosen: it is detected at no other
 
     @property
     def name(self) -> str:
@@ -72,7 +72,7 @@ class FailureMode:
 
     def joints(self, phase: str) -> tuple[str, ...]:
         """Return the joints from which one is drawn."""
-        turning = TURNING.get(phase, "") if self.turns else ""
+        turning = TURNING_JOINT.get(phase, "") if self.turns else ""
         return tuple(joint for joint in JOINTS if joint.endswith(turning))
 
     @property
@@ -80,7 +80,7 @@ class FailureMode:
         return FAULT_KINDS.get(self.fault)
 
 
-BUGS = {
+BUGGY_METHODS = {  # of the loop, by the part of the tick in which the method is called
     "reading drives": "drives.read",
     "reading pose": "pose.read",
     "learning": "learning.update",
@@ -90,7 +90,7 @@ BUGS = {
     "sending": "drives.send",
     "recording": "recorder.put",
 }
-DYING = ("hold", *GAIT, "recovery")
+BUG_PHASES = ("hold", *GAIT, "recovery")
 
 FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("none", nothing, 1.0, PHASES),
@@ -160,18 +160,19 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("daemon_killed", killed, 1.0, PHASES),
     FailureMode("daemon_hung", loop_stalled(760), 2.2, PHASES),
     *(
-        FailureMode("bug_in_the_tick", bug_in(path), 0.5, DYING, f"while {stage}", ends_daemon=True)
-        for stage, path in BUGS.items()
+        FailureMode("bug_in_the_tick", bug_in(path), 0.5, BUG_PHASES, f"while {part}", ends_daemon=True)
+        for part, path in BUGGY_METHODS.items()
     ),
 )
 BY_NAME = {mode.name: mode for mode in FAILURE_MODES}
 
-ABSENT_DRIVE = (
+ABSENT_DRIVE = (  # faults of a drive from which no messages arrive
     "drive_late", "current_stale", "position_stale", "drive_quiet", "drive_silent", "heartbeat_silent",
     "temperature_silent", "voltage_silent", "drive_energised", "drive_error", "drive_restarted", "drive_version",
     "watchdog_unknown",
 )  # fmt: skip
-IDLE_DRIVE = ("drive_error", "drive_disarmed", "torque_missing")
+IDLE_DRIVE = ("drive_error", "drive_disarmed", "torque_missing")  # faults of a drive that no commands reach
+# Other faults that may be reported with a fault, because they are true as well.
 CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "drive_quiet": ("drive_late", "position_stale", "current_stale"),
     "drive_silent": ABSENT_DRIVE,
@@ -182,17 +183,13 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "heartbeat_silent": ("drive_energised",),
     "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": ABSENT_DRIVE,
-    "duplicate_node_id": (
-        "encoder_jump",
-        "joint_moving",
-        "drive_disarmed",
-        "joint_position",
-    ),  # the encoder of the other drive is elsewhere
+    # the second drive reports another angle
+    "duplicate_node_id": ("encoder_jump", "joint_moving", "drive_disarmed", "joint_position"),
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version"),
     "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
     "bus_refuses": IDLE_DRIVE,
     "joint_position": ("encoder_jump",),
-    "encoder_stuck": ("encoder_jump",),  # when it continues
+    "encoder_stuck": ("encoder_jump",),  # when it reports angles again
     "encoder_jump": ("joint_moving",),
     "joint_velocity": ("encoder_stuck",),  # its angle is held and its speed is not
     "motor_overheating": ("winding_overheating",),
@@ -201,4 +198,4 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "loop_stalled": ("loop_lagging",),
     "loop_crawling": ("loop_stalled", "loop_lagging"),
     "daemon_hung": (*IDLE_DRIVE, "loop_stalled", "loop_crawling", "loop_lagging", "arming_failed"),
-}  # other faults that may be reported, because they are true as well
+}

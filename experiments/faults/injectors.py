@@ -20,6 +20,29 @@ LONGEST_S = 60.0
 BLOCKED_KG_M2 = 1e6  # too much inertia for any torque
 
 Injector = Callable[[FaultBench, str], AbstractContextManager[None]]
+Act = Callable[[FaultBench, str], None]
+
+
+def once(act: Act) -> Injector:
+    """Act at the injection."""
+
+    @contextmanager
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        act(bench, joint)
+        yield
+
+    return inject
+
+
+def in_every_step(act: Act) -> Injector:
+    """Act in every step while the failure lasts."""
+
+    @contextmanager
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        with bench.every_step(lambda: act(bench, joint)):
+            yield
+
+    return inject
 
 
 def failing(component: str, kind: str) -> Injector:
@@ -51,10 +74,9 @@ def drive_with(**changes: Any) -> Injector:
     return inject
 
 
-@contextmanager
-def overcurrent(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def overcurrent(bench: FaultBench, joint: str) -> None:
     bench.drive(joint).trip(DriveError.OVERCURRENT)
-    yield
 
 
 @contextmanager
@@ -65,25 +87,16 @@ def watchdog_ran_out(bench: FaultBench, joint: str) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def left_closed_loop(bench: FaultBench, joint: str) -> Iterator[None]:
+def _leave_closed_loop(bench: FaultBench, joint: str) -> None:
     bench.drive(joint).energised = False
-    yield
 
 
-@contextmanager
-def never_in_closed_loop(bench: FaultBench, joint: str) -> Iterator[None]:
-    def leave() -> None:
-        bench.drive(joint).energised = False
-
-    with bench.every_step(leave):
-        yield
+left_closed_loop, never_in_closed_loop = once(_leave_closed_loop), in_every_step(_leave_closed_loop)
 
 
-@contextmanager
-def restart(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def restart(bench: FaultBench, joint: str) -> None:
     bench.drive(joint).restart(bench.robot.now_s)
-    yield
 
 
 def duplicate(angle_rad: float) -> Injector:
@@ -99,36 +112,18 @@ def duplicate(angle_rad: float) -> Injector:
 
 
 def forged(forgery: Forgery) -> Injector:
-    """Sends the frame once."""
-
-    @contextmanager
-    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
-        bench.send_foreign(joint, bench.drive(joint).forge(forgery))
-        yield
-
-    return inject
+    return once(lambda bench, joint: bench.send_foreign(joint, bench.drive(joint).forge(forgery)))
 
 
 def current_reported(current_a: float) -> Injector:
-    """Reports another current after each report of the drive itself."""
-
-    @contextmanager
-    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
-        with bench.every_step(lambda: bench.send_foreign(joint, bench.drive(joint).forge_current(current_a))):
-            yield
-
-    return inject
+    """Report another current after each report of the drive itself."""
+    return in_every_step(lambda bench, joint: bench.send_foreign(joint, bench.drive(joint).forge_current(current_a)))
 
 
-@contextmanager
-def other_master(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Another program commands this drive into closed loop, without torque."""
-
-    def command() -> None:
-        bench.send_foreign(joint, bench.drive(joint).forge(Forgery.CLOSE_LOOP))
-
-    with bench.every_step(command):
-        yield
+@in_every_step
+def other_master(bench: FaultBench, joint: str) -> None:
+    """Command this drive into closed loop without torque, as another program would."""
+    bench.send_foreign(joint, bench.drive(joint).forge(Forgery.CLOSE_LOOP))
 
 
 # joints
@@ -186,21 +181,14 @@ def blocked(bench: FaultBench, joint: str) -> Iterator[None]:
     arm.parameters = before
 
 
-@contextmanager
-def recovery_given_up(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def recovery_given_up(bench: FaultBench, joint: str) -> None:
     """Wait until the last attempt of a recovery has failed; the injection begins there."""
     bench.run_until(lambda: bool(bench.loop.controller.recovery.given_up), 5.0)
-    yield
 
 
-@contextmanager
-def current_reversed(bench: FaultBench, joint: str) -> Iterator[None]:
+@in_every_step
+def current_reversed(bench: FaultBench, joint: str) -> None:
     """Report a current against the commanded torque."""
-    index, sign = JOINTS.index(joint), bench.drive(joint).parameters.sign
-
-    def report() -> None:
-        current_a = -copysign(4.0, bench.loop.sent.torques_nm[index]) * sign
-        bench.send_foreign(joint, bench.drive(joint).forge_current(current_a))
-
-    with bench.every_step(report):
-        yield
+    drive, sent_nm = bench.drive(joint), bench.loop.sent.torques_nm[JOINTS.index(joint)]
+    bench.send_foreign(joint, drive.forge_current(-copysign(4.0, sent_nm) * drive.parameters.sign))

@@ -12,17 +12,16 @@ from control.modes import Mode, Request
 from control.records import Estimate, StrideEstimate
 from estimation.mud import MudReading
 from experiments.faults.bench import FaultBench
-from experiments.faults.injectors import Injector
+from experiments.faults.injectors import Injector, once
 
 
-@contextmanager
-def lease_hung_up(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def lease_hung_up(bench: FaultBench, joint: str) -> None:
     """Close the connection of the lease holder; where torque is off, right after a request to arm."""
-    bench.loop.lease.renew("somebody", bench.now_s, 10.0)
+    bench.loop.lease.renew("operator", bench.now_s, 10.0)
     if bench.loop.mode is Mode.IDLE:
         bench.loop.request(Request.ARM, bench.now_s)
-    bench.loop.lease.hang_up("somebody")
-    yield
+    bench.loop.lease.hang_up("operator")
 
 
 def writer_reports(**changes: Any) -> Injector:
@@ -36,27 +35,24 @@ def writer_reports(**changes: Any) -> Injector:
     return inject
 
 
-@contextmanager
-def writer_lost_rows(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def writer_lost_rows(bench: FaultBench, joint: str) -> None:
     bench.rows.dropped += 3
-    yield
 
 
-@contextmanager
-def port_lost_frames(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def port_lost_frames(bench: FaultBench, joint: str) -> None:
     """Lose frames in the port below the one that injects failures."""
     port = bench.loop.drives.ports[bench.loop.configuration.drive[joint].bus]
     vars(port).get("_port", port).lost_frames += 3
-    yield
 
 
 def heated(temperature_c: float) -> Injector:
     """Set the modelled temperature, which then falls at the model's own rate."""
 
-    @contextmanager
-    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+    @once
+    def inject(bench: FaultBench, joint: str) -> None:
         bench.winding(joint).temperature_c = temperature_c
-        yield
 
     return inject
 
@@ -70,24 +66,22 @@ def gains_of_nan(bench: FaultBench, joint: str) -> Iterator[None]:
     controller.gains = before
 
 
-@contextmanager
-def five_newton_metres(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def five_newton_metres(bench: FaultBench, joint: str) -> None:
     """Send a torque past every limit of the loop, as a bug would."""
     bench.loop.drives.send_torque(joint, 5.0)
-    yield
 
 
 def loop_stalled(ticks: int) -> Injector:
-    @contextmanager
-    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+    @once
+    def inject(bench: FaultBench, joint: str) -> None:
         bench.stalled_steps = ticks
-        yield
 
     return inject
 
 
-@contextmanager
-def absurd_stride(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def absurd_stride(bench: FaultBench, joint: str) -> None:
     """Make the next sample close a stride with a coefficient of 10²⁰ N/m³."""
     estimator = bench.loop.learning.estimator
     true_update = estimator.update
@@ -101,21 +95,19 @@ def absurd_stride(bench: FaultBench, joint: str) -> Iterator[None]:
         return true_update(*arguments)._replace(strides=(stride,))
 
     estimator.__dict__["update"] = update
-    yield
 
 
 # the daemon
 
 
-@contextmanager
-def killed(bench: FaultBench, joint: str) -> Iterator[None]:
+@once
+def killed(bench: FaultBench, joint: str) -> None:
     bench.dead = True
-    yield
 
 
-@contextmanager
-def nothing(bench: FaultBench, joint: str) -> Iterator[None]:
-    yield
+@once
+def nothing(bench: FaultBench, joint: str) -> None:
+    """Inject no failure: the control group."""
 
 
 class DeliberateBugError(Exception):
@@ -125,8 +117,8 @@ class DeliberateBugError(Exception):
 def bug_in(path: str) -> Injector:
     """Make the next call of a method of the loop raise. `path` is the dotted name of the method."""
 
-    @contextmanager
-    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+    @once
+    def inject(bench: FaultBench, joint: str) -> None:
         *owners, method = path.split(".")
         part: Any = bench.loop
         for owner in owners:
@@ -136,6 +128,5 @@ def bug_in(path: str) -> Injector:
             raise DeliberateBugError(path)
 
         setattr(part, method, broken)
-        yield
 
     return inject
