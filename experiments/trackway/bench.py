@@ -43,14 +43,14 @@ from firmware_host.operator.counted_nouns import counted
 
 PATIENCE_S = 900.0  # longest time of a whole walk
 UNSEEN_S = 2.0  # longest time without a pose, before or during a walk: the end of the track is unknown then
-BACKWARDS_M = 0.2  # behind the start: no mud pushes a body back so far
-LOOK_S = 0.05
-PAST_END = ""  # in place of a mud's name
+BACKWARDS_M = 0.2  # distance behind the start; no mud pushes the body back so far
+POLL_S = 0.05  # interval at which the status and the prompt are checked
+PAST_END = ""  # name of the mud past the end of the trackway
 UNSEEN = "the pose of the body is lost: check that the cameras see the robot's markers"
 BACKWARDS = "the measured position falls while the robot walks: reverse pose.axis, or the sign of metres_per_count"
 KEEP = "k"
-WALKED = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
-STOPPED = {GO_ON: "walk it again", KEEP: "keep it", SKIP: "leave it out"}
+ANSWERS = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
+ANSWERS_IF_STOPPED = {GO_ON: "walk it again", KEEP: "keep it", SKIP: "leave it out"}
 
 
 class Trackway(Protocol):
@@ -82,11 +82,11 @@ class PromptedTrackway:
         return self._robot
 
     def evaluate(self, summary: str, stopped: bool) -> str:
-        answer = self._operator.ask(summary, STOPPED if stopped else WALKED, self._wait)
+        answer = self._operator.ask(summary, ANSWERS_IF_STOPPED if stopped else ANSWERS, self._wait)
         return {GO_ON: REDO, KEEP: GO_ON}.get(answer, answer) if stopped else answer
 
     def _wait(self) -> None:
-        self._robot.wait(LOOK_S)
+        self._robot.wait(POLL_S)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class LoggedTime(NamedTuple):
 
 
 class End(NamedTuple):
-    why: str = ""  # empty at the proper end
+    why: str = ""  # empty for a walk that arrived past the last mud
     stopped: bool = False  # by the operator or a fault; a robot that gets stuck is a result, not a stopped walk
 
 
@@ -208,7 +208,7 @@ def _require_pose(robot: BenchRobot) -> Status:
             disarm(robot)
             why = status["pose"]["trouble"] or "no pose arrives from motion capture or rail encoder; see [pose]."
             raise BenchError(f"the position of the body is not known: {why} 'mudskipper check' says what to do")
-        robot.wait(LOOK_S)
+        robot.wait(POLL_S)
         status = robot.call("status")
     return status
 
@@ -254,11 +254,12 @@ class Progress:
 
 def trial_text(key: str, walk: Walk) -> str:
     """Summarise a trial in one line."""
-    seen = _with_pose(walk)
-    speed = f"{100.0 * speed_m_s(seen):.1f} cm/s" if seen else "no stride with a pose"
-    lost = len(walk.strides) - len(seen)
-    without = f", {lost} of them without a pose" if lost else ""
-    return f"{key}: {counted(len(walk.strides), 'stride')}{without}, {speed}{'; ' + walk.fault if walk.fault else ''}"
+    with_pose = _with_pose(walk)
+    speed = f"{100.0 * speed_m_s(with_pose):.1f} cm/s" if with_pose else "no stride with a pose"
+    lost = len(walk.strides) - len(with_pose)
+    lost_text = f", {lost} of them without a pose" if lost else ""
+    fault = f"; {walk.fault}" if walk.fault else ""
+    return f"{key}: {counted(len(walk.strides), 'stride')}{lost_text}, {speed}{fault}"
 
 
 def _with_pose(walk: Walk) -> list[WalkedStride]:
@@ -276,20 +277,20 @@ def first_walks(plan: Plan, notebook: Notebook) -> dict[str, LoggedTime]:
 
 
 def report_of(plan: Plan, notebook: Notebook) -> BenchReport:
-    """Report all trials. Strides without a position or a length are counted apart; those past the end are not."""
+    """Report all trials. Strides without a position or a length are only counted; those past the end are left out."""
     walks: dict[str, list[Walk]] = {rule.name: [] for rule in plan.rules}
     ends: dict[str, Counter[str]] = {rule.name: Counter() for rule in plan.rules}
-    unseen, left_out, arm_m = 0, 0, 0.0
+    without_pose, left_out, arm_m = 0, 0, 0.0
     for key, rule in plan.orders():
         entry = notebook.entries[key]
         if entry["skipped"]:
             left_out += 1
             continue
         walk, arm_m = walk_of(entry), entry["arm_m"]
-        seen = _with_pose(walk)
-        unseen += len(walk.strides) - len(seen)
-        walks[rule.name].append(Walk([stride for stride in seen if stride.mud != PAST_END], walk.fault))
+        located = _with_pose(walk)
+        without_pose += len(walk.strides) - len(located)
+        walks[rule.name].append(Walk([stride for stride in located if stride.mud != PAST_END], walk.fault))
         ends[rule.name][walk.fault or "past the end"] += 1
     lengths_cm = {mud.name: 100.0 * mud.length_m for mud in plan.muds}
     report = table_report(walks, arm_m, ends, BenchSettings(plan.trials, lengths_cm, plan.muds))
-    return BenchReport(**vars(report), left_out=left_out, strides_without_position=unseen)
+    return BenchReport(**vars(report), left_out=left_out, strides_without_position=without_pose)

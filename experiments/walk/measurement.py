@@ -39,13 +39,14 @@ from experiments.walk.walk_profile import walk_profile_of, walk_profile_row
 from firmware_host.log_reading.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
-SOFT = ("53.1", "51.2")  # figure 7 has the first, called 53.8 % there; the other yields here at 3 cm and not at 5 cm
+# The first is that of figure 7, called 53.8 % there; in simulation the second yields at 3 cm and not at 5 cm.
+SOFT = ("53.1", "51.2")
 SOFT_DEPTHS_M = (0.03, 0.05)
 METHODS = (DEFAULT, PAPER, COMPENSATED)
 BORDER_M = 0.03  # a plate closer to a border than this may be in either mud
 LOST_S = 2.0  # longest time without a pose in a walk that began with one
-STUCK_S, ADVANCED_M = 60.0, 0.03
-SLIPPING = 4  # factor on the strides of a robot that never slips
+STUCK_S, ADVANCED_M = 60.0, 0.03  # longest time in which the body advances by less
+SLIP_ALLOWANCE = 4  # ordered strides, as a multiple of those of a robot that never slips
 DRAWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start from a standing body
 
 
@@ -93,7 +94,7 @@ class Plan:
         return list(accumulate(mud.length_m for mud in self.muds))[:-1]
 
     def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
-        """Name the mud in which a plate goes down and slips back; empty past the last mud and too close to a border."""
+        """Name the mud in which a plate goes down and slips back; empty past the last mud and near a border."""
         rear_m, front_m = plates_m - slip_m - BORDER_M, plates_m + BORDER_M
         if plates_m >= self.length_m or any(rear_m < border_m < front_m for border_m in self.borders_m):
             return ""
@@ -136,7 +137,7 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
     profile = walk_profile_row(walk_profile_of(log, plan.flipper))
     entry |= {"start_m": start_m, "course": profile, "remarks": remarks + [end] * bool(end)}
-    _note_slips(entry, log, plan.flipper, robot.configuration.geometry.flipper_length_m)
+    _add_slips(entry, log, plan.flipper, robot.configuration.geometry.flipper_length_m)
     if after["notice"]:
         raise InvalidTrialError(after["notice"], entry)
     if end is None and made < ordered:
@@ -144,7 +145,7 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     return entry
 
 
-def _note_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
+def _add_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
     """Add the slip to the strides of all methods, which begin at the same times."""
     strides = list(chain.from_iterable(entry["strides"].values()))
     starts_s = {stride["t_start_s"] for stride in strides}
@@ -161,7 +162,7 @@ def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str |
     robot = bench.robot
     reach_m = reach_of(robot.configuration)
     strides = ceil(plan.length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
-    ordered = strides if start_m is None else SLIPPING * strides
+    ordered = strides if start_m is None else SLIP_ALLOWANCE * strides
     robot.call("walk", depth_m=plan.depth_m, strides=ordered)
     length_m = plan.length_m - reach_m
     end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m, now_s).evaluate)
@@ -169,7 +170,7 @@ def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str |
 
 
 class Advance:
-    """Owns the progress of a walk. Without a position at its start, a walk makes all of its strides."""
+    """Owns the progress of a walk. A walk without a position at its start makes all of its strides."""
 
     def __init__(self, start_m: float | None, length_m: float, now_s: float) -> None:
         self._start_m = start_m
