@@ -9,56 +9,46 @@ from math import isfinite, nan
 from pathlib import Path
 
 
-def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
-    """Returns a parser of numbers from `low` to `high`."""
-
-    def value_of(text: str) -> float:
-        value = _number(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text}: must be from {low:.15g} to {high:.15g}{unit and ' '}{unit}")
-        return value
-
-    return value_of
-
-
-def whole(low: int, high: int) -> Callable[[str], int]:
-    """Returns a parser of whole numbers from `low` to `high`."""
-
-    def value_of(text: str) -> int:
-        value = _number(text)
-        if not (low <= value <= high and value == int(value)):
-            raise argparse.ArgumentTypeError(f"{text}: must be a whole number from {low} to {high}")
-        return int(value)
-
-    return value_of
-
-
 def _number(text: str) -> float:
-    """Returns NaN for a text that is no number; every bound refuses it."""
+    """Returns NaN for a text that is no number; every condition refuses it."""
     with suppress(ValueError):
         return float(text)
     return nan
 
 
-def finite(text: str) -> float:
-    value = _number(text)
-    if not isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text}: must be a number")
-    return value
+def _number_where(allowed: Callable[[float], bool], must_be: str) -> Callable[[str], float]:
+    """Returns a parser of numbers that are `allowed`."""
+
+    def value_of(text: str) -> float:
+        value = _number(text)
+        if not allowed(value):
+            raise argparse.ArgumentTypeError(f"{text}: must be {must_be}")
+        return value
+
+    return value_of
 
 
-def positive(text: str) -> float:
-    value = _number(text)
-    if not (value > 0.0 and isfinite(value)):
-        raise argparse.ArgumentTypeError(f"{text}: must be more than 0")
-    return value
+def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
+    """Returns a parser of numbers from `low` to `high`."""
+    return _number_where(lambda value: low <= value <= high, f"from {low:.15g} to {high:.15g}{unit and ' '}{unit}")
 
 
-def depth_cm(text: str) -> float:
-    value = _number(text)
-    if not 0.0 < value <= 20.0:
-        raise argparse.ArgumentTypeError(f"{text}: must be more than 0 and at most 20 cm")
-    return value
+def whole(low: int, high: int) -> Callable[[str], int]:
+    """Returns a parser of whole numbers from `low` to `high`."""
+    must_be = f"a whole number from {low} to {high}"
+    value_of = _number_where(lambda value: low <= value <= high and value == int(value), must_be)
+    return lambda text: int(value_of(text))
+
+
+finite = _number_where(isfinite, "a number")
+positive = _number_where(lambda value: value > 0.0 and isfinite(value), "more than 0")
+depth_cm = _number_where(lambda value: 0.0 < value <= 20.0, "more than 0 and at most 20 cm")
+_lever_cm = between(1.0, 100.0, "cm")
+
+
+def lever_m(text: str) -> float:
+    """Parses a length in cm."""
+    return _lever_cm(text) / 100.0
 
 
 def joint_angle(text: str) -> tuple[str, float]:
@@ -116,10 +106,3 @@ def picture(*endings: str) -> Callable[[str], Path]:
         return Path(text)
 
     return path
-
-
-def lever_m(text: str) -> float:
-    value = _number(text)
-    if not 1.0 <= value <= 100.0:
-        raise argparse.ArgumentTypeError(f"{text}: must be from 1 to 100 cm")
-    return value / 100.0

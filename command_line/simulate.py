@@ -17,29 +17,21 @@ from simulation.mud.clay import MUDS
 
 
 def simulate(options: argparse.Namespace) -> int:
-    waters = options.mud or []
-    unknown = [water for water in waters if water not in MUDS]
+    unknown = [water for water in options.mud or () if water not in MUDS]
     if unknown:
         complain(f"--mud {unknown[0]}: known water contents are {', '.join(MUDS)}")
         return exit_codes.USAGE
     try:
         if options.world:
             complain(*load_world(options.world).warnings)  # before anything is written; the peer reads it again
-        path = options.config or _local_configuration(options.bus)
+        options.config = options.config or _local_configuration(options.bus)
     except ConfigurationError as problem:
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
     except ValueError as problem:
         complain(f"--bus {problem}")
         return exit_codes.USAGE
-    arguments = ["--config", str(path), "--seed", str(options.seed)]
-    for water in waters:
-        arguments += ["--mud", water]
-    if options.world:
-        arguments += ["--world", str(options.world)]
-    if options.on_blocks:
-        arguments.append("--on-blocks")
-    return peer.main(arguments)
+    return peer.simulate(options)
 
 
 def _local_configuration(bus: str) -> Path:

@@ -150,21 +150,6 @@ def test_an_import_that_points_up_is_noticed(package: str, line: str) -> None:
     assert any(not allowed(package, name) for name in imports(line, package))
 
 
-@pytest.mark.parametrize(
-    ("package", "line"),
-    [
-        ("control", "from math import pi"),
-        ("control", "from . import records"),
-        ("estimation", "import numpy as np"),
-        ("drivers", "from control.records import JOINTS"),
-        ("simulation", "from firmware_host.ticker import Tick"),
-        ("command_line", "import estimation.mud"),
-    ],
-)
-def test_an_import_that_points_down_is_allowed(package: str, line: str) -> None:
-    assert all(allowed(package, name) for name in imports(line, package))
-
-
 def test_a_circle_is_noticed() -> None:
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
     assert not circle({"a": {"b", "c"}, "b": {"c"}, "c": set()})

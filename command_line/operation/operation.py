@@ -30,6 +30,7 @@ Options = argparse.Namespace
 ARMING_S = 5.0
 STOPPING_S = 10.0
 CLEARING_S = 1.5
+POLL_S = 0.05
 MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
 
 
@@ -95,7 +96,7 @@ def move(options: Options) -> int:
             angles_rad = {f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles}
             client.call("move", take_over=options.take_over, **angles_rad)
             while (report := client.call("status"))["moving"]:
-                time.sleep(0.05)
+                time.sleep(POLL_S)
         except KeyboardInterrupt:
             client.call("stop")
             raise
@@ -109,8 +110,8 @@ def move(options: Options) -> int:
 
 
 def stop(options: Options) -> int:
-    at_rest = ("hold", "idle", "boot", "fault")
-    return with_daemon(options, lambda client: _request(client, "stop", at_rest, STOPPING_S))
+    modes = ("hold", "idle", "boot", "fault")
+    return with_daemon(options, lambda client: _request(client, "stop", modes, STOPPING_S))
 
 
 def disarm(options: Options) -> int:
@@ -120,14 +121,13 @@ def disarm(options: Options) -> int:
 def clear(options: Options) -> int:
     def act(client: StatusClient) -> int:
         client.call("clear")
-        deadline_s = time.monotonic() + CLEARING_S
-        while time.monotonic() < deadline_s:
-            report = client.call("status")
-            if report["mode"] in ("idle", "boot") and not stopping_faults(report):
-                print(report["mode"])
-                return exit_codes.OK
-            time.sleep(0.05)
+        report = _poll(
+            client, lambda status: status["mode"] in ("idle", "boot") and not stopping_faults(status), CLEARING_S
+        )
         messages = [fault["message"] for fault in stopping_faults(report)]
+        if report["mode"] in ("idle", "boot") and not messages:
+            print(report["mode"])
+            return exit_codes.OK
         complain(f"the cause is still there: {' '.join(messages) or report['mode']}")
         return exit_codes.REFUSED
 
@@ -151,20 +151,25 @@ def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_
 
 
 def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> int:
-    deadline_s = time.monotonic() + longest_s
-    while time.monotonic() < deadline_s:
-        report = client.call("status")
-        if report["mode"] in modes:
-            print(report["mode"])
-            if report["notice"]:
-                complain(report["notice"])
-            return exit_codes.OK
-        if report["mode"] == "fault":
-            complain(report["fault"]["message"] if report["fault"] else report["notice"])
-            return exit_codes.REFUSED
-        time.sleep(0.05)
+    report = _poll(client, lambda status: status["mode"] in (*modes, "fault"), longest_s)
+    if report["mode"] in modes:
+        print(report["mode"])
+        if report["notice"]:
+            complain(report["notice"])
+        return exit_codes.OK
+    if report["mode"] == "fault":
+        complain(report["fault"]["message"] if report["fault"] else report["notice"])
+        return exit_codes.REFUSED
     complain(f"still {report['mode']} after {longest_s:g} s")
     return exit_codes.TIMED_OUT
+
+
+def _poll(client: StatusClient, done: Callable[[dict[str, Any]], bool], longest_s: float) -> dict[str, Any]:
+    """Returns the first status that is `done`, or the last one after `longest_s`."""
+    deadline_s = time.monotonic() + longest_s
+    while not done(report := client.call("status")) and time.monotonic() < deadline_s:
+        time.sleep(POLL_S)
+    return dict(report)
 
 
 def check(options: Options) -> int:

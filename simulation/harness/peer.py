@@ -114,8 +114,8 @@ def take_precedence() -> None:
             os.nice(NICENESS)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    options = _parse(arguments)
+def simulate(options: argparse.Namespace) -> int:
+    """Simulates the robot until a signal ends the process; returns the exit status."""
     try:
         configuration = load_configuration(options.config)
         peer = Peer(configuration, _world(options, configuration), options.seed)
@@ -134,6 +134,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     take_precedence()
     peer.run()
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    return simulate(_parse(arguments))
 
 
 if __name__ == "__main__":

@@ -50,26 +50,20 @@ def log(two_walks: Path, tmp_path: Path) -> Path:
 # what is written
 
 
-def test_a_plot_stands_beside_its_log(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plot", str(log)]) == exit_codes.OK
-    assert png_size(log.with_name("two.png"))[0] == 1200
+@pytest.mark.parametrize(("command", "name", "width"), [("plot", "two.png", 1200), ("film", "two-strides.png", 1800)])
+def test_a_picture_of_the_last_walk_is_written_next_to_its_log(
+    command: str, name: str, width: int, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, str(log)]) == exit_codes.OK
+    assert png_size(log.with_name(name))[0] == width
     printed = capsys.readouterr()
-    assert str(log.with_name("two.png")) in printed.out
-    assert "last of 2 walks" in printed.err
+    assert str(log.with_name(name)) in printed.out and "last of 2 walks" in printed.err
 
 
-@pytest.mark.parametrize("ending", ["svg", "pdf"])
-def test_a_plot_can_have_other_names_and_formats(log: Path, tmp_path: Path, ending: str) -> None:
-    path = tmp_path / f"figure.{ending}"
-    assert main(["plot", str(log), "--walk", "1", "--out", str(path)]) == exit_codes.OK
-    begins = {"svg": b"<?xml", "pdf": b"%PDF"}
-    assert path.read_bytes().startswith(begins[ending])
-
-
-def test_a_strip_stands_beside_its_log(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["film", str(log), "--walk", "1"]) == exit_codes.OK
-    assert png_size(log.with_name("two-strides.png"))[0] == 1800
-    assert "two-strides.png" in capsys.readouterr().out
+def test_a_plot_can_have_other_names_and_formats(log: Path, tmp_path: Path) -> None:
+    for name, start in (("figure.svg", b"<?xml"), ("figure.pdf", b"%PDF")):
+        assert main(["plot", str(log), "--walk", "1", "--out", str(tmp_path / name)]) == exit_codes.OK
+        assert (tmp_path / name).read_bytes().startswith(start)
 
 
 def test_a_strip_has_a_row_for_each_stride_asked_for(log: Path, tmp_path: Path) -> None:
@@ -254,26 +248,19 @@ def test_what_is_no_log_is_refused_in_a_sentence(
 
 
 @pytest.mark.parametrize("command", ["plot", "film"])
-def test_a_walk_that_there_is_not_is_refused(command: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "no walk 3, only 2" in failure(capsys, command, str(log), "--walk", "3")
-
-
-def test_a_stride_that_there_is_not_is_refused_with_those_there_are(
-    log: Path, capsys: pytest.CaptureFixture[str]
+def test_an_unknown_walk_and_an_unwritable_file_are_refused(
+    command: str, log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    message = refusal(capsys, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
-    assert "--stride 2: this walk has 0 to 1" in message
-
-
-@pytest.mark.parametrize(("command", "name"), [("plot", "x.gif"), ("film", "x.mp4"), ("film", "x"), ("plot", "")])
-def test_other_formats_are_refused(command: str, name: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "must end with .png" in refusal(capsys, command, str(log), "--out", name)
-
-
-@pytest.mark.parametrize("command", ["plot", "film"])
-def test_a_place_that_cannot_be_written_is_named(command: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "no walk 3, only 2" in failure(capsys, command, str(log), "--walk", "3")
     out = log.parent / "nowhere" / "x.png"
     assert f"{out} cannot be written" in failure(capsys, command, str(log), "--out", str(out))
+
+
+def test_an_unknown_stride_and_other_formats_are_wrong_usage(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    message = refusal(capsys, "film", str(log), "--walk", "1", "--stride", "0", "--stride", "2")
+    assert "--stride 2: this walk has 0 to 1" in message
+    for command, name in (("plot", "x.gif"), ("film", "x.mp4"), ("film", "x"), ("plot", "")):
+        assert "must end with .png" in refusal(capsys, command, str(log), "--out", name)
 
 
 @pytest.fixture
@@ -318,11 +305,7 @@ def test_without_matplotlib_a_sentence_says_what_to_install(command: tuple[str, 
         cwd=log.parent,
     )
     assert (ended.returncode, ended.stdout) == (exit_codes.UNHEALTHY, "")
-    assert (
-        ended.stderr.splitlines()[-1]
-        == "mudskipper: pictures need matplotlib: install mudskipper with its extra 'plots'"
-    )
-    assert "Traceback" not in ended.stderr
+    assert "extra 'plots'" in ended.stderr and "Traceback" not in ended.stderr
 
 
 def test_another_missing_module_is_no_matter_of_pictures(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:

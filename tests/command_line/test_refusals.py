@@ -48,16 +48,6 @@ def test_a_closed_connection_is_not_reported_as_a_missing_daemon(
     assert (said.out, said.err) == ("", "mudskipper: the daemon closed the connection\n")
 
 
-def test_a_missing_daemon_is_reported_with_the_command_that_starts_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert operation.status(NO_SOCKET) == exit_codes.NO_DAEMON
-    assert "systemctl start mudskipper" in capsys.readouterr().err
-
-
-def test_check_works_without_a_daemon(capsys: pytest.CaptureFixture[str]) -> None:
-    assert operation.check(NO_SOCKET) == exit_codes.UNHEALTHY
-    assert "FAIL daemon" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -122,7 +112,7 @@ def test_an_estimate_is_printed_with_its_standard_error_and_its_limits(valid: bo
         (("loadcell", "--scale", "many"), "many: must be more than 0"),
         (("loadcell", "--plate", "3x"), "3x: width and height must be from"),
         (("flipper", "--depth", "deep"), "deep: must be more than 0 and at most 20 cm"),
-        (("trackway", "--mud", "48.5=long"), "48.5=long: must be a mud and its length"),
+        *((("walk", "--mud", mud), f"{mud}: must be a mud and its length") for mud in ("=30", "47.6=long", "47.6=3")),
         (("walk", "--out", __file__), "must be a folder"),
     ],
 )

@@ -45,7 +45,8 @@ def peers(monkeypatch: pytest.MonkeyPatch) -> list[StillPeer]:
 
 
 def test_a_world_is_simulated_as_it_is_written(short_folder: Path, world: Path, peers: list[StillPeer]) -> None:
-    extra = "[robot]\nbody_mass_kg = 3.0\n[drives]\nencoder_counts = 4096\n[disturbances]\nclinging_n = 0.5\n"
+    encoder_and_watchdog = "[drives]\nencoder_counts = 4096\nwatchdog_s = 0.5\n"
+    extra = f"[robot]\nbody_mass_kg = 3.0\n{encoder_and_watchdog}[disturbances]\nclinging_n = 0.5\n"
     world.write_text(WORLD + extra, encoding="utf-8")
     setup = write_local_setup(short_folder, short_folder)
     assert main(["simulate", "--config", str(setup), "--world", str(world)]) == exit_codes.OK
@@ -54,14 +55,7 @@ def test_a_world_is_simulated_as_it_is_written(short_folder: Path, world: Path, 
     assert [segment.clay.name for segment in plant.track.segments] == ["2000 Pa"]
     assert (plant.parameters.body_mass_kg, plant.parameters.disturbances.clinging_n) == (3.0, 0.5)
     assert {drive.parameters.encoder_counts for drive in drives} == {4096}
-    assert {drive.parameters.watchdog_s for drive in drives} == {peer.WATCHDOG_S}
-
-
-def test_a_world_may_set_the_watchdog(short_folder: Path, world: Path, peers: list[StillPeer]) -> None:
-    world.write_text(WORLD + "[drives]\nwatchdog_s = 0.5\n", encoding="utf-8")
-    setup = write_local_setup(short_folder, short_folder)
-    assert main(["simulate", "--config", str(setup), "--world", str(world)]) == exit_codes.OK
-    assert peers[0].robot.drives[0].parameters.watchdog_s == 0.5
+    assert {drive.parameters.watchdog_s for drive in drives} == {0.5}
 
 
 @pytest.mark.parametrize(
@@ -73,6 +67,7 @@ def test_without_a_world_there_are_the_paper_s_muds(
     setup = write_local_setup(short_folder, short_folder)
     assert main(["simulate", "--config", str(setup), *arguments]) == exit_codes.OK
     assert [segment.clay.name for segment in peers[0].robot.plant.track.segments] == names
+    assert {drive.parameters.watchdog_s for drive in peers[0].robot.drives} == {peer.WATCHDOG_S}
 
 
 def test_a_configuration_for_a_single_flipper_gets_a_robot_whose_base_is_fixed(
@@ -131,19 +126,8 @@ def test_a_world_that_cannot_be_is_refused_before_anything_starts(
         "mudskipper: segment 1.start_m = 0.5: must be 0, where the track begins, without gap",
     ]
     assert list(tmp_path.iterdir()) == [world]
-
-
-@pytest.mark.parametrize("command", ["simulate", "demo"])
-def test_a_world_that_is_not_there_is_refused_by_its_name(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--world", "/nowhere/world.toml"]) == exit_codes.CONFIGURATION
     assert capsys.readouterr() == ("", "mudskipper: /nowhere/world.toml: No such file or directory\n")
-
-
-def test_a_world_has_its_own_mud(world: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["simulate", "--world", str(world), "--mud", "48.5"])
-    assert ended.value.code == exit_codes.USAGE
-    assert "not allowed with argument" in capsys.readouterr().err
 
 
 def test_the_peer_refuses_a_world_too(short_folder: Path, world: Path, capsys: pytest.CaptureFixture[str]) -> None:

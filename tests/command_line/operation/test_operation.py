@@ -134,9 +134,13 @@ def test_ctrl_c_ends_a_watch_without_a_message(bench: Bench) -> None:
         assert watch.stderr.read() == ""
 
 
-def test_without_a_daemon_every_command_says_so(short_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("status", "arm", "walk", "stop", "disarm", "clear", "watch"):
-        assert main([command, "--socket", str(short_folder / "none")]) == exit_codes.NO_DAEMON, command
+def test_without_a_daemon_every_command_says_so(
+    short_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(short_folder)
+    experiments = ("experiment flipper --mud 47.6", "experiment walk --mud 47.6")
+    for command in ("status", "arm", "walk", "stop", "disarm", "clear", "watch", *experiments):
+        assert main([*command.split(), "--socket", str(short_folder / "none")]) == exit_codes.NO_DAEMON, command
         assert "systemctl start mudskipper" in capsys.readouterr().err
 
 
@@ -171,6 +175,7 @@ def test_status_loads_no_large_library() -> None:
         ("dance",),
         ("log",),
         ("walk", "--depth", "3", "--adaptive"),
+        ("simulate", "--world", "world.toml", "--mud", "48.5"),
         *(("move", text) for text in ("left_sweep", "left_sweep=", "left_sweep=far", "left_sweep=nan", "=3")),
     ],
 )
