@@ -27,7 +27,7 @@ from firmware_host.pose_sources import open_pose
 LISTENING_S = 0.6  # six heartbeats
 
 
-def desk_check(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
+def check_without_daemon(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
     fix = "start it ('systemctl start mudskipper'), name its socket with --socket, or join the group that owns it"
     items = [check_item("daemon", False, why_no_daemon, fix)]
     try:

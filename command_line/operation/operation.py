@@ -177,9 +177,11 @@ def check(options: Options) -> int:
     try:
         StatusClient(options.socket).close()
     except NoDaemonError as problem:
-        from command_line.doctor.checks_before_arming import desk_check  # python-can, pydantic: too slow for `status`
+        from command_line.doctor.checks_before_arming import (
+            check_without_daemon,  # python-can, pydantic: too slow for `status`
+        )
 
-        return _show_items(options, desk_check(options.config, str(problem)))
+        return _show_items(options, check_without_daemon(options.config, str(problem)))
     except NotPermittedError:
         pass  # with_daemon reports it
     return with_daemon(options, lambda client: _show_items(options, client.call("check")))

@@ -7,15 +7,13 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
 from control.rate import PERIOD_S, RATE_HZ
 from control.records import JOINTS
-from drivers.can.can_port import BusState
-from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
 from firmware_host import daemon
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, StatusParameters
@@ -157,34 +155,14 @@ def test_the_network_files_configure_the_same_buses(configuration: Configuration
     assert only(network, "RequiredForOnline") == "no"
 
 
-class CountingPort:
-    state = BusState.ACTIVE
-    failed_sends = error_frames = lost_frames = 0
-    last_error = last_send_error = ""
-
-    def __init__(self) -> None:
-        self.sent = 0
-
-    def listen_to(self, ids: Iterable[int]) -> None:
-        return
-
-    def receive(self) -> list[Frame]:
-        return []
-
-    def send(self, frame: Frame) -> None:
-        self.sent += 1
-
-    def close(self) -> None:
-        return
-
-
 def test_the_transmit_queue_holds_the_tick_that_arms_where_linux_s_own_would_not(configuration: Configuration) -> None:
-    ports = {name: CountingPort() for name in configuration.bus}
-    drives = make_drives(configuration.drive, ports, configuration.limits)
+    buses = {name: MockBus() for name in configuration.bus}
+    peers = [bus.open() for bus in buses.values()]
+    drives = make_drives(configuration.drive, {name: bus.open() for name, bus in buses.items()}, configuration.limits)
     drives.request_settings(0.0)
     drives.arm(0.0)
     drives.send((0.0,) * len(JOINTS), PERIOD_S)  # type: ignore[arg-type]
-    most = max(port.sent for port in ports.values())
+    most = max(len(peer.receive()) for peer in peers)
     assert LINUX_QUEUE_LENGTH < most <= int(only(read_settings("80-can.link"), "TransmitQueueLength"))
 
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-import msgpack
 import pytest
 
 from command_line import commands, exit_codes
@@ -92,27 +90,11 @@ def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_be
     }
 
 
-def test_malformed_requests_are_answered_and_end_nothing(bench: Bench) -> None:
-    for garbage in (b"\xc1\xc1\xc1", b"\x00" * 5000, msgpack.packb([0, 1, "no such", {}]), b"GET /\n"):
-        with socket.socket(socket.AF_UNIX) as client:
-            client.connect(str(bench.socket))
-            client.settimeout(LONGEST_S)
-            client.sendall(garbage)
-            assert client.recv(4096)
-    assert bench.wait_for(lambda report: True)["mode"] == "idle"
-
-
 def test_a_second_daemon_on_the_same_socket_is_refused(bench: Bench) -> None:
     second = bench.start("firmware_host.daemon")
     _, complaint = second.communicate(timeout=LONGEST_S)
     assert second.returncode == 1
     assert "already running" in complaint and "Traceback" not in complaint
-
-
-def test_a_depth_out_of_reach_is_refused(bench: Bench) -> None:
-    bench.run("arm")
-    ended = bench.run("walk", "--depth", "6")
-    assert ended.returncode == exit_codes.REFUSED and "depth" in ended.stderr
 
 
 def test_a_walk_of_two_strides_ends_by_itself(bench: Bench) -> None:
