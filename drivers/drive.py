@@ -32,7 +32,7 @@ class DriveParameters:
     node_id: Annotated[int, Bounds(0, 62), Meaning("on that bus", "id")]
     type: Annotated[str, Meaning("the protocol that the drive speaks; the same for all joints")] = "odrive"
     sign: Annotated[
-        int, Bounds(-1, 1), Meaning("-1 for a mirrored motor: turns angle, velocity, current and torque round", "±1")
+        int, Bounds(-1, 1), Meaning("-1 for a mirrored motor: inverts angle, velocity, current and torque", "±1")
     ] = 1  # 0 is refused
     zero_turn: Annotated[float, Bounds(-1000.0, 1000.0), Meaning("encoder reading at joint angle zero")] = 0.0
     torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0), Meaning("torque per current")] = (

@@ -13,6 +13,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
+from operator import attrgetter
 from random import Random
 from struct import Struct
 
@@ -75,7 +76,7 @@ class FailingPort:
         joints = {drive.node_id: joint for joint, drive in drives.items() if drive.bus == name}
         self._joints = joints
         self._listeners = {node_id: (self._bus, joint, f"{joint}.command") for node_id, joint in joints.items()}
-        self._incoming, self._outgoing = DelayLine(_arbitration_id), DelayLine(self._node_id)
+        self._incoming, self._outgoing = DelayLine(attrgetter("arbitration_id")), DelayLine(self._node_id)
         self._frozen: dict[tuple[str, int], tuple[Failure, bytes]] = {}
         self._refused_sends = self._forged_error_frames = 0
         self.last_send_error = ""
@@ -261,7 +262,3 @@ def _random_frames(random: Random) -> list[Frame]:
         Frame(random.randint(0, STANDARD_MASK), random.randbytes(random.randint(0, DATA_MAX_BYTES)))
         for _ in range(random.randint(0, MOST_RANDOM_FRAMES))
     ]
-
-
-def _arbitration_id(frame: Frame) -> int:
-    return frame.arbitration_id

@@ -66,11 +66,7 @@ class PoseForecast:
         if not self._positions:
             return UNKNOWN
         (first_s, first_m), (last_s, last_m) = self._positions[0], self._positions[-1]
-        ahead_s = min(now_s - last_s, LONGEST_EXTRAPOLATION_S)
-        if (
-            last_s - first_s < VELOCITY_SPAN_S / 2.0
-            or last_s - first_s > 2.0 * LONGEST_EXTRAPOLATION_S
-            or ahead_s <= 0.0
-        ):
+        ahead_s, span_s = min(now_s - last_s, LONGEST_EXTRAPOLATION_S), last_s - first_s
+        if ahead_s <= 0.0 or not VELOCITY_SPAN_S / 2.0 <= span_s <= 2.0 * LONGEST_EXTRAPOLATION_S:
             return last_m
-        return last_m + (last_m - first_m) / (last_s - first_s) * ahead_s
+        return last_m + (last_m - first_m) / span_s * ahead_s

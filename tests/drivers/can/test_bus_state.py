@@ -10,7 +10,6 @@ import errno
 import logging
 import socket
 from collections.abc import Iterator
-from typing import Any
 
 import can
 import pytest
@@ -162,21 +161,6 @@ def test_sending_into_a_full_queue_does_not_wait(port: CanPort) -> None:
         port.send(ENCODER)
     assert port.failed_sends > 0
     assert port.last_send_error == "Transmit buffer full"
-
-
-def test_no_broadcast_manager_is_asked_for(kernel: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    """python-can opens CAN_BCM for periodic messages only: opening, sending and reading never do."""
-
-    def refuse(*arguments: Any, **options: Any) -> None:
-        raise AssertionError("a BCM socket")
-
-    monkeypatch.setattr(socketcan, "create_bcm_socket", refuse)
-    monkeypatch.setattr(socketcan.SocketcanBus, "_send_periodic_internal", refuse)
-    opened = open_port("socketcan", "can0", {})
-    opened.send(ENCODER)
-    report(kernel, ENCODER)
-    assert ids(opened) == [0x009]
-    opened.close()
 
 
 @settings(max_examples=500, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -100,13 +100,6 @@ def test_frames_pass_unchanged_and_in_order_in_both_directions(port: CanPort, ot
     assert other.recv(0.0) is None
 
 
-def test_error_frames_are_counted_and_not_passed_on(port: CanPort, other: can.BusABC) -> None:
-    for frame in (Frame(0x040, bytes(8), is_error=True), Frame(0x009, b"\x01")):
-        other.send(as_message(frame))
-    assert unstamped(port) == [Frame(0x009, b"\x01")]
-    assert port.error_frames == 1
-
-
 def test_nothing_is_waited_for() -> None:
     bus = FakeBus()
     bus.answers = 1

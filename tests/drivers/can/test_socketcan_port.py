@@ -145,33 +145,23 @@ def test_a_frame_says_when_it_was_on_the_bus(bench: Bench) -> None:
     assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the clock on the wall is read a moment later
 
 
-def test_a_frame_without_a_stamp_passes_without_one(bench: Bench) -> None:
-    bench.socket.reported = [(encode_frame(ENCODER), [], 0, None)]
-    assert bench.port.receive() == [ENCODER._replace(stamp_s=NEVER_S)]
-
-
-def test_the_kernel_is_asked_to_count_what_it_loses(bench: Bench) -> None:
+@pytest.mark.parametrize(
+    ("kernel_counts", "lost_frames"),
+    [((None, 3, 3), 3), ((3, 10, None), 10), ((2**32 - 2, 1), 2**32 + 1)],
+    ids=["once", "grows", "wraps"],
+)
+def test_frames_that_found_the_queue_full_are_counted_once(
+    bench: Bench, kernel_counts: tuple[int | None, ...], lost_frames: int
+) -> None:
     assert bench.socket.socket_options[SO_RXQ_OVFL] == 1
+    bench.socket.reported = [message(ENCODER, lost=lost) for lost in kernel_counts]
+    assert len(bench.port.receive()) == len(kernel_counts)
+    assert bench.port.lost_frames == lost_frames
 
 
-def test_frames_that_found_the_queue_full_are_counted_once(bench: Bench) -> None:
-    bench.socket.reported = [message(ENCODER, lost=lost) for lost in (None, 3, 3)]
-    assert len(bench.port.receive()) == 3
-    assert bench.port.lost_frames == 3
-    bench.socket.reported = [message(ENCODER, lost=lost) for lost in (3, 10, None)]
-    assert len(bench.port.receive()) == 3
-    assert bench.port.lost_frames == 10
-
-
-def test_the_kernel_s_count_may_go_round(bench: Bench) -> None:
-    bench.socket.reported = [message(ENCODER, lost=lost) for lost in (2**32 - 2, 1)]
-    bench.port.receive()
-    assert bench.port.lost_frames == 2**32 + 1
-
-
-def test_an_error_frame_also_carries_the_count_of_lost_frames(bench: Bench) -> None:
-    bench.socket.reported = [message(OFF, lost=5)]
-    assert bench.port.receive() == []
+def test_an_error_frame_carries_the_count_of_lost_frames_and_a_frame_may_lack_its_stamp(bench: Bench) -> None:
+    bench.socket.reported = [message(OFF, lost=5), (encode_frame(ENCODER), [], 0, None)]
+    assert bench.port.receive() == [ENCODER._replace(stamp_s=NEVER_S)]
     assert (bench.port.lost_frames, bench.port.error_frames) == (5, 1)
 
 

@@ -191,12 +191,8 @@ def test_a_stuck_signal_stands_still_while_messages_keep_coming(component: str) 
 
 
 @pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position", "bus.left"])
-def test_a_signal_that_is_off_does_not_come(component: str) -> None:
+def test_an_intermittent_signal_loses_about_half_and_one_that_is_off_does_not_arrive(component: str) -> None:
     assert position(run(component, "off")) == []
-
-
-@pytest.mark.parametrize("component", ["left_sweep", "left_sweep.position", "bus.left"])
-def test_an_intermittent_signal_loses_about_half(component: str) -> None:
     assert 0.35 * TICKS < len(position(run(component, "intermittent"))) < 0.65 * TICKS
 
 
@@ -266,25 +262,23 @@ def test_a_malformed_heartbeat_of_a_drive_with_an_error_stays_malformed() -> Non
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"), [("off", "Network is down"), ("stuck", "No buffer space"), ("bus-off", "Network is down")]
+    ("kind", "refused", "state", "error_frames"),
+    [
+        ("off", "Network is down", BusState.ACTIVE, 0),
+        ("stuck", "No buffer space", BusState.ACTIVE, 0),
+        ("bus-off", "Network is down", BusState.OFF, TICKS),
+        ("warning", "", BusState.WARNING, TICKS),
+        ("passive", "", BusState.PASSIVE, TICKS),
+    ],
 )
-def test_a_bus_that_cannot_send_counts_what_it_refuses_and_says_why(kind: str, said: str) -> None:
+def test_a_failing_bus_counts_refused_frames_and_shows_its_state(
+    kind: str, refused: str, state: BusState, error_frames: int
+) -> None:
     seen = run("bus.left", kind)
-    assert seen.failed_sends == 2 * TICKS
-    assert said in seen.last_send_error and "on purpose" in seen.last_send_error
-
-
-@pytest.mark.parametrize(
-    ("kind", "state"),
-    [("warning", BusState.WARNING), ("passive", BusState.PASSIVE), ("bus-off", BusState.OFF)],
-)
-def test_a_controller_in_trouble_shows_its_state_and_error_frames(kind: str, state: BusState) -> None:
-    seen = run("bus.left", kind)
-    assert seen.worst_state is state and seen.error_frames == TICKS
-
-
-def test_a_stuck_transmit_queue_still_receives() -> None:
-    assert run("bus.left", "stuck").received == SOUND.received
+    assert seen.failed_sends == (2 * TICKS if refused else 0)
+    assert refused in seen.last_send_error and ("on purpose" in seen.last_send_error) == bool(refused)
+    assert (seen.worst_state, seen.error_frames) == (state, error_frames)
+    assert kind != "stuck" or seen.received == SOUND.received  # a full transmit queue still receives
 
 
 def test_a_bus_full_of_garbage_adds_random_frames_and_leaves_commands_unchanged() -> None:

@@ -49,8 +49,9 @@ def test_before_and_after_its_failure_the_pose_is_true_and_a_seed_repeats_it(kin
     assert len(outside) > 90 and all(body == (now_s, now_s) for now_s, body in outside)
 
 
-def test_no_pose_comes() -> None:
+def test_no_pose_arrives_or_about_half_of_them() -> None:
     assert all(isnan(body.x_m) and body.stamp_s < 0.0 for _, body in during("off"))
+    assert 30 < sum(isfinite(body.x_m) for _, body in during("intermittent")) < 70
 
 
 def test_a_stuck_body_stands_with_fresh_stamps() -> None:
@@ -69,11 +70,6 @@ def test_a_delayed_position_is_an_earlier_one_with_a_fresh_stamp() -> None:
     later = [(now_s, body) for now_s, body in during("slow") if now_s > BEGIN_S + LATE_S + 0.5 * PERIOD_S]
     assert all(isnan(body.x_m) for body in early) and len(early) == 20
     assert all(abs(now_s - LATE_S - body.x_m) < 1.5 * PERIOD_S and body.stamp_s == now_s for now_s, body in later)
-
-
-def test_half_of_the_time_no_pose_comes() -> None:
-    known = [body for _, body in during("intermittent") if isfinite(body.x_m)]
-    assert 30 < len(known) < 70
 
 
 def test_a_pose_that_may_not_fail_is_not_wrapped() -> None:

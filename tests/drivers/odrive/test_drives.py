@@ -99,14 +99,14 @@ def test_a_sign_turns_angle_velocity_current_and_torque_alike(
     assert bench.sent()["left"][0].data == pack("<f", sign * torque_nm)
 
 
-def test_the_zero_is_taken_off_before_the_sign(bench: Bench) -> None:
+def test_the_newest_measured_current_counts_and_the_zero_is_subtracted_before_the_sign(bench: Bench) -> None:
     bench.report("left_adduction", GET_ENCODER_ESTIMATES, 0.5, 0.0)
-    assert bench.drives.read(1.0)[1].angle_rad == pytest.approx(-0.25 * 2.0 * pi)
-
-
-def test_the_measured_current_is_taken_not_the_set_point(bench: Bench) -> None:
-    bench.report("left_sweep", GET_IQ, 9.0, 1.5)
-    assert bench.drives.read(1.0)[0].current_a == 1.5
+    for current_a in (1.0, 2.0, 1.5):
+        bench.report("left_sweep", GET_IQ, 9.0, current_a)
+    states = bench.drives.read(1.0)
+    assert states[0].current_a == 1.5
+    assert states[1].angle_rad == pytest.approx(-0.25 * 2.0 * pi)
+    assert bench.silent()  # reading transmits nothing
 
 
 def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
@@ -127,12 +127,6 @@ def test_a_signal_has_the_stamp_of_its_frame_unless_that_is_of_another_clock(
 ) -> None:
     bench.report("left_sweep", GET_IQ, 0.0, 1.0, stamp_s=frame_s)
     assert bench.drives.read(9.0)[0].current_stamp_s == stamp_s
-
-
-def test_the_newest_frame_wins(bench: Bench) -> None:
-    for current_a in (1.0, 2.0, 3.0):
-        bench.report("left_sweep", GET_IQ, 0.0, current_a)
-    assert bench.drives.read(1.0)[0].current_a == 3.0
 
 
 def test_every_field_comes_from_its_message(bench: Bench) -> None:
@@ -247,12 +241,6 @@ def test_the_drives_are_heard_once_every_signal_of_all_has_come(bench: Bench, jo
     bench.report(joint, missing, *dict(SIGNALS)[missing])
     bench.drives.read(2.0)
     assert bench.drives.heard
-
-
-def test_reading_transmits_nothing(bench: Bench) -> None:
-    bench.drives.read(0.0)
-    bench.report_everything(1.0)
-    assert bench.silent()
 
 
 def test_torques_leave_in_the_order_of_the_joints_with_these_bytes() -> None:
