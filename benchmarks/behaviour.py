@@ -29,7 +29,7 @@ from firmware_host.log.rows import ROW_KINDS
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Level, Peer
-from firmware_host.operator.status_socket import RefusedError
+from firmware_host.operator.rpc import RefusedError
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 

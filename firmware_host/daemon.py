@@ -2,7 +2,7 @@
 
 The daemon reads the configuration, opens the buses, and runs the loop until a signal ends it. SIGTERM, SIGINT and
 SIGHUP let it finish safely: flippers out of the mud, torque to zero, drives idle, log closed. An unexpected exception
-ends in one place, which idles the drives, reports the exception, and exits with status 1; systemd starts the daemon
+ends in one handler, which idles the drives, reports the exception, and exits with status 1; systemd starts the daemon
 again, disarmed.
 """
 
@@ -41,34 +41,35 @@ from firmware_host.log.recorder import NullRecorder, Recorder
 from firmware_host.loop import Loop
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Rights, load_rights
-from firmware_host.operator.status_socket import AlreadyServedError, StatusSocket
+from firmware_host.operator.socket_file import AlreadyServedError
+from firmware_host.operator.status_socket import StatusSocket
 from firmware_host.pose_sources import open_pose
 from firmware_host.software_version import build_metadata
 from firmware_host.ticker import Tick, Ticker
 
 EXIT_FAILED = 1
-LONGEST_SHUTDOWN_S = 5.0
+LONGEST_SHUTDOWN_S = 5.0  # then torque goes off wherever the flippers are
 LONGEST_LOG_CLOSE_S = 10.0
-IDLING_S = 0.3  # for the drives to obey a request to go idle
+IDLING_S = 0.3  # the longest time that drives may take to go idle
 IDLE_REQUESTS = 5  # to each drive when a bug ends the loop
-NOTIFY_TICKS = int(RATE_HZ / 4)
+NOTIFY_TICKS = int(RATE_HZ / 4)  # ticks between two messages to systemd
 
 
 class WatchdogFeed:
-    """Feeds systemd's watchdog from the ticks themselves, as long as the loop misses no more ticks than it makes."""
+    """Feeds systemd's watchdog from the ticks, unless more ticks are missed than run."""
 
     def __init__(self, notifier: SystemdNotifier) -> None:
         self._notifier = notifier
-        self._made = self._missed = 0
+        self._ran = self._missed = 0
 
     def update(self, tick: Tick, mode: Mode) -> None:
-        self._made += 1
+        self._ran += 1
         self._missed += tick.missed
-        if self._made < NOTIFY_TICKS:
+        if self._ran < NOTIFY_TICKS:
             return
-        if self._missed <= self._made:
+        if self._missed <= self._ran:
             self._notifier.send("WATCHDOG=1", f"STATUS={mode.name.lower()}")
-        self._made = self._missed = 0
+        self._ran = self._missed = 0
 
 
 class Shutdown:
@@ -147,7 +148,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
 def _serve_loop(status: StatusSocket, loop: Loop) -> None:
     """Connect the socket to the loop's lease and log."""
     status.on_hang_up = loop.lease.hang_up
-    status.spares = lambda caller: caller == loop.lease.holder
+    status.is_protected = lambda caller: caller == loop.lease.holder
     status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
 
 
@@ -182,7 +183,7 @@ def _run_loop(
             reopen_pose(loop, pose, now_s)
         notifier.send("STOPPING=1")
         return 0
-    except Exception as problem:  # noqa: BLE001 - the one place where unexpected exceptions end
+    except Exception as problem:  # noqa: BLE001 - the only handler of unexpected exceptions
         notifier.send("STOPPING=1")
         if failures is not None:  # an injected failure could keep the drives from going idle
             failures.end_all()
@@ -205,12 +206,12 @@ def reopen_pose(loop: Loop, pose: OpenedPose, now_s: float) -> None:
 
 
 def end_safely(loop: Loop, problem: Exception) -> int:
-    """Idle the drives, in whatever state the rest is, and report the exception."""
+    """Idle the drives without relying on the rest of the loop, and report the exception."""
     loop.drives.force_idle(IDLE_REQUESTS)
-    place = traceback.extract_tb(problem.__traceback__)[-1]
-    message = f"{type(problem).__name__}: {problem} ({Path(place.filename).name}, line {place.lineno})"
+    origin = traceback.extract_tb(problem.__traceback__)[-1]
+    message = f"{type(problem).__name__}: {problem} ({Path(origin.filename).name}, line {origin.lineno})"
     print(f"mudskipperd: stopped by a bug, the drives are idle: {message}", file=sys.stderr)
-    with suppress(Exception):  # the log may be what broke
+    with suppress(Exception):  # the log itself may have failed
         loop.events.report(time.monotonic(), f"stopped by a bug: {message}")
     return EXIT_FAILED
 
@@ -236,8 +237,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (BusError, PoseSourceError, AlreadyServedError) as problem:
         return _refuse([f"mudskipperd: {problem}"], EXIT_FAILED)
     except OSError as problem:
-        place = f" {problem.filename}" if problem.filename else ""
-        return _refuse([f"mudskipperd: cannot start:{place} {problem.strerror or problem}"], EXIT_FAILED)
+        path = f" {problem.filename}" if problem.filename else ""
+        return _refuse([f"mudskipperd: cannot start:{path} {problem.strerror or problem}"], EXIT_FAILED)
 
 
 def _on_signals(handler: Callable[[int, object], None]) -> None:

@@ -76,13 +76,6 @@ class FaultMonitor:
         self._log = LogMonitor(configuration.faults)
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
-        self.reset()
-
-    def reset(self) -> None:
-        for joint in self.joints:
-            joint.reset()
-        self._loop.reset()
-        self._log.reset()
         self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
         self._bus_events = {name: (0, BusState.ACTIVE) for name in self._drives.ports}
         self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)

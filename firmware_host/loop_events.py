@@ -37,9 +37,6 @@ class RequestEvents:
     """
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
         self.unlogged = 0  # since the start
         self._unlogged_before = 0  # since the last request that was logged
         self._logged_s: dict[str, float] = {}
@@ -64,11 +61,7 @@ class LoopEvents:
         self._recorder = recorder
         self._longest_hold_s = longest_hold_s
         self.requests = RequestEvents()
-        self.reset()
-
-    def reset(self) -> None:
         self.notice = ""
-        self.requests.reset()
 
     def report(self, now_s: float, message: str) -> None:
         """Write a message into the log."""

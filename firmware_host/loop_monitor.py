@@ -9,20 +9,17 @@ from control.monitors.joint_monitor import FaultBounds
 from control.rate import PERIOD_S
 from firmware_host.ticker import Tick
 
-MEAN_TICKS = 100
-CRAWL_TICKS = 5
+MEAN_TICKS = 100  # ticks over which the mean rate is measured
+CRAWL_TICKS = 5  # ticks over which a crawling loop is measured
 CLOCK_STEP_S = 0.1  # more than a wall clock drifts between two ticks
 
 
 class LoopMonitor:
-    """Owns the stamps of the last ticks and the offset between the two clocks."""
+    """Owns the stamps of the last ticks and the offset from the monotonic clock to the wall clock."""
 
     def __init__(self, bounds: FaultBounds, period_s: float = PERIOD_S) -> None:
         self._period_s = period_s
         self._bounds = bounds
-        self.reset()
-
-    def reset(self) -> None:
         self._stamps_s: deque[float] = deque(maxlen=MEAN_TICKS + 1)
         self._clock_offset_s: float | None = None
 

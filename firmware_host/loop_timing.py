@@ -10,9 +10,6 @@ LONGEST_US = 20000  # everything longer falls into the last bucket; `max` stays 
 
 class Histogram:
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
         self._counts = array("L", [0]) * (LONGEST_US + 1)
         self.count = 0
         self.max_us = 0.0
@@ -47,13 +44,10 @@ class LoopTiming:
     """Owns the histograms and counts since the last reset."""
 
     def __init__(self) -> None:
-        self.wake_late = Histogram()
-        self.tick = Histogram()
         self.reset()
 
     def reset(self) -> None:
-        self.wake_late.reset()
-        self.tick.reset()
+        self.wake_late, self.tick = Histogram(), Histogram()
         self.ticks = self.missed_ticks = 0
         self._first_s = self._last_s = 0.0
 

@@ -18,7 +18,7 @@ def software_version() -> str:
 
 
 def software_commit() -> str:
-    """Returns the commit of the checkout, or the one that pip recorded at installation; empty where neither is known.
+    """Return the commit of the checkout, or the one that pip recorded at installation; empty if neither is known.
 
     It reads git's files, since a process of git would delay the start.
     """
@@ -27,7 +27,7 @@ def software_commit() -> str:
 
 
 def build_metadata() -> dict[str, str]:
-    """Returns the metadata of a log that says which software wrote it."""
+    """Return the metadata of a log that says which software wrote it."""
     return {"version": software_version(), "commit": software_commit()}
 
 

@@ -31,14 +31,11 @@ class Ticker:
         self.period_s = period_s
         self._clock = clock
         self._sleep = sleep
-        self.reset()
-
-    def reset(self) -> None:
-        """Set the first deadline to one period from now."""
-        self._start_s = self._clock()
+        self._start_s = clock()  # the first deadline is one period later
         self._number = 0
 
     def wait(self) -> Tick:
+        """Sleep until the next deadline."""
         self._number += 1
         deadline_s = self._start_s + self._number * self.period_s
         now_s = self._clock()

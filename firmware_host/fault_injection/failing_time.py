@@ -29,7 +29,7 @@ class Stalls:
         self._stalled: Failure | None = None
 
     def next_s(self) -> float:
-        """The time for which the loop stands still before its next tick."""
+        """Return the time for which the loop stalls before its next tick."""
         failure = self._failures.of("loop")
         if failure is None or failure is self._stalled:
             return 0.0
@@ -71,7 +71,7 @@ def failing_ticker(ticker: TickSource, failures: Failures | None, report: Callab
 
 
 class FailingClock:
-    """A wall clock that steps or stands still."""
+    """A wall clock that steps or stops on purpose."""
 
     def __init__(self, clock: Callable[[], float], failures: Failures) -> None:
         self._clock = clock
@@ -85,8 +85,8 @@ class FailingClock:
         if failure.kind is FailureKind.GARBAGE:
             return now_s + CLOCK_STEP_S
         if self._since is not failure:
-            self._since, self._stands_at_s = failure, now_s
-        return self._stands_at_s
+            self._since, self._stuck_at_s = failure, now_s
+        return self._stuck_at_s
 
 
 def failing_clock(clock: Callable[[], float], failures: Failures | None) -> Callable[[], float]:

@@ -13,7 +13,8 @@ from drivers.fault_injection.failures import EFFECTS, Failure, Failures, begin_t
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import validated
-from firmware_host.operator.status_socket import Methods, RefusedError
+from firmware_host.operator.rpc import RefusedError
+from firmware_host.operator.status_socket import Methods
 
 FORBIDDEN = "nothing may fail on purpose here: set failures.allowed = true in the configuration, and start again"
 OK, ALL = "ok", "all"

@@ -56,10 +56,10 @@ class Client:
         self.outgoing = bytearray()
         self.closing = False  # rejected: nothing more is read or answered
         self.ended = False  # disconnected: its earlier requests still count
-        self.watched = 0  # what epoll looks for
+        self.watched = 0  # the epoll events that this client is registered for
         self._unpacker = make_unpacker(READ_BYTES)
         self._received = self._read = 0  # bytes in total, and bytes of complete messages
-        self._begun_s = inf  # since when the rest of a request is missing
+        self._begun_s = inf  # when the first part of an incomplete request arrived
 
     def receive(self) -> None:
         """Raises OSError, or MalformedError for a request that is too long."""
@@ -78,7 +78,7 @@ class Client:
         except (ValueError, msgpack.UnpackException, RecursionError):
             raise MalformedError(SHAPE) from None
         end = self._received if message is NOTHING else self._unpacker.tell()
-        if end - self._read > LONGEST_REQUEST:  # of many short parts: the unpacker bounds only each part
+        if end - self._read > LONGEST_REQUEST:  # the unpacker bounds only each part of a message
             raise MalformedError(TOO_LONG)
         if message is not NOTHING:
             self._read, self._begun_s = end, inf
@@ -86,7 +86,7 @@ class Client:
             self._begun_s = min(self._begun_s, now_s)
         return message
 
-    def is_tardy(self, now_s: float) -> bool:
+    def is_overdue(self, now_s: float) -> bool:
         """Whether the rest of a request has been missing for too long."""
         return now_s - self._begun_s > LONGEST_SENDING_S
 

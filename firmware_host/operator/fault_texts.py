@@ -1,4 +1,4 @@
-"""What people read about each fault: what it means, what happened this time, and what to do.
+"""The text of each fault: what it means, what happened this time, and what to do.
 
 A message is a template over the fault's subject and measured values. A fault that carries a `reason`, such as a
 drive's own error text or an operating system's, shows it at the end of its message.
@@ -29,7 +29,7 @@ class FaultText(NamedTuple):
 
 
 def _silence(signal: str) -> Callable[[Fault], str]:
-    """The message about a signal that does not arrive; an infinite age says that it never did."""
+    """Make the message about a missing signal; an infinite age means that it never arrived."""
 
     def message(fault: Fault) -> str:
         age_s = float(dict(fault.values)["age_s"])
@@ -153,7 +153,7 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
     ),
     FaultKind.TORQUE_MISSING: FaultText(
         "A motor's current does not fit its torque command for 0.1 s.",
-        "The {subject} motor gives {measured_nm:.2f} N·m in place of {commanded_nm:.2f} N·m.",
+        "The {subject} motor gives {measured_nm:.2f} N·m instead of {commanded_nm:.2f} N·m.",
         "check the drive's limits, its torque constant and cables, then 'mudskipper clear'",
     ),
     FaultKind.MOTOR_OVERHEATING: FaultText(
@@ -183,7 +183,7 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         "charge or change the battery",
     ),
     FaultKind.FLIPPER_STUCK: FaultText(
-        "The mud keeps a flipper after every attempt to free it.",
+        "A flipper is still stuck in the mud after every attempt to free it.",
         _stuck,
         "free it by hand, then 'mudskipper clear', and walk less deep",
     ),
@@ -200,7 +200,7 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         BUSY,
     ),
     FaultKind.LOOP_CRAWLING: FaultText(
-        "Commands leave too seldom to brake a joint.", "The loop's ticks take {tick_ms:.0f} ms.", BUSY
+        "Commands are sent too rarely to brake a joint.", "The loop's ticks take {tick_ms:.0f} ms.", BUSY
     ),
     FaultKind.LOOP_STALLED: FaultText("The loop stood still.", "The loop stood still for {late_ms:.0f} ms.", BUSY),
     FaultKind.CLOCK_STEP: FaultText(
@@ -248,7 +248,7 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
 
 
 def fault_message(fault: Fault) -> str:
-    """What happened, as whole sentences.
+    """Return what happened, in whole sentences.
 
     A fault without the values that its message shows is described in general: no text may stop the loop.
     """
@@ -260,7 +260,7 @@ def fault_message(fault: Fault) -> str:
 
 
 def exact_message(fault: Fault) -> str:
-    """The message with its values; raises KeyError or ValueError if one is missing or is no number."""
+    """Return the message with its values; raises KeyError or ValueError if one is missing or is no number."""
     template, values = FAULT_TEXTS[fault.kind].message, dict(fault.values)
     message = template(fault) if callable(template) else template.format(subject=fault.subject, **values)
     reason = str(values.get("reason", "")).rstrip(".")
@@ -268,11 +268,12 @@ def exact_message(fault: Fault) -> str:
 
 
 def what_to_do(fault: Fault) -> str:
+    """Return the advice, to continue a sentence."""
     return FAULT_TEXTS[fault.kind].what_to_do
 
 
 def fault_advice(fault: Fault) -> str:
-    """What happened, and what to do."""
+    """Return what happened, and what to do."""
     to_do = what_to_do(fault)
     return f"{fault_message(fault)} {to_do[:1].upper()}{to_do[1:]}."
 
@@ -290,7 +291,7 @@ IN_MODE: dict[Mode, str] = {
 
 
 def refusal_text(refusal: Refusal) -> str:
-    """Why the robot refuses a request in its present mode, and what to do."""
+    """Return why the robot refuses a request in its present mode, and what to do."""
     if refusal.faults:
         return " ".join(fault_message(fault) for fault in refusal.faults)
     if refusal.request is Request.CLEAR and refusal.mode is Mode.HOLD:

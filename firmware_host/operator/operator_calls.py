@@ -22,8 +22,9 @@ from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.reports import known, map_report, mud_estimate_report, stride_report
+from firmware_host.operator.rpc import RefusedError
 from firmware_host.operator.socket_methods import METHODS, STRIDES_PER_ANSWER
-from firmware_host.operator.status_socket import Methods, RefusedError
+from firmware_host.operator.status_socket import Methods
 from firmware_host.software_version import software_version
 
 Method = Callable[[dict[str, Any], Caller], Any]

@@ -48,7 +48,7 @@ def make_unpacker(read_bytes: int) -> msgpack.Unpacker:
 
 
 def read_shape(message: Any) -> tuple[int, str, Any]:
-    """Number, method and params. Raises MalformedError."""
+    """Return number, method and params of a request; raises MalformedError."""
     if not isinstance(message, list) or len(message) != PARTS:
         raise MalformedError(SHAPE)
     kind, number, method, params = message

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-PROBE_S = 1.0  # for a daemon to let a connection in
+PROBE_S = 1.0  # the longest wait for a daemon to accept a connection
 OPEN_FILE, OPEN_FOLDER = 0o666, 0o755
 
 
@@ -26,10 +26,10 @@ class AlreadyServedError(Exception):
 
 
 class SocketFile:
-    """Owns the listening socket and its place in the file system."""
+    """Owns the listening socket and its file."""
 
     def __init__(self, path: Path, backlog: int) -> None:
-        """Raises AlreadyServedError, or OSError where the path cannot be bound."""
+        """Bind and listen; raises AlreadyServedError, or OSError if the path cannot be bound."""
         with _umask(0o777 & ~OPEN_FOLDER):
             path.parent.mkdir(parents=True, exist_ok=True)
         _refuse_open_folder(path.parent)
@@ -42,7 +42,7 @@ class SocketFile:
         self.listener.listen(backlog)
 
     def close(self) -> None:
-        """The file goes with it, unless it is another daemon's by now."""
+        """Close the socket and remove its file, unless another daemon has replaced it."""
         self.listener.close()
         if _identity(self.path) == self._identity:
             self.path.unlink(missing_ok=True)
@@ -59,7 +59,7 @@ def _bind(listener: socket.socket, path: Path) -> None:
 
 @contextmanager
 def _umask(mask: int) -> Iterator[None]:
-    """So that there is no moment at which what is made has other permissions."""
+    """Set the permissions of new files from their creation on."""
     before = os.umask(mask)
     try:
         yield
@@ -82,7 +82,7 @@ def _refuse_open_folder(folder: Path) -> None:
 
 
 def _remove_stale(path: Path) -> None:
-    """A socket that nobody answers was left behind by a daemon that died."""
+    """Remove the socket of a daemon that died; raises OSError or AlreadyServedError for anything else."""
     try:
         kind = path.lstat().st_mode
     except FileNotFoundError:
@@ -95,7 +95,7 @@ def _remove_stale(path: Path) -> None:
 
 
 def _answers(path: Path) -> bool:
-    """Also where nobody is let in for a while: a daemon that hangs is no dead one."""
+    """Whether a daemon listens; one that accepts no connection in time hangs, but is not dead."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.settimeout(PROBE_S)
         try:

@@ -24,15 +24,15 @@ class NoDaemonError(Exception):
 
 
 class DroppedError(NoDaemonError):
-    """A daemon is running, but gives no answer; the text says how."""
+    """A daemon is running, but gives no answer; the message gives the cause."""
 
 
 class NotPermittedError(Exception):
-    """The socket may not be used, or not for this; the text says what to do."""
+    """The user may not use the socket or this method; the message says what to do."""
 
 
 class CallRefusedError(Exception):
-    """The daemon will not do it; the text says why."""
+    """The daemon refuses the request; the message says why."""
 
 
 class StatusClient:
@@ -58,7 +58,7 @@ class StatusClient:
         return int(CREDENTIALS.unpack(self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, size))[0])
 
     def call(self, method: str, **params: Any) -> Any:
-        """The result.
+        """Return the result of a method.
 
         Raises CallRefusedError or NotPermittedError with the daemon's message, or NoDaemonError if no answer comes.
         """
@@ -80,7 +80,7 @@ class StatusClient:
         return result
 
     def _receive(self) -> tuple[Any, Any]:
-        """Problem and result. An answer that a Ctrl-C kept from being read belongs to an earlier request."""
+        """Return problem and result; skips an answer to an earlier request, which a Ctrl-C may have left unread."""
         while True:
             for message in self._unpacker:
                 _, number, problem, result = message

@@ -2,9 +2,9 @@
 
 The loop calls `serve` once a tick. It never waits, answers at most one request, and takes the clients in turn. Every
 client has bounded buffers, a bounded rate and a bounded time to send a request: faster requests wait in the kernel, and
-malformed ones get an error and end the connection. When all places are taken, the user with the most connections loses
-one, so that no user can exclude another; the holder of the lease is spared. A method that fails answers with an error
-and is logged: no report stops a robot.
+malformed ones get an error and end the connection. When all connections are in use, the user with the most of them
+loses one, so that no user can exclude another; the holder of the lease keeps its own. A method with a bug answers with
+an error and is logged: it does not stop the robot.
 """
 
 from __future__ import annotations
@@ -22,11 +22,7 @@ import msgpack
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.operator.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
 from firmware_host.operator.rights import Peer, Rights, load_rights, read_peer
-from firmware_host.operator.rpc import RESPONSE, MalformedError, read_params, read_shape
-from firmware_host.operator.rpc import RefusedError as RefusedError  # for modules that define methods
-from firmware_host.operator.socket_file import (
-    AlreadyServedError as AlreadyServedError,  # for modules that open a socket
-)
+from firmware_host.operator.rpc import RESPONSE, MalformedError, RefusedError, read_params, read_shape
 from firmware_host.operator.socket_file import SocketFile
 
 MOST_CLIENTS = 16
@@ -48,16 +44,16 @@ class StatusSocket:
         self.path = path
         self.methods = methods
         self.report_bug: Callable[[str], None] = lambda message: None
-        self.on_hang_up: Callable[[Caller], None] = lambda caller: None  # may come twice
-        self.spares: Callable[[Caller], bool] = lambda caller: False  # clients whose disconnection would stop the robot
+        self.on_hang_up: Callable[[Caller], None] = lambda caller: None  # may be called twice for one client
+        self.is_protected: Callable[[Caller], bool] = lambda caller: False  # its disconnection would stop the robot
         self._rights = rights or load_rights(StatusParameters())
         self._peer_of = peer_of
         self._file = SocketFile(path, MOST_CLIENTS)
         self._listener = self._file.listener
         self._poll = select.epoll()
         self._poll.register(self._listener.fileno(), select.EPOLLIN)
-        self._clients: dict[int, Client] = {}  # the client that was silent for longest comes first
-        self._waiting: dict[int, None] = {}  # in turn: clients that may have a request not yet answered
+        self._clients: dict[int, Client] = {}  # ordered by their last message, oldest first
+        self._waiting: dict[int, None] = {}  # clients that may have an unanswered request, in turn
         self._accepted = self._malformed = self._not_permitted = self._too_slow = self._made_room = 0
 
     @property
@@ -73,18 +69,19 @@ class StatusSocket:
         }
 
     def serve(self, now_s: float) -> None:
+        """Accept, read and send as far as possible without waiting, and answer at most one request."""
         for descriptor, events in self._poll.poll(0.0):
             if descriptor == self._listener.fileno():
                 self._accept()
             elif descriptor in self._clients:
-                self._attend(descriptor, events)
+                self._handle_events(descriptor, events)
         self._answer_next(now_s)
-        self._drop_tardy(now_s)
+        self._drop_overdue(now_s)
 
     def _accept(self) -> None:
         try:
             connection, _ = self._listener.accept()
-        except OSError:  # the client left again before it was let in
+        except OSError:  # the client disconnected before it was accepted
             return None
         try:
             peer = self._peer_of(connection)
@@ -93,23 +90,23 @@ class StatusSocket:
         level = self._rights.level(peer)
         refused = self._rights.refusal_to_connect(level)
         if refused:
-            return self._turn_away(connection, refused)
+            return self._refuse_connection(connection, refused)
         self._accepted += 1
         if len(self._clients) >= MOST_CLIENTS:
-            self._make_room(peer)
+            self._drop_for(peer)
         connection.setblocking(False)
         caller = Caller(self._accepted, peer, level)
         client = self._clients[connection.fileno()] = Client(connection, caller)
         client.watched = select.EPOLLIN
         return self._poll.register(connection.fileno(), client.watched)
 
-    def _turn_away(self, connection: socket.socket, message: str) -> None:
+    def _refuse_connection(self, connection: socket.socket, message: str) -> None:
         self._not_permitted += 1
         connection.setblocking(False)
-        with connection, suppress(OSError):  # it may be gone already
+        with connection, suppress(OSError):  # the client may have disconnected already
             connection.send(msgpack.packb([RESPONSE, None, message, None]))
 
-    def _make_room(self, newcomer: Peer) -> None:
+    def _drop_for(self, newcomer: Peer) -> None:
         """Drop the longest silent client of the user with the most connections; of equal users, the less privileged."""
         connections = Counter(client.caller.peer.uid for client in self._clients.values())
         connections[newcomer.uid] += 1
@@ -118,12 +115,12 @@ class StatusSocket:
             caller = self._clients[descriptor].caller
             return connections[caller.peer.uid], -caller.level, descriptor not in self._waiting
 
-        candidates = [each for each, client in self._clients.items() if not self.spares(client.caller)]
+        candidates = [each for each, client in self._clients.items() if not self.is_protected(client.caller)]
         self._made_room += 1
         self._drop(max(candidates or self._clients, key=claim))  # the first of equals
 
-    def _attend(self, descriptor: int, events: int) -> None:
-        """Read, unless something of this client still waits for its turn: the kernel keeps the rest."""
+    def _handle_events(self, descriptor: int, events: int) -> None:
+        """Read from a client, unless an earlier request of it still waits; further data stays in the kernel."""
         client = self._clients[descriptor]
         if events & select.EPOLLHUP:
             self.on_hang_up(client.caller)
@@ -136,7 +133,7 @@ class StatusSocket:
                 self._reject(client, str(problem))
             except OSError:
                 return self._drop(descriptor)
-        return self._settle(descriptor)
+        return self._flush(descriptor)
 
     def _answer_next(self, now_s: float) -> None:
         """Answer the first client in turn whose request rate permits it."""
@@ -158,7 +155,7 @@ class StatusSocket:
                 client.budget.spend()
                 self._waiting[descriptor] = None  # another request may follow
                 self._answer(client, *request)
-        self._settle(descriptor)
+        self._flush(descriptor)
 
     def _answer(self, client: Client, number: int, method: str, params: Any) -> None:
         if method not in self.methods:
@@ -181,12 +178,12 @@ class StatusSocket:
         client.send([RESPONSE, None, message, None])
         client.closing = True
 
-    def _settle(self, descriptor: int) -> None:
+    def _flush(self, descriptor: int) -> None:
         """Send pending answers; drop a client that is rejected, too slow, or finished."""
         client = self._clients[descriptor]
         try:
             client.flush()
-        except OSError:  # the client is gone; its earlier requests still count
+        except OSError:  # the client has disconnected; its earlier requests still count
             client.ended = True
             client.outgoing.clear()
             self._waiting.setdefault(descriptor)
@@ -205,9 +202,9 @@ class StatusSocket:
             client.watched = wanted
             self._poll.modify(client.connection.fileno(), wanted)
 
-    def _drop_tardy(self, now_s: float) -> None:
-        tardy = [descriptor for descriptor, client in self._clients.items() if client.is_tardy(now_s)]
-        for descriptor in tardy:
+    def _drop_overdue(self, now_s: float) -> None:
+        overdue = [descriptor for descriptor, client in self._clients.items() if client.is_overdue(now_s)]
+        for descriptor in overdue:
             self._too_slow += 1
             self._drop(descriptor)
 

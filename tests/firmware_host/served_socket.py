@@ -12,7 +12,8 @@ import msgpack
 from control.rate import PERIOD_S
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.rights import Group, Peer, Rights
-from firmware_host.operator.status_socket import RefusedError, StatusSocket
+from firmware_host.operator.rpc import RefusedError
+from firmware_host.operator.status_socket import StatusSocket
 
 
 def refuse(params: dict[str, Any], caller: Caller) -> Any:

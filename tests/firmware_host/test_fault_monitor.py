@@ -147,10 +147,10 @@ def test_two_consecutive_ticks_of_lost_commands_are_no_fault(bench: Bench) -> No
         assert bench.tick() == []
 
 
-def test_commands_lost_before_the_reset_do_not_count(configuration: Configuration) -> None:
+def test_commands_lost_before_the_start_do_not_count(configuration: Configuration) -> None:
     bench = Bench(configuration)
     bench.ports["left"].failed_sends = 99
-    bench.monitor.reset()
+    bench.monitor = FaultMonitor(configuration, cast(Drives, bench.drives))
     for _ in range(10):
         assert bench.tick() == []
 

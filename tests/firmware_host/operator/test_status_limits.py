@@ -219,7 +219,7 @@ def test_a_user_without_rights_is_refused_with_a_message(short_folder: Path) -> 
 
 
 def test_the_holder_of_the_lease_is_never_dropped_for_a_newcomer(served: Served) -> None:
-    served.spares = lambda caller: caller.connection == 1
+    served.is_protected = lambda caller: caller.connection == 1
     clients = [connect(served, OPERATOR) for _ in range(MOST_CLIENTS)]  # the first one is still for longest
     serve(served, MOST_CLIENTS)
     connect(served, OPERATOR)
