@@ -183,7 +183,7 @@ def test_arming_counts_only_heartbeats_newer_than_the_request(robot: Lockstep) -
     for _ in range(5):
         robot.step()
         modes.append(robot.loop.mode)
-    assert modes == [Mode.ARMING] * 5  # although the last heartbeats still say closed loop
+    assert modes == [Mode.ARMING] * 5  # the last heartbeats still report closed loop
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 1.0)
     assert len(energised_drives(robot)) == 4
     robot.run_for(0.5)

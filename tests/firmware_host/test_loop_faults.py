@@ -195,7 +195,7 @@ def test_a_drive_that_restarts_is_a_fault_until_it_is_cleared(at: Copied) -> Non
     assert by_hand == {"drive_silent", "drive_restarted"}
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
-    robot.run_for(1.5)  # in which version and watchdog are read anew
+    robot.run_for(1.5)  # version and watchdog are read again meanwhile
     assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 
@@ -326,7 +326,7 @@ def test_a_fault_that_ends_with_its_cause_does_not_arm_the_robot_again(at: Copie
         assert mode_of(robot) is Mode.IDLE
         assert not any(drive.energised for drive in robot.robot.drives)
     assert robot.loop.fault is None
-    assert "stopped by voltage_under" in robot.loop.events.notice  # still told
+    assert "stopped by voltage_under" in robot.loop.events.notice  # still shown
     assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 

@@ -25,7 +25,7 @@ Ends = tuple[StatusClient, socket.socket]
 
 @pytest.fixture
 def ends(short_folder: Path) -> Iterator[Ends]:
-    """A client and what it is connected to."""
+    """A client and the other end of its connection."""
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(short_folder / "s"))
         listener.listen()
@@ -37,7 +37,7 @@ def ends(short_folder: Path) -> Iterator[Ends]:
 
 
 def answer(ends: Ends, *messages: Any) -> Any:
-    """What the client makes of them; they are there before it asks."""
+    """Return the client's result for these messages, which arrive before its request."""
     client, connection = ends
     connection.sendall(b"".join(msgpack.packb(message) for message in messages))
     return client.call("status")
@@ -93,7 +93,7 @@ def test_a_message_before_the_connection_closes_is_read(ends: Ends) -> None:
 
 
 def test_a_full_queue_is_waited_for(short_folder: Path) -> None:
-    """Where somebody else connects all the time, the next in the queue may be us."""
+    """The queue may be full for a moment only."""
     with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as before:
         listener.bind(str(short_folder / "s"))
         listener.listen(0)

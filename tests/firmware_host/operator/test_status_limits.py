@@ -176,7 +176,7 @@ def test_one_user_s_connections_do_not_exclude_other_users(served: Served, monke
     for _ in range(4 * MOST_CLIENTS):
         others.append(connect(served, OTHER_USER))
         served.tick()
-    assert is_open(operator) and is_open(reader)  # although they were still for longest
+    assert is_open(operator) and is_open(reader)  # although they were silent for longest
     late = connect(served, Peer(9, 1009, frozenset()))
     late.sendall(STOP)
     serve(served, 6)
