@@ -1,11 +1,10 @@
-"""`mudskipper check` where no daemon runs: would one start here, and are the drives there?
+"""`mudskipper check` where no daemon runs: checks whether one would start, and whether its drives are heard.
 
-Listens only; nothing is transmitted on a bus.
+It listens to the buses and transmits nothing.
 """
 
 from __future__ import annotations
 
-import os
 import time
 from math import isfinite
 from pathlib import Path
@@ -15,8 +14,8 @@ from control.records import JOINTS
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PoseSourceError
 from firmware_host.buses import BusError, open_ports
-from firmware_host.computer.can_links import examine_bus, read_links
-from firmware_host.computer.host_checks import Account, examine_folder, examine_limits
+from firmware_host.computer.can_links import examine_buses, read_links
+from firmware_host.computer.host_checks import examine_folder, examine_limits, this_account
 from firmware_host.computer.host_facts import process_limits
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
@@ -76,11 +75,8 @@ def _pose_items(configuration: Configuration) -> list[dict[str, Any]]:
 def _host_items(configuration: Configuration) -> list[dict[str, Any]]:
     findings = []
     if configuration.log.enabled:
-        you = Account("you", os.geteuid(), frozenset({os.getegid(), *os.getgroups()}))
-        findings.append(examine_folder(Path(configuration.log.directory), you))
+        findings.append(examine_folder(Path(configuration.log.directory), this_account()))
     findings += examine_limits(configuration.loop, process_limits(Path("/"), None))
-    links = read_links()
-    for name, bus in configuration.bus.items():
-        drives = [drive for drive in configuration.drive.values() if drive.bus == name]
-        findings += examine_bus(name, bus, drives, links)[1:]  # whether it opens was said
+    opened = [f"bus.{name}" for name in configuration.bus]  # _drive_items reported whether they open
+    findings += [finding for finding in examine_buses(configuration, read_links()) if finding.id not in opened]
     return [finding.as_check_item for finding in findings]

@@ -1,4 +1,4 @@
-"""`mudskipper doctor`: the computer and its buses, line by line, with what to do. Looks only; transmits nothing."""
+"""`mudskipper doctor`: checks the computer and its buses, one line each with its fix. It transmits nothing."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import json
 import os
 import pwd
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
 from command_line.screen import GREEN, RED, YELLOW, coloured
-from firmware_host.computer.can_links import CanLink, examine_bus, read_links
-from firmware_host.computer.findings import Finding, Level, fail, ok, warn
+from firmware_host.computer.can_links import CanLink, examine_buses, read_links
+from firmware_host.computer.findings import Finding, Level, fail, ok, ok_if, warn
 from firmware_host.computer.host_checks import (
     OURS,
     Account,
@@ -24,6 +24,7 @@ from firmware_host.computer.host_checks import (
     examine_host,
     examine_storage,
     examine_this_python,
+    this_account,
 )
 from firmware_host.computer.host_facts import (
     UNIT,
@@ -55,8 +56,8 @@ def doctor(options: argparse.Namespace) -> int:
     try:
         configuration = load_configuration(options.config)
     except ConfigurationError as problem:
-        messages = [fail("configuration", message, f"edit {options.config}") for message in problem.problems]
-        return _show([*messages, *examine_this_python(), _clock()], options.json)
+        failed = [fail("configuration", message, f"edit {options.config}") for message in problem.problems]
+        return _show([*failed, *examine_this_python(), _examine_clock()], options.json)
     socket = options.socket or Path(configuration.status.socket)
     findings = [ok("configuration", str(options.config)), *examine_all(configuration, socket, read_links(ROOT))]
     return _show(findings, options.json)
@@ -67,30 +68,26 @@ def examine_all(configuration: Configuration, socket: Path, links: dict[str, Can
     limits = process_limits(ROOT, pid) if pid else unit_limits(ROOT) or process_limits(ROOT, None)
     priority = thread_priority(ROOT, pid) if pid else None
     yield from examine_host(ROOT, configuration.loop, limits, priority)
-    for name, bus in configuration.bus.items():
-        drives = [drive for drive in configuration.drive.values() if drive.bus == name]
-        yield from examine_bus(name, bus, drives, links)
-    yield from examine_storage(ROOT, configuration.log, _writer(), pid is not None)
-    yield _clock()
+    yield from examine_buses(configuration, links)
+    yield from examine_storage(ROOT, configuration.log, _log_writer(), pid is not None)
+    yield _examine_clock()
     yield from daemon
-    yield from _groups(configuration, socket)
+    yield from _examine_groups(configuration, socket)
     yield from examine_this_python()
 
 
-def _clock() -> Finding:
+def _examine_clock() -> Finding:
     return examine_clock(datetime.now(UTC), clock_is_synchronised(), has_clock_chip(ROOT))
 
 
 def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, list[Finding]]:
-    """Its process id, and what it tells of itself and of its drives."""
+    """Returns the daemon's process id, and the findings about itself and its drives."""
     pid = None
     try:
         client = StatusClient(socket)
-        try:
+        with closing(client):
             pid = client.daemon_pid
             return pid, list(examine_daemon(client.call("status"), software_version(), longest_watchdog_s))
-        finally:
-            client.close()
     except NotPermittedError as problem:
         return pid, [warn("daemon", str(problem), "or run this with sudo")]
     except DroppedError as problem:
@@ -102,39 +99,36 @@ def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, li
 
 
 def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
-    """Returns the findings about a status."""
-    text = f"runs, version {status['version']}, {status['mode']}"
-    if status["version"] == version:
-        yield ok("daemon", text)
-    else:
-        fix = "'systemctl restart mudskipper', with the robot disarmed"
-        yield warn("daemon", f"{text}; this command is version {version}", fix)
+    """Yields the findings about the status of a daemon; `version` is that of this command."""
+    text, same = f"runs, version {status['version']}, {status['mode']}", status["version"] == version
+    text += "" if same else f"; this command is version {version}"
+    yield ok_if(same, "daemon", text, "'systemctl restart mudskipper', with the robot disarmed")
     for drive in status["drives"]:
         yield _examine_watchdog(f"watchdog.{drive['joint']}", drive["watchdog_s"], longest_watchdog_s)
 
 
 def _examine_watchdog(identity: str, watchdog_s: float | None, longest_s: float) -> Finding:
-    setting = "docs/how-to/odrive.md"
+    fix = "docs/how-to/odrive.md"
     if watchdog_s is None:
-        return warn(identity, "not read back: the drive is silent, or its firmware's numbers are not known", setting)
+        return warn(identity, "not read back: the drive is silent, or its firmware's numbers are not known", fix)
     if watchdog_s == 0.0:
-        return fail(identity, "off: nothing stops this motor when the computer dies", setting)
-    if watchdog_s > longest_s:
-        return fail(identity, f"{watchdog_s:g} s is slower than faults.longest_watchdog_s = {longest_s:g}", setting)
-    return ok(identity, f"{watchdog_s:g} s")
+        return fail(identity, "off: nothing stops this motor when the computer dies", fix)
+    slow = watchdog_s > longest_s
+    text = f"{watchdog_s:g} s" + (f" is slower than faults.longest_watchdog_s = {longest_s:g}" if slow else "")
+    return ok_if(not slow, identity, text, fix, Level.FAIL)
 
 
-def _writer() -> Account:
-    """The daemon's user where the service is installed, else this one."""
+def _log_writer() -> Account:
+    """Returns the daemon's user where the service is installed, or else this one."""
     with suppress(KeyError):
         if (ROOT / UNIT).exists():
             user = pwd.getpwnam(OURS)
             return Account(OURS, user.pw_uid, frozenset(os.getgrouplist(OURS, user.pw_gid)))
-    return Account("you", os.geteuid(), frozenset({os.getegid(), *os.getgroups()}))
+    return this_account()
 
 
-def _groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
-    """Who may use the socket."""
+def _examine_groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
+    """Checks who may use the socket."""
     with suppress(OSError):
         status = socket.stat()
         yield ok("socket", f"{socket}, mode {status.st_mode & 0o777:o}, group {_group_name(status.st_gid)}")
@@ -149,8 +143,8 @@ def _groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
     except KeyError:
         yield warn("groups", f"there is no group {name}", "'mudskipper install' makes it")
         return
-    text = f"operators are the members of {name}: {', '.join(members) or 'nobody but root'}"
-    yield ok("groups", text) if members else warn("groups", text, f"'adduser YOU {name}', then log in again")
+    text = f"operators are the members of {name}: {', '.join(members) or 'only root'}"
+    yield ok_if(bool(members), "groups", text, f"'adduser YOU {name}', then log in again")
 
 
 def _group_name(gid: int) -> str:
@@ -160,11 +154,7 @@ def _group_name(gid: int) -> str:
 
 
 def _show(findings: list[Finding], as_json: bool) -> int:
-    if as_json:
-        print(json.dumps([finding._asdict() for finding in findings]))
-    else:
-        for finding in findings:
-            print(_line(finding))
+    print(json.dumps([each._asdict() for each in findings]) if as_json else "\n".join(map(_line, findings)))
     failed = any(finding.level is Level.FAIL for finding in findings)
     return exit_codes.UNHEALTHY if failed else exit_codes.OK
 

@@ -1,4 +1,4 @@
-"""`mudskipper install` and `uninstall`: show what will be done to this computer, do it, and say how far it came."""
+"""`mudskipper install` and `uninstall`: print the planned steps, do them, and report how many were done."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from command_line.install.service_plan import CONFIGURATION, Plan, System, plan_
 from command_line.install.service_steps import Command, Run, StepError, WriteFile, perform, run_command
 from command_line.screen import complain
 
-HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # from the service: ProtectHome= and PrivateTmp=
-Find = Callable[[str], str | None]  # where a program is
+HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # ProtectHome= and PrivateTmp= of the unit hide them
+Find = Callable[[str], str | None]  # returns the path of a program
 NEXT = """\
 Next: edit {root}etc/mudskipper/mudskipper.toml (your geometry, your drives), then
   adduser YOU mudskipper             an operator; takes effect at the next login
@@ -25,7 +25,7 @@ Next: edit {root}etc/mudskipper/mudskipper.toml (your geometry, your drives), th
 
 def install(options: argparse.Namespace, run: Run = run_command, find: Find = shutil.which) -> int:
     system = _system(options, run)
-    refusal = problem_with_place((system.prefix, Path(__file__).resolve().parent)) if system.live else ""
+    refusal = location_problem((system.prefix, Path(__file__).resolve().parent)) if system.live else ""
     if refusal:
         complain(refusal)
         return exit_codes.REFUSED
@@ -49,19 +49,21 @@ def _system(options: argparse.Namespace, run: Run) -> System:
     return System(root, prefix, run, live=root == Path("/"))
 
 
-def problem_with_place(places: Sequence[Path]) -> str:
-    """Why the service could not be started out of these; empty where it could."""
-    for place in places:
-        if any(place.is_relative_to(hidden) for hidden in HIDDEN):
-            return f"{place} is hidden from the service; install into an environment below /opt: docs/how-to/install.md"
-    if not (places[0] / "bin" / "mudskipperd").exists():
-        return f"there is no mudskipperd in {places[0]}/bin: install the package there with pip first"
+def location_problem(folders: Sequence[Path]) -> str:
+    """Returns why the service could not be started from these folders, or an empty text."""
+    for folder in folders:
+        if any(folder.is_relative_to(hidden) for hidden in HIDDEN):
+            return (
+                f"{folder} is hidden from the service; install into an environment below /opt: docs/how-to/install.md"
+            )
+    if not (folders[0] / "bin" / "mudskipperd").exists():
+        return f"there is no mudskipperd in {folders[0]}/bin: install the package there with pip first"
     return ""
 
 
 def _carry_out(options: argparse.Namespace, system: System, plan: Plan, find: Find) -> int:
     if system.live and os.geteuid() != 0 and not options.dry_run:
-        complain("this changes the system: run it with sudo, or look at it with --dry-run")
+        complain("this changes the system: run it with sudo, or print the steps with --dry-run")
         return exit_codes.NOT_PERMITTED
     for note in plan.notes:
         print(f"note: {note}")
@@ -85,13 +87,13 @@ def _missing_programs(plan: Plan, find: Find) -> list[str]:
 
 
 def _perform_all(plan: Plan, run: Run) -> int:
-    os.umask(0o022)  # what is written is for everybody to read
+    os.umask(0o022)  # everyone may read the installed files
     for number, step in enumerate(plan.steps):
         try:
             perform(step, run)
         except StepError as problem:
             complain(f"could not {step}: {problem}")
-            complain(f"done before that: {number} of {len(plan.steps)} steps. Mend it and run this again")
+            complain(f"done before that: {number} of {len(plan.steps)} steps. Fix it and run this command again")
             return exit_codes.UNHEALTHY
     print("done")
     return exit_codes.OK

@@ -1,8 +1,8 @@
-"""What has to be done to a system so that the robot's service is on it, or no longer: computed, not done.
+"""Plans the installation or removal of the robot's service: lists the steps without doing them.
 
-A file of ours that its owner has edited is never overwritten: the new one is put beside it as .new, once. Whether it
-was edited is seen by its digest, which the last installation has left in a manifest. The manifest is written last, so
-an installation that broke off is done again. The configuration counts as edited from the first day.
+A file that its owner has edited is never overwritten: the new version is written next to it as NAME.new, once. A file
+counts as edited where its digest differs from the one in the manifest of the last installation. The manifest is
+written last, so an interrupted installation is repeated. The configuration always counts as edited.
 """
 
 from __future__ import annotations
@@ -22,21 +22,16 @@ MANIFEST = "etc/mudskipper/.installed.json"
 LINK = "usr/local/bin/mudskipper"
 INTERFACES = ("can0", "can1")
 SERVICE, NETWORKD, WAIT_ONLINE = "mudskipper", "systemd-networkd", "systemd-networkd-wait-online"
-SYSUSERS, LINK_FILE, NETWORK, UNIT, CONFIGURATION = (
-    "etc/sysusers.d/mudskipper.conf",
-    "etc/systemd/network/80-can.link",
-    "etc/systemd/network/80-can.network",
-    "etc/systemd/system/mudskipper.service",
-    "etc/mudskipper/mudskipper.toml",
-)
-SOURCES = {  # in systemd/
+SYSUSERS = "etc/sysusers.d/mudskipper.conf"
+LINK_FILE = "etc/systemd/network/80-can.link"
+NETWORK = "etc/systemd/network/80-can.network"
+UNIT = "etc/systemd/system/mudskipper.service"
+CONFIGURATION = "etc/mudskipper/mudskipper.toml"
+SOURCES = {  # name in systemd/ by installed path
     SYSUSERS: "mudskipper.sysusers",
-    LINK_FILE: "80-can.link",
-    NETWORK: "80-can.network",
-    UNIT: "mudskipper.service",
-    CONFIGURATION: "mudskipper.toml",
+    **{path: path.rpartition("/")[2] for path in (LINK_FILE, NETWORK, UNIT, CONFIGURATION)},
 }
-OWNED = ("etc/mudskipper", "var/lib/mudskipper")  # what a purge removes
+OWNED = ("etc/mudskipper", "var/lib/mudskipper")  # folders that a purge removes
 
 
 class Plan(NamedTuple):
@@ -45,16 +40,15 @@ class Plan(NamedTuple):
 
 
 class System(NamedTuple):
-    """The computer, or another system's files."""
+    """This computer, or the file tree of another one."""
 
     root: Path
     prefix: Path  # of the environment, as that system sees it
     run: Run
-    live: bool  # the one that runs here
+    live: bool  # whether it is this computer
 
     def command(self, program: str, *words: str) -> Command:
-        where = () if self.live else (f"--root={self.root}",)
-        return Command((program, *where, *words))
+        return Command((program, *(() if self.live else (f"--root={self.root}",)), *words))
 
     def is_enabled(self, unit: str) -> bool:
         return self.run(self.command("systemctl", "is-enabled", unit).words).text.strip() == "enabled"
@@ -64,28 +58,27 @@ class System(NamedTuple):
 
 
 def source_folder() -> Path:
-    """Beside the packages in a working tree, in the environment's share/ where they are installed."""
-    beside = Path(__file__).resolve().parents[2] / "systemd"
-    if (beside / "mudskipper.service").exists():
-        return beside
-    return Path(sysconfig.get_path("data")) / "share" / "mudskipper"
+    """Returns systemd/ of a working tree, or the environment's share/ where the package is installed."""
+    in_tree = Path(__file__).resolve().parents[2] / "systemd"
+    installed = Path(sysconfig.get_path("data")) / "share" / "mudskipper"
+    return in_tree if (in_tree / "mudskipper.service").exists() else installed
 
 
 def load_sources(prefix: Path) -> dict[str, str]:
-    """The text of each file, by its place. Raises OSError."""
-    texts = {place: (source_folder() / name).read_text(encoding="utf-8") for place, name in SOURCES.items()}
+    """Returns the text of each file by its installed path. Raises OSError."""
+    texts = {path: (source_folder() / name).read_text(encoding="utf-8") for path, name in SOURCES.items()}
     texts[UNIT] = texts[UNIT].replace(DEFAULT_PREFIX, str(prefix))
     return texts
 
 
 def plan_installation(system: System) -> Plan:
     sources, before = load_sources(system.prefix), _load_manifest(system.root)
-    after = {place: _digest(text) for place, text in sources.items()}
+    after = {path: _digest(text) for path, text in sources.items()}
     plan = Plan([], [])
-    for place, text in sources.items():
-        _plan_file(plan, system.root / place, text, before.get(place))
+    for path, text in sources.items():
+        _plan_file(plan, system.root / path, text, before.get(path))
     _plan_link(plan, system)
-    changed = {place for place in after if before.get(place) != after[place]}
+    changed = {path for path in after if before.get(path) != after[path]}
     plan.steps.extend(_commands(system, changed))
     if before != after:
         plan.steps.append(WriteFile(system.root / MANIFEST, json.dumps(after, indent=1) + "\n"))
@@ -95,21 +88,17 @@ def plan_installation(system: System) -> Plan:
 
 
 def _plan_file(plan: Plan, path: Path, text: str, before: str | None) -> None:
-    """`before` is the digest of what was installed last."""
-    if not path.exists() and not path.is_symlink():
-        plan.steps.append(WriteFile(path, text))
-        return
+    """`before` is the digest of the text that was installed last."""
+    exists = path.exists() or path.is_symlink()
     present, new = _digest(_text_of(path)), _digest(text)
-    if present == new:
-        return
     edited = path.is_symlink() or present != before or path.name == Path(CONFIGURATION).name
-    if not edited:
+    if not exists or (present != new and not edited):
         plan.steps.append(WriteFile(path, text))
-    elif before != new:
-        beside = path.with_name(f"{path.name}.new")
-        plan.notes.append(f"{path} stays as it is; what is new is in {beside.name} beside it")
-        if _text_of(beside) != text:
-            plan.steps.append(WriteFile(beside, text))
+    elif present != new and before != new:
+        newer = path.with_name(f"{path.name}.new")
+        plan.notes.append(f"{path} was edited and stays; the new version is in {newer.name} next to it")
+        if _text_of(newer) != text:
+            plan.steps.append(WriteFile(newer, text))
 
 
 def _plan_link(plan: Plan, system: System) -> None:
@@ -117,7 +106,7 @@ def _plan_link(plan: Plan, system: System) -> None:
     if path.is_symlink() and path.readlink() == target:
         return
     if path.exists() and not path.is_symlink():
-        plan.notes.append(f"{path} is none of ours and stays as it is")
+        plan.notes.append(f"{path} belongs to other software and stays")
     else:
         plan.steps.append(MakeLink(path, target))
 
@@ -130,8 +119,8 @@ def _commands(system: System, changed: set[str]) -> Iterator[Step]:
         yield Command(("systemctl", "daemon-reload"))
     if LINK_FILE in changed and live:
         yield Command(("udevadm", "control", "--reload"))
-        places = [system.root / "sys/class/net" / name for name in INTERFACES]
-        present = [str(place) for place in places if place.exists()]
+        links = [system.root / "sys/class/net" / name for name in INTERFACES]
+        present = [str(link) for link in links if link.exists()]
         if present:
             yield Command(("udevadm", "trigger", "--action=add", *present))
     if not system.is_enabled(NETWORKD):
@@ -144,20 +133,19 @@ def _commands(system: System, changed: set[str]) -> Iterator[Step]:
 
 
 def plan_removal(system: System, purge: bool) -> Plan:
-    """Also of files that were installed by hand, as far as they are ours to the letter."""
+    """Also removes files that were copied without this command, where they are unchanged."""
     root, plan, before = system.root, Plan([], []), _load_manifest(system.root)
-    sources = load_sources(system.prefix)
     if system.is_enabled(SERVICE) or system.is_active(SERVICE):
         now = ("--now",) if system.live else ()
         plan.steps.append(system.command("systemctl", "disable", *now, SERVICE))
-    for place, text in sources.items():
-        _plan_removal_of(plan, root / place, {_digest(text), before.get(place)}, purge)
+    for path, text in load_sources(system.prefix).items():
+        _plan_removal_of(plan, root / path, {_digest(text), before.get(path)}, purge)
     link = root / LINK
     if link.is_symlink() and link.readlink() == system.prefix / "bin" / "mudskipper":
         plan.steps.append(Remove(link))
     _plan_reloading(plan, system)
     if purge:
-        plan.steps.extend(Remove(root / place) for place in OWNED if (root / place).exists())
+        plan.steps.extend(Remove(root / path) for path in OWNED if (root / path).exists())
         if system.live and SERVICE in _users(root):
             plan.steps.append(Command(("userdel", SERVICE)))
     else:
@@ -165,13 +153,13 @@ def plan_removal(system: System, purge: bool) -> Plan:
     return plan
 
 
-def _plan_removal_of(plan: Plan, path: Path, ours: set[str | None], purge: bool) -> None:
-    beside = path.with_name(f"{path.name}.new")
-    if beside.exists():
-        plan.steps.append(Remove(beside))
+def _plan_removal_of(plan: Plan, path: Path, known_digests: set[str | None], purge: bool) -> None:
+    newer = path.with_name(f"{path.name}.new")
+    if newer.exists():
+        plan.steps.append(Remove(newer))
     if not path.exists() or path.name == Path(CONFIGURATION).name:
-        return  # the configuration goes with its folder, if at all
-    if purge or _digest(_text_of(path)) in ours:
+        return  # only a purge removes the configuration, together with its folder
+    if purge or _digest(_text_of(path)) in known_digests:
         plan.steps.append(Remove(path))
     else:
         plan.notes.append(f"{path} was edited and stays; --purge removes it")
@@ -186,16 +174,14 @@ def _plan_reloading(plan: Plan, system: System) -> None:
 
 
 def _plan_manifest(plan: Plan, root: Path, before: dict[str, str]) -> None:
-    """It remembers the configuration alone, and what else stays."""
+    """Keeps the digests of the files that stay."""
     removed = {step.path for step in plan.steps if isinstance(step, Remove)}
-    left = {
-        place: digest for place, digest in before.items() if root / place not in removed and (root / place).exists()
-    }
+    left = {path: digest for path, digest in before.items() if (root / path).exists() and root / path not in removed}
     if left != before:
         plan.steps.append(WriteFile(root / MANIFEST, json.dumps(left, indent=1) + "\n"))
-    kept = [str(root / place) for place in OWNED if (root / place).exists()]
-    if kept:
-        plan.notes.append(f"kept, as long as you do not say --purge: {', '.join(kept)}")
+    staying = [str(root / path) for path in OWNED if (root / path).exists()]
+    if staying:
+        plan.notes.append(f"{', '.join(staying)}: stays; --purge removes it")
 
 
 def _users(root: Path) -> set[str]:
@@ -204,14 +190,14 @@ def _users(root: Path) -> set[str]:
 
 def _load_manifest(root: Path) -> dict[str, str]:
     with suppress(ValueError):
-        reported = json.loads(_text_of(root / MANIFEST))
-        if isinstance(reported, dict):
-            return {str(place): str(digest) for place, digest in reported.items()}
+        manifest = json.loads(_text_of(root / MANIFEST))
+        if isinstance(manifest, dict):
+            return {str(path): str(digest) for path, digest in manifest.items()}
     return {}
 
 
 def _text_of(path: Path) -> str:
-    """Empty where there is none."""
+    """Returns the text of a file, empty where it is missing."""
     with suppress(FileNotFoundError):
         return path.read_text(encoding="utf-8", errors="replace")
     return ""

@@ -1,5 +1,6 @@
-"""What `mudskipper install` does to a system: files written, links made, things removed, commands run; each shows
-itself before it is done.
+"""The steps of `mudskipper install`: writing files, making links, removing files, running commands.
+
+The text of a step is printed before the step is done.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-PATIENCE_S = 120.0  # with one command: stopping the service may take 20 s
+COMMAND_TIMEOUT_S = 120.0  # stopping the service may take 20 s
 
 
 class Outcome(NamedTuple):
@@ -24,7 +25,7 @@ Run = Callable[[Sequence[str]], Outcome]
 
 
 class StepError(Exception):
-    """A step that could not be done; the text says why."""
+    """A step failed; the text gives the reason."""
 
 
 class WriteFile(NamedTuple):
@@ -71,18 +72,18 @@ def perform(step: Step, run: Run) -> None:
 def _perform(step: Step, run: Run) -> None:
     match step:
         case WriteFile(path, text):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            beside = _beside(path)
-            beside.write_text(text, encoding="utf-8")
-            beside.chmod(0o644)
-            beside.replace(path)
+            temporary = _temporary_path(path)
+            temporary.write_text(text, encoding="utf-8")
+            temporary.chmod(0o644)
+            temporary.replace(path)
         case MakeLink(path, target):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            beside = _beside(path)
-            beside.symlink_to(target)
-            beside.replace(path)
+            temporary = _temporary_path(path)
+            temporary.symlink_to(target)
+            temporary.replace(path)
+        case Remove(path) if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
         case Remove(path):
-            _remove(path)
+            path.unlink(missing_ok=True)
         case Command(words):
             outcome = run(words)
             if outcome.status != 0:
@@ -90,25 +91,19 @@ def _perform(step: Step, run: Run) -> None:
                 raise StepError(last_line or f"exit status {outcome.status}")
 
 
-def _beside(path: Path) -> Path:
-    """A name of its own, free of what a power cut may have left."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    beside.unlink(missing_ok=True)
-    return beside
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+def _temporary_path(path: Path) -> Path:
+    """Returns an unused path in the same folder, which it makes; removes the rest of an interrupted installation."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary.unlink(missing_ok=True)
+    return temporary
 
 
 def run_command(words: Sequence[str]) -> Outcome:
     try:
-        done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        done = subprocess.run(words, capture_output=True, text=True, timeout=COMMAND_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
-        return Outcome(124, f"took longer than {PATIENCE_S:g} s")
+        return Outcome(124, f"took longer than {COMMAND_TIMEOUT_S:g} s")
     except FileNotFoundError:
         return Outcome(127, f"{words[0]} is not installed")
     return Outcome(done.returncode, done.stdout + done.stderr)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.json_output import print_json
+from command_line.logs.refusals import UsageError, explain_errors
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.log_reading.lab_csv import write_lab_csv
 from firmware_host.log_reading.log_reader import LogError, log_summary, read_log, read_logs
@@ -26,17 +26,11 @@ LONGEST_FILM_S = 60.0
 CUT_OFF = "the log is not finished: it is still being written, or was cut off; everything up to there was read"
 
 
+@explain_errors
 def replay(options: Options) -> int:
-    try:
-        configuration = load_configuration(options.config) if options.config else None
-        with watched() as watch:
-            replayed = replay_files(options.files, configuration, options.method, watch)
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return exit_codes.CONFIGURATION
-    except LogError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+    configuration = load_configuration(options.config) if options.config else None
+    with watched() as watch:
+        replayed = replay_files(options.files, configuration, options.method, watch)
     _show_replay(replayed, options.json)
     return exit_codes.OK
 
@@ -62,34 +56,25 @@ def _show_replay(replayed: Replay, as_json: bool) -> None:
         complain(CUT_OFF)
 
 
+@explain_errors
 def plot(options: Options) -> int:
-    path = options.out or _beside(options.files[0], ".png")
-    try:
-        walk = _walk_for_picture(options, path)
-    except LogError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+    path = options.out or _picture_path(options.files[0], ".png")
+    walk = _walk_for_picture(options, path)
     if not walk.strides:
         complain("no complete stride in this log")
-    from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time
+    from experiments.pictures.walk_plot import plot_walk  # matplotlib is slow to import
 
     plot_walk(walk, path)
     print(f"written  {path}")
     return exit_codes.OK
 
 
+@explain_errors
 def film(options: Options) -> int:
-    path = options.out or _beside(options.files[0], "-strides.png")
+    path = options.out or _picture_path(options.files[0], "-strides.png")
     moving = path.suffix == ".gif"
-    try:
-        walk = _walk_for_picture(options, path)
-        strides = _chosen_strides(options, walk, moving)
-    except LogError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
-    except ValueError as problem:
-        complain(str(problem))
-        return exit_codes.USAGE
+    walk = _walk_for_picture(options, path)
+    strides = _chosen_strides(options, walk, moving)
     if moving:
         _draw_film(walk, strides, path)
     else:
@@ -101,8 +86,8 @@ def film(options: Options) -> int:
     return exit_codes.OK
 
 
-def _beside(log: Path, ending: str) -> Path:
-    """The log's name with another ending. A log that is being written leaves its folder, a picture would not."""
+def _picture_path(log: Path, ending: str) -> Path:
+    """Returns the log's path with another ending, but not in active/, which the log leaves when it is finished."""
     name = log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending
     if log.absolute().parent.name != ACTIVE:
         return log.with_name(name)
@@ -115,7 +100,7 @@ def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
     with watched() as watch:
         walk = read_walk(options.files[0], options.walk, options.files[1:], watch)
     if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise LogError(f"{path} cannot be written; choose another place with --out")
+        raise LogError(f"{path} cannot be written; choose another path with --out")
     if walk.walks > 1 and not options.walk:
         complain(f"the last of {walk.walks} walks in this log; --walk N takes another")
     if walk.missing:
@@ -128,22 +113,20 @@ def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
 
 
 def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[Stride]:
-    """Those asked for, or all for a film, or the clearest of each kind. Raises LogError, and ValueError for a wish that
-    cannot be fulfilled.
-    """
+    """Returns the requested strides, or all for a film, or the clearest of each kind. Raises LogError, UsageError."""
     by_number = {stride["index"]: stride for stride in walk.own_strides}
     if not by_number:
         raise LogError(f"{options.files[0]}: no complete stride in this log")
     for number in options.stride or ():
         if number not in by_number:
-            raise ValueError(f"--stride {number}: this walk has {min(by_number)} to {max(by_number)}")
+            raise UsageError(f"--stride {number}: this walk has {min(by_number)} to {max(by_number)}")
     if options.stride:
         strides = [by_number[number] for number in options.stride]
     else:
         strides = walk.own_strides if moving else choose_strides(walk)
     length_s = sum(duration_s(walk, stride) for stride in strides)
     if moving and length_s > LONGEST_FILM_S:
-        raise ValueError(f"{length_s:.0f} s of film are more than {LONGEST_FILM_S:.0f} s; choose with --stride")
+        raise UsageError(f"{length_s:.0f} s of film are more than {LONGEST_FILM_S:.0f} s; choose with --stride")
     return strides
 
 
@@ -157,13 +140,10 @@ def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
         progress.clear()
 
 
+@explain_errors
 def info(options: Options) -> int:
-    try:
-        with watched() as watch:
-            summary = log_summary(read_logs(options.files, watch))
-    except LogError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+    with watched() as watch:
+        summary = log_summary(read_logs(options.files, watch))
     if options.json:
         print_json("log-info", summary)
     else:
@@ -172,19 +152,15 @@ def info(options: Options) -> int:
     return exit_codes.OK
 
 
+@explain_errors
 def export(options: Options) -> int:
-    try:
-        with watched() as watch:
-            log = read_log(options.file, watch)
-    except LogError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+    with watched() as watch:
+        log = read_log(options.file, watch)
     if options.out is None:
         write_lab_csv(log, sys.stdout)
         return exit_codes.OK
     if options.out.exists() and options.out.samefile(options.file):
-        complain(f"{options.out} is the log itself; name another file")
-        return exit_codes.USAGE
+        raise UsageError(f"{options.out} is the log itself; name another file")
     with Path(options.out).open("w", encoding="utf-8") as out, watched() as watch:
         write_lab_csv(log, out, watch)
     return exit_codes.OK

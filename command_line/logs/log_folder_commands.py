@@ -1,9 +1,10 @@
-"""Commands that look after the folder of the logs: list, recover, preserve."""
+"""Commands on the log folder: list, recover, preserve."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shutil import disk_usage
 from typing import Any
 
 from mcap.exceptions import McapError
@@ -11,17 +12,16 @@ from mcap.reader import make_reader
 
 from command_line import exit_codes
 from command_line.json_output import print_json
+from command_line.logs.refusals import explain_errors
 from command_line.screen import QUIET_S, Progress, complain, size_text
 from experiments.reports.text_tables import number, table
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import (
     BROKEN,
     DONE,
     ENDING,
     PART,
     PRESERVED,
-    disk_bytes,
     free_space,
     log_files,
     preserve,
@@ -36,24 +36,22 @@ Options = argparse.Namespace
 
 LEGEND = (
     "unfinished: still being written, or cut off; broken: damaged, or left by a recovery that did not end.\n"
-    "'mudskipper log recover' puts in order what it can; remove what resists it, and what is no log"
+    "'mudskipper log recover' repairs what it can; remove files that it cannot repair, and those that are no logs"
 )
 
 
+@explain_errors
 def list_logs(options: Options) -> int:
     folder = options.folder or _configured_folder(options.config)
-    if folder is None:
-        return exit_codes.CONFIGURATION
     if not folder.is_dir():
-        complain(f"{folder}: there is no such folder")
-        return exit_codes.UNHEALTHY
+        raise LogError(f"{folder}: there is no such folder")
     logs = [describe(path) for path in [*stored_files(folder), *log_files(folder, PRESERVED)]]
     space = free_space(folder)
     report = {
         "folder": str(folder),
         "logs": logs,
         "logs_bytes": sum(log["bytes"] for log in logs),
-        "disk_bytes": disk_bytes(folder),
+        "disk_bytes": disk_usage(folder).total,
         "free_bytes": space.free_bytes,
     }
     if options.json:
@@ -63,12 +61,8 @@ def list_logs(options: Options) -> int:
     return exit_codes.OK
 
 
-def _configured_folder(path: Path) -> Path | None:
-    try:
-        return Path(load_configuration(path).log.directory)
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return None
+def _configured_folder(path: Path) -> Path:
+    return Path(load_configuration(path).log.directory)
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -108,57 +102,56 @@ def _summary_of(path: Path) -> tuple[dict[str, str], float | None]:
 
 
 def _listing(report: dict[str, Any]) -> str:
-    rows, odd = [["log", "place", "size (MB)", "length (s)", ""]], False
+    rows = [["log", "folder", "size (MB)", "length (s)", ""]]
     for log in report["logs"]:
-        odd = odd or log["state"] != "whole"
         marks = "recovered" if log["recovered"] else log["state"].removeprefix("whole")
         size = f"{log['bytes'] / 1e6:.1f}"
         rows.append([log["name"], log["place"], size, number(log["duration_s"], 1), marks])
     sizes = [size_text(report[name]) for name in ("logs_bytes", "free_bytes", "disk_bytes")]
     total = f"{sizes[0]} of logs, {sizes[1]} free of {sizes[2]}"
-    return "\n".join([table(rows), *[LEGEND] * odd, total])
+    unfinished = any(log["state"] != "whole" for log in report["logs"])
+    return "\n".join([table(rows), *[LEGEND] * unfinished, total])
 
 
+@explain_errors
 def recover(options: Options) -> int:
-    places = options.places or [_configured_folder(options.config)]
-    if None in places:
-        return exit_codes.CONFIGURATION
-    named = {place for place in places if not place.is_dir()}
-    paths = [path for place in places for path in ([place] if place in named else unfinished_files(place))]
-    recovered, resisted = _recover_each(paths, named)
+    given = options.places or [_configured_folder(options.config)]
+    named = {path for path in given if not path.is_dir()}
+    paths = [path for each in given for path in ([each] if each in named else unfinished_files(each))]
+    recovered, problems = _recover_each(paths, named)
     if options.json:
         logs = [{"path": str(log.path), "rows": log.rows, "lost": log.lost, "note": log.note} for log in recovered]
-        print_json("log-recover", {"recovered": logs, "problems": resisted})
+        print_json("log-recover", {"recovered": logs, "problems": problems})
     else:
         for log in recovered:
             print(f"{log.path}: {log.note}")
-        if not recovered and not resisted:
+        if not recovered and not problems:
             print("nothing to recover")
-    complain(*resisted)
-    return exit_codes.UNHEALTHY if resisted else exit_codes.OK
+    complain(*problems)
+    return exit_codes.UNHEALTHY if problems else exit_codes.OK
 
 
 def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Recovered], list[str]]:
-    """Skips the files of living writers, unless the operator named them."""
-    recovered, resisted = [], []
+    """Recovers the logs and returns messages about the others. Skips files of living writers that were not named."""
+    recovered, problems = [], []
     progress = Progress("", QUIET_S)
     for done, path in enumerate(paths):
         progress.follow("logs", done, len(paths))
         try:
             recovered.append(recover_log(path, progress.follow))
         except LogError as problem:
-            resisted.append(str(problem))
+            problems.append(str(problem))
         except BlockingIOError:
             if path in named:
-                resisted.append(f"{path}: is being written; its writer will finish it")
+                problems.append(f"{path}: is being written; its writer will finish it")
         except OSError as problem:
-            resisted.append(why_not_moved(path, problem))
+            problems.append(why_not_moved(path, problem))
     progress.clear()
-    return recovered, resisted
+    return recovered, problems
 
 
 def preserve_log(options: Options) -> int:
-    """Each that can be, whatever becomes of the others."""
+    """Preserves each log that can be moved, and reports the others."""
     status = exit_codes.OK
     for path in options.files:
         try:

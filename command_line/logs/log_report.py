@@ -1,4 +1,4 @@
-"""`mudskipper log report`: what a log tells, as one page with its pictures, its numbers and the log itself."""
+"""`mudskipper log report`: makes a page of a log, with pictures and numbers, and a copy of the log next to it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.screen import coefficient, complain, watched
+from command_line.logs.refusals import explain_errors
+from command_line.screen import coefficient, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides
 from experiments.reports.report_page import PAGE, Figure, Section, to_json, write_report
@@ -22,19 +23,16 @@ from firmware_host.log_reading.replay import Replay, replay_files
 from firmware_host.operator.reports import map_report, stride_report
 
 EVENTS_REPORTED = 200  # the last ones
-SINCE = "Times are since the log's begin."
+SINCE = "Times count from the beginning of the log."
 Report = dict[str, Any]
 
 
+@explain_errors
 def log_report(options: argparse.Namespace) -> int:
-    folder: Path = options.out or _beside(options.files[0])
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with watched() as watch:
-            report, sections = _reported(options.files, watch)
-    except LogError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+    folder: Path = options.out or _report_folder(options.files[0])
+    folder.mkdir(parents=True, exist_ok=True)
+    with watched() as watch:
+        report, sections = _read_report(options.files, watch)
     logs = [_copy(path, folder) for path in options.files]
     written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
     if options.json:
@@ -45,8 +43,8 @@ def log_report(options: argparse.Namespace) -> int:
     return exit_codes.OK
 
 
-def _beside(log: Path) -> Path:
-    """In the present folder: where logs lie there may be no permission to write."""
+def _report_folder(log: Path) -> Path:
+    """Returns a path in the present folder: the user may not be permitted to write into the log folder."""
     return Path(f"{log.name.removesuffix('.gz').removesuffix('.csv').removesuffix('.mcap')}-report")
 
 
@@ -57,7 +55,7 @@ def _copy(log: Path, folder: Path) -> Path:
     return copy
 
 
-def _reported(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
+def _read_report(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
     """Raises LogError."""
     ours = read_logs(files, watch) if files[0].suffix == ".mcap" else None
     replayed = replay_files(files, watch=watch)
@@ -77,7 +75,7 @@ def _reported(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section
 def _summary_section(log: Log) -> Section:
     unfinished = "" if log.complete else "The log was not finished: everything up to where it ends was read."
     rows = [["", ""], *([name, _shown(value)] for name, value in log_summary(log).items())]
-    return Section("What the log holds", unfinished, rows=rows)
+    return Section("Contents of the log", unfinished, rows=rows)
 
 
 def _shown(value: str | int | float | bool) -> str:
@@ -87,7 +85,7 @@ def _shown(value: str | int | float | bool) -> str:
 
 
 def _walk_sections(files: Sequence[Path], watch: Watch) -> list[Section]:
-    """One of each walk; none where the robot did not walk."""
+    """Returns a section for each walk, or one message where the robot did not walk."""
     try:
         last = read_walk(files[0], 0, files[1:], watch)
     except LogError as problem:
@@ -97,12 +95,12 @@ def _walk_sections(files: Sequence[Path], watch: Watch) -> list[Section]:
 
 
 def _walk_section(walk: RecordedWalk, count: int) -> Section:
-    from experiments.pictures.walk_plot import plot_walk  # matplotlib takes its time
+    from experiments.pictures.walk_plot import plot_walk  # matplotlib is slow to import
 
     begun = f"It begins {walk.begun_s:.2f} s after the log. Its pictures count from there, as 'mudskipper plot' does."
     missing = f"Not in this log: {', '.join(walk.missing)}." if walk.missing else ""
     cut = f"The walk may have {walk.cut}." if walk.cut else ""
-    figures = [Figure(f"walk-{count}", "Forces, coefficients, depth, place and steps.", partial(plot_walk, walk))]
+    figures = [Figure(f"walk-{count}", "Forces, coefficients, depth, position and steps.", partial(plot_walk, walk))]
     if walk.own_strides:
         figures.append(Figure(f"strides-{count}", "The clearest stride of each outcome.", partial(_draw_strip, walk)))
     return Section(f"Walk {count}", "\n\n".join(filter(None, (begun, missing, cut))), figures=figures)
@@ -115,17 +113,12 @@ def _draw_strip(walk: RecordedWalk, path: Path) -> None:
 
 
 def _strides_section(replayed: Replay) -> Section:
+    if not replayed.strides:
+        return Section("Strides", "No complete stride.")
+    text = f"{SINCE} Coefficients have their standard errors; ≥ marks a lower bound, brackets mark an invalid one."
     head = ["flipper", "stride", "from (s)", "k_p (N/cm³)", "k_s (N/cm³)", "k_e (N/cm³)", "depth (cm)", "step (cm)", ""]
-    return Section(
-        "Strides",
-        f"{SINCE} Coefficients with their standard error; after a ≥ where the mud did not yield, in brackets where not"
-        " valid."
-        if replayed.strides
-        else "No complete stride.",
-        rows=[head, *(_stride_row(stride_report(stride), replayed.begin_s) for stride in replayed.strides)]
-        if replayed.strides
-        else (),
-    )
+    rows = [_stride_row(stride_report(stride), replayed.begin_s) for stride in replayed.strides]
+    return Section("Strides", text, rows=[head, *rows])
 
 
 def _stride_row(stride: dict[str, Any], begin_s: float) -> list[str]:
@@ -145,7 +138,7 @@ def _in_cm(value_m: float | None) -> str:
 
 
 def _events_section(log: Log) -> Section:
-    reported = log.events[-EVENTS_REPORTED:]
-    before = f" The last {len(reported)} of {len(log.events)}." if len(reported) < len(log.events) else ""
-    rows = [["at (s)", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in reported)]
-    return Section("Events", SINCE + before, rows=rows)
+    latest = log.events[-EVENTS_REPORTED:]
+    omitted = f" The last {len(latest)} of {len(log.events)}." if len(latest) < len(log.events) else ""
+    rows = [["at (s)", ""], *([f"{event['stamp_s'] - begin_s(log):.2f}", event["text"]] for event in latest)]
+    return Section("Events", SINCE + omitted, rows=rows)

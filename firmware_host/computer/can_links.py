@@ -19,7 +19,7 @@ from drivers.can.bus_load import MOST_FRACTION, WARN_FRACTION, bus_load
 from drivers.drive import DriveParameters
 from drivers.drive_types import traffic_of
 from firmware_host.computer.findings import Finding, Level, fail, ok, ok_if
-from firmware_host.configuration.configuration import BusParameters
+from firmware_host.configuration.configuration import BusParameters, Configuration
 
 QUEUE_FRAMES = (16, 64)  # a shorter queue overflows in the tick of arming, a longer one delivers old torques late
 LONGEST_RESTART_MS = 1000
@@ -100,6 +100,12 @@ def read_sys_links(root: Path) -> dict[str, CanLink]:
                 up = bool(int(flags, 16) & FLAG_UP)
                 links[folder.name] = CanLink(folder.name, up, queue_frames=int(queue))
     return links
+
+
+def examine_buses(configuration: Configuration, links: dict[str, CanLink]) -> Iterator[Finding]:
+    for name, bus in configuration.bus.items():
+        drives = [drive for drive in configuration.drive.values() if drive.bus == name]
+        yield from examine_bus(name, bus, drives, links)
 
 
 def examine_bus(

@@ -53,6 +53,10 @@ class Account(NamedTuple):
     groups: frozenset[int]
 
 
+def this_account() -> Account:
+    return Account("you", os.geteuid(), frozenset({os.getegid(), *os.getgroups()}))
+
+
 def examine_host(root: Path, loop: LoopParameters, limits: Limits | None, priority: int | None) -> Iterator[Finding]:
     """`priority` is that of the running loop, None where no daemon runs."""
     yield examine_kernel(is_realtime(root), kernel_text(root))

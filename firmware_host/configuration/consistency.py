@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from math import ceil, degrees, floor, radians
+from operator import attrgetter
 
 from control.depth.gait_choice import gait_candidates
 from control.records import JOINTS
@@ -16,7 +17,14 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.pose_consistency import pose_problems
 
 LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
-ROUNDING = 1e-6  # of numbers that a file gives with few digits
+ROUNDING = 1e-6  # relative error of a number that a file gives with few digits
+ORDERED = (  # pairs of keys, the first of which must be at most the second
+    ("faults.late_s", "faults.quiet_s"),  # milder reactions come first
+    ("faults.quiet_s", "faults.silence_s"),
+    ("faults.lag_s", "faults.silence_s"),
+    ("faults.voltage_min_v", "faults.voltage_low_v"),
+    ("adaptation.min_depth_m", "adaptation.max_depth_m"),
+)
 
 
 def contradictions(configuration: Configuration) -> Iterator[str]:
@@ -24,7 +32,6 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _text_problems(configuration)
     yield from pose_problems(configuration.pose)
     yield from _drive_problems(configuration)
-    yield from _friction_problems(configuration)
     yield from _motor_force_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
@@ -32,7 +39,8 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
         yield from _sweep_problems(configuration)
     yield from _torque_problems(configuration)
     yield from _lead_problems(configuration)
-    yield from _fault_problems(configuration)
+    yield from _order_problems(configuration)
+    yield from _winding_problems(configuration)
 
 
 def _text_problems(configuration: Configuration) -> Iterator[str]:
@@ -54,31 +62,26 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _drive_problems(configuration: Configuration) -> Iterator[str]:
-    places: dict[tuple[str, int], str] = {}
+    joint_at: dict[tuple[str, int], str] = {}
     for joint in JOINTS:
         if joint not in configuration.drive:
             yield f"drive.{joint} is missing: all of {', '.join(JOINTS)} are needed"
+    for section, table in (("drive", configuration.drive), ("friction", configuration.friction)):
+        for joint in (joint for joint in table if joint not in JOINTS):
+            yield f"{section}.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
     for joint, drive in configuration.drive.items():
-        if joint not in JOINTS:
-            yield f"drive.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
         if drive.bus not in configuration.bus:
             known = ", ".join(configuration.bus) or "none"
             yield f"drive.{joint}.bus = {drive.bus!r}: no such bus; there is {known}"
         if drive.sign == 0:
             yield f"drive.{joint}.sign = 0: must be 1 or -1"
-        duplicate = places.setdefault((drive.bus, drive.node_id), joint)
+        duplicate = joint_at.setdefault((drive.bus, drive.node_id), joint)
         if duplicate != joint:
             yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {drive.bus!r}"
 
 
-def _friction_problems(configuration: Configuration) -> Iterator[str]:
-    for joint in configuration.friction:
-        if joint not in JOINTS:
-            yield f"friction.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
-
-
 def _torque_problems(configuration: Configuration) -> Iterator[str]:
-    """A drive must be able to give what the limits allow, or it clamps torque without a word."""
+    """Checks that each drive can reach the torque limit: it would clamp a larger torque without a report."""
     torque_nm = configuration.limits.torque_nm
     for joint, drive in configuration.drive.items():
         for value, problem in drive.torque_problems(torque_nm):
@@ -86,7 +89,7 @@ def _torque_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _lead_problems(configuration: Configuration) -> Iterator[str]:
-    """A recovery's targets must lead far enough for the full torque, or the last attempt is a weak one."""
+    """Checks that the lead of a recovery's targets gives the full torque in its last attempt."""
     gains, lead_deg, torque_nm = configuration.gains, configuration.recovery.lead_deg, configuration.limits.torque_nm
     needed_nm_rad = torque_nm / radians(lead_deg)
     for key in ("sweep_stiffness_nm_rad", "adduction_stiffness_nm_rad"):
@@ -97,13 +100,14 @@ def _lead_problems(configuration: Configuration) -> Iterator[str]:
             )
 
 
-def _fault_problems(configuration: Configuration) -> Iterator[str]:
-    """Milder reactions come first."""
-    bounds = configuration.faults
-    for milder, harder in (("late_s", "quiet_s"), ("quiet_s", "silence_s"), ("lag_s", "silence_s")):
-        low, high = getattr(bounds, milder), getattr(bounds, harder)
+def _order_problems(configuration: Configuration) -> Iterator[str]:
+    for lower, upper in ORDERED:
+        low, high = attrgetter(lower)(configuration), attrgetter(upper)(configuration)
         if low > high:
-            yield f"faults.{milder} = {low}: must be at most faults.{harder} = {high}"
+            yield f"{lower} = {low}: must be at most {upper} = {high}"
+
+
+def _winding_problems(configuration: Configuration) -> Iterator[str]:
     room_c, limits = configuration.winding.room_c, configuration.limits
     nearly_hot_c = (limits.temperature_warm_c + limits.temperature_hot_c) / 2.0
     if room_c >= nearly_hot_c:
@@ -111,15 +115,10 @@ def _fault_problems(configuration: Configuration) -> Iterator[str]:
             f"winding.room_c = {room_c}: must be less than {nearly_hot_c:g}, the middle of limits.temperature_warm_c"
             " and temperature_hot_c, or a resting motor counts as too hot"
         )
-    if bounds.voltage_min_v > bounds.voltage_low_v:
-        yield (
-            f"faults.voltage_min_v = {bounds.voltage_min_v}: must be at most"
-            f" faults.voltage_low_v = {bounds.voltage_low_v}"
-        )
 
 
 def _motor_force_problems(configuration: Configuration) -> Iterator[str]:
-    """The force that is predicted for an extraction must be within the torque limit."""
+    """Checks that the torque limit permits the force that the depth choice allows for an extraction."""
     length_m, force_n = configuration.geometry.flipper_length_m, configuration.adaptation.motor_force_n
     largest_n = configuration.limits.torque_nm / length_m
     if force_n > largest_n * (1.0 + ROUNDING):
@@ -143,11 +142,6 @@ def _depth_problems(configuration: Configuration) -> Iterator[str]:
             f"adaptation.max_depth_m = {adaptation.max_depth_m}: out of reach, must be at most {deepest_m:.4f}"
             f" for this geometry and a sweep of ±{gait.sweep_angle_deg:g} degrees"
         )
-    if adaptation.min_depth_m > adaptation.max_depth_m:
-        yield (
-            f"adaptation.min_depth_m = {adaptation.min_depth_m}: must be at most"
-            f" adaptation.max_depth_m = {adaptation.max_depth_m}"
-        )
     if not adaptation.min_depth_m <= adaptation.initial_depth_m <= adaptation.max_depth_m:
         yield (
             f"adaptation.initial_depth_m = {adaptation.initial_depth_m}: must be from {adaptation.min_depth_m}"
@@ -170,7 +164,7 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
         yield f"limits.adduction_max_deg = {limits.adduction_max_deg}: must be at least 0, the raised arm"
     depth_m = configuration.adaptation.max_depth_m
     if depth_m > configuration.geometry.deepest_m(sweep_deg):
-        return  # said already
+        return  # _depth_problems reports it
     lowest_deg = degrees(configuration.geometry.adduction_rad(radians(sweep_deg), depth_m))
     if limits.adduction_min_deg > lowest_deg:
         yield (
@@ -182,10 +176,8 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
 def _sweep_problems(configuration: Configuration) -> Iterator[str]:
     """Checks the sweeps among which the method "gait" chooses; a wide one reaches less deep."""
     geometry, limits, adaptation = configuration.geometry, configuration.limits, configuration.adaptation
-    widest_deg, widest = (
-        adaptation.gait.max_sweep_deg,
-        f"adaptation.gait.max_sweep_deg = {adaptation.gait.max_sweep_deg}",
-    )
+    widest_deg = adaptation.gait.max_sweep_deg
+    widest = f"adaptation.gait.max_sweep_deg = {widest_deg}"
     within_deg = min(-limits.sweep_min_deg, limits.sweep_max_deg)
     reached_m = geometry.deepest_m(widest_deg)
     if adaptation.gait.min_sweep_deg > widest_deg:

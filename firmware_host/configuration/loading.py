@@ -1,4 +1,8 @@
-"""Reads a configuration file: the records, the checks of the whole, and the keys' former names."""
+"""Reads a configuration file into its records.
+
+A file is read in four steps: keys of version 0.1 get their present names, a gait protocol is replaced by its values,
+each value is checked against its own bounds, and then the values are checked against each other.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,7 @@ from firmware_host.configuration.toml_records import (
     shown,
 )
 
-FORMER_KEYS = {  # of version 0.1, accepted in version 0.2
+FORMER_KEYS = {  # key of version 0.1: present key in the same section; version 0.2 accepts both
     "faults.lag_share": "lag_fraction",
     "faults.disk_free_share": "disk_free_fraction",
     "adaptation.lifting_share": "lifting_fraction",
@@ -31,7 +35,7 @@ FORMER_KEYS = {  # of version 0.1, accepted in version 0.2
     "estimation.paper_compensation": "paper.compensation",
     "log.min_free_share": "min_free_fraction",
 }
-NO_KEYS = frozenset({"text", "warnings"})  # fields of the configuration that no file gives
+NO_KEYS = frozenset({"text", "warnings"})  # fields of the record that are no keys of the file
 
 _READERS = {
     name: RecordReader(Configuration, without=NO_KEYS, hints={"drive": dict[str, each.parameters]})  # type: ignore[name-defined]
@@ -40,12 +44,12 @@ _READERS = {
 
 
 def load_configuration(path: Path) -> Configuration:
-    """Raises ConfigurationError, for an unreadable file too."""
+    """Reads a file. Raises ConfigurationError, also for a file that cannot be read."""
     return parse_configuration(read_text(path), path)
 
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:
-    """Raises ConfigurationError with all problems of the text."""
+    """Reads a text; messages name its file. Raises ConfigurationError with all problems."""
     document = parse_document(text, file)
     warnings = rename_former_keys(document, FORMER_KEYS)
     _apply_protocol(document)
@@ -62,10 +66,11 @@ def _drive_type(document: dict[str, Any]) -> str:
     drives = document.get("drive")
     tables = drives if isinstance(drives, dict) else {}
     types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
-    first = next((name for name in types.values() if _is_drive_type(name)), DEFAULT)
+    known = tuple(DRIVE_TYPES)  # not the dictionary: a malformed type may not be hashable
+    first = next((name for name in types.values() if name in known), DEFAULT)
     problems = []
     for joint, name in types.items():
-        if not _is_drive_type(name):
+        if name not in known:
             problems.append(f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(DRIVE_TYPES)}")
         elif name != first:
             problems.append(f"drive.{joint}.type = {name!r}: must be {first!r}, as that of the first drive")
@@ -74,12 +79,8 @@ def _drive_type(document: dict[str, Any]) -> str:
     return str(first)
 
 
-def _is_drive_type(name: object) -> bool:
-    return isinstance(name, str) and name in DRIVE_TYPES
-
-
 def _apply_protocol(document: dict[str, Any]) -> None:
-    """`gait.protocol` names the preset that the other keys of [gait] change."""
+    """Replaces `gait.protocol` by the values of that preset; the other keys of [gait] overrule them."""
     gait = document.get("gait")
     if not isinstance(gait, dict) or "protocol" not in gait:
         return

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -111,10 +110,6 @@ def free_space(folder: Path) -> FreeSpace:
         folder = folder.parent
     disk = os.statvfs(folder)
     return FreeSpace(disk.f_bavail / max(1, disk.f_blocks), disk.f_bavail * disk.f_frsize)
-
-
-def disk_bytes(folder: Path) -> int:
-    return shutil.disk_usage(folder).total
 
 
 def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[DeletedLog]:

@@ -1,5 +1,7 @@
-"""The live estimator over recorded rows: a log of ours gives again what the daemon computed, to the last digit; the
-authors' logs are its first real input.
+"""Feeds recorded rows to the estimator of the live robot.
+
+A log of this project gives the estimates that the daemon computed, to the last digit. The logs of the paper's authors,
+which hold angles and currents of their own robot, are replayed with the assumptions of their method.
 """
 
 from __future__ import annotations
@@ -26,7 +28,6 @@ from firmware_host.log_reading.log_reader import (
     LogError,
     Watch,
     begin_s,
-    read_log,
     read_logs,
     segment_of,
     unwatched,
@@ -35,11 +36,11 @@ from firmware_host.log_reading.log_reader import (
 PAPER_CONSTANT_NM_A = 0.083
 WEIGHTLESS = ArmMass(
     arm_mass_kg=0.0, center_of_mass_m=0.0, sweep_inertia_kg_m2=0.0, adduction_inertia_kg_m2=0.0
-)  # what the authors' method assumes; nothing else is known of their arm
+)  # the assumption of the authors' method; the masses of their arm are unknown
 LAB_DRIVE = FlipperDrive(WEIGHTLESS, PAPER_CONSTANT_NM_A, PAPER_CONSTANT_NM_A)
 NO_VELOCITY = (nan, nan, nan, nan)
 PHASES = tuple(Phase)
-WATCHED_TICKS = 1000  # between two words on how far it is
+WATCHED_TICKS = 1000  # between two reports of progress
 TICK_FIELDS = (
     "stamp_s", "mode", "phase",
     "body_x_m", "angle_rad", "velocity_rad_s", "current_a", "angle_age_s", "current_age_s",
@@ -48,14 +49,14 @@ TICK_FIELDS = (
 
 @dataclass(frozen=True)
 class Replay:
-    """Everything that one recorded run says about the mud."""
+    """The estimates from one recorded run."""
 
     strides: list[StrideEstimate]
     flippers: tuple[str, ...]
-    map: tuple[MapRow, ...] = ()  # of the mud along the way, where there was a pose
+    map: tuple[MapRow, ...] = ()  # of the mud along the track, where there was a pose
     complete: bool = True  # False where the writer of the log was cut off, or still writes
-    segment: int = 0  # of the run, where the log begins with a later one
-    begin_s: float = 0.0  # by the log's own clock, which is that of the strides
+    segment: int = 0  # of the run with which the log begins
+    begin_s: float = 0.0  # on the log's own clock, which is also that of the strides
 
 
 def replay_files(
@@ -64,24 +65,16 @@ def replay_files(
     method: Method | None = None,
     watch: Watch = unwatched,
 ) -> Replay:
-    """One file, or several segments of one run. Raises LogError."""
-    if len(paths) == 1:
-        return replay_file(paths[0], configuration, method, watch)
-    return replay_log(paths[0], read_logs(paths, watch), configuration, method, watch)
+    """Replays a log of this project, several segments of one run, or the authors' CSV. Raises LogError.
 
-
-def replay_file(
-    path: Path, configuration: Configuration | None = None, method: Method | None = None, watch: Watch = unwatched
-) -> Replay:
-    """Replays our MCAP log or the authors' CSV, by the file's name. Raises LogError.
-
-    `method` instead of the configured one.
+    `configuration` and `method` replace those of the log.
     """
-    if path.name.endswith((".csv", ".csv.gz")):
+    path = paths[0]
+    if len(paths) == 1 and path.name.endswith((".csv", ".csv.gz")):
         return replay_lab(read_lab_csv(path), configuration, method)
-    if path.suffix == ".mcap":
-        return replay_log(path, read_log(path, watch), configuration, method, watch)
-    raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
+    if len(paths) == 1 and path.suffix != ".mcap":
+        raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
+    return replay_log(path, read_logs(paths, watch), configuration, method, watch)
 
 
 def replay_log(
@@ -91,9 +84,9 @@ def replay_log(
     method: Method | None = None,
     watch: Watch = unwatched,
 ) -> Replay:
-    """Uses the configuration that the log carries, unless another one is given."""
+    """Replays with the configuration that the log carries, unless another one is given."""
     configuration = configuration or configuration_of(path, log.configuration_text)
-    parameters = _by_method(configuration.estimation, method)
+    parameters = replace(configuration.estimation, method=method or configuration.estimation.method)
     drag_n = configuration.adaptation.body_drag_n
     estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
     strides = list(_strides_of_log(estimator, log, watch))
@@ -105,15 +98,11 @@ def configuration_of(path: Path, text: str) -> Configuration:
     try:
         return parse_configuration(text)
     except ConfigurationError as problem:
-        raise LogError(f"{path}: its configuration is not one of this version: {problem.problems[0]}") from problem
-
-
-def _by_method(parameters: EstimationParameters, method: Method | None) -> EstimationParameters:
-    return replace(parameters, method=method) if method else parameters
+        raise LogError(f"{path}: this version does not accept its configuration: {problem.problems[0]}") from problem
 
 
 def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator[StrideEstimate]:
-    """Row by row as the loop did it: first the sample, then the change of mode, which begins a walk afresh."""
+    """Yields the strides in the order of the loop: the sample comes before the change of mode that resets a walk."""
     ticks = log.ticks
     walking, mode_before = int(Mode.WALKING), -1
     rows = zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True)
@@ -128,16 +117,16 @@ def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator
 
 
 def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
-    """Assumes the paper's torque constant and a weightless arm, unless a configuration is given.
+    """Replays with the paper's torque constant and a weightless arm, unless a configuration is given.
 
-    One flipper alone hung from a bench; two carried a body.
+    A single flipper was mounted on a fixed bench; two flippers carried a body.
     """
     geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters()
     if configuration:
         geometry, drives, parameters = configuration.geometry, configuration.flipper_drives, configuration.estimation
     left, right = (drive._replace(current_limit_a=min(lab.current_limit_a, drive.current_limit_a)) for drive in drives)
-    parameters = _by_method(parameters, method)
-    parameters = replace(parameters, fixed_base=parameters.fixed_base or len(lab.flippers) == 1)
+    fixed_base = parameters.fixed_base or len(lab.flippers) == 1
+    parameters = replace(parameters, method=method or parameters.method, fixed_base=fixed_base)
     drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
     estimator = MudEstimator(geometry, (left, right), parameters, drag_n)
     strides = [stride for stride in _strides_of_lab(estimator, lab) if stride.flipper in lab.flippers]

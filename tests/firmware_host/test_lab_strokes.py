@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from control.records import StrideEstimate
-from firmware_host.log_reading.replay import replay_file
+from firmware_host.log_reading.replay import replay_files
 from tests.folders import SHARED_DATA
 
 FOLDER = SHARED_DATA / "flipper_in_mud"
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the shared measurem
 def first_strokes(label: str) -> list[StrideEstimate]:
     logs = sorted(FOLDER.glob(f"single_{label}_*"))
     assert logs
-    return [replay_file(path).strides[0] for path in logs]
+    return [replay_files([path]).strides[0] for path in logs]
 
 
 def variation(values: list[float]) -> float:
@@ -67,5 +67,5 @@ def test_the_stiffest_mud_supports_the_largest_forces() -> None:
 
 def test_repeats_in_the_same_hole_read_weaker_mud() -> None:
     for path in sorted(FOLDER.glob("single_12.5N_*")):
-        strides = replay_file(path).strides
+        strides = replay_files([path]).strides
         assert strides[-1].stance_force_n < 0.9 * strides[0].stance_force_n

@@ -13,7 +13,7 @@ import mudskipper
 from control.records import Phase
 from firmware_host.log.log_file import LogFile
 from firmware_host.log_reading.log_reader import read_log
-from firmware_host.log_reading.replay import replay_file
+from firmware_host.log_reading.replay import replay_files
 from tests.firmware_host.synthetic_rows import OPENING
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
@@ -47,7 +47,7 @@ def test_a_log_without_strides_has_their_fields(tmp_path: Path) -> None:
 
 
 def test_a_replay_is_that_of_the_command() -> None:
-    expected = repr(replay_file(LOG).strides)  # in which NaN equals NaN
+    expected = repr(replay_files([LOG]).strides)  # in which NaN equals NaN
     assert repr(mudskipper.replay(LOG).strides) == expected
     assert repr(mudskipper.replay(str(LOG), method="paper").strides) != expected
 

@@ -17,7 +17,7 @@ from control.records import NO_TORQUE, Phase
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.replay import replay_file
+from firmware_host.log_reading.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track
@@ -194,4 +194,4 @@ def test_a_replayed_walk_with_recoveries_gives_the_same_strides_to_the_last_digi
     assert recorder.close(20.0)
     live = [stride.estimate for stride in robot.loop.learning.strides]
     assert [stride.released for stride in live] == [False] * 2
-    assert repr(replay_file(path).strides) == repr(live)
+    assert repr(replay_files([path]).strides) == repr(live)

@@ -16,7 +16,6 @@ from command_line.doctor.doctor import examine_all, examine_daemon
 from command_line.main import main
 from control.records import JOINTS
 from firmware_host.computer.findings import Level, fail, ok, warn
-from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from tests.command_line.conftest import Bench
@@ -53,12 +52,6 @@ def test_a_wrong_configuration_fails_line_by_line(tmp_path: Path, capsys: pytest
     assert "FAIL configuration" in shown
     assert "loop.priority" in shown and "loop.speed" in shown
     assert f"-> edit {path}" in shown
-
-
-def test_interfaces_that_are_missing_fail(configuration: Configuration, tmp_path: Path) -> None:
-    found = {finding.id: finding for finding in examine_all(configuration, tmp_path / "no.sock", {})}
-    assert found["bus.left"].level is Level.FAIL
-    assert found["bus.right"].text == "there is no interface can1"
 
 
 @pytest.mark.parametrize(

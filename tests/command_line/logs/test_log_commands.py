@@ -161,15 +161,6 @@ def test_a_log_that_is_not_there_is_a_sentence(tmp_path: Path) -> None:
         assert ended.returncode == exit_codes.UNHEALTHY and "No such file" in ended.stderr
 
 
-def test_a_malformed_row_is_named_by_its_line(tmp_path: Path, walk: Path) -> None:
-    path = tmp_path / "walk.csv"
-    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
-    lines[100] = lines[100].replace(",", ",x", 1)
-    path.write_text("\n".join(lines), encoding="utf-8")
-    ended = run("replay", str(path))
-    assert ended.returncode == exit_codes.UNHEALTHY and "line 101" in ended.stderr
-
-
 def test_a_reader_that_stops_reading_is_no_error(walk: Path) -> None:
     command = (
         f"{shlex.quote(sys.executable)} -m command_line.main log export {shlex.quote(str(walk))} --csv | head -n 3"
@@ -192,14 +183,6 @@ def test_a_terminal_without_unicode_gets_question_marks(walk: Path) -> None:
     command = [sys.executable, "-m", "command_line.main", "replay", str(walk)]
     ended = subprocess.run(command, capture_output=True, timeout=LONGEST_S, check=False, env=environment)
     assert ended.returncode == exit_codes.OK and b"N/cm?" in ended.stdout and ended.stderr == b""
-
-
-def test_a_reversed_log_names_the_line(tmp_path: Path, walk: Path) -> None:
-    lines = run("log", "export", str(walk), "--csv").stdout.splitlines()
-    path = tmp_path / "reversed.csv"
-    path.write_text("\n".join(lines[:2] + lines[:1:-1]), encoding="utf-8")
-    ended = run("replay", str(path))
-    assert ended.returncode == exit_codes.UNHEALTHY and "goes back in time" in ended.stderr
 
 
 def test_a_byte_order_mark_is_no_error(tmp_path: Path, walk: Path) -> None:

@@ -66,9 +66,9 @@ def test_people_are_told_times_since_the_log_s_begin_however_long_the_computer_i
     capsys.readouterr()
     assert main(["replay", str(two_walks)]) == exit_codes.OK
     strides = capsys.readouterr().out
+    monkeypatch.setattr(recorded_walk, "read_log", read_later, raising=False)
     for module in (log_report, recorded_walk, replay):
-        monkeypatch.setattr(module, "read_log", read_later, raising=False)
-    monkeypatch.setattr(log_report, "read_logs", lambda paths, watch: read_later(paths[0]))
+        monkeypatch.setattr(module, "read_logs", lambda paths, *_: read_later(paths[0]), raising=False)
     assert reported_pages(two_walks, monkeypatch) == before
     capsys.readouterr()
     assert main(["replay", str(two_walks)]) == exit_codes.OK

@@ -16,7 +16,7 @@ from command_line.main import main
 from control.modes import Mode
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reading.log_reader import read_log
-from firmware_host.log_reading.replay import replay_file
+from firmware_host.log_reading.replay import replay_files
 from simulation.harness.peer import WATCHDOG_S
 from tests.command_line.command_lines import refusal, run
 from tests.command_line.conftest import Bench
@@ -43,7 +43,7 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     assert bench.run("disarm").stdout == "idle\n"
     path = bench.stop_daemon()
     assert read_log(path).complete
-    assert len(replay_file(path).strides) >= 2
+    assert len(replay_files([path]).strides) >= 2
 
 
 def test_sigterm_in_a_walk_raises_the_flippers_and_ends_without_torque(own_bench: Bench) -> None:

@@ -17,7 +17,7 @@ from firmware_host.log.recorder import Recorder
 from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.log_reading.lab_csv import read_lab_csv, write_lab_csv
 from firmware_host.log_reading.log_reader import LogError, read_log
-from firmware_host.log_reading.replay import replay_file
+from firmware_host.log_reading.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track, paper_track
@@ -129,7 +129,7 @@ def test_a_file_of_another_name_is_no_log(tmp_path: Path, name: str) -> None:
 
 
 def test_strides_of_the_authors_form_are_those_of_the_replay(as_csv: Path) -> None:
-    walk, replayed = read_walk(as_csv), replay_file(as_csv).strides
+    walk, replayed = read_walk(as_csv), replay_files([as_csv]).strides
     start_s = float(read_lab_csv(as_csv).stamp_s[0])
     assert len(walk.strides) == len(replayed) > 2
     for stride, estimate in zip(walk.strides, replayed, strict=True):

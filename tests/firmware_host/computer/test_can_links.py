@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from drivers.drive import DriveParameters
 from firmware_host.computer import can_links
-from firmware_host.computer.can_links import CanLink, examine_bus, parse_links, read_links, read_sys_links
+from firmware_host.computer.can_links import CanLink, examine_bus, parse_links, read_sys_links
 from firmware_host.computer.findings import Level
 from firmware_host.configuration.configuration import BusParameters
 
@@ -179,7 +179,3 @@ def test_without_iproute2_the_kernel_s_files_tell(tmp_path: Path, monkeypatch: p
         "can1": (False, 10),
     }
     assert levels(links) == {"bus.left": Level.OK, "queue.left": Level.WARN, "load.left": Level.OK}
-
-
-def test_this_machine_s_own_interfaces_are_read_without_a_word() -> None:
-    assert all(link.name == name for name, link in read_links().items())

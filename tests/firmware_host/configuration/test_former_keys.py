@@ -11,9 +11,7 @@ import pytest
 
 from firmware_host.configuration.loading import FORMER_KEYS, parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
-from firmware_host.log_reading.log_reader import read_log
 from simulation.harness.world import parse_world
-from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
 VALUES = {
@@ -53,10 +51,6 @@ def test_a_former_key_of_a_world_is_accepted_with_a_warning() -> None:
         "[[segment]]\nstart_m = 0.0\nend_m = 9.0\nwater_percent = 50.0\n[drives]\nrepeated_share = 0.1\n"
     )
     assert world.drive_changes == {"repeated_fraction": 0.1} and len(world.warnings) == 1
-
-
-def test_the_configuration_in_a_log_of_version_0_1_is_read() -> None:
-    assert parse_configuration(read_log(ROOT / "tests/fixtures/walk_0_1.mcap").configuration_text).robot.name
 
 
 def test_the_daemon_s_check_of_a_configuration_prints_the_warnings(short_folder: Path, example_text: str) -> None:

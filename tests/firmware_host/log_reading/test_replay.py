@@ -16,7 +16,7 @@ from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.recorder import Recorder
 from firmware_host.log_reading.log_reader import LogError, read_logs
-from firmware_host.log_reading.replay import replay_file, replay_files
+from firmware_host.log_reading.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.folders import SHARED_DATA
@@ -35,7 +35,7 @@ def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path
     path = tmp_path / "walk.mcap"
     robot = record_walks(path, configuration, 4, 2)  # the second walk in one log begins afresh
     live = [stride.estimate for stride in robot.loop.learning.strides]
-    replayed = replay_file(path).strides
+    replayed = replay_files([path]).strides
     assert len(live) == len(replayed) == 12
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
 
@@ -65,7 +65,7 @@ def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
 @pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not beside the repository")
 @pytest.mark.parametrize("path", LAB_LOGS, ids=lambda path: path.name.removesuffix(".csv.gz"))
 def test_the_authors_logs_replay_with_forces_of_the_right_sign(path: Path) -> None:
-    replayed = replay_file(path)
+    replayed = replay_files([path])
     first = replayed.strides[0]
     assert len(replayed.strides) >= 1
     assert first.insertion_force_n > 1.0
@@ -89,7 +89,7 @@ def test_first_strokes_have_the_sizes_that_were_measured(mud: str) -> None:
     logs = [path for path in LAB_LOGS if path.name.startswith(f"{mud}_")]
     assert len(logs) >= 2
     for path in logs:
-        first = replay_file(path, method="paper").strides[0]
+        first = replay_files([path], method="paper").strides[0]
         assert insertion_n[0] <= first.insertion_force_n <= insertion_n[1], path.name
         assert stance_n[0] <= first.stance_force_n <= stance_n[1], path.name
         assert extraction_n[0] <= first.extraction_force_n <= extraction_n[1], path.name
@@ -97,21 +97,14 @@ def test_first_strokes_have_the_sizes_that_were_measured(mud: str) -> None:
 
 def test_a_file_of_another_kind_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"notes\.txt: not a log"):
-        replay_file(tmp_path / "notes.txt")
-
-
-def test_a_lab_log_that_is_not_one_names_the_line(tmp_path: Path) -> None:
-    path = tmp_path / "x.csv"
-    path.write_text("# gait header: a | 1\ntime,turtle_state\n0,1\n", encoding="utf-8")
-    with pytest.raises(LogError, match="line 2"):
-        replay_file(path)
+        replay_files([tmp_path / "notes.txt"])
 
 
 def test_estimates_of_an_absent_flipper_are_left_out() -> None:
     single = [path for path in LAB_LOGS if path.name.startswith("single")]
     if not single:
         pytest.skip("the shared measurements are not beside the repository")
-    replayed = replay_file(single[0])
+    replayed = replay_files([single[0]])
     assert replayed.flippers == ("right",)
     assert {stride.flipper for stride in replayed.strides} == {"right"}
     assert math.isnan(replayed.strides[0].step_m)
