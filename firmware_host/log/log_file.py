@@ -4,8 +4,8 @@ The MCAP writer fills a buffer in memory. `flush` ends the chunk and hands the b
 survives the death of this process; after the next synchronisation every row survives a power cut. When the disk refuses
 a write, the file is cut back to the last flush, so that the number of rows in it is known.
 
-The writer holds a lock on its file (flock). The lock ends with the process, whatever ends the process: an unlocked file
-in active/ is one that nobody will finish.
+The writer holds a lock on its file (flock), which the kernel releases when the process ends: the writer of an unlocked
+file in active/ is dead, and the file needs recovery.
 """
 
 from __future__ import annotations

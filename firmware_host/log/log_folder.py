@@ -149,7 +149,7 @@ def preserve(path: Path, undo: bool = False) -> Path:
     path = path.absolute()
     if path.parent.name == target:
         return path
-    at_the_top = not undo and path.suffix == ENDING and (path.parent / DONE).is_dir()
+    at_the_top = not undo and path.suffix == ENDING and (path.parent / DONE).is_dir()  # as older versions left it
     if path.parent.name != source and not at_the_top:
         raise ValueError(f"{path}: only a log in {source}/ can be moved to {target}/")
     moved = (path.parent if at_the_top else path.parent.parent) / target / path.name

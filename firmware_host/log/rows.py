@@ -1,6 +1,7 @@
 """The three kinds of row in a log. A new field is one line here: name with unit, type, source and meaning.
 
-Doubles stand first, so that no padding is needed. The sources read the names that row_packing.py prepares.
+The source of a field is the Python expression that gives its value; it uses the names that row_packing.py defines.
+Wide types come first, so that a row needs no padding between its fields.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The layout of a log's rows: a table of fields, from which the ros2msg text, the packing and the decoding follow.
+"""The layout of a log's rows: a table of fields, which defines the ros2msg text, the packing and the decoding.
 
 A row is one ROS 2 message in CDR: four bytes of encapsulation (little-endian), then the fields in the table's order,
 each aligned to its own size. The ros2msg text goes into the log file, and a log is decoded by the text that it carries:
@@ -25,7 +25,7 @@ FIELD_LINE = re.compile(r"(\w+)(?:\[(\d+)\])?\s+(\w+)\s*(?:#\s*(.*))?")
 
 
 class LayoutError(ValueError):
-    """A definition that this version cannot decode."""
+    """This version cannot decode the definition of a row."""
 
 
 @dataclass(frozen=True)
@@ -139,9 +139,9 @@ class RowKind:
         return values
 
     def compile(self, arguments: str, *preparation: str) -> Callable[..., bytes]:
-        """Makes one function that packs a row from the fields' sources, which read `arguments` and what is prepared.
+        """Makes one function that packs a row from the fields' sources, which use `arguments` and `preparation`.
 
-        The generated text is that of a function written by hand, so it is as fast.
+        It generates the source text of the function, which is as fast as one written for this row kind.
         """
         sources = ", ".join(source for field in self.fields for source in field.sources)
         lines = [f"def pack_row({arguments}):", *preparation, f"return pack(header, {sources})"]

@@ -1,10 +1,9 @@
-"""The authors' CSV of a run, read into this program's conventions, and written from one of our logs.
+"""Reads the CSV logs of the paper's authors into this project's conventions, and writes logs as such CSV files.
 
-Mirrored motors were logged with signs that differ from file to file, of the position and of the current
-separately, so no table of signs can be right. They are found from the motion itself. A flipper goes down in
-insertion and back in stance, so there its angles fall; and there its motors push through mud, so they do
-positive work: the current has the sign of the change of angle. A joint without such a motion keeps the signs
-it was logged with. Forward is where the stances moved the body.
+The authors logged mirrored motors with signs that differ from file to file, for positions and currents separately.
+The reader therefore finds the signs from the motion. A flipper moves down in insertion and backward in stance, so its
+angles fall there. Its motors do positive work on the mud there, so the current has the sign of the change of angle. A
+joint without such a motion keeps its logged signs. The body moves forward in stance.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import gzip
 import math
 import tomllib
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, NoReturn, TextIO
 
@@ -31,56 +31,43 @@ JOINT_COLUMNS = ("leftsweeping", "leftadduction", "rightsweeping", "rightadducti
 WRITTEN_ORDER = (1, 0, 3, 2)  # the authors put adduction first
 BODY_COLUMNS = ("OptitrackPosition_x", "OptitrackPosition_y", "OptitrackPosition_z")
 JOINT_SIGNALS = [joint + signal for signal in ("_pos", "_curr") for joint in JOINT_COLUMNS]
-NEEDED_COLUMNS = ("time", "turtle_state", *JOINT_SIGNALS)
+REQUIRED_COLUMNS = ("time", "turtle_state", *JOINT_SIGNALS)
 FIRST_ROW_LINE = 3
-WATCHED_ROWS = 5000  # between two words on how far it is
+WATCHED_ROWS = 5000  # between two reports of progress
 
-PHASE_OF_STATE = {
-    -1: Phase.REST,
-    0: Phase.REST,
-    1: Phase.SWING,
-    2: Phase.INSERTION,
-    3: Phase.STANCE,
-    4: Phase.EXTRACTION,
-    **dict.fromkeys((5, 6, 7, 8), Phase.PAUSE),  # holds and moves between phases
+PHASES_BY_STATE = (Phase.REST, Phase.SWING, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE)
+STATE_OF_PHASE = {phase: state for state, phase in enumerate(PHASES_BY_STATE)} | {
+    Phase.RECOVERY: 5  # the authors have no such state; it is between extraction and swing, as their pauses are
 }
-STATE_OF_PHASE = {
-    Phase.REST: 0,
-    Phase.SWING: 1,
-    Phase.INSERTION: 2,
-    Phase.STANCE: 3,
-    Phase.EXTRACTION: 4,
-    Phase.PAUSE: 5,
-    Phase.RECOVERY: 5,  # they have no such state: it is between extraction and swing
-}
-PUSHING = (Phase.STANCE, Phase.INSERTION, Phase.STANCE, Phase.INSERTION)  # when each of JOINTS works on mud
+PHASE_OF_STATE = {-1: Phase.REST, **dict(enumerate(PHASES_BY_STATE)), **dict.fromkeys((6, 7, 8), Phase.PAUSE)}
+PUSHING = (Phase.STANCE, Phase.INSERTION, Phase.STANCE, Phase.INSERTION)  # the phase in which each joint works on mud
 
-CLIP_FRACTION, CLIPPED_ROWS = 0.9995, 200  # rows at the largest current that make it a limit: half a second of them
-BACKWARDS_S = 1.0  # rows written out of order by less are kept as they are
-FROZEN_S, LEAP_M = 0.5, 0.02  # a pose that stands still so long and then leaps so far was lost, not measured
+CLIP_FRACTION, CLIPPED_ROWS = 0.9995, 200  # half a second of rows at the largest current makes it a limit
+BACKWARDS_S = 1.0  # accepted disorder of the rows' times
+FROZEN_S, LEAP_M = 0.5, 0.02  # a pose is invalid where it is constant for so long and then changes by so much
 
 
 class LabLog(NamedTuple):
-    """One run, row by row. Joints in the order of JOINTS; those of an absent flipper are NaN."""
+    """One run: n rows, joints in the order of JOINTS. The joints of an absent flipper are NaN."""
 
     stamp_s: Floats
     phase: Integers  # of control.records.Phase
     angle_rad: Floats  # (n, 4)
     current_a: Floats  # (n, 4)
-    body_x_m: Floats  # NaN without motion capture and where it had lost the body
-    gait: dict[str, float]  # what the operator had set; `insertion_angle` is the commanded depth in m
-    flippers: tuple[str, ...]  # those that ever moved
-    current_limit_a: float  # at which the drives clipped; infinite where they never did
+    body_x_m: Floats  # NaN where motion capture did not see the body
+    gait: dict[str, float]  # the operator's settings; `insertion_angle` is the commanded depth in m
+    flippers: tuple[str, ...]  # the ones that moved
+    current_limit_a: float  # at which the drives clipped; infinite where they did not
 
 
 def read_lab_csv(path: Path) -> LabLog:
-    """A `.csv` or `.csv.gz`: the operator's settings, the names of the columns, then a row per sample."""
+    """Reads a `.csv` or `.csv.gz`: settings, column names, then a row per sample. Raises LogError."""
     lines = _read_lines(path)
     gait = _parse_gait(path, lines[0])
     names = _parse_names(path, lines[1])
     column = dict(zip(names, _parse_rows(path, lines[2:], len(names)).T, strict=True))
     stamp_s = _check_time(path, column["time"])
-    phase = _phases(path, column["turtle_state"])
+    phase = _read_phases(path, column["turtle_state"])
     angle_rad = math.tau * np.column_stack([column[f"{joint}_pos"] for joint in JOINT_COLUMNS])
     current_a = np.column_stack([column[f"{joint}_curr"] for joint in JOINT_COLUMNS])
     flippers = _find_flippers(angle_rad)
@@ -91,7 +78,7 @@ def read_lab_csv(path: Path) -> LabLog:
 
 
 def _read_lines(path: Path) -> list[str]:
-    """At least the two lines of the head and one row."""
+    """Returns the lines of the file, at least the two of the head and one row."""
     contents = _unpack(path)
     try:
         lines = contents.decode("utf-8-sig").splitlines()
@@ -120,7 +107,7 @@ def _unpack(path: Path) -> bytes:
 
 
 def _parse_gait(path: Path, line: str) -> dict[str, float]:
-    """Those of the operator's settings that are numbers."""
+    """Returns the operator's settings that are numbers."""
     names, bar, values = line.removeprefix(GAIT_HEADER).partition("|")
     settings = list(zip(names.split(","), values.split(","), strict=False))
     if not line.startswith(GAIT_HEADER) or not bar or names.count(",") != values.count(","):
@@ -130,24 +117,23 @@ def _parse_gait(path: Path, line: str) -> dict[str, float]:
 
 def _parse_names(path: Path, line: str) -> list[str]:
     names = [name.strip() for name in line.split(",")]
-    missing = [name for name in NEEDED_COLUMNS if name not in names]
+    missing = [name for name in REQUIRED_COLUMNS if name not in names]
     if missing:
         raise LogError(f"{path}: line 2 names no column {', '.join(missing)}")
     return names
 
 
 def _parse_rows(path: Path, rows: list[str], width: int) -> Floats:
-    try:
+    table: Floats = np.empty(0)
+    with suppress(ValueError):
         table = np.loadtxt(rows, delimiter=",", comments=None, ndmin=2)
-    except ValueError:
-        _refuse_rows(path, rows, width)
     if table.shape != (len(rows), width):
         _refuse_rows(path, rows, width)
     return table
 
 
 def _refuse_rows(path: Path, rows: list[str], width: int) -> NoReturn:
-    """Go through them again, one by one, to name the first that is wrong."""
+    """Reads the rows again, one by one, to name the first malformed one."""
     for line, row in enumerate(rows, FIRST_ROW_LINE):
         fields = row.split(",")
         if len(fields) != width:
@@ -168,12 +154,12 @@ def _is_number(text: str) -> bool:
 
 def _check_time(path: Path, stamp_s: Floats) -> Floats:
     _refuse_where(~np.isfinite(stamp_s), path, "has no time")
-    behind_s = np.maximum.accumulate(stamp_s) - stamp_s
-    _refuse_where(behind_s > BACKWARDS_S, path, f"goes back in time by more than {BACKWARDS_S:g} s")
+    back_s = np.maximum.accumulate(stamp_s) - stamp_s
+    _refuse_where(back_s > BACKWARDS_S, path, f"goes back in time by more than {BACKWARDS_S:g} s")
     return stamp_s
 
 
-def _phases(path: Path, state: Floats) -> Integers:
+def _read_phases(path: Path, state: Floats) -> Integers:
     _refuse_where(~np.isin(state, list(PHASE_OF_STATE)), path, "has a turtle_state that is not known")
     phase_from_lowest = np.array([PHASE_OF_STATE[known] for known in sorted(PHASE_OF_STATE)], dtype=np.int64)
     return phase_from_lowest[state.astype(np.int64) - min(PHASE_OF_STATE)]
@@ -185,21 +171,21 @@ def _refuse_where(wrong: Truths, path: Path, reason: str) -> None:
 
 
 def _find_flippers(angle_rad: Floats) -> tuple[str, ...]:
-    """Those of which a joint ever moved."""
+    """Returns the flippers that moved."""
     joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
-    return tuple(name for place, name in enumerate(FLIPPERS) if joint_moved[2 * place : 2 * place + 2].any())
+    return tuple(name for number, name in enumerate(FLIPPERS) if joint_moved[2 * number : 2 * number + 2].any())
 
 
 def _blank_absent(angle_rad: Floats, current_a: Floats, flippers: tuple[str, ...]) -> None:
-    """The authors log zeros for motors that are not there."""
-    for place, name in enumerate(FLIPPERS):
+    """Replaces the zeros that the authors logged for absent motors."""
+    for number, name in enumerate(FLIPPERS):
         if name not in flippers:
-            angle_rad[:, 2 * place : 2 * place + 2] = UNKNOWN
-            current_a[:, 2 * place : 2 * place + 2] = UNKNOWN
+            angle_rad[:, 2 * number : 2 * number + 2] = UNKNOWN
+            current_a[:, 2 * number : 2 * number + 2] = UNKNOWN
 
 
 def _find_limit_a(current_a: Floats) -> float:
-    """The largest current, where one joint shows exactly that again and again: a clip, and no peak."""
+    """Returns the largest current if one joint shows it in many rows: then the drive clipped it."""
     size_a = np.nan_to_num(np.abs(current_a))
     peak_a = float(size_a.max(initial=0.0))
     at_peak = size_a >= CLIP_FRACTION * peak_a
@@ -207,7 +193,7 @@ def _find_limit_a(current_a: Floats) -> float:
 
 
 def _orient(angle_rad: Floats, current_a: Floats, phase: Integers) -> None:
-    """Turn a joint's angle round unless it falls while pushing, then its current unless that does work."""
+    """Inverts a joint's angle unless it falls while pushing, then its current unless that does positive work."""
     for joint, pushing in enumerate(PUSHING):
         inside = _steps_inside(phase, pushing)
         if np.nansum(np.diff(angle_rad[:, joint])[inside]) > 0.0:
@@ -218,15 +204,15 @@ def _orient(angle_rad: Floats, current_a: Floats, phase: Integers) -> None:
 
 
 def _steps_inside(phase: Integers, wanted: Phase) -> Truths:
-    """Which steps from one row to the next begin and end in a phase."""
+    """Returns which steps from one row to the next begin and end in a phase."""
     inside: Truths = (phase[1:] == wanted) & (phase[:-1] == wanted)
     return inside
 
 
 def _body_advance(position_columns_m: list[Floats], stamp_s: Floats, phase: Integers) -> Floats:
-    """The body's place along the direction in which the stances moved it.
+    """Returns the body's position along the direction in which the stances moved it.
 
-    Not along its first principal axis: in two of the authors' walks the body heaves as far as it advances.
+    The first principal axis would be wrong: in two of the authors' walks the body heaves as far as it advances.
     """
     if not position_columns_m:
         return np.full(len(stamp_s), UNKNOWN)
@@ -241,10 +227,10 @@ def _body_advance(position_columns_m: list[Floats], stamp_s: Floats, phase: Inte
 
 
 def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
-    """Rows in which the pose is old, held until it leaps to the true one, or is three zeros."""
+    """Returns the rows with an invalid pose: frozen until it leaps to the true one, or three zeros."""
     is_new = np.any(np.diff(position_m, axis=0, prepend=UNKNOWN) != 0.0, axis=1)
     first = np.flatnonzero(is_new)
-    rows = np.diff(first, append=len(stamp_s))  # that show each pose
+    rows = np.diff(first, append=len(stamp_s))  # number of rows with each pose
     held_s = stamp_s[first + rows - 1] - stamp_s[first]
     leap_m = np.append(np.linalg.norm(np.diff(position_m[first], axis=0), axis=1), 0.0)
     lost: Truths = np.repeat((held_s > FROZEN_S) & (leap_m > LEAP_M), rows)
@@ -254,16 +240,16 @@ def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
 
 
 def write_lab_csv(log: Log, out: TextIO, watch: Watch = unwatched) -> None:
-    """In the authors' columns and units. The settings are those configured and the first stride's depth."""
+    """Writes the authors' columns and units, with the configured gait and the first stride's depth as settings."""
     settings = _settings(log)
     out.write(f"{GAIT_HEADER} {','.join(settings)} | {','.join(settings.values())}\n")
     table = _columns(log)
     out.write(",".join(table) + "\n")
     formats = ["%d" if name == "turtle_state" else "%.9g" for name in table]
     rows = np.column_stack(list(table.values()))
-    for place in range(0, len(rows), WATCHED_ROWS):
-        watch("rows written", place, len(rows))
-        np.savetxt(out, rows[place : place + WATCHED_ROWS], fmt=formats, delimiter=",")
+    for start in range(0, len(rows), WATCHED_ROWS):
+        watch("rows written", start, len(rows))
+        np.savetxt(out, rows[start : start + WATCHED_ROWS], fmt=formats, delimiter=",")
 
 
 def _settings(log: Log) -> dict[str, str]:

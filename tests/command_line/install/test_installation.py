@@ -186,28 +186,6 @@ def test_an_upgrade_keeps_what_was_edited_and_puts_the_new_one_beside_it_once(
     assert not (machine.root / f"{place}.new").exists()
 
 
-def test_a_configuration_that_was_there_before_is_kept(machine: Machine) -> None:
-    (machine.root / CONFIGURATION).parent.mkdir(parents=True)
-    (machine.root / CONFIGURATION).write_text("[robot]\n", encoding="utf-8")
-    machine.install()
-    assert machine.text(CONFIGURATION) == "[robot]\n"
-
-
-def test_a_unit_that_was_masked_stays_so(machine: Machine) -> None:
-    (machine.root / UNIT).parent.mkdir(parents=True)
-    (machine.root / UNIT).symlink_to("/dev/null")
-    machine.install()
-    assert (machine.root / UNIT).readlink() == Path("/dev/null")
-
-
-def test_a_command_of_the_same_name_that_is_not_ours_stays(machine: Machine) -> None:
-    (machine.root / LINK).parent.mkdir(parents=True)
-    (machine.root / LINK).write_text("#!/bin/sh\n", encoding="utf-8")
-    machine.install()
-    machine.uninstall("--purge")
-    assert machine.text(LINK) == "#!/bin/sh\n"
-
-
 def test_a_running_system_is_told_to_look_again(machine: Machine) -> None:
     for name in ("can0", "lo"):
         (machine.root / "sys/class/net" / name).mkdir(parents=True)
@@ -300,6 +278,8 @@ def test_uninstall_keeps_configuration_and_logs_and_forgets_the_rest(machine: Ma
     assert set(json.loads(left[MANIFEST])) == {CONFIGURATION}
     assert "mudskipper" not in machine.enabled
     assert not (machine.root / LINK).is_symlink()
+    machine.install()
+    assert machine.text(CONFIGURATION) == edited and not (machine.root / f"{CONFIGURATION}.new").exists()
 
 
 def test_uninstall_leaves_a_network_file_that_was_edited_and_purge_does_not(machine: Machine) -> None:
@@ -320,15 +300,6 @@ def test_a_purge_stops_the_service_first_and_removes_the_user_last(machine: Mach
     assert Remove(machine.root / "etc/mudskipper") in steps
 
 
-def test_reinstalling_after_an_uninstall_keeps_the_configuration(machine: Machine) -> None:
-    machine.install()
-    edited = machine.edit(CONFIGURATION)
-    machine.uninstall()
-    assert machine.install() == exit_codes.OK
-    assert machine.text(CONFIGURATION) == edited
-    assert not (machine.root / f"{CONFIGURATION}.new").exists()
-
-
 def test_a_manifest_that_makes_no_sense_counts_as_none(machine: Machine) -> None:
     machine.install()
     (machine.root / MANIFEST).write_text("[1, 2", encoding="utf-8")
@@ -336,14 +307,24 @@ def test_a_manifest_that_makes_no_sense_counts_as_none(machine: Machine) -> None
     assert set(json.loads(machine.text(MANIFEST))) == set(SOURCES)
 
 
-def test_a_command_that_is_not_there_or_fails_is_a_sentence(tmp_path: Path) -> None:
-    with pytest.raises(StepError, match="is not installed"):
-        perform(Command((str(tmp_path / "nothing"),)), run_command)
-    with pytest.raises(StepError, match="exit status 1"):
-        perform(Command(("false",)), run_command)
+def test_files_that_were_there_before_stay(machine: Machine) -> None:
+    for path in (CONFIGURATION, UNIT, LINK):
+        (machine.root / path).parent.mkdir(parents=True, exist_ok=True)
+    (machine.root / CONFIGURATION).write_text("[robot]\n", encoding="utf-8")
+    (machine.root / LINK).write_text("#!/bin/sh\n", encoding="utf-8")
+    (machine.root / UNIT).symlink_to("/dev/null")  # a masked unit
+    machine.install()
+    assert machine.text(CONFIGURATION) == "[robot]\n" and (machine.root / UNIT).readlink() == Path("/dev/null")
+    machine.uninstall("--purge")
+    assert machine.text(LINK) == "#!/bin/sh\n"
 
 
-def test_a_file_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
+def test_a_step_that_fails_raises_its_reason(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(StepError, match="Not a directory|File exists"):
-        perform(WriteFile(tmp_path / "file" / "below", "x"), run_command)
+    for step, reason in (
+        (Command((str(tmp_path / "nothing"),)), "is not installed"),
+        (Command(("false",)), "exit status 1"),
+        (WriteFile(tmp_path / "file" / "below", "x"), "Not a directory|File exists"),
+    ):
+        with pytest.raises(StepError, match=reason):
+            perform(step, run_command)

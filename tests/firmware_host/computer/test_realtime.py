@@ -52,30 +52,20 @@ def test_what_is_not_permitted_becomes_one_sentence_each_and_never_an_exception(
     assert priority.endswith("; raise the rtprio limit")
 
 
-def test_a_processor_that_is_not_there_becomes_a_sentence() -> None:
-    answer = in_child("answer = prepare_loop(0, 1023, False)")
-    assert answer[0].startswith("not pinned to processor 1023: ")
+def test_settings_that_cannot_be_applied_are_warnings() -> None:
+    processor, priority = in_child("answer = prepare_loop(0, 1023, False)")
+    assert "processor 1023" in processor and "loop.priority is 0" in priority
 
 
-def test_priority_zero_is_said_to_be_the_configuration_s_choice() -> None:
-    assert in_child("answer = prepare_loop(0, -1, False)") == ["no real-time priority: loop.priority is 0"]
+def test_garbage_is_frozen_and_no_longer_collected() -> None:
+    heap = "heap = [[number] for number in range(200_000)]"
+    enabled, left = in_child(f"{heap}; prepare_loop(0, -1, False); answer = [gc.isenabled(), len(gc.get_objects())]")
+    assert not enabled and left < 1000  # a full collection would examine the objects that are left
 
 
 def test_the_loop_runs_on_its_processor_alone() -> None:
     cpu = max(os.sched_getaffinity(0))
     assert in_child(f"prepare_loop(0, {cpu}, False); answer = sorted(os.sched_getaffinity(0))") == [cpu]
-
-
-def test_garbage_is_frozen_and_collected_no_more() -> None:
-    code = "prepare_loop(0, -1, False); answer = [gc.isenabled(), gc.get_freeze_count()]"
-    enabled, frozen = in_child(code)
-    assert not enabled
-    assert frozen > 1000  # everything that was imported
-
-
-def test_a_full_collection_after_freezing_has_next_to_nothing_to_look_at() -> None:
-    code = "heap = [[number] for number in range(200_000)]; prepare_loop(0, -1, False); answer = len(gc.get_objects())"
-    assert in_child(code) < 1000
 
 
 def test_memory_is_locked_where_that_is_permitted() -> None:
