@@ -1,4 +1,4 @@
-"""The ticker paces the loop; it is the only place that sleeps.
+"""The ticker paces the loop; only this module sleeps.
 
 Deadlines are absolute, start + n · period, so the rate does not drift with the work done in a tick. A deadline that
 is missed by a whole period or more is skipped and counted, and no tick makes up for it: two control ticks in a row on

@@ -71,28 +71,21 @@ def _for_members(what: str, group: Group) -> str:
 
 def load_rights(parameters: StatusParameters) -> Rights:
     """Resolve the configured groups; raises ConfigurationError for a group that does not exist."""
-    named = {"read_group": parameters.read_group, "drive_group": parameters.drive_group}
-    problems = [
-        f"status.{key} = {name!r}: there is no such group; make it with 'groupadd {name}', or leave the key out"
-        for key, name in named.items()
-        if name and not _exists(name)
-    ]
+    groups, problems = [], []
+    for key, name in (("read_group", parameters.read_group), ("drive_group", parameters.drive_group)):
+        try:
+            groups.append(_find_group(name))
+        except KeyError:
+            missing = f"status.{key} = {name!r}: there is no such group"
+            problems.append(f"{missing}; make it with 'groupadd {name}', or leave the key out")
     if problems:
         raise ConfigurationError(problems)
-    readers, operators = (_find_group(name) for name in named.values())
+    readers, operators = groups
     return Rights(readers, operators, os.geteuid(), parameters.anyone_may_stop)
 
 
-def _exists(name: str) -> bool:
-    try:
-        grp.getgrnam(name)
-    except KeyError:
-        return False
-    return True
-
-
 def _find_group(name: str) -> Group:
-    """Return the group with this name, or the daemon's own group for an empty name."""
+    """Return the group with this name, or the daemon's own group for an empty name; raises KeyError."""
     if name:
         return Group(name, grp.getgrnam(name).gr_gid)
     own = os.getegid()
