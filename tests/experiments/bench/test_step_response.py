@@ -1,6 +1,8 @@
-"""The delay from a command to its current, reckoned over ticks that came and ticks that did not."""
+"""The delay from a command to its current counts ticks, including missed ones."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import pytest
 
@@ -16,8 +18,8 @@ STEP = 2  # the sample that sends it
 SENT: Torques = Joints(PULSE_NM, 0.0, 0.0, 0.0)
 
 
-def made_up(answer: int, numbers: list[int]) -> list[Sample]:
-    """A current that follows from sample `answer` on, at the ticks of these numbers."""
+def synthetic_samples(answer: int, numbers: Sequence[int]) -> list[Sample]:
+    """Return samples at the ticks of these numbers; the current answers from sample `answer` on."""
     rest, following = DriveState(), DriveState(current_a=PULSE_NM / CONSTANT_NM_A)
     return [
         Sample(
@@ -32,21 +34,16 @@ def made_up(answer: int, numbers: list[int]) -> list[Sample]:
     ]
 
 
-@pytest.mark.parametrize("delay", [1, 2, 3, LONGEST_TICKS - 1])
-def test_it_is_the_ticks_from_the_command_to_its_current(delay: int) -> None:
-    samples = made_up(STEP + delay, list(range(20)))
-    assert delay_ticks(samples, 0, STEP, CONSTANT_NM_A) == delay
-
-
-def test_a_tick_that_is_missed_meanwhile_is_one_of_the_delay() -> None:
-    samples = made_up(STEP + 1, [0, 1, 2, 4, *range(5, 20)])
-    assert delay_ticks(samples, 0, STEP, CONSTANT_NM_A) == 2
-
-
-def test_a_current_that_does_not_answer_counts_as_the_longest() -> None:
-    assert delay_ticks(made_up(20, list(range(20))), 0, STEP, CONSTANT_NM_A) == LONGEST_TICKS
-
-
-def test_a_pause_longer_than_that_counts_as_the_longest() -> None:
-    samples = made_up(STEP + 1, [0, 1, 2, *range(50, 67)])
-    assert delay_ticks(samples, 0, STEP, CONSTANT_NM_A) == LONGEST_TICKS
+@pytest.mark.parametrize(
+    ("answer", "numbers", "delay"),
+    [
+        *((STEP + delay, range(20), delay) for delay in (1, 2, 3, LONGEST_TICKS - 1)),
+        (STEP + 1, (0, 1, 2, 4, *range(5, 20)), 2),  # a missed tick counts
+        (20, range(20), LONGEST_TICKS),  # no answer
+        (STEP + 1, (0, 1, 2, *range(50, 67)), LONGEST_TICKS),  # a pause
+    ],
+)
+def test_the_delay_is_the_ticks_from_the_command_to_its_current(
+    answer: int, numbers: Sequence[int], delay: int
+) -> None:
+    assert delay_ticks(synthetic_samples(answer, numbers), 0, STEP, CONSTANT_NM_A) == delay

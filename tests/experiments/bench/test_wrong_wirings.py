@@ -1,4 +1,4 @@
-"""Robots that are built wrong, each noticed by the right stage of the bench, with a sentence that says what to do.
+"""Robots that are wired wrong: the right stage of the bench finds each, with a message that says what to do.
 
 The stages are the very tests of tests/bench, called one after the other until one of them fails.
 """
@@ -9,6 +9,7 @@ import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import pytest
@@ -24,32 +25,13 @@ from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from simulation.harness.blocks import on_blocks
-from tests.bench import (
-    test_1_wiring,
-    test_2_signs,
-    test_3_zeros,
-    test_4_currents,
-    test_5_watchdogs,
-    test_6_strokes,
-    test_7_stops,
-    test_8_strides,
-)
 from tests.bench.staged_bench import STAGES, BenchReport, StagedBench
 
-MODULES = (
-    test_1_wiring,
-    test_2_signs,
-    test_3_zeros,
-    test_4_currents,
-    test_5_watchdogs,
-    test_6_strokes,
-    test_7_stops,
-    test_8_strides,
-)
+MODULES = [import_module(f"tests.bench.test_{number}_{name}") for number, name in enumerate(STAGES, 1)]
 
 
 def claims() -> Iterator[tuple[str, Callable[[StagedBench], None]]]:
-    """Of all stages, as pytest runs them: the name of the stage, and what to call."""
+    """Yield the tests of all stages in pytest's order: the name of the stage, and what to call."""
     for name, module in zip(STAGES, MODULES, strict=True):
         for title, test in vars(module).items():
             if not title.startswith("test_"):
@@ -62,7 +44,7 @@ def claims() -> Iterator[tuple[str, Callable[[StagedBench], None]]]:
 
 
 def first_complaint(rig: SimulatedRig, begin: str) -> tuple[str, str]:
-    """The stage and its sentence, from a stage on."""
+    """Return the first stage that fails, and its message; `begin` is the first stage to run."""
     bench = StagedBench(TestRig(rig, SimulatedBenchOperator(rig)), BenchReport())
     for name, claim in claims():
         if STAGES.index(name) < STAGES.index(begin):
@@ -76,13 +58,13 @@ def first_complaint(rig: SimulatedRig, begin: str) -> tuple[str, str]:
 
 
 def built(configuration: Configuration, **drives: dict[str, Any]) -> Configuration:
-    """With changes of some drives."""
+    """Return the configuration with changes of some drives."""
     changed = {joint: replace(configuration.drive[joint], **changes) for joint, changes in drives.items()}
     return replace(configuration, drive=configuration.drive | changed)
 
 
 def swapped(configuration: Configuration, one: str, other: str) -> SimulatedRig:
-    """The two motors are where the configuration has the other one."""
+    """Return a rig with two motors exchanged."""
     drive = configuration.drive | {one: configuration.drive[other], other: configuration.drive[one]}
     return SimulatedRig(configuration, replace(configuration, drive=drive))
 
@@ -94,20 +76,20 @@ def with_drive(configuration: Configuration, joint: str, **changes: float) -> Si
 
 
 def babble(rig: SimulatedRig) -> None:
-    """Of somebody with the node id 40, ten frames in each tick."""
+    """Send ten frames of the unknown node id 40 in each tick."""
     for _ in range(10):
         for port in rig.buses["left"].ports:
             port.queue.append(Frame(40 << 5 | 0x15, bytes(8)))
 
 
 def command(rig: SimulatedRig) -> None:
-    """Of another program."""
+    """Send a torque command as another program would."""
     for port in rig.buses["right"].ports:
         port.queue.append(Frame(arbitration_id(3, codec.SET_INPUT_TORQUE), bytes(4)))
 
 
 class Repeater:
-    """What sends the last torque again and again, and so feeds the drive's watchdog."""
+    """Repeats the last torque command and so feeds the drive's watchdog."""
 
     def __init__(self) -> None:
         self._last: Frame | None = None
@@ -121,13 +103,13 @@ class Repeater:
 
 
 def hold_down(rig: SimulatedRig) -> None:
-    """A hand, while the robot raises its flippers at the end of a walk."""
+    """Hold a flipper down while the robot raises its flippers at the end of a walk."""
     if hasattr(rig, "loop") and rig.loop.mode is Mode.STOPPING:
         rig.robot.plant.arms[0].adduction_rad = -0.4
 
 
-class Stumbler:
-    """A drive that starts anew in the third stride."""
+class DriveRestart:
+    """Restarts a drive in the third stride."""
 
     def __init__(self) -> None:
         self.done = False
@@ -139,8 +121,8 @@ class Stumbler:
             rig.robot.restart_drive(2)
 
 
-def hung(configuration: Configuration) -> SimulatedRig:
-    """An encoder that tells the same angle for ever, and no speed."""
+def stuck_encoder(configuration: Configuration) -> SimulatedRig:
+    """Return a rig with an encoder that always reports the same angle, and no speed."""
     rig = SimulatedRig(configuration)
     rig.robot.drives[1].measure = lambda angle_rad, velocity_rad_s: None  # type: ignore[method-assign]
     return rig
@@ -151,7 +133,7 @@ class Wrong(NamedTuple):
     rig: Callable[[Configuration], SimulatedRig]
     stage: str
     advice: str
-    begin: str = "wiring"  # what costs too much time to come to begins there, with a robot that is well until then
+    begin: str = "wiring"  # the first stage to run; earlier stages of a slow case pass
 
 
 SILENT = {"encoder_period_s": 1e9, "current_period_s": 1e9, "heartbeat_period_s": 1e9, "slow_period_s": 1e9}
@@ -159,7 +141,7 @@ SILENT = {"encoder_period_s": 1e9, "current_period_s": 1e9, "heartbeat_period_s"
 WRONG = (
     Wrong("buses", lambda c: swapped_buses(c), "wiring", "exchange the buses' channels"),
     Wrong("missing drive", lambda c: with_drive(c, "left_adduction", **SILENT), "wiring", "check its power, wiring"),
-    Wrong("stranger", lambda c: SimulatedRig(c, others=[babble]), "wiring", "node 40: take it off the bus"),
+    Wrong("unknown sender", lambda c: SimulatedRig(c, others=[babble]), "wiring", "node 40: take it off the bus"),
     Wrong("second program", lambda c: SimulatedRig(c, others=[command]), "wiring", "commands to node 3 from another"),
     Wrong("rare messages", lambda c: with_drive(c, "left_sweep", current_period_s=0.01), "wiring", "message period"),
     Wrong("watchdog off", lambda c: with_drive(c, "right_sweep", watchdog_s=0.0), "wiring", "enable_watchdog"),
@@ -175,7 +157,7 @@ WRONG = (
         "signs",
         "drive.left_adduction.sign",
     ),
-    Wrong("hung encoder", hung, "signs", "left_adduction: answer to a shake is 0 rad"),
+    Wrong("stuck encoder", stuck_encoder, "signs", "left_adduction: answer to a shake is 0 rad"),
     Wrong(
         "encoder offset",
         lambda c: with_drive(c, "left_adduction", encoder_offset_rad=0.15),
@@ -225,7 +207,7 @@ WRONG = (
         "something holds the flippers down",
         "stops",
     ),
-    Wrong("a drive starts anew", lambda c: SimulatedRig(c, others=[Stumbler()]), "strides", "right_sweep", "strides"),
+    Wrong("drive restarts", lambda c: SimulatedRig(c, others=[DriveRestart()]), "strides", "right_sweep", "strides"),
 )
 
 

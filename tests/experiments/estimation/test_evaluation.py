@@ -63,7 +63,7 @@ def test_one_layer_is_that_layer_alone(layer: str) -> None:
     assert plan != with_layers(Plan(), ())
 
 
-def test_a_layer_that_there_is_not_is_named() -> None:
+def test_an_unknown_layer_is_named() -> None:
     with pytest.raises(ValueError, match=r"'fog': must be one of clinging, .*, or none"):
         with_layers(Plan(), ("noise", "fog"))
 
@@ -73,19 +73,19 @@ def test_layers_leave_the_rest_of_the_plan() -> None:
     assert replace(plan, disturbances=SHORT.disturbances, repeats=True, torque=True) == SHORT
 
 
-def test_the_plan_is_every_mud_and_seed_and_a_crossing_of_each_seed() -> None:
+def test_the_plan_is_every_mud_and_seed_and_a_walk_over_borders_for_each_seed() -> None:
     plan = Plan(seeds=3)
     parts = plan.parts()
-    crossings, alone = [p for p in parts if len(p.muds) > 1], [p for p in parts if len(p.muds) == 1]
-    assert parts[: len(crossings)] == crossings  # the longest first
-    assert [(p.setup, p.seed, p.strides) for p in crossings] == [(WALKING, seed, 24) for seed in (1, 2, 3)]
+    transitions, alone = [p for p in parts if len(p.muds) > 1], [p for p in parts if len(p.muds) == 1]
+    assert parts[: len(transitions)] == transitions  # the longest first
+    assert [(p.setup, p.seed, p.strides) for p in transitions] == [(WALKING, seed, 24) for seed in (1, 2, 3)]
     for setup, muds, strides in ((SINGLE, plan.single, 2), (WALKING, plan.walking, 8)):
         reported = {(p.muds[0], p.seed) for p in alone if p.setup == setup and p.strides == strides}
         assert reported == {(mud, seed) for mud in muds for seed in (1, 2, 3)}
     assert len(alone) == 3 * (5 + 3)
 
 
-def test_crossings_go_both_ways() -> None:
+def test_walks_over_borders_go_in_both_directions() -> None:
     plan = Plan(seeds=2)
     first, second, *_ = plan.parts()
     assert first.muds == second.muds[::-1]
@@ -95,29 +95,26 @@ def test_one_mud_alone_has_no_border() -> None:
     assert {len(part.muds) for part in SHORT.parts()} == {1}
 
 
-def test_on_a_bench_the_methods_are_ours_and_the_papers() -> None:
-    methods = methods_of(SINGLE)
-    assert [(m.name, m.setup, m.with_pose) for m in methods] == [
-        ("default", "single flipper", True),
-        ("paper", "single flipper", True),
+def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> None:
+    single, walking = (
+        [
+            (each.name, each.setup, each.with_pose, each.parameters.method, each.parameters.paper.compensation)
+            for each in methods_of(setup)
+        ]
+        for setup in (SINGLE, WALKING)
+    )
+    assert single == [
+        ("default", "single flipper", True, "default", False),
+        ("paper", "single flipper", True, "paper", False),
     ]
-    assert all(m.parameters.fixed_base for m in methods)
-    assert [m.parameters.method for m in methods] == ["default", "paper"]
-
-
-def test_a_walk_is_also_judged_with_the_papers_drag_and_without_a_pose() -> None:
-    methods = {(m.name, m.setup): m for m in methods_of(WALKING)}
-    assert list(methods) == [
-        ("default", "walking"),
-        ("paper", "walking"),
-        ("paper compensated", "walking"),
-        ("default", "walking without pose"),
+    assert walking == [
+        ("default", "walking", True, "default", False),
+        ("paper", "walking", True, "paper", False),
+        ("paper compensated", "walking", True, "paper", True),
+        ("default", "walking without pose", False, "default", False),
     ]
-    assert not any(m.parameters.fixed_base for m in methods.values())
-    compensated, blind = methods["paper compensated", "walking"], methods["default", "walking without pose"]
-    assert compensated.parameters.paper.compensation and compensated.parameters.method == "paper"
-    assert not blind.with_pose and blind.parameters.method == "default"
-    assert not methods["paper", "walking"].parameters.paper.compensation
+    for setup in (SINGLE, WALKING):
+        assert {each.parameters.fixed_base for each in methods_of(setup)} == {setup is SINGLE}
 
 
 # a short one, for real

@@ -18,7 +18,6 @@ from experiments.mud_fit.mud_fit import (
     best_fit,
     chi2_of,
     fixed_speed_cm_s,
-    present,
     run,
     strength_range_pa,
     walk_on,
@@ -125,10 +124,6 @@ def test_the_report_has_fit_present_values_and_the_six_cells(synthetic_world: No
     assert {rule: list(row) for rule, row in report.fitted.cells.items()} == {"3 cm": list(MUDS), "5 cm": list(MUDS)}
     assert min(report.chi2_of_damping.values()) == report.fitted.chi2
     json.dumps(to_json(report), allow_nan=False)
-
-
-def test_present_values_are_those_of_the_repository() -> None:
-    assert present().strengths_pa == {name: clay.strength_pa for name, clay in MUDS.items()}
 
 
 # for real

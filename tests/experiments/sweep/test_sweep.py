@@ -43,11 +43,6 @@ def test_the_default_muds_range_from_soup_to_firm_clay() -> None:
     assert {order.rule.method for order in Plan().method_walks()} >= {"default", "paper"}
 
 
-def test_an_unknown_method_is_named() -> None:
-    with pytest.raises(ValueError, match="'fog'"):
-        Plan(methods=("fog",)).method_walks()
-
-
 def test_each_constant_depth_has_its_speed_and_failures() -> None:
     (row,) = synthetic_report().strengths
     assert row.strength_pa == 680.0

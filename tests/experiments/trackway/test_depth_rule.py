@@ -28,7 +28,7 @@ def test_every_method_of_the_adaptation_can_be_chosen() -> None:
         assert chosen_by(method).name == method
 
 
-def test_a_method_that_there_is_not_is_named() -> None:
+def test_an_unknown_method_is_named() -> None:
     with pytest.raises(ValueError, match="'fog': must be one of default, paper"):
         chosen_by("fog")
 

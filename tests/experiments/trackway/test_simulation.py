@@ -52,11 +52,6 @@ def test_the_first_method_is_the_adaptive_row_and_others_have_their_names() -> N
     assert rules_of(["default"])[:2] == FIXED
 
 
-def test_an_unknown_method_is_named() -> None:
-    with pytest.raises(ValueError, match="'fog'"):
-        rules_of(["default", "fog"])
-
-
 def test_constant_depths_are_walked_in_each_mud_alone_in_steps_of_2_5_mm() -> None:
     orders = Plan().constant_walks()
     assert {order.clay for order in orders} == set(MUDS.values())
