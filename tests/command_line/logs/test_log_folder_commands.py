@@ -88,6 +88,8 @@ def test_several_logs_are_preserved_whatever_becomes_of_one(folder: Path, capsys
     assert main.main(["log", "preserve", *names]) == exit_codes.REFUSED
     assert "only a log in done/" in capsys.readouterr().err
     assert sorted(path.name for path in (folder / PRESERVED).iterdir()) == ["1.mcap", "3.mcap"]
+    assert main.main(["log", "preserve", "--undo", str(folder / PRESERVED / "1.mcap")]) == exit_codes.OK
+    assert capsys.readouterr().out == f"{folder / DONE / '1.mcap'}\n" and (folder / DONE / "1.mcap").exists()
 
 
 def test_recovery_that_takes_its_time_says_how_far_it_is(
@@ -119,15 +121,6 @@ def test_what_cannot_be_recovered_is_said(folder: Path, capsys: pytest.CaptureFi
     assert main.main(["log", "recover", str(folder / "none.mcap")]) == exit_codes.UNHEALTHY
     assert "No such file" in capsys.readouterr().err
     living.finish()
-
-
-def test_a_preserved_log_moves_to_kept_and_back(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main.main(["log", "preserve", str(folder / DONE / "1.mcap")]) == exit_codes.OK
-    kept = folder / PRESERVED / "1.mcap"
-    assert capsys.readouterr().out == f"{kept}\n" and kept.exists()
-    assert main.main(["log", "preserve", str(folder / ACTIVE / "2.mcap")]) == exit_codes.REFUSED
-    assert main.main(["log", "preserve", "--undo", str(kept)]) == exit_codes.OK
-    assert (folder / DONE / "1.mcap").exists()
 
 
 def test_who_may_not_read_or_move_a_log_is_told_what_to_do(

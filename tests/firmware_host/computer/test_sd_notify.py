@@ -113,16 +113,3 @@ def test_a_full_queue_loses_the_notice_instead_of_the_deadline(
     assert 0 < arrived < 5000
     sender.send("STOPPING=1")
     assert systemd.recv(4096) == b"STOPPING=1"
-
-
-def test_a_notifier_can_be_closed_twice_and_is_silent_afterwards(
-    listen: Listen, notifier: Start, short_folder: Path
-) -> None:
-    address = str(short_folder / "notify")
-    systemd = listen(address)
-    sender = notifier(address)
-    sender.close()
-    sender.close()
-    sender.send("WATCHDOG=1")
-    with pytest.raises(BlockingIOError):
-        systemd.recv(4096)

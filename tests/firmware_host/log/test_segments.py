@@ -139,22 +139,6 @@ def test_a_log_removed_under_the_writer_is_noticed(
     assert read.events[0]["text"].startswith("rows missing here: 200, ")
 
 
-def test_what_took_the_place_of_a_removed_log_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
-    log = make_segments(tmp_path, ONE_FILE)
-    path = tmp_path / ACTIVE / "run-0000.mcap"
-    path.rename(tmp_path / "elsewhere")
-    path.write_text("somebody's")
-    (tmp_path / "elsewhere").unlink()
-    monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
-    monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
-    log.write(make_ticks(0, 100))
-    assert (log.dropped, path.read_text()) == (100, "somebody's")
-    log.write(make_ticks(100, 200))
-    log.write(make_ticks(200, 300))
-    assert log.close() and (tmp_path / DONE / "run-0001.mcap").exists()
-
-
 def test_a_log_moved_away_keeps_its_rows_and_its_place_is_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -213,11 +213,6 @@ def test_what_is_no_log_is_refused_at_its_first_byte(contents: bytes, tmp_path: 
         read_bytes(tmp_path, contents)
 
 
-def test_a_log_that_is_not_there_is_told_in_a_sentence(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"none\.mcap: No such file or directory"):
-        read_log(tmp_path / "none.mcap")
-
-
 def write_foreign(
     path: Path,
     rows: list[bytes],

@@ -11,7 +11,7 @@ import pytest
 
 from command_line import main
 from firmware_host.log.log_file import LogFile
-from firmware_host.log.rows import EVENT, ROW_KINDS, STRIDE, TICK
+from firmware_host.log.rows import ROW_KINDS, STRIDE, TICK
 from firmware_host.log.schema import RowKind, read_definition
 from firmware_host.log_reading.log_reader import Log, log_summary, read_log, read_logs
 from firmware_host.log_reading.recovery import recover_log
@@ -121,7 +121,3 @@ def test_segments_with_an_unknown_field_are_joined(tmp_path: Path) -> None:
         paths.append(write_version(tmp_path / f"run-{segment}.mcap", with_extra).path)
     del OPENING["metadata"]["segment"]
     assert read_logs(paths).ticks["battery_v"].shape == (600, 2)
-
-
-def test_an_event_s_time_and_text_are_packed_as_before() -> None:
-    assert EVENT.decode(EVENT.encode(1.0, "stop")) == {"stamp_s": 1.0, "text": "stop"}

@@ -20,7 +20,7 @@ from firmware_host.log.rows import TICK
 from firmware_host.log_reading import salvage as log_salvage
 from firmware_host.log_reading.log_reader import LogError, read_log
 from firmware_host.log_reading.recovery import recover_all, recover_log
-from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
+from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.waiting import LONGEST_S
 
 CHUNK = 100  # ticks
@@ -125,23 +125,6 @@ def test_a_whole_file_that_was_not_renamed_is_only_renamed(tmp_path: Path) -> No
     assert (recovered.note, recovered.path.read_bytes()) == ("is whole", before)
 
 
-def test_a_log_anywhere_else_is_rewritten_in_its_place(tmp_path: Path) -> None:
-    path = make_cut_log(tmp_path)
-    path = path.rename(tmp_path / "copy.mcap")
-    assert recover_log(path).path == path
-    assert read_log(path).complete
-    assert [entry.name for entry in tmp_path.iterdir() if entry.is_file()] == ["copy.mcap"]
-
-
-def test_what_never_was_a_log_is_told_and_stays(tmp_path: Path) -> None:
-    (tmp_path / ACTIVE).mkdir()
-    path = tmp_path / ACTIVE / "x.mcap"
-    path.write_bytes(b"no log at all" * 1000)
-    with pytest.raises(LogError, match="nothing of a log can be found in it; remove it"):
-        recover_log(path)
-    assert path.exists()
-
-
 def test_an_empty_file_goes(tmp_path: Path) -> None:
     (tmp_path / ACTIVE).mkdir()
     (tmp_path / ACTIVE / "x.mcap").touch()
@@ -171,12 +154,6 @@ def test_the_program_recovers_a_folder(tmp_path: Path) -> None:
     ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=True)
     assert "recovered: 500 rows;" in ended.stderr and ended.stdout == ""
     assert unfinished_files(tmp_path) == []
-
-
-def test_rows_written_late_are_read_in_order(tmp_path: Path) -> None:
-    log = LogFile(tmp_path / "x.mcap", OPENING)
-    log.write([*make_ticks(10, 20), make_event("between"), *make_ticks(0, 10)])
-    assert read_log(log.finish()).ticks["tick"].tolist() == list(range(20))
 
 
 def test_a_log_of_the_older_layout_is_recovered_where_it_lies(tmp_path: Path) -> None:
