@@ -19,7 +19,8 @@ from experiments.robot.bench_robot import BenchError, arm, disarm, move, walk
 from experiments.robot.daemon_robot import DaemonRobot
 from firmware_host.log_reading.log_reader import read_log
 from firmware_host.operator.status_client import CallRefusedError
-from tests.command_line.conftest import Bench, bench  # noqa: F401 - the fixture
+from tests.command_line.conftest import Bench
+from tests.command_line.conftest import own_bench as bench  # noqa: F401 - each test ends processes of its own
 from tests.waiting import LONGEST_S
 
 
