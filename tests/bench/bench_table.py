@@ -1,4 +1,4 @@
-"""The figures of a stage as a table for people: a row a figure, and what was measured on each joint side by side."""
+"""The readings of a stage as a text table: a row for each quantity, a column for each joint."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from control.records import JOINTS
 from experiments.bench.reading import Reading
 
-ROBOT = "robot"  # what is about no joint
+ROBOT = "robot"  # the column of readings that belong to no joint
 HEADS = {ROBOT: ROBOT} | {joint: f"{joint[0]}. {joint.split('_')[1].replace('duction', 'd.')}" for joint in JOINTS}
 WHAT, CELL = 46, 11  # characters
 
@@ -20,7 +20,7 @@ class Row(NamedTuple):
 
 
 def table_lines(heading: str, readings: Sequence[Reading]) -> Iterator[tuple[str, bool]]:
-    """Each line with whether all is well there; nothing where nothing was measured."""
+    """Yield each line, and whether its readings are good; yield nothing without readings."""
     rows: dict[Row, dict[str, Reading]] = {}
     for reading in readings:
         column, what = split_name(reading.what)
@@ -33,7 +33,7 @@ def table_lines(heading: str, readings: Sequence[Reading]) -> Iterator[tuple[str
 
 
 def split_name(what: str) -> tuple[str, str]:
-    """The column that a figure belongs to, and the rest of its name."""
+    """Return the column of a reading, and the rest of its name."""
     joint, _, rest = what.partition(": ")
     return (joint, rest) if joint in JOINTS else (ROBOT, what)
 

@@ -93,10 +93,10 @@ def operator_at(config: pytest.Config) -> BenchOperator:
     capture = config.pluginmanager.getplugin("capturemanager")
     if capture is not None:
         capture.suspend(in_=True)
-    somebody = sys.stdin is not None and sys.stdin.isatty()
+    has_terminal = sys.stdin is not None and sys.stdin.isatty()
     if capture is not None:
         capture.resume()
-    if somebody:
+    if has_terminal:
         return PromptedBenchOperator(UncapturedOperator(config), config.option.yes)
     if config.option.yes:
         return BenchOperator()

@@ -1,6 +1,4 @@
-"""A plugin for pytest: the simulated bench's robot has an encoder that counts against its motor, and tells at the end
-how fast that joint ever was.
-"""
+"""A pytest plugin that reverses one encoder of the simulated bench's robot, and prints the joint's highest speed."""
 
 from __future__ import annotations
 

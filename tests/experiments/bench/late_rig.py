@@ -1,6 +1,7 @@
-"""A simulated robot on a computer with too much to do: ticks are missed, or emulated drives come late, by chance of a
-seed. A drive that comes late obeys what has waited for it, the newest command last, and then lives through the time
-that it has missed: so it is with the process that emulates drives in real time.
+"""A simulated robot on a busy computer: ticks are missed, or emulated drives run late, at random by a seed.
+
+A late drive obeys the commands that have waited for it, the newest last, and then catches up with the missed time, as
+the process that emulates drives in real time does.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A joint whose encoder tells nothing is found out before it has gone anywhere; one that lives is not accused."""
+"""A shake finds a stuck encoder before the joint moves far, and passes a working one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from simulation.harness.blocks import on_blocks
 
 
 class Bench:
-    """A simulated robot, and how far one of its joints has truly been from where it was."""
+    """A simulated robot, and the largest true distance of one joint from its start."""
 
     def __init__(self, configuration: Configuration, joint: str, inertia: float = 1.0, noise_rad: float = 0.0) -> None:
         index, arm = JOINTS.index(joint), configuration.arm
@@ -44,8 +44,8 @@ class Bench:
 
         self.rig.others.append(observe_farthest)
 
-    def hang(self) -> None:
-        """Its encoder tells the same angle and a speed of exactly zero, from the start."""
+    def stick_encoder(self) -> None:
+        """Let the encoder always report the same angle and a speed of exactly zero."""
         self.drive.measure(self.rig.robot.plant.angles_rad[self.rig.robot.drives.index(self.drive)], 0.0)
         self.drive.measure = lambda angle_rad, velocity_rad_s: None  # type: ignore[method-assign]
 
@@ -59,7 +59,7 @@ def test_a_joint_with_a_stuck_encoder_hardly_moves_and_is_reported(
     configuration: Configuration, joint: str, farthest_rad: float
 ) -> None:
     bench = Bench(configuration, joint)
-    bench.hang()
+    bench.stick_encoder()
     readings = list(check_nudge(bench.test_rig, joint))
     assert bench.farthest_rad < farthest_rad < UNSEEN_RAD
     (reading,) = readings  # nothing more is tried on it
@@ -74,7 +74,7 @@ def test_a_joint_with_half_the_inertia_and_no_friction_hardly_moves_either(
 ) -> None:
     bench = Bench(configuration, joint, inertia=0.5)
     bench.without_friction()
-    bench.hang()
+    bench.stick_encoder()
     assert not shake_of(bench, joint).answered
     bench.test_rig.run_for(0.3)  # nothing is left of its speed
     assert bench.farthest_rad < UNSEEN_RAD
@@ -86,9 +86,9 @@ def shake_of(bench: Bench, joint: str) -> Shake:
 
 
 def test_noise_is_no_answer(configuration: Configuration) -> None:
-    """Of an encoder whose magnet has come off."""
+    """The noise is that of an encoder whose magnet has come off."""
     bench = Bench(configuration, "left_sweep", noise_rad=0.002)
-    bench.hang()
+    bench.stick_encoder()
     law = shake_of(bench, "left_sweep")
     assert law.answer_rad > 0.003 and not law.answered
 
@@ -134,8 +134,8 @@ def test_a_shake_leaves_a_free_joint_at_rest_where_it_was() -> None:
         )
     assert sum(given_nm_s) == pytest.approx(0.0, abs=1e-12)
     assert max(given_nm_s) == pytest.approx(FIRST_NM * PERIOD_S) and len(given_nm_s) > SHAKE_TICKS == 4 * HALF_TICKS
-    way = speed = 0.0
+    travel = speed = 0.0
     for impulse in given_nm_s:
         speed += impulse
-        way += speed
-    assert way == pytest.approx(0.0, abs=1e-12)
+        travel += speed
+    assert travel == pytest.approx(0.0, abs=1e-12)

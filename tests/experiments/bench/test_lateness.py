@@ -1,4 +1,4 @@
-"""On a computer with too much to do the bench passes what is well, and tells what was late of what it cannot judge."""
+"""On a busy computer the bench passes a sound robot, and reports late ticks and messages with a failed check."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tests.experiments.bench.late_rig import LateRig
 
 @pytest.fixture
 def patient(configuration: Configuration) -> Configuration:
-    """With bounds as where drives are emulated on the same computer: what is late is no fault yet."""
+    """Return bounds for drives that are emulated on the same computer: late messages are no fault yet."""
     waits = {name: 0.5 for name in ("late_s", "quiet_s", "silence_s", "lag_s", "crawl_s", "fast_s")}
     return replace(configuration, faults=replace(configuration.faults, **waits, lag_fraction=1.0, jump_rad=2.0))
 
@@ -50,7 +50,7 @@ def by_name(readings: Readings) -> dict[str, Reading]:
 
 
 class Sinking:
-    """A flipper that begins to sink in the very tick in which a wish to arm is acted on."""
+    """Lets a flipper sink from the tick in which the loop handles a request to arm."""
 
     def __init__(self, times: int) -> None:
         self._times = times
@@ -65,7 +65,7 @@ class Sinking:
 
 
 def sinking_rig(configuration: Configuration, sinking: Sinking) -> TestRig:
-    """Its drives tell a motion in the tick in which it begins."""
+    """Return a rig whose drives report a motion in the tick in which it begins."""
     drives = on_blocks(configuration).drives(configuration)
     prompt = {joint: replace(each, message_delay_s=0.0) for joint, each in drives.items()}
     rig = SimulatedRig(configuration, drives=prompt, others=[sinking])
@@ -107,7 +107,7 @@ def test_a_drive_that_holds_its_torque_is_found_by_its_current(
     assert isinstance(drive, SimulatedOdrive)
 
     def keep(rig: SimulatedRig) -> None:
-        """Deaf from the wish on, its watchdog fed by somebody else."""
+        """Let the drive ignore all commands from the request on, while another program feeds its watchdog."""
         if rig.loop.pending_request is Request.DISARM:
             drive.receive = lambda frame, now_s: []  # type: ignore[method-assign]
         drive._fed_s = rig.now_s
@@ -123,7 +123,7 @@ def test_a_drive_that_holds_its_torque_is_found_by_its_current(
 def test_a_drive_that_goes_idle_too_late_is_found_in_spite_of_missed_ticks(
     opened_rig: TestRig, rig: LateRig, briefly: None
 ) -> None:
-    """Six ticks too late, of which this computer sees three."""
+    """The drive goes idle six ticks late; this computer reads three of those ticks."""
     drive, late = rig.robot.drives[2], rig
     asked: list[int] = []
 
@@ -145,7 +145,7 @@ def test_a_drive_that_goes_idle_too_late_is_found_in_spite_of_missed_ticks(
 
 @pytest.fixture
 def briefly(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Joints are watched for a moment once torque is off."""
+    """Shorten the time for which joints are measured after torque off."""
     monkeypatch.setattr("experiments.bench.stop_check.COASTING_S", 0.15)
 
 
@@ -245,7 +245,7 @@ def test_a_measurement_that_ends_early_reports_the_lateness(bench: StagedBench) 
 
 
 def test_readings_are_computed_after_torque_is_off(opened_rig: TestRig, rig: LateRig) -> None:
-    """They take longer than a tick, and on a slow computer than a drive's watchdog."""
+    """The computation takes longer than a tick, and on a slow computer longer than a drive's watchdog."""
     for _ in check_stroke(opened_rig, "fast", FAST_RAD_S, FAST_DEG):
         assert not any(drive.energised for drive in rig.robot.drives)
 
@@ -266,7 +266,7 @@ def test_a_pause_that_trips_the_watchdogs_is_reported_with_the_fault(opened_rig:
 
 
 def test_a_robot_in_mud_must_go_onto_blocks(patient: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where its strides would not be in air, and the mud would take more torque than there is."""
+    """Its strides would not be in air, and the mud would need more torque than the limit."""
     monkeypatch.setattr("experiments.bench.rig.on_blocks", lambda configuration: World(track_of(["48.5"])))
     rig = SimulatedRig(patient)
     reported = by_name(check_rest_pose(TestRig(rig, SimulatedBenchOperator(rig))))

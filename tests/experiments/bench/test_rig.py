@@ -1,4 +1,4 @@
-"""The rigs of the bench: real buses in real time, and nobody else who commands them."""
+"""The rigs of the bench: real buses in real time, with no other program that commands the drives."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.waiting import LONGEST_S
 
 @pytest.fixture
 def answering(short_folder: Path) -> Iterator[Path]:
-    """A socket on which somebody answers."""
+    """Yield a socket that accepts connections, like that of a running daemon."""
     path = short_folder / "mudskipper.sock"
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(str(path))
@@ -81,7 +81,7 @@ def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path
 
 
 def test_a_joint_whose_encoder_counts_backwards_never_gets_stiffness(tmp_path: Path) -> None:
-    """It would run away. All joints are still nudged, and nothing moves after that."""
+    """With stiffness it would run away. All joints are still nudged, and nothing moves after that."""
     report = tmp_path / "report.json"
     flipped = ["-p", "tests.experiments.bench.flipped_encoder"]
     command = [sys.executable, "-m", "pytest", "tests/bench", *flipped, "--simulated", "--bench-report", str(report)]
@@ -97,7 +97,7 @@ def test_a_joint_whose_encoder_counts_backwards_never_gets_stiffness(tmp_path: P
 
 @pytest.fixture
 def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
-    """A simulated robot as a process of its own, in real time, on local buses."""
+    """Yield the configuration of a simulated robot that runs in real time as a process of its own, on local buses."""
     path = write_local_setup(short_folder, tmp_path)
     command = [sys.executable, "-m", "simulation.harness.peer", "--config", str(path), "--on-blocks"]
     robot = subprocess.Popen(command, cwd=ROOT)
@@ -126,7 +126,7 @@ def bad(readings: Iterable[Reading]) -> list[str]:
 
 
 def test_every_drive_is_heard_on_real_buses(opened_rig: TestRig) -> None:
-    """Only checks that a busy computer cannot disturb; rates and delays need an idle one."""
+    """A busy computer cannot disturb these checks; those of rates and delays need an idle one."""
     readings = [
         reading
         for check in (check_ids, check_unknown_ids, check_firmware, check_watchdogs)

@@ -1,4 +1,4 @@
-"""Whatever goes wrong at the bench ends with idle drives and a sentence; its figures are told as they are."""
+"""Every failure at the bench ends with idle drives and a message; readings are reported unchanged."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Asked(PromptedBenchOperator):
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
 def test_an_earlier_fault_is_cleared_if_the_operator_says_so(rig: SimulatedRig, answer: str) -> None:
-    """No daemon may run beside the bench, so 'mudskipper clear' is not to be had."""
+    """No daemon may run during the bench, so 'mudskipper clear' is not available."""
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
     bench_operator = Asked(answer)
     opened_rig = TestRig(rig, bench_operator)
