@@ -126,7 +126,7 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
         for command in (("move", "left_sweep=3"), ("walk",), ("walk", "--attended")):
             refused = run_beside(first, bench, *command)
             assert refused.returncode == exit_codes.REFUSED and "operates the robot" in refused.stderr
-        assert "operated by uid" in run_beside(first, bench, "status").stdout
+        assert "the lease is held by uid" in run_beside(first, bench, "status").stdout
         move(first, {"right_sweep": 0.05})
         disarm(first)
         assert "operates the robot" in run_beside(first, bench, "arm").stderr
