@@ -77,11 +77,7 @@ def cell_text(value: Any) -> str:
 
 
 def evaluated(report: dict[str, Any], bar: str, reached: bool) -> dict[str, Any]:
-    return report | {"reached": reached, "verdict": verdict(bar, reached)}
-
-
-def verdict(bar: str, reached: bool) -> str:
-    return f"{bar}: {'reached' if reached else 'not reached'}"
+    return report | {"reached": reached, "verdict": f"{bar}: {'reached' if reached else 'not reached'}"}
 
 
 def summary_us(durations_s: Sequence[float]) -> dict[str, float]:

@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import argparse
 import ctypes
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from benchmarks.local_robot import LocalRobot
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from control.controller import WalkOrder
 from control.modes import Mode, Request
@@ -39,8 +39,6 @@ from firmware_host.loop_timing import Histogram
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.status_socket import StatusSocket
 from firmware_host.ticker import Tick, Ticker
-from simulation.harness.local_setup import write_local_setup
-from simulation.harness.peer import end_with_parent
 
 BAR_RATIO = 2.0
 TURN_S = 5.0
@@ -158,26 +156,15 @@ class DaemonLoop:
                 raise RuntimeError(f"the simulated robot is {self.loop.mode.name.lower()}: {self.loop.fault}")
 
 
-@contextmanager
-def simulated_robot(configuration_path: Path) -> Iterator[None]:
-    command = [sys.executable, "-m", "simulation.harness.peer", "--config", str(configuration_path)]
-    robot = subprocess.Popen(command, preexec_fn=end_with_parent)  # noqa: PLW1509 - no threads here
-    try:
-        yield
-    finally:
-        robot.terminate()
-        robot.wait()
-
-
 def measure(seconds: float) -> dict[str, Any]:
     real, bare, turn_s = Punctuality(), Punctuality(), min(TURN_S, seconds)
     rounds = max(1, round(seconds / turn_s))
     progress = Progress(rounds)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mudskipper-")))
-        path = write_local_setup(folder, folder)
-        configuration = load_configuration(path)
-        stack.enter_context(simulated_robot(path))
+        robot = LocalRobot(folder)
+        stack.callback(robot.end)
+        configuration = load_configuration(robot.configuration)
         daemon, bare_loop = DaemonLoop(configuration, folder, stack), BareLoop()
         options = configuration.loop
         warnings = prepare_loop(options.priority, options.cpu, options.lock_memory)

@@ -71,7 +71,7 @@ class Samples:
 
 
 class TimedWalk:
-    """Owns the walk and what was measured of it."""
+    """Owns the walk and its measured durations."""
 
     def __init__(self, configuration: Configuration, wiring: Wiring, recorder: Recording) -> None:
         self.walk = Lockstep(configuration, paper_track())

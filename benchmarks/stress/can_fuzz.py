@@ -43,6 +43,7 @@ BABBLE_FRACTION = 0.001
 BAR_KIB = 1024.0
 WARM_UP_FRACTION = 0.1  # of the frames, before the first reading of memory
 NUMBERS = [float("nan"), float("inf"), float("-inf"), 0.0, -0.0, 1e38, -3.4e38, 1e-45, 0.5]
+STAMPS_S = [0.0, 1e9, -1.0, float("nan")]
 REPORTED = [
     (codec.GET_ENCODER_ESTIMATES, (0.1, 0.0)),
     (codec.GET_IQ, (0.0, 0.5)),
@@ -102,7 +103,7 @@ class FrameSource:
     def _marked(self, frame: Frame) -> Frame:
         remote, error, extended = (self._random.random() < 0.5 for _ in range(3))
         identifier = self._random.randrange(0x20000000) if extended else frame.arbitration_id
-        return Frame(identifier, frame.data, remote, error, extended, self._random.choice([0.0, 1e9, -1.0]))
+        return Frame(identifier, frame.data, remote, error, extended, self._random.choice(STAMPS_S))
 
     def _random_frame(self, frame: Frame) -> Frame:
         data = self._random.randbytes(self._random.randint(0, 8))

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, new_parser, run_benchmark, verdict
+from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
 from benchmarks.stress.can_fuzz import is_forbidden, is_ours, open_third_node
 from benchmarks.stress.malformed_configurations import CandidateFile, MalformedConfigurations
 from control.controller import WalkOrder
@@ -146,10 +146,10 @@ def idle(robot: Lockstep) -> list[str]:
     if robot.loop.mode in ENERGISED:
         robot.loop.request(Request.DISARM, robot.now_s)
         robot.step()
-    beside = [open_third_node(robot, bus) for bus in robot.loop.configuration.bus]
+    third_nodes = [open_third_node(robot, bus) for bus in robot.loop.configuration.bus]
     for _ in range(IDLE_TICKS):
         robot.step()
-    sent = [frame for port in beside for frame in port.receive() if is_ours(frame) and is_forbidden(frame)]
+    sent = [frame for port in third_nodes for frame in port.receive() if is_ours(frame) and is_forbidden(frame)]
     problems = [f"sent 0x{frame.arbitration_id:03x} {frame.data.hex(' ')}" for frame in sent[:3]]
     if robot.loop.mode in ENERGISED or any(robot.loop.sent.torques_nm):
         problems.append(f"is in mode {robot.loop.mode.name} with torques {robot.loop.sent.torques_nm}")
@@ -178,8 +178,7 @@ def _stays(robot: Lockstep, mode: Mode, duration_s: float) -> bool:
 
 
 def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
-    clean = not found.bugs
-    return {
+    report = {
         "configurations": sum(found.kinds.values()),
         "seed": seed,
         "kinds": dict(found.kinds),
@@ -191,9 +190,10 @@ def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
         "most_kib": found.most_kib,
         "bugs": len(found.bugs),
         "first_bugs": found.bugs[:20],
-        "reached": clean,
-        "verdict": verdict("refused with messages or accepted and working, within 1 s and 64 MiB each", clean),
     }
+    return evaluated(
+        report, "refused with messages or accepted and working, within 1 s and 64 MiB each", not found.bugs
+    )
 
 
 def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:

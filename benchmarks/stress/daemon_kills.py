@@ -18,8 +18,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from benchmarks.local_robot import LONGEST_WAIT_S, LocalRobot
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
-from benchmarks.stress.local_robot import LONGEST_WAIT_S, LocalRobot
 from control.records import JOINTS
 from drivers.odrive import codec
 from firmware_host.buses import open_ports

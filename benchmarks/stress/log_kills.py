@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.local_robot import LONGEST_WAIT_S, LocalRobot, kill_session, wait_for
 from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
-from benchmarks.stress.local_robot import LONGEST_WAIT_S, LocalRobot, kill_session, wait_for
 from benchmarks.stress.resources import children_of
 from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
 from firmware_host.log_reading.log_reader import Log, read_log

@@ -12,11 +12,12 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from benchmarks.local_robot import LONGEST_WAIT_S, LocalRobot, wait_for
 from benchmarks.report import Progress
-from benchmarks.stress.local_robot import LONGEST_WAIT_S, LocalRobot, wait_for
 from benchmarks.stress.random_operator import Call, RandomOperator
 from benchmarks.stress.resources import children_of
 from benchmarks.stress.soaked_loop import reading_of, rows_of
+from firmware_host.log.log_folder import ACTIVE, log_files
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError
 
 QUOTA_BYTES, SEGMENT_BYTES = 20_000_000, 4_000_000
@@ -77,7 +78,7 @@ def soak_daemon(seconds: float, seed: int, folder: Path, progress: Progress) -> 
     robot = LocalRobot(folder, LOG_LINES)
     daemon, client = robot.start_daemon(), Client(robot, seed)
     try:
-        if not wait_for(lambda: robot.call("status")["mode"] == "idle"):
+        if not wait_for(lambda: robot.call("status")["mode"] == "idle" and bool(log_files(robot.logs, ACTIVE))):
             raise RuntimeError("the daemon did not start")
         readings = _readings(client, robot, daemon.pid, seconds, progress)
         client.read_status()

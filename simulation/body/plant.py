@@ -4,7 +4,8 @@ Arms have a constant inertia about each joint, the gravity of a level body, and 
 with the body's, so their acceleration does not move the body. Viscous friction grows with speed. Coulomb friction, off
 at 0, opposes a turning joint with a constant torque and holds a resting one against less than that. It is solved for
 the velocity at the end of a step, which it brings to zero but never reverses, so a joint sticks and steps of any length
-are stable. The effects of earlier strokes are each arm's own history, off by default. The integrator is semi-implicit
+are stable. Each arm has its own history of earlier strokes, whose effects are off by default. The sources write
+`lift_nm` for the torque that raises the adduction joint. The integrator is semi-implicit
 Euler at STEP_S: the stiffest spring, mud along a plate 5 cm deep in the stiffest of the paper's muds, makes the arm
 swing at about 400 rad/s.
 """
@@ -78,9 +79,9 @@ class Arm:
         self.reset()
 
     def reset(self) -> None:
-        """At rest with the plate's edge on the mud, as a robot lies when its motors are off."""
+        """Puts the arm at rest with the plate's edge on the mud, as a robot lies when its motors are off."""
         self.history.reset()
-        self.relief_m = self.track.surface_m(0.0)
+        self.relief_m = self.track.surface_m(0.0)  # depth of the track's own surface, without earlier strokes
         self.put_back()
         self.force = NO_CONTACT
         self.clay = self.track.clay_at(0.0)
@@ -88,7 +89,7 @@ class Arm:
     def put_back(self) -> None:
         """Moves the arm as an operator does by hand: straight out, the plate's edge on the mud; level on a bench.
 
-        The mud remembers its strokes.
+        The mud keeps the effects of earlier strokes.
         """
         self.sweep_rad = self.sweep_velocity_rad_s = self.adduction_velocity_rad_s = self.adduction_rad = 0.0
         if not self.mount:
@@ -99,7 +100,7 @@ class Arm:
 
     @property
     def surface_m(self) -> float:
-        """How far the mud that this flipper meets lies below its nominal height."""
+        """The depth of the mud under this flipper below its nominal surface."""
         return self.relief_m + self.history.surface_m
 
     def step(
@@ -191,7 +192,7 @@ class Arm:
 
 
 def _slowed(velocity_rad_s: float, loss_rad_s: float) -> float:
-    """Dry friction slows the joint, at most to a halt."""
+    """Returns the velocity after dry friction, which stops the joint but never reverses it."""
     return copysign(max(abs(velocity_rad_s) - loss_rad_s, 0.0), velocity_rad_s)
 
 

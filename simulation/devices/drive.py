@@ -1,4 +1,4 @@
-"""What a simulated motor drive is to the simulated robot, whatever protocol it speaks on the bus."""
+"""The interface of a simulated motor drive to the simulated robot, for every protocol on the bus."""
 
 from __future__ import annotations
 
@@ -79,13 +79,13 @@ class SimulatedDrive(Protocol):
         """Goes idle by itself with an error."""
 
     def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
-        """Takes in where the joint is."""
+        """Sets the joint's true angle and velocity."""
 
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts now."""
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Obeys one frame of the bus; returns the answers that it calls for."""
+        """Executes one frame of the bus and returns the answers to it."""
 
     def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
         """Yields the messages that have come due."""

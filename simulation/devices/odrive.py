@@ -1,4 +1,4 @@
-"""A motor drive as the bus sees it: ODrive CANSimple 0.6, byte for byte.
+"""Simulates a motor drive on the bus: ODrive CANSimple 0.6, byte for byte.
 
 It has the axis state machine (idle, closed loop), the error word with the disarm reason, the watchdog, torque mode with
 the velocity-limit clamp and the current limits, cyclic messages, and requests by remote frame.
@@ -86,12 +86,12 @@ class SimulatedOdrive:
             (periods.heartbeat_period_s, (codec.HEARTBEAT,)),
             (periods.slow_period_s, (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)),
         ]
-        # Boards are switched on at different moments: their messages do not come all at once.
+        # Boards are switched on at different times, so their messages do not all come in the same tick.
         self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
         self._next_due_s = min(self._due_s)
 
     def restart(self, now_s: float) -> None:
-        """Restarts as after a supply dip: deaf and silent for BOOT_S, then one heartbeat reports the initialisation."""
+        """Restarts as after a supply dip: ignores and sends nothing for BOOT_S, then reports its initialisation."""
         turns, turns_s = self._turns, self._turns_s
         self.reset(now_s + BOOT_S)
         self._turns, self._turns_s = turns, turns_s
@@ -219,7 +219,7 @@ class SimulatedOdrive:
         return -parameters.cogging_nm * (sin(angle) + SECOND_HARMONIC * sin(2.0 * angle))
 
     def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
-        """Takes over the joint's true angle and velocity."""
+        """Sets the joint's true angle and velocity, from which the encoder's messages are made."""
         parameters = self.parameters
         self._turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
         self._turns_s = parameters.sign * velocity_rad_s / TURN_RAD
@@ -231,12 +231,12 @@ class SimulatedOdrive:
         return self._late.update(frames, now_s, longest_s) if longest_s else frames
 
     def _due_frames(self, now_s: float) -> Iterator[Frame]:
-        for place, (period_s, messages) in enumerate(self._schedule):
-            if now_s < self._due_s[place]:
+        for index, (period_s, messages) in enumerate(self._schedule):
+            if now_s < self._due_s[index]:
                 continue
-            self._due_s[place] += period_s
-            if self._due_s[place] <= now_s:  # delayed by more than a period: lost messages are not sent later
-                self._due_s[place] = now_s + period_s
+            self._due_s[index] += period_s
+            if self._due_s[index] <= now_s:  # delayed by more than a period: lost messages are not sent later
+                self._due_s[index] = now_s + period_s
             for message in messages:
                 repeating = self.parameters.repeated_fraction and message in REPEATED
                 yield self._new_or_repeated_frame(message, now_s) if repeating else self._frame(message, now_s)

@@ -1,4 +1,4 @@
-"""The simulated laboratory's pose of the body, sent to the source that the robot's configuration names.
+"""Sends the simulated body's pose to the source that the robot's configuration names.
 
 Motion capture's frames leave through the pose socket, as NatNet packets from the address at which the robot looks for
 its server, or as counts of a rail encoder that appears where the robot looks for its device.
@@ -7,7 +7,6 @@ its server, or as counts of a rail encoder that appears where the robot looks fo
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
 
 from drivers.pose.natnet_sockets import parse_version
 from drivers.pose.pose_port import PoseSender
@@ -19,17 +18,9 @@ from simulation.devices.natnet_server import LOOPBACK, NEWEST_VERSION, NatNetSer
 from simulation.devices.rail_encoder_emulator import EmulatedRailEncoder
 
 
-class PoseLine(Protocol):
-    """One connection to a robot."""
+class PoseLine:
+    """One connection to a robot; this one sends nothing."""
 
-    def send(self, frame: CameraFrame) -> None: ...
-
-    def step(self, now_s: float) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class NoLine:
     def send(self, frame: CameraFrame) -> None:
         return
 
@@ -40,7 +31,7 @@ class NoLine:
         return
 
 
-class SocketLine(NoLine):
+class SocketLine(PoseLine):
     def __init__(self, path: Path) -> None:
         self._sender = PoseSender(path)
 
@@ -51,7 +42,7 @@ class SocketLine(NoLine):
         self._sender.close()
 
 
-class NatNetLine:
+class NatNetLine(PoseLine):
     """A NatNet server on this computer."""
 
     def __init__(self, pose: PoseParameters) -> None:
@@ -79,7 +70,7 @@ class NatNetLine:
         self.server.close()
 
 
-class RailEncoderLine(NoLine):
+class RailEncoderLine(PoseLine):
     """A rail encoder on a pseudo-terminal, under the device's name."""
 
     def __init__(self, pose: PoseParameters) -> None:
@@ -120,4 +111,4 @@ def _line(pose: PoseParameters) -> PoseLine:
             return NatNetLine(pose)
         case "rail_encoder":
             return RailEncoderLine(pose)
-    return NoLine()
+    return PoseLine()

@@ -55,10 +55,6 @@ class SerialTalker:
         self.waiting = b""
         self.plug_in()
 
-    @property
-    def is_plugged_in(self) -> bool:
-        return self._terminal is not None
-
     def plug_in(self) -> None:
         self.link.unlink(missing_ok=True)
         self._terminal = PseudoTerminal(self.link)

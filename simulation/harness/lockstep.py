@@ -1,4 +1,4 @@
-"""The simulated robot and the daemon's own loop in one process, in step, as fast as they compute.
+"""Runs the simulated robot and the daemon's own loop in one process, in step, as fast as they compute.
 
 In every tick the robot simulates until the tick's time, then the loop runs exactly as in the daemon. All frames are
 encoded and decoded.
@@ -63,7 +63,7 @@ def plant_of(
 
 
 class Lockstep:
-    """Owns the common time of robot and loop. Disturbances concern the mud and the drives.
+    """Owns the common time of robot and loop. Disturbances change the mud and the drives.
 
     `plant` and `drives` replace those made from configuration, disturbances and base. `failures` make parts of the
     loop's side fail: `fail` starts them.
@@ -99,7 +99,7 @@ class Lockstep:
         rows = failing_recorder(recorder or NullRecorder(), failures)
         wall_clock = failing_clock(self._now_s, failures)
         self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock, period_s)
-        self._sound = failures is None
+        self._can_fail = failures is not None
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
         self.tick_number = 0
@@ -121,7 +121,7 @@ class Lockstep:
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
         """Makes a component fail from the next tick on. Raises RuntimeError where it is refused."""
-        refused = "no failures were given" if self._sound else self.failures.refusal(component, kind, for_s)
+        refused = self.failures.refusal(component, kind, for_s) if self._can_fail else "no failures were given"
         if refused:
             raise RuntimeError(refused)
         self.loop.events.report(self.now_s, begin_text(component, kind, for_s, "lockstep"))

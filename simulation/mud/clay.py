@@ -1,4 +1,4 @@
-"""Undrained clay: the stresses at which a mud yields, from one strength.
+"""Computes the stresses at which undrained clay yields, from its strength.
 
 With the undrained strength s_u, a body of width b yields at the depth ζ under
 
@@ -16,9 +16,9 @@ adds a tenth to the strength, as in clay practice. (So a held insertion in the s
 3 s, and reaches 2.7 N at 3 cm; the authors' logs of the mud that they call 12.5N show 2.5 to 2.8 N.)
 
 The three strengths are fitted to the six fixed-depth speeds of the paper's Table I, together with the damping of the
-body's rail, by experiments/mud_fit/mud_fit.py; the adaptive speeds are not used. Four numbers for six show that such
-a mud suffices, not that it is the only one. 45.3 % comes out hardly firmer than 48.5 %, which its water content would
-not suggest: a motor that just fails at 5 cm gives only a lower bound.
+body's rail, by experiments/mud_fit/mud_fit.py; the adaptive speeds are not used. Four fitted numbers reproduce six
+speeds: such a mud suffices, but others may do so too. 45.3 % comes out hardly firmer than 48.5 %, which its water
+content would not suggest: a motor that just fails at 5 cm gives only a lower bound.
 
 A mud may have layers, crusts or weak ones, in which s_u differs: the laws then apply with the strength at the piece's
 own depth, and the weight of the mud above it stays the same.

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from benchmarks.behaviour import differences
-from benchmarks.report import Progress, evaluated, new_parser, report_lines, run_benchmark, summary_us, verdict
+from benchmarks.report import Progress, evaluated, new_parser, report_lines, run_benchmark, summary_us
 from benchmarks.speed import lockstep_speed
 from benchmarks.speed.stage_marks import STAGES
 from benchmarks.speed.wirings import VARIANTS
@@ -235,11 +235,6 @@ def test_summary_is_of_ordered_microseconds() -> None:
     durations_s = [place * 1e-6 for place in range(101)]
     assert summary_us(durations_s[::-1]) == {"median": 50.0, "p99": 99.0, "max": 100.0}
     assert summary_us([]) == {"median": 0.0, "p99": 0.0, "max": 0.0}
-
-
-def test_verdict() -> None:
-    assert verdict("fast", True) == "fast: reached"
-    assert verdict("fast", False) == "fast: not reached"
 
 
 def test_progress_is_silent_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:

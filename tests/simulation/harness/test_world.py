@@ -22,7 +22,6 @@ from simulation.harness.world import (
     FIXED_OF_ROBOT,
     STRONGEST_PA,
     SegmentText,
-    World,
     WorldText,
     load_world,
     parse_world,
@@ -246,11 +245,6 @@ def test_robot_and_drives_accept_all_fields_of_their_records() -> None:
         assert {"robot": world.robot_changes, "drives": world.drive_changes}[section] == numbers
 
 
-def test_a_world_refuses_keys_that_the_configuration_fixes() -> None:
-    assert {item.name for item in fields(PlantParameters)} > FIXED_OF_ROBOT
-    assert {item.name for item in fields(SimulatedDriveParameters)} > FIXED_OF_DRIVE
-
-
 def test_a_base_is_fixed_where_the_configuration_fixes_it(configuration: Configuration) -> None:
     on_a_bench = replace(configuration, estimation=replace(configuration.estimation, fixed_base=True))
     world, free = parse_world(SHORTEST), parse_world(SHORTEST + "[robot]\nfree_body = true\n")
@@ -280,11 +274,6 @@ def test_a_lockstep_runs_in_a_world(configuration: Configuration) -> None:
     lockstep.walk(WalkOrder(0.03))
     lockstep.run_for(1.0)
     assert plant.arms[0].clay == Clay("20000 Pa", 20000.0)
-
-
-def test_a_world_of_a_track_alone_changes_nothing() -> None:
-    track = parse_world(SHORTEST).track
-    assert World(track) == World(track, NONE, {}, {})
 
 
 def test_a_whole_number_beyond_all_floats_is_refused_by_its_key() -> None:
