@@ -7,20 +7,25 @@ from pathlib import Path
 
 from command_line.commands import DEFAULT_CONFIG
 from command_line.experiments.conduct import conduct_bench
+from control.joint_pd import GRAVITY_M_S2
+from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan
 from experiments.actuator.run import Order, calibrate
+from firmware_host.configuration.configuration import Configuration
+
+DEFAULT_JOINTS = ("right_adduction", "right_sweep")
 
 
 def run_actuator(options: argparse.Namespace) -> int:
-    order = Order(
-        joints=tuple(dict.fromkeys(options.joint or ())),
-        weights_g=options.weights,
-        trials=options.trials,
-        lever_m=options.lever_m,
-        gravity_m_s2=options.gravity,
-        lever_tolerance_m=options.lever_tolerance_mm / 1000.0,
-        weight_tolerance=options.weight_tolerance_percent / 100.0,
-        apply=options.apply,
-        configuration=options.config,
-        seed=options.seed,
-    )
+    def plan(configuration: Configuration) -> Plan:
+        return Plan(
+            joints=tuple(dict.fromkeys(options.joint or DEFAULT_JOINTS)),
+            weights_g=options.weights or PAPER_WEIGHTS_G,
+            trials=options.trials,
+            lever_m=options.lever_m or configuration.geometry.flipper_length_m,
+            gravity_m_s2=options.gravity or GRAVITY_M_S2,
+            lever_tolerance_m=options.lever_tolerance_mm / 1000.0,
+            weight_tolerance=options.weight_tolerance_percent / 100.0,
+        )
+
+    order = Order(plan, apply=options.apply, configuration=options.config, seed=options.seed)
     return conduct_bench(options, "readings", lambda session: calibrate(session, order, Path(DEFAULT_CONFIG)))

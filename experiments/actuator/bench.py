@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -56,13 +57,13 @@ class RobotBench:
     def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         require_possible(plan, self.configuration)
         self._switch_torque_off("The robot holds its pose", operator)
-        weights, count = ManualWeights(operator, plan), len(steps_of(plan))
+        weights, steps = ManualWeights(operator, plan), len(steps_of(plan))
         readings: dict[str, Mapping[str, Entry]] = {}
         for number, joint in enumerate(plan.joints):
             notebook = Notebook(folder / joint, notebook_plan(plan, joint))
             if notebook.has_entries:
-                operator.report(f"{joint}: {len(notebook.entries)} of {count} readings are done already.")
-            if len(notebook.entries) < count:
+                operator.report(f"{joint}: {len(notebook.entries)} of {steps} readings are done already.")
+            if len(notebook.entries) < steps:
                 operator.report(FALLS)
 
             def show_all(done: int, total: int, before: int = number) -> None:
@@ -98,13 +99,12 @@ class SimulatedBench:
 
     def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         require_possible(plan, self.configuration)
-        count = len(steps_of(plan))
         joints = [partial(_simulate, self.configuration.text, joint, plan, self._seed, folder) for joint in plan.joints]
 
         def show_progress() -> None:
-            show(sum(_readings_in(folder / joint / NAME) for joint in plan.joints), count * len(joints))
+            show(sum(_readings_in(folder / joint / NAME) for joint in plan.joints), len(steps_of(plan)) * len(joints))
 
-        outcomes = run_parallel(joints, _discard_progress, meanwhile=show_progress)
+        outcomes = run_parallel(joints, _discard, meanwhile=show_progress)
         return dict(zip(plan.joints, outcomes, strict=True))
 
     def leave(self, folder: Path, operator: Operator) -> list[Path]:
@@ -117,8 +117,7 @@ def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> dic
     notebook = Notebook(folder / joint, notebook_plan(plan, joint))
     robot, weights = simulated_bench(configuration, joint, plan, seed, _new_log(folder, joint))
     try:
-        operator = AutomaticOperator(_discard_message)
-        entries = Calibration(robot, joint, plan, weights, operator, notebook, _discard_progress).run()
+        entries = Calibration(robot, joint, plan, weights, AutomaticOperator(_discard), notebook, _discard).run()
     finally:
         robot.close()
     return dict(entries)
@@ -131,10 +130,8 @@ def _readings_in(notebook: Path) -> int:
 
 def _new_log(folder: Path, joint: str) -> Path:
     """Return a path next to the logs of earlier attempts."""
-    number = 1
-    while (log := folder / f"{joint}-{number}.mcap").exists():
-        number += 1
-    return log
+    logs = (folder / f"{joint}-{number}.mcap" for number in count(1))
+    return next(log for log in logs if not log.exists())
 
 
 def notebook_plan(plan: Plan, joint: str) -> dict[str, Any]:
@@ -142,9 +139,5 @@ def notebook_plan(plan: Plan, joint: str) -> dict[str, Any]:
     return {name: value for name, value in asdict(plan).items() if name not in REVISABLE} | {"joint": joint}
 
 
-def _discard_message(message: str) -> None:
-    """Many joints at once report every reading; their notebooks have it."""
-
-
-def _discard_progress(done: int, total: int) -> None:
-    """A process without a screen shows no progress."""
+def _discard(*_: object) -> None:
+    """Show no message and no progress of one process; every reading is in the notebook of its joint."""

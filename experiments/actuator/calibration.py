@@ -66,16 +66,12 @@ class Calibration:
             self._show(index, len(self._steps))
             step = self._steps[index]
             if step.key not in self._notebook.entries and self._measure(step) == REDO:
-                index = self._step_back(index)
+                index = max(index - 1, 0)
+                self._notebook.forget(self._steps[index].key)
             elif step.key in self._notebook.entries:
                 index += 1
         self._show(index, len(self._steps))
         return self._notebook.entries
-
-    def _step_back(self, index: int) -> int:
-        index = max(index - 1, 0)
-        self._notebook.forget(self._steps[index].key)
-        return index
 
     def _measure(self, step: Step) -> str:
         """Return the operator's answer. A step that is not in the notebook then is measured again."""

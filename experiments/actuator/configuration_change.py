@@ -65,7 +65,8 @@ def _apply(path: Path, fits: Sequence[JointFit], operator: Operator) -> str:
     after = changed_text(before, changes)
     if after == before:
         return f"{path} needs no change"
-    operator.report(difference(before, after, str(path)))
+    changes_shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")
+    operator.report("\n".join(changes_shown))
     if operator.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
         return f"{path} was left as it is"
     backup = replace_file(path, before, after)
@@ -131,12 +132,6 @@ def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: float
     del body[len(body) - len(trailing) :]
     table[path[-1]] = value
     body.extend(trailing)
-
-
-def difference(before: str, after: str, name: str) -> str:
-    """Return the output of `diff -u`."""
-    lines = unified_diff(before.splitlines(), after.splitlines(), name, f"{name}, changed", lineterm="")
-    return "\n".join(lines)
 
 
 def replace_file(path: Path, before: str, after: str) -> Path:

@@ -147,15 +147,12 @@ class HeldJoint:
             if -direction * self._resting_rad() > OFF_RAD / 2.0:
                 return
 
-    def _angle_rad(self) -> float:
-        return self.sample().angle_rad
-
     def _resting_rad(self) -> float:
         """Return the angle once it hardly changes, or after a time limit."""
-        before_rad = self._angle_rad()
+        before_rad = self.sample().angle_rad
         for _ in range(MOST_RESTS):
             self._robot.wait(REST_S)
-            angle_rad = self._angle_rad()
+            angle_rad = self.sample().angle_rad
             if abs(angle_rad - before_rad) <= REST_RAD:
                 break
             before_rad = angle_rad

@@ -17,6 +17,7 @@ from experiments.actuator.fit import (
 )
 from experiments.actuator.friction import SWING_RAD
 from experiments.actuator.plan import Plan
+from experiments.actuator.plots import plot_errors, plot_friction, plot_torques
 from experiments.actuator.summary import list_left_out
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import Rows, TitledRows
@@ -169,8 +170,6 @@ def _weight_rows(fit: JointFit) -> Rows:
 
 
 def _figures(fits: Sequence[JointFit]) -> list[Figure]:
-    from experiments.actuator.plots import plot_errors, plot_torques  # matplotlib takes its time
-
     return [
         Figure(
             "torques",
@@ -191,8 +190,6 @@ def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
     """Return no figure for readings without loops."""
     if not all(fit.loops for fit in fits):
         return []
-    from experiments.actuator.plots import plot_friction  # matplotlib takes its time
-
     return [
         Figure(
             "friction",

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from control.joint_pd import GRAVITY_M_S2
 from experiments.actuator.bench import ActuatorBench, RobotBench, SimulatedBench
 from experiments.actuator.configuration_change import apply_fits, find_target
 from experiments.actuator.fit import JointFit, fit_joint
-from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan
+from experiments.actuator.plan import Plan
 from experiments.actuator.report import TITLE, make_sections, make_tables
 from experiments.actuator.simulation import bench_configuration, truth_rows
 from experiments.actuator.summary import list_left_out, make_report
@@ -21,35 +20,17 @@ from experiments.trials.session import Ending, Finding, Session
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 
-DEFAULT_JOINTS = ("right_adduction", "right_sweep")
 TRUTH = "The simulated motors themselves"
 
 
 @dataclass(frozen=True)
 class Order:
-    """The options of one calibration; None stands for a default that the configuration or the paper gives."""
+    """The options of one calibration."""
 
-    joints: tuple[str, ...]
-    weights_g: tuple[float, ...] | None
-    trials: int
-    lever_m: float | None
-    gravity_m_s2: float | None
-    lever_tolerance_m: float
-    weight_tolerance: float
+    plan: Callable[[Configuration], Plan]  # its lever may be the flipper of the robot
     apply: bool
     configuration: Path | None  # the file to change
     seed: int  # of the simulated motors
-
-    def plan(self, configuration: Configuration) -> Plan:
-        return Plan(
-            joints=self.joints or DEFAULT_JOINTS,
-            weights_g=self.weights_g or PAPER_WEIGHTS_G,
-            trials=self.trials,
-            lever_m=self.lever_m or configuration.geometry.flipper_length_m,
-            gravity_m_s2=self.gravity_m_s2 or GRAVITY_M_S2,
-            lever_tolerance_m=self.lever_tolerance_m,
-            weight_tolerance=self.weight_tolerance,
-        )
 
 
 def calibrate(session: Session, order: Order, default_configuration: Path) -> Finding:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,7 +34,7 @@ from experiments.loadcell.preparation import OR_WITHOUT, CellSettings, prepare_c
 from experiments.loadcell.recording import CellRecorder, WallClock, load_counted
 from experiments.loadcell.stage import ManualStage, SimulatedStage, Stage, clay_truth, water_of
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
-from experiments.reports.report_page import FLAT, to_json
+from experiments.reports.report_page import to_json
 from experiments.robot.bench_errors import BenchError
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.session import Session, Show
@@ -68,31 +68,12 @@ class Results(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MudReport:
-    mud: str
-    coefficients: Mapping[str, Mapping[str, Any]] = field(metadata=FLAT)
-
-
-@dataclass(frozen=True)
-class TrialReport:
-    key: str
-    entry: Entry = field(metadata=FLAT)  # of the notebook
-    coefficients: Mapping[str, Any] = field(metadata=FLAT)
-    speed_m_s: float | None
-    is_measured: bool
-    position_error_m: float | None = field(metadata={"key": "place_error_m"})
-    alignment: Any
-    problem: str
-    remark: str
-
-
-@dataclass(frozen=True)
 class LoadcellReport:
     settings: Mapping[str, float]
     cell: Mapping[str, Any]
     stage: Mapping[str, float | None]
-    muds: Sequence[MudReport]
-    trials: Sequence[TrialReport]
+    muds: Sequence[Mapping[str, Any]]
+    trials: Sequence[Mapping[str, Any]]
     left_out: Mapping[str, Entry]
     remarks: Sequence[str]
     compared: Sequence[Mapping[str, Any]]
@@ -267,10 +248,10 @@ def make_report(
             "acceleration_m_s2": sum(pace.acceleration_m_s2 for pace in paces) / len(paces) if paces else None,
         },
         muds=[
-            MudReport(mud, {name: _describe(coefficient) for name, coefficient in coefficients.items()})
+            {"mud": mud} | {name: each._asdict() | {"std_error": each.std_error} for name, each in coefficients.items()}
             for mud, coefficients in results.muds.items()
         ],
-        trials=[_trial_report(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
+        trials=[_trial_entries(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
         left_out=notebook.left_out,
         remarks=results.remarks,
         compared=[
@@ -280,19 +261,13 @@ def make_report(
     )
 
 
-def _describe(coefficient: MudCoefficient) -> dict[str, Any]:
-    return coefficient._asdict() | {"std_error": coefficient.std_error}
-
-
-def _trial_report(trial: AnalysedTrial, entry: Entry) -> TrialReport:
-    return TrialReport(
-        key=trial.recorded.key,
-        entry=entry,
-        coefficients=trial.coefficients,
-        speed_m_s=trial.speed_m_s,
-        is_measured=trial.is_measured,
-        position_error_m=trial.position_error_m if trial.is_measured else None,
-        alignment=trial.alignment,
-        problem=trial.problem,
-        remark=trial.remark,
-    )
+def _trial_entries(trial: AnalysedTrial, entry: Entry) -> dict[str, Any]:
+    """Join the notebook's entry of a trial and its results, by the names that programs read."""
+    return {"key": trial.recorded.key, **entry, **trial.coefficients} | {
+        "speed_m_s": trial.speed_m_s,
+        "is_measured": trial.is_measured,
+        "place_error_m": trial.position_error_m if trial.is_measured else None,
+        "alignment": trial.alignment,
+        "problem": trial.problem,
+        "remark": trial.remark,
+    }

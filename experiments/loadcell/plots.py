@@ -6,33 +6,29 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402 - after the choice of a backend without a screen
-import numpy as np  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-
-from control.plate import submerged_part  # noqa: E402
-from experiments.loadcell.analysis.coefficients import (  # noqa: E402
+from control.plate import submerged_part
+from experiments.loadcell.analysis.coefficients import (
     COEFFICIENTS,
     AnalysedTrial,
     MudCoefficient,
     depths_of,
     volume_m3,
 )
-from experiments.loadcell.analysis.curve_fit import Array  # noqa: E402
-from experiments.loadcell.analysis.force_motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings  # noqa: E402
-from experiments.loadcell.comparison import Compared  # noqa: E402
-from experiments.reports.mud_names import mud_text  # noqa: E402
-from experiments.reports.mud_styles import INK, LABELS, looks_of, mark_of  # noqa: E402
-from experiments.reports.value_text import N_CM3  # noqa: E402
+from experiments.loadcell.analysis.curve_fit import Array
+from experiments.loadcell.analysis.force_motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings
+from experiments.loadcell.comparison import Compared
+from experiments.reports.mud_names import mud_text
+from experiments.reports.mud_styles import DOTS_PER_INCH, INK, LABELS, looks_of, mark_of
+from experiments.reports.value_text import N_CM3
 
 COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
 MODEL: dict[str, Any] = {"color": "tab:red", "linestyle": (0, (5, 2)), "linewidth": 1.8, "zorder": 5}
 BEFORE_S, AFTER_S = 0.3, 0.4
 SHOWN_ABOVE_M = 0.01  # the mud
-DPI = 110
 
 
 def plot_mud(
@@ -56,7 +52,7 @@ def plot_mud(
         _plot_shear_model(shear, drags[-1], over_travel, coefficients["k_s"], settings)
     _name_axes(vertical, shear, depth, curve)
     _name_panels(shear, depth, curve, over_travel, {trial.is_measured for trial in strokes})
-    figure.savefig(path, dpi=DPI)
+    figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
 
 
@@ -162,7 +158,7 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]], path: Pa
         panel.set_ylim(0.0, None)
         panel.set_xlabel("mud")
         panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
-    figure.savefig(path, dpi=DPI)
+    figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
 
 
@@ -172,7 +168,9 @@ def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
     looks = looks_of(list(dict.fromkeys(row.mud for row in rows)))
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
         of_name = [row for row in rows if row.coefficient == name]
-        reach = 1.05 * max([_farthest(row) / N_CM3 for row in of_name], default=1.0)
+        ends = [row.sensed + 2.0 * row.sensed_std_error for row in of_name]
+        ends += [row.truth + 2.0 * row.truth_std_error for row in of_name]
+        reach = 1.05 * max(ends, default=N_CM3) / N_CM3
         panel.plot([0.0, reach], [0.0, reach], color="grey", linewidth=1.2, zorder=0)
         for row in of_name:
             _plot_pair(panel, row, looks[row.mud])
@@ -182,13 +180,8 @@ def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
         panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
         panel.set_ylabel("by the flipper (N/cm³)")
     panels[0].legend(fontsize="small", title="mud", loc="upper left")
-    figure.savefig(path, dpi=DPI)
+    figure.savefig(path, dpi=DOTS_PER_INCH)
     plt.close(figure)
-
-
-def _farthest(row: Compared) -> float:
-    """Return the larger end of the two error bars."""
-    return max(row.sensed + 2.0 * row.sensed_std_error, row.truth + 2.0 * row.truth_std_error)
 
 
 def _plot_pair(panel: Axes, row: Compared, look: dict[str, Any]) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from experiments.loadcell.analysis.force_motion import RATE_EXPONENT, Insertion,
 from experiments.loadcell.analysis.stage_track import common_alignment
 from experiments.loadcell.comparison import OTHER_PLATE, Compared
 from experiments.loadcell.measurement import Results
+from experiments.loadcell.plots import plot_coefficients, plot_comparison, plot_mud
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.mud_names import mud_text
 from experiments.reports.report_page import Figure, Section
@@ -47,7 +47,11 @@ COMPARED = "Flipper and load cell; see the report for the effects of plate and p
 
 def errors_text(muds: Mapping[str, Mapping[str, MudCoefficient]], plan: TrialPlan) -> str:
     """Explain the two errors of each value."""
-    fractions = ", ".join(f"{100.0 * _largest_bench_fraction(muds, name):.1f} % of {name}" for name in COEFFICIENTS)
+    known = [(name, mud[name]) for mud in muds.values() for name in COEFFICIENTS if isfinite(mud[name].value)]
+    largest = dict.fromkeys(COEFFICIENTS, 0.0)
+    for name, each in known:
+        largest[name] = max(largest[name], each.shared_error / each.value)
+    fractions = ", ".join(f"{100.0 * fraction:.1f} % of {name}" for name, fraction in largest.items())
     return (
         "The first ± is one standard error of the trials: their scatter with Student's factor, or their own errors of "
         "samples, speed, surface, lag and rate where these are larger. Two of them contain the truth in 19 of 20 cases "
@@ -58,11 +62,6 @@ def errors_text(muds: Mapping[str, Mapping[str, MudCoefficient]], plan: TrialPla
         f"thickness, and the reading of the calibration, together at most {fractions}. The weights are taken as exact, "
         "and so is an amplifier that prints grams or newtons. A depth that an encoder measured has no error of a ruler."
     )
-
-
-def _largest_bench_fraction(muds: Mapping[str, Mapping[str, MudCoefficient]], name: str) -> float:
-    coefficients = [mud[name] for mud in muds.values()]
-    return max((each.shared_error / each.value for each in coefficients if isfinite(each.value)), default=0.0)
 
 
 def comparison_text(results: Results, settings: StageSettings) -> str:
@@ -91,11 +90,14 @@ def _plate_text(plate: Mapping[str, Any], before: str, after: str = "_m") -> str
 
 
 def make_sections(results: Results, plan: TrialPlan) -> list[Section]:
-    rows, figures = coefficient_rows(results.muds), _coefficient_figures(results)
+    rows, draw = coefficient_rows(results.muds), partial(plot_coefficients, results.muds)
+    figures = [Figure("coefficients", "Mean of the trials with two standard errors; grey: every trial.", draw)]
     text = "\n\n".join([METHOD, *position_texts(results.trials), errors_text(results.muds, plan)])
     sections = [Section("Coefficients", text, rows=rows, figures=figures)]
     if results.compared:
-        rows, figures = compared_rows(results.compared), _pairs(results)
+        rows, draw = compared_rows(results.compared), partial(plot_comparison, results.compared)
+        caption = "Flipper against load cell, two standard errors; grey: both are equal."
+        figures = [Figure("comparison", caption, draw)]
         text = comparison_text(results, plan.settings)
         sections.append(Section("Compared with the flipper", text, rows=rows, figures=figures))
     if results.remarks:
@@ -126,24 +128,6 @@ def position_texts(trials: Sequence[AnalysedTrial]) -> list[str]:
     ]
 
 
-def _coefficient_figures(results: Results) -> list[Figure]:
-    def draw(path: Path) -> None:
-        from experiments.loadcell.plots import plot_coefficients  # matplotlib takes its time
-
-        plot_coefficients(results.muds, path)
-
-    return [Figure("coefficients", "Mean of the trials with two standard errors; grey: every trial.", draw)]
-
-
-def _pairs(results: Results) -> list[Figure]:
-    def draw(path: Path) -> None:
-        from experiments.loadcell.plots import plot_comparison
-
-        plot_comparison(results.compared, path)
-
-    return [Figure("comparison", "Flipper against load cell, two standard errors; grey: both are equal.", draw)]
-
-
 def _mud_section(
     trials: Sequence[AnalysedTrial], mud: str, coefficients: Mapping[str, MudCoefficient], settings: StageSettings
 ) -> Section:
@@ -153,16 +137,8 @@ def _mud_section(
         "dashed)."
     )
     name = re.sub(r"[^\w.]+", "_", f"mud_{mud}")
-    figure = Figure(name, caption, partial(_draw_mud, own, coefficients, settings))
+    figure = Figure(name, caption, partial(plot_mud, own, coefficients, settings))
     return Section(f"Mud {mud_text(mud)}", rows=trial_rows(own), figures=[figure])
-
-
-def _draw_mud(
-    trials: Sequence[AnalysedTrial], coefficients: Mapping[str, MudCoefficient], settings: StageSettings, path: Path
-) -> None:
-    from experiments.loadcell.plots import plot_mud
-
-    plot_mud(trials, coefficients, settings, path)
 
 
 def coefficient_rows(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> list[list[str]]:
@@ -174,8 +150,7 @@ def coefficient_rows(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> list[l
 
 def _cells(coefficients: Mapping[str, MudCoefficient]) -> list[str]:
     cells = []
-    for name in COEFFICIENTS:
-        each = coefficients[name]
+    for each in (coefficients[name] for name in COEFFICIENTS):
         cells.append(value_text(each.value, each.trials_error, each.shared_error, per=N_CM3))
         cells.append(repeatability_text(each.repeatability, len(each.trials)))
     return cells

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.loadcell.analysis.coefficients import AnalysedTrial, Recorded
+from experiments.loadcell.analysis.coefficients import AnalysedTrial
 from experiments.loadcell.analysis.force_motion import Insertion, Shear
 from experiments.loadcell.recording import PositionStretch, Stretch, Tare
 
@@ -34,7 +34,8 @@ def list_problems(analysed: AnalysedTrial, stretch: Stretch, before: Tare, after
     problems += [each for each in (analysed.problem, analysed.remark) if each]
     if stretch.position is not None:
         problems += _list_position_problems(analysed, stretch.position)
-    moved_n, largest_n = abs(after.force_n - before.force_n), _largest_n(recorded)
+    moved_n = abs(after.force_n - before.force_n)
+    largest_n = float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
     if moved_n > max(LEAST_DRIFT_N, DRIFT_FRACTION * largest_n):
         problems.append(
             f"the zero moved by {moved_n:.3f} N over the trial: something slipped, mud clings to the plate, or the "
@@ -70,10 +71,6 @@ def _fraction_without_position(analysed: AnalysedTrial) -> float:
         inside = (times_s >= begin_s) & (times_s < end_s)
         fractions.append(float(np.mean(np.isnan(analysed.positions_m[inside]))) if np.any(inside) else 0.0)
     return max(fractions)
-
-
-def _largest_n(recorded: Recorded) -> float:
-    return float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
 
 
 def is_clipped(forces_n: np.ndarray[Any, np.dtype[np.float64]]) -> bool:

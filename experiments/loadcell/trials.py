@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.loadcell.analysis.analyse import analyse_trial
-from experiments.loadcell.analysis.coefficients import INSERTION, KINDS, SINGLE_SPEED_BOUND, AnalysedTrial, speed_remark
+from experiments.loadcell.analysis.coefficients import INSERTION, KINDS, SINGLE_SPEED_BOUND, speed_remark
 from experiments.loadcell.analysis.force_motion import StageSettings, wide_pace
 from experiments.loadcell.recording import (
     AVERAGED,
@@ -130,7 +130,8 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
         entry["position"] = _make_position_entry(position_name, recorder, stretch.position)
     recorded = load_recorded(bench.folder, trial.key, entry)
     analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
-    _report_speed(bench, analysed, plan.settings)
+    if analysed.pace and (remark := speed_remark(analysed.pace, plan.settings, SINGLE_SPEED_BOUND)):
+        bench.operator.report(f"{trial.key}: {remark}")  # the trial is valid; the stage can be set for the next one
     return entry, list_problems(analysed, stretch, before, after)
 
 
@@ -170,13 +171,6 @@ def _encoder_problem(recorder: CellRecorder) -> str:
     if encoder.silent_for_s(recorder.clock.now_s()) > SILENT_S:
         return f"no count arrives from the stage's encoder on {encoder.settings.path}: check its power and cable"
     return ""
-
-
-def _report_speed(bench: TrialBench, analysed: AnalysedTrial, settings: StageSettings) -> None:
-    """Report a wrong speed while the stage can still be set; the trial stays valid."""
-    remark = speed_remark(analysed.pace, settings, SINGLE_SPEED_BOUND) if analysed.pace is not None else ""
-    if remark:
-        bench.operator.report(f"{analysed.recorded.key}: {remark}")
 
 
 def _make_entry(

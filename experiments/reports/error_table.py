@@ -93,6 +93,8 @@ def _error_row(group: Sequence[Evaluation]) -> ErrorRow:
     values, bounds = [each for each in group if each.is_value], [each for each in group if each.is_bound]
     ratios = np.array([each.estimate.value / each.truth for each in values])
     errors = np.abs(ratios - 1.0)
+    covered = [abs(each.estimate.value - each.truth) <= NORMAL_95 * each.estimate.std_error for each in values]
+    right = [each.estimate.value - NORMAL_95 * each.estimate.std_error <= each.truth for each in bounds]
     first = group[0]
     return ErrorRow(
         setup=first.setup,
@@ -102,22 +104,14 @@ def _error_row(group: Sequence[Evaluation]) -> ErrorRow:
         median=_rounded(np.median(errors)) if values else None,
         p95=_rounded(np.percentile(errors, 95.0)) if values else None,
         bias=_rounded(np.median(ratios) - 1.0) if values else None,
-        coverage=_rounded(np.mean([_covers(each) for each in values])) if values else None,
+        coverage=_rounded(np.mean(covered)) if values else None,
         strides=len(values),
         bounds=len(bounds),
-        bounds_hold=_rounded(np.mean([_is_right(each) for each in bounds])) if bounds else None,
+        bounds_hold=_rounded(np.mean(right)) if bounds else None,
         bound_over_truth=_rounded(np.median([b.estimate.value / b.truth for b in bounds])) if bounds else None,
         not_valid=len(group) - len(values) - len(bounds),
         truth_n_m3=round(float(np.median([each.truth for each in group]))),
     )
-
-
-def _covers(each: Evaluation) -> bool:
-    return abs(each.estimate.value - each.truth) <= NORMAL_95 * each.estimate.std_error
-
-
-def _is_right(bound: Evaluation) -> bool:
-    return bound.estimate.value - NORMAL_95 * bound.estimate.std_error <= bound.truth
 
 
 def plate_rows(evaluations: Sequence[Evaluation]) -> list[PlateRow]:

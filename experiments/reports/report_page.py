@@ -108,17 +108,14 @@ def _picture_path(figure: Figure, folder: Path) -> Path:
 
 def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[Path]) -> str:
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    logs_text = f"Logs: {', '.join(escape(log.name) for log in logs)}." if logs else ""
     body = "\n".join(_section(section, folder) for section in sections)
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
         f'<p class="when">{made}, mudskipper {escape(software_version())}</p>\n{body}\n'
-        f"<footer>Numbers: {SUMMARY}. {_logs_text(logs)}</footer>\n</body></html>\n"
+        f"<footer>Numbers: {SUMMARY}. {logs_text}</footer>\n</body></html>\n"
     )
-
-
-def _logs_text(logs: Sequence[Path]) -> str:
-    return f"Logs: {', '.join(escape(log.name) for log in logs)}." if logs else ""
 
 
 def _section(section: Section, folder: Path) -> str:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, RobotInUseError
-from experiments.robot.bench_robot import ENERGISED, UNDER_WAY, Status
+from experiments.robot.bench_robot import ENERGISED, UNDER_WAY
 from experiments.robot.log_copies import copy_since, cut_log
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import why_not
@@ -61,15 +61,11 @@ class DaemonRobot:
             self._renew()
             self.configuration = self._read_configuration()
         except (BenchError, ConfigurationError):
-            self._release()
+            if self._holder:
+                with suppress(BenchError, CallRefusedError):
+                    self.call("release")
             self._client.close()
             raise
-
-    def _release(self) -> None:
-        """Release the lease if this program has it."""
-        if self._holder:
-            with suppress(BenchError, CallRefusedError):
-                self.call("release")
 
     def _require_at_rest(self) -> None:
         """Check before the lease: taking and releasing it would stop a walk that began without one."""
@@ -135,7 +131,8 @@ class DaemonRobot:
         if status["lease"] not in (None, self._holder):
             raise RobotInUseError(f"{status['lease']} operates the robot: wait for its end, then start again")
         is_lost = self._holder and status["lease"] is None and status["mode"] in ENERGISED
-        if is_lost and not _stops_without_lease(status):
+        stops = any(fault["name"] == "lease_lost" for fault in status["faults"])  # then no program operates it
+        if is_lost and not stops:
             self._lost_reason = self._find_lost_reason()
             raise RobotInUseError(self._lost_reason)
 
@@ -222,16 +219,12 @@ class DaemonRobot:
             if self.call("status")["mode"] in ("hold", *UNDER_WAY):
                 self.call("stop")
                 self.wait(RENEWAL_S)  # a request waits for its tick
-            self._wait_for_hold()
+            end_s = time.monotonic() + WRITTEN_S
+            while self.call("status")["mode"] in UNDER_WAY and time.monotonic() < end_s:  # flippers rise out of the mud
+                self.wait(RENEWAL_S)
             self.call("disarm")
             self.call("release")
         self._client.close()
-
-    def _wait_for_hold(self) -> None:
-        """Wait until flippers in the mud are raised."""
-        end_s = time.monotonic() + WRITTEN_S
-        while self.call("status")["mode"] in UNDER_WAY and time.monotonic() < end_s:
-            self.wait(RENEWAL_S)
 
 
 def _files_of(log: Path) -> list[Path]:
@@ -242,8 +235,3 @@ def _files_of(log: Path) -> list[Path]:
             f"you may operate the robot, but not read its log, which every experiment needs: have root add you to the"
             f" group of {problem.filename}, then log in again"
         ) from problem
-
-
-def _stops_without_lease(status: Status) -> bool:
-    """Return whether the robot stops after a lost lease: no program operates it until its torque is off."""
-    return any(fault["name"] == "lease_lost" for fault in status["faults"])

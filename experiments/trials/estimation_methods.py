@@ -40,14 +40,11 @@ def strides_by_method(
 ) -> dict[str, Strides]:
     """Return one flipper's strides of one walk; `own` are the daemon's, by the configured method."""
     configured = configured_method(configuration.estimation)
-    by_method = {configured: own} | {
-        method: _replayed(log, configuration, method) for method in methods if method != configured
-    }
+    by_method = {configured: own}
+    for method in methods:
+        if method != configured:
+            other = replace(configuration, estimation=with_method(configuration.estimation, method))
+            by_method[method] = [stride_report(stride) for stride in replay_log(Path("log"), log, other).strides]
     return {
         method: [stride for stride in strides if stride["flipper"] == flipper] for method, strides in by_method.items()
     }
-
-
-def _replayed(log: Log, configuration: Configuration, method: str) -> Strides:
-    other = replace(configuration, estimation=with_method(configuration.estimation, method))
-    return [stride_report(stride) for stride in replay_log(Path("log"), log, other).strides]

@@ -18,10 +18,9 @@ from control.rate import PERIOD_S
 from control.records import BodyPose, DriveStates, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
+from experiments.robot.lockstep_robot import simulated_configuration
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.loading import parse_configuration
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
-from simulation.harness.local_setup import CONFIGURATION
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.disturbances import Disturbances
 from simulation.mud.track import Track
@@ -66,10 +65,8 @@ class Trial:
 
 def configuration_of(setup: Setup) -> Configuration:
     """Return the simulated robot's configuration with a setup's gait and base."""
-    text = CONFIGURATION.format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
-    configuration = parse_configuration(text)
     estimation = EstimationParameters(fixed_base=setup.fixed_base)
-    configuration = replace(configuration, gait=setup.gait, estimation=estimation)
+    configuration = replace(simulated_configuration(), gait=setup.gait, estimation=estimation)
     return _with_bench_drives(configuration) if setup.fixed_base else configuration
 
 
@@ -128,8 +125,8 @@ def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool =
 def mud_estimates(trial: Trial, parameters: EstimationParameters) -> dict[int, MudEstimate]:
     """Return the estimate after each stride, by the stride's index."""
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
-    beliefs: dict[int, MudEstimate] = {}
+    estimates: dict[int, MudEstimate] = {}
     for sample in trial.samples:
         for stride in estimator.update(*sample).strides:
-            beliefs[stride.index] = estimator.mud_estimate
-    return beliefs
+            estimates[stride.index] = estimator.mud_estimate
+    return estimates

@@ -17,13 +17,13 @@ TruthOfMud = dict[str, dict[str, float]]  # N/m³ by the mud's key and coefficie
 def truth_by_mud(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
     """Return the known coefficients of each mud of a summary. A lower bound is no truth."""
     return {
-        mud_key(mud["mud"]): {name: mud[name]["value"] for name in COEFFICIENTS if _is_known(mud.get(name))}
+        mud_key(mud["mud"]): {
+            name: known["value"]
+            for name in COEFFICIENTS
+            if (known := mud.get(name)) and known.get("value") and not known.get("at_least")
+        }
         for mud in muds
     }
-
-
-def _is_known(coefficient: Mapping[str, Any] | None) -> bool:
-    return bool(coefficient and coefficient.get("value") and not coefficient.get("at_least"))
 
 
 def load_truth(path: Path) -> TruthOfMud:

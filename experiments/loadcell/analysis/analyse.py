@@ -94,13 +94,10 @@ def common_pace(paces: Sequence[Pace], settings: StageSettings) -> tuple[Pace, f
 
 
 def _common(values: Sequence[float], uncertainties: Sequence[float]) -> tuple[float, float]:
-    return median(values), sqrt(max(0.0, _scatter(values) ** 2 - median(uncertainties) ** 2))
-
-
-def _scatter(values: Sequence[float]) -> float:
-    """Return the relative standard deviation, robust to outliers."""
+    """Return the median, and the relative scatter between trials: robust to outliers, less their own uncertainty."""
     middle = median(values)
-    return NORMAL_MAD * median(abs(value / middle - 1.0) for value in values)
+    scatter = NORMAL_MAD * median(abs(value / middle - 1.0) for value in values)
+    return middle, sqrt(max(0.0, scatter**2 - median(uncertainties) ** 2))
 
 
 def analyse_trial(trial: Recorded, settings: StageSettings, expected: Pace, aligned: Alignment = WIDE) -> AnalysedTrial:

@@ -55,6 +55,7 @@ def test_the_measured_coefficients_of_a_simulated_mud_are_the_true_ones(report: 
     truth = report["truth"]["48.6"]
     for name in ("k_p", "k_s", "k_e"):
         assert reported[name]["value"] == pytest.approx(truth[name], rel=0.03)
+        assert 0.0 < reported[name]["std_error"] < 0.1 * reported[name]["value"]
     shear_n = measure_shear(clay_of_water(48.6), PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
     assert truth["k_s"] == pytest.approx(shear_n / (0.03 * 0.03**2 / 2.0), rel=1e-3)
 
@@ -69,30 +70,11 @@ def test_a_simulated_experiment_needs_no_questions_and_leaves_a_report(report: d
     assert page.count("data:image/png") == 3 and "Compared with the flipper" in page
 
 
-def test_the_coefficients_are_those_of_the_mud(report: dict[str, Any]) -> None:
-    (mud,) = report["muds"]
-    shear_n = measure_shear(clay_of_water(48.6), PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
-    assert mud["mud"] == "48.6"
-    assert mud["k_s"]["value"] == pytest.approx(shear_n / (0.03 * 0.03**2 / 2.0), rel=0.03)
-    assert all(0.0 < mud[name]["std_error"] < 0.1 * mud[name]["value"] for name in ("k_p", "k_e"))
-
-
 def test_the_flipper_is_compared_where_it_has_a_value(report: dict[str, Any]) -> None:
     (row,) = report["compared"]
     (mud,) = report["muds"]
     assert (row["mud"], row["coefficient"]) == ("48.6", "k_p")
     assert row["ratio"] == pytest.approx(1.1e6 / mud["k_p"]["value"])
-
-
-def test_the_comparison_names_both_plates_and_depths(report: dict[str, Any], folder: Path) -> None:
-    page = (folder / "out" / "report.html").read_text()
-    for reported in (
-        "3 x 3.5 cm, 4 mm thick, upright",
-        "2.5 x 7 cm, 4 mm thick, leaning",
-        "went 4 cm deep",
-        "8 to 12 % more true k_p",
-    ):
-        assert reported in page
 
 
 def test_the_error_contains_the_part_that_all_trials_share(report: dict[str, Any]) -> None:

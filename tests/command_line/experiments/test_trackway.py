@@ -14,7 +14,6 @@ from command_line.main import main
 from experiments.mud_fit import mud_fit
 from experiments.sweep import sweep
 from experiments.trackway import simulation
-from experiments.trackway.depth_rule import METHODS
 from experiments.trackway.one_mud import constant_walks
 from experiments.trackway.paper_table import ADAPTIVE
 from experiments.trackway.walk import Walk, WalkedStride
@@ -51,41 +50,28 @@ def test_a_real_trackway_needs_a_daemon(capsys: pytest.CaptureFixture[str], tmp_
     assert "no daemon answers" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [("--method", "paper"), ("--mud", "soft", "--mud", "soft")])
-def test_options_of_the_simulation_are_refused_for_a_real_trackway(
-    arguments: tuple[str, str], capsys: pytest.CaptureFixture[str], no_walks: None
-) -> None:
-    assert arguments[0] in refusal(capsys, "experiment", "trackway", *arguments)
+REFUSED = {
+    "trackway --method paper": "--method is for --simulated",
+    "trackway --mud soft --mud soft": "--mud",
+    "trackway --compartment 0.5": "--compartment is for --simulated",
+    "trackway --simulated --mud 48.5": "--mud is for a real trackway",
+    "trackway --mud 48.5=5": "its length from 20 to 10000 cm",
+    "sweep": "--simulated",
+    "mud-fit": "--simulated",
+    "trackway --simulated --method paper --method fog": "'fog': must be one of default, paper",
+    "sweep --simulated --method paper --method fog": "'fog': must be one of default, paper",
+    "trackway --simulated --seeds 0": "--seeds",
+    "trackway --simulated --compartment 0.1": "--compartment",
+    "trackway --simulated --compartment nan": "--compartment",
+    "sweep --simulated --strength 49": "--strength",
+    "sweep --simulated --strength firm": "--strength",
+    "mud-fit --simulated --seeds 1001": "--seeds",
+}
 
 
-@pytest.mark.parametrize("name", ["sweep", "mud-fit"])
-def test_sweep_and_fit_run_in_simulation_only(name: str, capsys: pytest.CaptureFixture[str], no_walks: None) -> None:
-    assert "--simulated" in refusal(capsys, "experiment", name)
-
-
-@pytest.mark.parametrize("name", ["trackway", "sweep"])
-def test_an_unknown_method_is_refused_with_the_known_ones(
-    name: str, capsys: pytest.CaptureFixture[str], no_walks: None
-) -> None:
-    message = refusal(capsys, "experiment", name, "--simulated", "--method", "paper", "--method", "fog")
-    assert "'fog': must be one of default, paper" in message
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("trackway", "--seeds", "0"),
-        ("trackway", "--compartment", "0.1"),
-        ("trackway", "--compartment", "nan"),
-        ("sweep", "--strength", "49"),
-        ("sweep", "--strength", "firm"),
-        ("mud-fit", "--seeds", "1001"),
-    ],
-)
-def test_a_value_out_of_range_is_refused(
-    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str], no_walks: None
-) -> None:
-    assert arguments[1] in refusal(capsys, "experiment", *arguments, "--simulated")
+def test_a_wrong_option_is_refused_by_name_or_range(capsys: pytest.CaptureFixture[str], no_walks: None) -> None:
+    for options, message in REFUSED.items():
+        assert message in refusal(capsys, "experiment", *options.split()), options
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -93,7 +79,7 @@ def test_an_impossible_output_folder_is_refused_before_the_work(
     name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert "file: is no folder" in refusal(capsys, "experiment", name, "--simulated", "--out", str(tmp_path / "file"))
+    assert "must be a folder" in refusal(capsys, "experiment", name, "--simulated", "--out", str(tmp_path / "file"))
     below = str(tmp_path / "file" / "below")
     assert "file/below: Not a directory" in failure(capsys, "experiment", name, "--simulated", "--out", below)
 
@@ -211,36 +197,3 @@ def test_the_screen_shows_table_one_next_to_the_papers(capsys: pytest.CaptureFix
     assert "2 past the end, 1 stuck in 53.1" in failed
     assert best.splitlines()[2].split()[:3] == ["depth", "2.75", "cm"]
     assert short.strip().endswith("all counted: 3 times.")
-
-
-def test_the_screen_shows_each_strength_and_where_the_methods_settle(
-    capsys: pytest.CaptureFixture[str], synthetic: None
-) -> None:
-    main(["experiment", "sweep", "--simulated", "--strength", "500", "--strength", "1500"])
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines[2:]] == ["500", "1500"]
-    assert all(line.count("100 %") == len(METHODS) and "0/4" in line for line in lines[2:])
-
-
-def test_the_screen_shows_fitted_next_to_present_values(capsys: pytest.CaptureFixture[str], synthetic: None) -> None:
-    main(["experiment", "mud-fit", "--simulated"])
-    values, cells, damping = capsys.readouterr().out.split("\n\n")
-    assert f"{MUDS['48.5'].strength_pa:.0f} Pa" in values
-    assert "rail damping" in values
-    assert " ".join(cells.splitlines()[1].split()) == "3 cm w = 48.5 % 7.6 ± 0.5 7.00 7.00"
-    assert len(cells.splitlines()) == 1 + 6
-    assert len(damping.splitlines()) == 2
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--compartment", "0.5"), "--compartment is for --simulated"),
-        (("--simulated", "--mud", "48.5"), "--mud is for a real trackway"),
-        (("--mud", "48.5=5"), "its length from 20 to 10000 cm"),
-    ],
-)
-def test_muds_and_their_lengths_are_given_where_they_count(
-    arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str], no_walks: None
-) -> None:
-    assert message in refusal(capsys, "experiment", "trackway", *arguments)

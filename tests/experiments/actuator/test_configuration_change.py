@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.actuator.configuration_change import changed_text, difference, replace_file
+from experiments.actuator.configuration_change import changed_text, replace_file
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.local_setup import CONFIGURATION
@@ -60,12 +60,6 @@ def test_a_change_that_would_be_wrong_is_refused_with_key_value_and_bound(exampl
 def test_what_is_no_toml_is_refused() -> None:
     with pytest.raises(BenchError, match="cannot be changed"):
         changed_text("[drive", {CONSTANT: 0.07})
-
-
-def test_the_difference_shows_old_and_new(example_text: str) -> None:
-    shown = difference(example_text, changed_text(example_text, {CONSTANT: 0.0721}), "mudskipper.toml")
-    assert "-torque_constant_nm_a = 0.083\n+torque_constant_nm_a = 0.0721" in shown
-    assert shown.startswith("--- mudskipper.toml\n+++ mudskipper.toml, changed")
 
 
 def test_a_file_is_replaced_with_its_permissions_and_the_old_one_remains(tmp_path: Path, example_text: str) -> None:

@@ -12,7 +12,6 @@ import pytest
 import statsmodels.api as sm
 from scipy.stats import t as student_t
 
-from estimation.strokes.origin_fit import student_factor
 from experiments.actuator.fit import fit_joint, fit_line, loads_of, repeatability
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step, steps_of
 
@@ -147,15 +146,6 @@ def test_friction_is_that_of_the_loops_with_the_error_of_the_constant() -> None:
     assert fit.rest_friction_a == pytest.approx(REST_A, abs=0.02)
 
 
-def test_without_loops_there_is_no_friction() -> None:
-    entries = make_entries()
-    for entry in entries.values():
-        entry.pop("loops", None)
-    fit = fit_joint("right_sweep", PLAN, entries, 0.083)
-    assert fit is not None and isnan(fit.friction_nm[0]) and isnan(fit.viscous_nm_s[0])
-    assert fit.offset_error_nm > 0.0
-
-
 def test_a_reading_kept_as_doubtful_is_not_fitted() -> None:
     entries = make_entries(noise_a=0.0)
     entries[Step(1, 800.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 180 g"}
@@ -199,9 +189,3 @@ def test_two_errors_contain_the_truth_in_nineteen_of_twenty(trials: int, low: fl
     lines = [fit_line(x, make_currents(x, random)) for _ in range(600)]
     assert low < np.mean([abs(line.slope_a_nm - SLOPE) < 2.0 * line.slope_error for line in lines]) < 0.98
     assert low < np.mean([abs(line.intercept_a - INTERCEPT) < 2.0 * line.intercept_error for line in lines]) < 0.99
-
-
-def test_students_factor_is_that_of_scipy() -> None:
-    reported = [student_factor(freedom) for freedom in range(1, 60)]
-    assert reported == pytest.approx([student_t.ppf(0.975, freedom) / 1.96 for freedom in range(1, 60)], rel=2e-3)
-    assert student_factor(0) == np.inf

@@ -192,6 +192,7 @@ def test_the_right_baud_rate_is_found_and_reported(make: Make) -> None:
     laboratory = make(amplifier=AmplifierParameters(baud=57600))
     with pytest.raises(BenchError, match="Use --baud 57600"):
         laboratory.measure()
+    LoadCellPort(laboratory.port.line.path, 57600, laboratory.port.line_format, COUNTS).close()  # it is free again
 
 
 def test_a_cell_that_sends_nothing_says_what_to_check(make: Make) -> None:
@@ -272,11 +273,3 @@ def test_the_manual_stage_prompts_for_every_step() -> None:
     stage.start(Trial("a", INSERTION, 1))
     assert "down to 3 cm, hold 3 s" in operator.reported[0]
     assert len(drained) == 4
-
-
-def test_a_port_is_closed_while_other_rates_are_tried(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters(baud=57600))
-    with pytest.raises(BenchError):
-        examine_lines(laboratory.recorder, "auto")
-    again = LoadCellPort(laboratory.port.line.path, 57600, laboratory.port.line_format, COUNTS)
-    again.close()

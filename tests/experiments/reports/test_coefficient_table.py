@@ -40,11 +40,8 @@ def test_the_part_of_an_estimators_error_beyond_the_scatter_is_shared() -> None:
     assert scattered.shared_error == pytest.approx(8e4)
     assert scattered.std_error is not None and scattered.trials_error is not None
     assert scattered.std_error == pytest.approx(hypot(scattered.trials_error, 8e4))
-
-
-def test_trials_with_large_scatter_still_share_the_motors_error() -> None:
-    reported = gather_coefficient(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
-    assert reported.shared_error == pytest.approx(0.032e6)
+    large = gather_coefficient(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
+    assert large.shared_error == pytest.approx(0.032e6)  # at least that of a motor
 
 
 def test_two_standard_errors_contain_the_truth_19_times_in_20_with_a_shared_error() -> None:
@@ -70,7 +67,8 @@ def test_bounds_do_not_mix_with_values() -> None:
     assert (mixed.value, mixed.at_least, mixed.bounds) == (1e6, False, 1)
     bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
     assert (bounds.value, bounds.at_least, bounds.bounds) == (2e6, True, 3)
-    assert coefficient_text(bounds).startswith("≥ 2.00")
+    assert bounds.std_error is bounds.trials_error is bounds.shared_error is None
+    assert coefficient_text(bounds) == "≥ 2.000"
 
 
 def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
@@ -100,12 +98,6 @@ def test_mud_that_yields_in_most_strides_is_known_by_them() -> None:
     assert abs(reported.value - 1e6) < 2.0 * reported.std_error
 
 
-def test_a_median_of_bounds_has_no_error() -> None:
-    bounds = gather_coefficient(make_estimate(value, at_least=True) for value in (1e6, 2e6, 9e6))
-    assert bounds.std_error is bounds.trials_error is bounds.shared_error is None
-    assert coefficient_text(bounds) == "≥ 2.000"
-
-
 def test_a_trial_without_a_standard_error_is_not_taken_as_exact() -> None:
     uncertainties = (1e5, nan, 1e5)
     reported = gather_coefficient(
@@ -120,11 +112,6 @@ def test_an_invalid_estimate_does_not_count_but_is_reported() -> None:
     nothing = gather_coefficient([make_estimate(None, reason="too short")])
     assert (nothing.value, nothing.std_error, nothing.trials) == (None, None, [])
     assert coefficient_text(nothing) == "-"
-
-
-@pytest.mark.parametrize("written", ["47.6", "47.6 %", "47.6%", "w = 47.6 %", "w=47.6"])
-def test_a_water_content_is_the_same_however_it_is_written(written: str) -> None:
-    assert mud_name(written) == "47.6"
 
 
 def test_other_names_stay_as_they_are() -> None:

@@ -92,10 +92,6 @@ def test_every_trial_is_prepared_measured_and_written(tmp_path: Path) -> None:
     session = Session(tmp_path).conduct()
     assert session.bed.prepared == session.measured == list(session.notebook.entries) == ALL
     assert session.shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
-
-
-def test_torque_is_off_after_every_trial(tmp_path: Path) -> None:
-    session = Session(tmp_path).conduct()
     assert session.robot.called.count("disarm") == len(TRIALS)
 
 
@@ -157,12 +153,14 @@ def test_the_operator_decides_on_a_fault_before_levelling_the_mud(tmp_path: Path
     assert robot.called.count("clear") == (answer == CLEAR) and len(operator.asked) == 1 + (answer == CLEAR)
 
 
-def test_a_trial_that_went_wrong_clears_nothing_by_itself(tmp_path: Path) -> None:
+def test_an_invalid_trial_can_be_left_out_and_clears_no_fault(tmp_path: Path) -> None:
     session = Session(tmp_path, ScriptedOperator(SKIP))
     session.robot.blocked = True
     session.outcomes = [InvalidTrialError("no mud")]
     session.conduct()
-    assert "clear" not in session.robot.called
+    assert list(counted_entries(session.notebook)) == ALL[1:]
+    assert session.notebook.left_out[ALL[0]]["why"] == ["no mud"]
+    assert KEEP not in session.operator.offered[0] and "clear" not in session.robot.called
 
 
 def test_no_repetition_is_offered_after_the_operator_ends_the_experiment(tmp_path: Path) -> None:
@@ -171,14 +169,6 @@ def test_no_repetition_is_offered_after_the_operator_ends_the_experiment(tmp_pat
     with pytest.raises(EndedError):
         session.conduct()
     assert session.operator.asked == [] and list(session.notebook.entries) == ALL[:1]
-
-
-def test_an_invalid_trial_can_be_left_out(tmp_path: Path) -> None:
-    session = Session(tmp_path, ScriptedOperator(SKIP))
-    session.outcomes = [InvalidTrialError("no mud")]
-    session.conduct()
-    assert list(counted_entries(session.notebook)) == ALL[1:]
-    assert session.notebook.left_out[ALL[0]]["why"] == ["no mud"]
 
 
 @pytest.mark.parametrize(("answer", "measured"), [(GO_ON, [ALL[0], *ALL]), (KEEP, ALL)])
@@ -190,13 +180,6 @@ def test_an_invalid_trial_is_repeated_by_enter_and_kept_by_a_key(
     assert session.conduct().measured == measured
     kept = ["the base moved by 113 mm"] if answer == KEEP else []
     assert session.notebook.entries[ALL[0]]["remarks"] == kept
-
-
-def test_a_trial_without_an_entry_cannot_be_kept(tmp_path: Path) -> None:
-    session = Session(tmp_path)
-    session.outcomes = [InvalidTrialError("no mud")]
-    session.conduct()
-    assert KEEP not in session.operator.offered[0]
 
 
 def test_a_robot_that_walks_on_is_stopped_before_anybody_is_asked(tmp_path: Path) -> None:

@@ -47,12 +47,9 @@ def test_a_trial_can_be_repeated() -> None:
     assert repr(again.samples) == repr(first.samples)
     assert again.truths == first.truths
     assert again.drives == first.drives
-
-
-def test_another_seed_is_another_trial() -> None:
-    assert repr(trial(seed=2).samples) != repr(trial().samples)
-    assert trial(seed=2).truths != trial().truths
-    assert trial(seed=2).drives != trial().drives
+    other = trial(seed=2)
+    assert repr(other.samples) != repr(first.samples)
+    assert other.truths != first.truths and other.drives != first.drives
 
 
 def test_there_is_a_sample_of_every_tick() -> None:
@@ -115,17 +112,14 @@ def test_a_single_flipper_hangs_from_a_bench_with_its_own_drives() -> None:
     assert configuration.gait == SINGLE.gait
     assert configuration.limits.torque_nm == BENCH_TORQUE_NM
     assert {drive.current_limit_a for drive in configuration.drive.values()} == {BENCH_CURRENT_A}
-
-
-def test_a_walking_robot_keeps_its_drives() -> None:
-    walking, single = configuration_of(WALKING), configuration_of(SINGLE)
-    assert not walking.estimation.fixed_base
-    assert walking.limits.torque_nm != single.limits.torque_nm
-    assert walking.geometry == single.geometry
+    walking = configuration_of(WALKING)
+    assert not walking.estimation.fixed_base and walking.limits.torque_nm != BENCH_TORQUE_NM
+    assert walking.geometry == configuration.geometry
 
 
 def test_torque_constants_are_known_as_wrongly_as_asked() -> None:
     exactly = configuration_of(WALKING).flipper_drives
+    assert len({constant for drive in trial().drives for constant in drive[1:3]}) == 4
     assert trial(torque_error=0.0).drives == exactly
     for known, true in zip(trial().drives, exactly, strict=True):
         assert known.sweep_constant_nm_a != true.sweep_constant_nm_a
@@ -133,11 +127,6 @@ def test_torque_constants_are_known_as_wrongly_as_asked() -> None:
         assert known._replace(sweep_constant_nm_a=0.0, adduction_constant_nm_a=0.0) == true._replace(
             sweep_constant_nm_a=0.0, adduction_constant_nm_a=0.0
         )
-
-
-def test_each_joints_constant_is_wrong_in_its_own_way() -> None:
-    wrong = [constant for drive in trial().drives for constant in drive[1:3]]
-    assert len(set(wrong)) == 4
 
 
 # what an estimator says about it
@@ -156,7 +145,7 @@ def test_the_estimators_strides_are_those_of_the_truth() -> None:
     assert reported == [(truth.flipper, truth.index) for truth in trial().truths]
 
 
-def test_beliefs_are_those_after_each_stride() -> None:
+def test_mud_estimates_are_those_after_each_stride() -> None:
     parameters = EstimationParameters()
     estimator = MudEstimator(trial().configuration.geometry, trial().drives, parameters)
     for sample in trial().samples:
