@@ -107,7 +107,10 @@ def _add_actuator(names: Commands) -> None:
 
 def _add_flipper(names: Commands) -> None:
     flipper = add(
-        names, "flipper", "experiments.flipper.run_flipper", "A single flipper on a fixed base: coefficients of muds."
+        names,
+        "flipper",
+        "experiments.mud_trials.run_flipper",
+        "A single flipper on a fixed base: coefficients of muds.",
     )
     _add_bench(flipper)
     flipper.add_argument("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
@@ -119,7 +122,9 @@ def _add_flipper(names: Commands) -> None:
 
 
 def _add_walk(names: Commands) -> None:
-    walk = add(names, "walk", "experiments.walk.run_walk", "The walking robot over several muds: their coefficients.")
+    walk = add(
+        names, "walk", "experiments.mud_trials.run_walk", "The walking robot over several muds: their coefficients."
+    )
     _add_bench(walk)
     walk.add_argument(
         "--mud",

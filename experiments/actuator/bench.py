@@ -61,7 +61,7 @@ class RobotBench:
         readings: dict[str, Mapping[str, Entry]] = {}
         for number, joint in enumerate(plan.joints):
             notebook = Notebook(folder / joint, notebook_plan(plan, joint))
-            if notebook.has_entries:
+            if notebook.entries:
                 operator.report(f"{joint}: {len(notebook.entries)} of {steps} readings are done already.")
             if len(notebook.entries) < steps:
                 operator.report(FALLS)

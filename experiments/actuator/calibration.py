@@ -25,10 +25,10 @@ from experiments.trials.notebook import Notebook
 from experiments.trials.session import Show
 from firmware_host.operator.status_client import CallRefusedError
 
-KEEP, OTHER = "k", "o"
-MOST_FAULTS = 5  # of one weight
+KEEP, OTHER = "k", "o"  # keys of answers
+MOST_FAULTS = 5  # during the attempts at one weight
 MOST_REPEATS = 3  # of one weight that does not come to rest, or does not match
-COOLING_S, LONGEST_COOLING_S = 1.0, 1800.0
+COOLING_S, LONGEST_COOLING_S = 1.0, 1800.0  # period of the check, and time limit
 TICK_S = 0.01  # of a prompt, in which the robot is attended
 
 
@@ -85,7 +85,7 @@ class Calibration:
                 self._read(step)
         except WarmError as problem:
             self._count(step, problem)
-            self._operator.report(f"{_named(step)} was not read: {problem}.")
+            self._operator.report(f"{_name(step)} was not read: {problem}.")
             self._weights.take_off()
         except (BenchError, CallRefusedError) as problem:
             self._recover(step, problem)
@@ -97,7 +97,7 @@ class Calibration:
         """Raise the problem after too many of them."""
         self._faults[step.key] = self._faults.get(step.key, 0) + 1
         if self._faults[step.key] >= MOST_FAULTS:
-            raise BenchError(f"{_named(step)} of {self._joint} cannot be read: {problem}") from problem
+            raise BenchError(f"{_name(step)} of {self._joint} cannot be read: {problem}") from problem
 
     # the robot
 
@@ -130,7 +130,7 @@ class Calibration:
         if self._is_cool(step):
             return
         self._operator.report(
-            f"The {self._joint} winding has {self._winding_c():.0f} °C, too warm for {_named(step)}: waiting."
+            f"The {self._joint} winding has {self._winding_c():.0f} °C, too warm for {_name(step)}: waiting."
         )
         waited_s = 0.0
         while not self._is_cool(step):
@@ -165,7 +165,7 @@ class Calibration:
         if status["mode"] == "hold":
             raise problem
         self._count(step, problem)
-        self._operator.report(f"{_named(step)} was not read: {str(problem).rstrip('.')}.")
+        self._operator.report(f"{_name(step)} was not read: {str(problem).rstrip('.')}.")
         self._weights.take_off()
         self._held = None
 
@@ -193,11 +193,11 @@ class Calibration:
             except MovedError as problem:
                 trouble = str(problem)
             answers = {GO_ON: "read it again", SKIP: "skip it"}
-            question = f"{_named(step)} did not come to rest: {trouble}. Let it hang still and touch nothing."
+            question = f"{_name(step)} did not come to rest: {trouble}. Let it hang still and touch nothing."
             if self._operator.ask(question, answers, self._attend_hold) == SKIP:
                 break
         self._notebook.write(step.key, {"skipped": trouble})
-        self._operator.report(f"{_named(step)} of trial {step.reported_trial} is left out: {trouble}.")
+        self._operator.report(f"{_name(step)} of trial {step.reported_trial} is left out: {trouble}.")
         return None
 
     def _measure_friction(self) -> Sequence[Loop]:
@@ -215,25 +215,22 @@ class Calibration:
         if mismatch.other_g is not None:
             answers[OTHER] = f"it was the {mismatch.other_g:g} g"
         self._mismatches[step.key] = self._mismatches.get(step.key, 0) + 1
-        answer = self._operator.ask(
-            f"{_named(step)}: {mismatch.message}", answers, self._attend
-        )  # a reading is at stake
+        question = f"{_name(step)}: {mismatch.message}"
+        answer = self._operator.ask(question, answers, self._attend)  # the reading counts even if the robot lets go
         if answer == OTHER and mismatch.other_g is not None:
-            self._keep_as(replace(step, weight_g=mismatch.other_g), reading)
+            other = replace(step, weight_g=mismatch.other_g)
+            if other.key in self._notebook.entries:
+                self._operator.report(f"{_name(other)} of trial {step.trial} was read already and is not replaced.")
+            else:
+                self._keep(other, reading)
         elif answer == KEEP or self._mismatches[step.key] >= MOST_REPEATS:
             self._keep(step, reading, mismatch.message)
-
-    def _keep_as(self, step: Step, reading: Reading) -> None:
-        if step.key in self._notebook.entries:
-            self._operator.report(f"{_named(step)} of trial {step.trial} was read already and is not replaced.")
-        else:
-            self._keep(step, reading)
 
     def _keep(self, step: Step, reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> None:
         self._notebook.write(step.key, entry_of(reading, doubt, loops))
         held_nm = self._constant_nm_a * reading.current_a
         self._operator.report(
-            f"{self._joint}, trial {step.reported_trial}, {_named(step)}: {reading.current_a:+.3f} A,"
+            f"{self._joint}, trial {step.reported_trial}, {_name(step)}: {reading.current_a:+.3f} A,"
             f" {held_nm:+.4f} N·m by the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
         )
 
@@ -253,5 +250,5 @@ def entry_of(reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> d
     return entry | ({"doubt": doubt} if doubt else {})
 
 
-def _named(step: Step) -> str:
+def _name(step: Step) -> str:
     return f"{step.weight_g:g} g" if step.weight_g else "the empty arm"

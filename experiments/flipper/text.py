@@ -21,7 +21,7 @@ from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import TitledRows, text_of_tables
 from experiments.trials.estimation_methods import DEFAULT
-from experiments.trials.mud_trials import SEED, left_out_texts, make_trials, open_bench
+from experiments.trials.mud_trials import SEED, left_out_texts, open_bench, run_trials
 from experiments.trials.notebook import Entry
 from experiments.trials.session import Finding, Session
 from experiments.trials.truth_file import load_truth
@@ -78,7 +78,7 @@ def run_flipper(plan: Plan, session: Session, truth_path: Path | None) -> Findin
     truth = load_truth(truth_path) if truth_path else None
     simulated = partial(flipper_bench, session.folder, plan.muds, SEED)
     bench = open_bench(session, plan.identity, simulated, lambda trial: INSTRUCTIONS)
-    configuration, entries, logs = make_trials(bench, session, lambda: run(bench, plan, session.show))
+    configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
     report = report_of(plan, entries, configuration, truth, bench.notebook.left_out)
     sections = sections_of(report, plan, entries, configuration)
     return Finding(report, "A single flipper through muds", sections, text_of_tables(tables_of(report)), logs)

@@ -109,7 +109,7 @@ def notebook_plan(settings: StageSettings) -> dict[str, Any]:
 
 
 def _report_progress(session: Session, notebook: Notebook, missing: int, has_encoder: bool) -> None:
-    if not notebook.has_entries:
+    if not notebook.entries:
         return
     report = session.operator.report
     report(f"{len(notebook.entries)} trials are in {session.folder} already, {missing} are left")

@@ -25,9 +25,9 @@ from experiments.trials.notebook import Notebook
 
 POLL_S = 0.005
 TARE_S = 1.0
-ABSENCE_S = 300.0  # for which an adapter may be away
-CONTACT_SAMPLES = 3
-AVERAGED_LIKENESS = 0.6  # correlation of successive means over three conversions
+ABSENCE_S = 300.0  # longest time for which the amplifier may be unplugged
+CONTACT_SAMPLES = 3  # in a row away from zero
+AVERAGED_CORRELATION = 0.6  # of successive samples, each a mean over three conversions
 LEAST_CORRELATED, LEAST_VALUES = 40, 8  # samples, and different values, for a correlation
 AVERAGED = (
     "the cell's samples at rest hardly differ from one to the next: its amplifier averages several conversions, which "
@@ -56,15 +56,15 @@ class Tare(NamedTuple):
     force_n: float
     noise_n: float
     samples: int
-    likeness: float = 0.0  # correlation of successive samples
+    correlation: float = 0.0  # correlation of successive samples
 
     @property
     def is_averaged(self) -> bool:
         """Whether a filter averages the samples, or something slow shakes the cell."""
-        return self.samples >= LEAST_CORRELATED and self.likeness > AVERAGED_LIKENESS
+        return self.samples >= LEAST_CORRELATED and self.correlation > AVERAGED_CORRELATION
 
 
-class PositionStretch(NamedTuple):
+class StrokePositions(NamedTuple):
     """The encoder's lines during a stroke."""
 
     positions: list[StagePosition]
@@ -73,14 +73,14 @@ class PositionStretch(NamedTuple):
     breaks: int  # unplugged or restarted: positions before and after have different zeros
 
 
-class Stretch(NamedTuple):
+class StrokeRecording(NamedTuple):
     """The samples of a stroke, and the problems of the line."""
 
     samples: list[Sample]
     garbled_lines: int
     drop_outs: int
     unpluggings: int
-    position: PositionStretch | None = None  # where the stage has an encoder
+    position: StrokePositions | None = None  # where the stage has an encoder
 
     @property
     def overloads(self) -> int:
@@ -137,14 +137,14 @@ class CellRecorder:
         if len(forces_n) < 4 and not self.port.line.is_there:
             forces_n = self._steady_forces_n()
         if len(forces_n) < 4:
-            raise BenchError(self._silence())
-        return Tare(float(np.mean(forces_n)), noise_of(np.array(forces_n)), len(forces_n), likeness(forces_n))
+            raise BenchError(self._why_silent())
+        return Tare(float(np.mean(forces_n)), noise_of(np.array(forces_n)), len(forces_n), correlation(forces_n))
 
     def _steady_forces_n(self) -> list[float]:
         self.drain()
         return [sample.force_n for sample in self.listen(TARE_S) if not sample.overloaded]
 
-    def _silence(self) -> str:
+    def _why_silent(self) -> str:
         if self.port.overloads and self.port.arrivals.readable > 0.5:
             return "the load cell reports an overload with nothing on it: check its mounting and its wires"
         return (
@@ -152,13 +152,13 @@ class CellRecorder:
             "without being asked"
         )
 
-    def record(self, noise_n: float, patience_s: float, stroke_s: float) -> Stretch:
+    def record(self, noise_n: float, patience_s: float, stroke_s: float) -> StrokeRecording:
         """Record until `stroke_s` after the contact, or until the patience ends without a contact."""
         self.await_port()
         self.drain()
         port = self.port
         garbled, drop_outs, unpluggings = port.malformed_lines, port.line.clock.drop_outs, port.line.unpluggings
-        before = _counted(self.encoder)
+        before = _count_problems(self.encoder)
         samples, begin_s = list[Sample](), self.clock.now_s()
         contact = _Contact(noise_n)
         end_s = begin_s + patience_s
@@ -167,19 +167,19 @@ class CellRecorder:
             samples += fresh
             if contact.handle(fresh):
                 end_s = self.clock.now_s() + stroke_s
-        positions, after = self._positions, _counted(self.encoder)
+        positions, after = self._positions, _count_problems(self.encoder)
         self._positions = []
         self.await_port()
-        return Stretch(
+        return StrokeRecording(
             samples,
             port.malformed_lines - garbled,
             port.line.clock.drop_outs - drop_outs,
             port.line.unpluggings - unpluggings,
-            PositionStretch(positions, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
+            StrokePositions(positions, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
         )
 
 
-def likeness(forces_n: Sequence[float]) -> float:
+def correlation(forces_n: Sequence[float]) -> float:
     """Return the correlation of successive samples, without their drift; 0 where the resolution is too coarse."""
     if len(set(forces_n)) < LEAST_VALUES:
         return 0.0
@@ -188,13 +188,13 @@ def likeness(forces_n: Sequence[float]) -> float:
     return float(apart_n[1:] @ apart_n[:-1] / (apart_n @ apart_n))
 
 
-def _counted(encoder: StageEncoder | None) -> tuple[int, int, int]:
+def _count_problems(encoder: StageEncoder | None) -> tuple[int, int, int]:
     """Return the numbers of garbled lines, drop-outs and breaks."""
     return (0, 0, 0) if encoder is None else (encoder.counts.malformed, encoder.line.clock.drop_outs, encoder.breaks)
 
 
 class _Contact:
-    """Detects that the force leaves its zero, which may drift until then."""
+    """Detects the contact with the mud: the force leaves its zero, which may drift until then."""
 
     def __init__(self, noise_n: float) -> None:
         self._bound_n = max(2.0 * CONTACT_NOISES * noise_n, LEAST_FORCE_N)
@@ -228,7 +228,7 @@ class _Contact:
 
 
 RAW = "raw"
-FORCE_COLUMNS, POSITION_COLUMNS = ("t_s", "force_n", "overloaded"), ("t_s", "place_m")
+FORCE_COLUMNS, POSITION_COLUMNS = ("t_s", "force_n", "overloaded"), ("t_s", "place_m")  # as in earlier files
 
 
 def raw_name(key: str, attempt: int, what: str = "") -> str:

@@ -17,8 +17,8 @@ from experiments.loadcell.analysis.force_motion import StageSettings, wide_pace
 from experiments.loadcell.recording import (
     AVERAGED,
     CellRecorder,
-    PositionStretch,
-    Stretch,
+    StrokePositions,
+    StrokeRecording,
     Tare,
     load_recorded,
     raw_name,
@@ -118,21 +118,21 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
         stage.lower()
     stage.start(trial)
     longest_s = stroke_s(trial.kind, plan.settings, bool(recorder.encoder))
-    stretch = recorder.record(before.noise_n, stage.patience_s, longest_s)
+    stroke = recorder.record(before.noise_n, stage.patience_s, longest_s)
     name, position_name = raw_name(trial.key, attempt), raw_name(trial.key, attempt, "_position")
-    write_samples(bench.folder / name, stretch.samples)
-    if stretch.position is not None:
-        write_positions(bench.folder / position_name, stretch.position.positions)
+    write_samples(bench.folder / name, stroke.samples)
+    if stroke.position is not None:
+        write_positions(bench.folder / position_name, stroke.position.positions)
     stage.lift()
     after = recorder.tare()
-    entry = _make_entry(trial, name, recorder, stretch, before, after)
-    if stretch.position is not None:
-        entry["position"] = _make_position_entry(position_name, recorder, stretch.position)
+    entry = _make_entry(trial, name, recorder, stroke, before, after)
+    if stroke.position is not None:
+        entry["position"] = _make_position_entry(position_name, recorder, stroke.position)
     recorded = load_recorded(bench.folder, trial.key, entry)
     analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
     if analysed.pace and (remark := speed_remark(analysed.pace, plan.settings, SINGLE_SPEED_BOUND)):
         bench.operator.report(f"{trial.key}: {remark}")  # the trial is valid; the stage can be set for the next one
-    return entry, list_problems(analysed, stretch, before, after)
+    return entry, list_problems(analysed, stroke, before, after)
 
 
 def stroke_s(kind: str, settings: StageSettings, is_measured: bool = False) -> float:
@@ -174,7 +174,7 @@ def _encoder_problem(recorder: CellRecorder) -> str:
 
 
 def _make_entry(
-    trial: Trial, name: str, recorder: CellRecorder, stretch: Stretch, before: Tare, after: Tare
+    trial: Trial, name: str, recorder: CellRecorder, stroke: StrokeRecording, before: Tare, after: Tare
 ) -> dict[str, Any]:
     return {
         "mud": trial.mud,
@@ -185,22 +185,22 @@ def _make_entry(
         "zero_after_n": after.force_n,
         "noise_n": before.noise_n,
         "rate_hz": recorder.port.line.clock.rate_hz,
-        "samples": len(stretch.samples),
-        "garbled_lines": stretch.garbled_lines,
-        "drop_outs": stretch.drop_outs,
-        "unpluggings": stretch.unpluggings,
-        "overloads": stretch.overloads,
+        "samples": len(stroke.samples),
+        "garbled_lines": stroke.garbled_lines,
+        "drop_outs": stroke.drop_outs,
+        "unpluggings": stroke.unpluggings,
+        "overloads": stroke.overloads,
         "calibration": recorder.port.calibration._asdict(),
     }
 
 
-def _make_position_entry(name: str, recorder: CellRecorder, stretch: PositionStretch) -> dict[str, Any]:
+def _make_position_entry(name: str, recorder: CellRecorder, stroke: StrokePositions) -> dict[str, Any]:
     encoder = recorder.encoder
     return {
         "file": name,
-        "places": len(stretch.positions),
+        "places": len(stroke.positions),
         "rate_hz": None if encoder is None else encoder.line.clock.rate_hz,
-        "garbled_lines": stretch.garbled_lines,
-        "drop_outs": stretch.drop_outs,
-        "breaks": stretch.breaks,
+        "garbled_lines": stroke.garbled_lines,
+        "drop_outs": stroke.drop_outs,
+        "breaks": stroke.breaks,
     }

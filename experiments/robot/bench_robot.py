@@ -1,7 +1,7 @@
 """A robot as an experiment operates it: the daemon's calls, waiting, and the log of its motion.
 
 The calls are those of the status socket. They reach the daemon of a robot, or the daemon's own loop in step with a
-simulated robot; an experiment cannot distinguish the two. It knows the robot by answers and log alone.
+simulated robot; an experiment cannot distinguish the two. It sees nothing of the robot but answers and log.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from experiments.robot.bench_errors import BenchError as BenchError
+from experiments.robot.bench_errors import BenchError as BenchError  # for those who import this module
 from experiments.robot.bench_errors import DaemonLostError, EndedError, RobotInUseError
 from experiments.robot.prompt import Operator
 from firmware_host.configuration.configuration import Configuration
@@ -20,12 +20,13 @@ from firmware_host.operator.counted_nouns import counted
 from firmware_host.operator.status_client import CallRefusedError
 
 POLL_S = 0.05
+# The longest that each may take, in s:
 ARMING_S = 10.0
 MOVING_S = 20.0
 RAISING_S = 10.0
-STRIDE_S = 60.0  # longest, with pauses and recoveries
-CLEARING_S = 1.5  # until a fault without a cause is over
-MOST_CLEARS = 3  # of a fault that comes back
+STRIDE_S = 60.0  # with pauses and recoveries
+CLEARING_S = 1.5  # until a transient fault is over
+MOST_CLEARS = 3  # requests to clear a fault that comes back
 MOST_ARMING_REQUESTS = 3  # a transient fault may cancel one
 CLEAR, LEAVE = "c", ""  # answers to a fault: Enter, pressed in haste, clears nothing
 UNDER_WAY = ("walking", "stopping", "damping")
@@ -70,7 +71,7 @@ WalkMonitor = Callable[[Status], End | None]  # None while the walk continues, t
 
 
 def wait_until(robot: BenchRobot, done: Callable[[Status], bool], longest_s: float, what: str) -> Status:
-    """Return the status that `done` accepts. Raises BenchError with `what` did not happen."""
+    """Return the first status that `done` accepts. Raises BenchError, which names `what` did not happen in time."""
     status: Status = robot.call("status")
     start_s = status["now_s"]
     while not done(status):
@@ -120,14 +121,15 @@ def _describe_faults(status: Status) -> str:
     faults = [fault for fault in status["faults"] if fault["blocks_arming"]]
     if status["mode"] == "fault" and not faults:
         faults = [status["fault"]] if status["fault"] else []
-    lines = [f"  {fault['message']} ({_for(fault['age_s'])})\n    -> {fault['what_to_do']}" for fault in faults]
+    ages_s = [fault["age_s"] for fault in faults]
+    ages = [f"{age_s:.0f} s" if age_s < 100.0 else f"{age_s / 60.0:.0f} min" for age_s in ages_s]
+    lines = [
+        f"  {fault['message']} (for {age})\n    -> {fault['what_to_do']}"
+        for fault, age in zip(faults, ages, strict=True)
+    ]
     if status["mode"] == "fault":
         return "\n".join(["The robot is in FAULT:", *(lines or [f"  {status['notice']}"])])
     return "\n".join(["A fault keeps the torque off:", *lines]) if lines else ""
-
-
-def _for(duration_s: float) -> str:
-    return f"for {duration_s:.0f} s" if duration_s < 100.0 else f"for {duration_s / 60.0:.0f} min"
 
 
 def arm(robot: BenchRobot, operator: Operator | None = None) -> None:
@@ -148,7 +150,7 @@ def arm(robot: BenchRobot, operator: Operator | None = None) -> None:
 
 
 def _ask_for_torque(robot: BenchRobot) -> None:
-    """Ask again only where a fault in the tick of the request cancelled it, as of a flipper that sinks.
+    """Request torque, again where a transient fault cancelled the request, such as a flipper that sinks.
 
     Raises BenchError, CallRefusedError.
     """
@@ -224,13 +226,13 @@ def count_strides(closed: Sequence[Mapping[str, Any]]) -> int:
     return len({stride["index"] for stride in closed})
 
 
-def follow_walk(robot: BenchRobot, begin: Callable[[float], WalkMonitor[End]]) -> tuple[End | None, Status]:
+def follow_walk(robot: BenchRobot, make_monitor: Callable[[float], WalkMonitor[End]]) -> tuple[End | None, Status]:
     """Follow a walk that was just ordered; return how its monitor ended it, or None, and the last status.
 
-    `begin` makes the monitor from the time at which the walk begins, by the robot's clock.
+    `make_monitor` takes the time at which the walk begins, by the robot's clock.
     """
     status = wait_until(robot, lambda now: now["mode"] != "hold", ARMING_S, "beginning to walk")
-    monitor = begin(status["now_s"])
+    monitor = make_monitor(status["now_s"])
     while status["mode"] == "walking":
         end = monitor(status)
         if end is not None:

@@ -7,6 +7,7 @@ its number and both clocks, so the copied ones can be read, replayed and reporte
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -19,17 +20,8 @@ from firmware_host.log_reading.recovery import recover_log
 
 def copy_since(segments: Sequence[Path], from_s: float, folder: Path) -> list[Path]:
     """Copy the segments that do not end before `from_s`, and complete the open one. Raises LogError, OSError."""
-    return [_copy(log, folder / log.name) for log in _segments_since(segments, from_s)]
-
-
-def _segments_since(segments: Sequence[Path], from_s: float) -> list[Path]:
-    """Search from the last segment, since there may be a thousand before it."""
-    found: list[Path] = []
-    for log in reversed(segments):
-        if _ends_before(log, from_s):
-            break
-        found.insert(0, log)
-    return found
+    later = takewhile(lambda log: not _ends_before(log, from_s), reversed(segments))  # a thousand may be before them
+    return [_copy(log, folder / log.name) for log in reversed([*later])]
 
 
 def _ends_before(log: Path, from_s: float) -> bool:

@@ -2,8 +2,8 @@
 
 Each trial is in the notebook before the next begins, so an interruption costs the current trial only. A trial that a
 fault ended, or that is invalid, is repeated, after the third time only if the operator wants it; a doubtful one is
-kept or repeated as the operator decides. A trial that is left out is written down and not asked for again. Torque is
-off whenever hands may be in the mud.
+kept or repeated as the operator decides. The notebook also has the trials that are left out, so that the same command
+does not ask for them again. Torque is off whenever hands may be in the mud.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from experiments.trials.session import Session
 from firmware_host.configuration.configuration import Configuration
 from simulation.mud.clay import clay_of_water
 
-MOST_ATTEMPTS = 3
+MOST_ATTEMPTS = 3  # of one trial, after which Enter ends the experiment
 SEED = 1  # of a simulated bench
-KEEP = "k"
+KEEP = "k"  # the key of an answer
 POLL_S = 0.05  # of a prompt, in which the lease is renewed
 PREPARED = {GO_ON: "go on", SKIP: "leave this trial out", REDO: "measure the last one again"}
 INVALID = {GO_ON: "repeat it", SKIP: "leave it out"}
@@ -39,14 +39,14 @@ class PlannedTrial(NamedTuple):
     key: str  # in the notebook
     mud: str
     number: int  # from 1
-    of: int
+    of: int  # trials in this mud
 
     def __str__(self) -> str:
         return f"{mud_text(self.mud)}, trial {self.number} of {self.of}"
 
 
 class InvalidTrialError(Exception):
-    """A trial is invalid; the text says why. If it has an entry, the operator may keep it."""
+    """A trial is invalid; the text says why. The operator may keep the `entry` of one that was measured completely."""
 
     def __init__(self, why: str, entry: Entry | None = None) -> None:
         super().__init__(why)
@@ -105,7 +105,7 @@ def conduct_trials(
             index = _forget_last(bench, planned[:index])
         elif answer == SKIP:
             _leave_out(bench, trial)
-        elif trial.key in entries or _is_done(bench, trial, measure, attempts + 1):
+        elif trial.key in entries or _settle(bench, trial, measure, attempts + 1):
             index, attempts = index + 1, 0
         else:
             attempts += 1
@@ -122,13 +122,13 @@ def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
     return len(before)
 
 
-def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) -> bool:
-    """Measure a trial, or leave it out. Raises BenchError after too many attempts."""
+def _settle(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) -> bool:
+    """Measure a trial; return False where it has to be repeated. Raises BenchError after too many attempts."""
     try:
         entry = measure(trial)
     except (InvalidTrialError, BenchError) as problem:
         rest(bench.robot)
-        return _is_done_with_invalid(bench, trial, problem, attempt)
+        return _settle_invalid(bench, trial, problem, attempt)
     rest(bench.robot)
     for remark in entry["remarks"]:
         bench.operator.report(f"{trial}: {remark}")
@@ -140,8 +140,8 @@ def _is_done(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) 
     return answer != REDO
 
 
-def _is_done_with_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
-    """Leave an invalid trial out, or keep it. Raises BenchError where the operator gives up after too many attempts."""
+def _settle_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
+    """Leave an invalid trial out, or keep it; return False to repeat it. Raises BenchError after too many attempts."""
     entry = problem.entry if isinstance(problem, InvalidTrialError) else None
     often = attempt >= MOST_ATTEMPTS
     message = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
@@ -190,10 +190,12 @@ def open_bench(
     return Bench(robot, PromptedBed(robot, session.operator, instructions), session.operator, notebook)
 
 
-def make_trials(
+def run_trials(
     bench: Bench, session: Session, run: Callable[[], None]
 ) -> tuple[Configuration, dict[str, Entry], list[Path]]:
-    """Return the robot's configuration, the entries that count, and the logs; leave the robot at rest in any case.
+    """Run trials; return the robot's configuration, the entries that count, and the logs.
+
+    The robot is left at rest, however they end.
 
     Raises BenchError where no entry counts.
     """

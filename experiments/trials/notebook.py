@@ -36,11 +36,6 @@ class Notebook:
             self._read(contents)
 
     @property
-    def has_entries(self) -> bool:
-        """Whether there is any measurement."""
-        return bool(self.entries)
-
-    @property
     def left_out(self) -> dict[str, Entry]:
         """The entries of skipped trials."""
         return {key: entry for key, entry in self.entries.items() if entry.get("skipped")}

@@ -21,7 +21,7 @@ from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import TitledRows, text_of_tables
 from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
-from experiments.trials.mud_trials import SEED, PlannedTrial, make_trials, open_bench
+from experiments.trials.mud_trials import SEED, PlannedTrial, open_bench, run_trials
 from experiments.trials.notebook import Entry
 from experiments.trials.session import Finding, Session
 from experiments.trials.truth_file import TruthOfMud, load_truth
@@ -67,7 +67,7 @@ def run_walk(plan: Plan, session: Session, truth_path: Path | None) -> Finding:
     """Make the walks and report them. Raises BenchError."""
     truth = load_truth(truth_path) if truth_path else None
     bench = open_bench(session, plan.identity, partial(walking_bench, session.folder, plan, SEED), _instructions)
-    configuration, entries, logs = make_trials(bench, session, lambda: run(bench, plan, session.show))
+    configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
     report = report_of(plan, entries, configuration, truth, bench.notebook.left_out)
     sections = sections_of(report, plan, entries, configuration, truth)
     return Finding(report, "The walking robot over several muds", sections, text_of_tables(tables_of(report)), logs)

@@ -150,7 +150,7 @@ def test_measurements_remain_however_the_experiment_ends(
     assert conduct_bench(options(tmp_path), "trials", run) == status
     said = capsys.readouterr().err
     assert message in said and "the same command continues from there" in said
-    assert Notebook(tmp_path, {}).has_entries
+    assert Notebook(tmp_path, {}).entries
 
 
 def test_where_nothing_was_measured_nothing_is_said_to_be_there(

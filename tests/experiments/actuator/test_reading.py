@@ -2,36 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import degrees
 from pathlib import Path
 
 import pytest
 
+from control.joint_pd import GRAVITY_M_S2
 from experiments.actuator.plan import Plan, Step
 from experiments.actuator.reading import SAMPLE_S, HeldJoint, MovedError, Sample, Side, find_motion
-from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
+from experiments.actuator.simulation import (
+    COULOMB_NM,
+    TRUE_CONSTANT_NM_A,
+    SimulatedWeights,
+    bench_configuration,
+    simulated_bench,
+)
 from experiments.robot.bench_robot import BenchError, arm
+from experiments.robot.lockstep_robot import LockstepRobot
 
 
 def nothing() -> None:
     pass
 
 
-@pytest.mark.parametrize("joint", ["left_sweep", "right_adduction"])
-def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path) -> None:
-    plan = Plan((joint,))
-    robot, hand = simulated_bench(bench_configuration(), joint, plan, 2, tmp_path / "log.mcap")
+Arm = tuple[LockstepRobot, SimulatedWeights, HeldJoint]
+
+
+@contextmanager
+def held_arm(joint: str, seed: int, folder: Path) -> Iterator[Arm]:
+    """Yield a simulated robot that holds its empty arm level, the weights for it, and the joint."""
+    robot, hand = simulated_bench(bench_configuration(), joint, Plan((joint,)), seed, folder / "log.mcap")
     try:
         hand.hold_level(joint, nothing)
         arm(robot)
         hand.release(nothing)
-        held = HeldJoint(robot, joint)
+        yield robot, hand, HeldJoint(robot, joint)
+    finally:
+        robot.close()
+
+
+@pytest.mark.parametrize("joint", ["left_sweep", "right_adduction"])
+def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path) -> None:
+    with held_arm(joint, 2, tmp_path) as (_, hand, held):
         empty = held.read()
         hand.hang(Step(1, 400.0), nothing)
         loaded = held.read()
-    finally:
-        robot.close()
-    external_nm = 0.4 * plan.gravity_m_s2 * hand.mount.lever_m
+    external_nm = 0.4 * GRAVITY_M_S2 * hand.mount.lever_m
     sensed_nm = abs(loaded.current_a - empty.current_a) * TRUE_CONSTANT_NM_A
     assert sensed_nm == pytest.approx(external_nm, abs=0.5 * COULOMB_NM)
     assert abs(degrees(loaded.angle_rad)) < 0.1 and abs(degrees(empty.angle_rad)) < 0.1
@@ -40,16 +58,11 @@ def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path)
 
 
 def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
-    joint, plan = "right_adduction", Plan(("right_adduction",))
-    robot, hand = simulated_bench(bench_configuration(), joint, plan, 3, tmp_path / "log.mcap")
-    try:
-        hand.hold_level(joint, nothing)
-        arm(robot)
-        hand.release(nothing)
-        held, plain_wait = HeldJoint(robot, joint), robot.wait
+    with held_arm("right_adduction", 3, tmp_path) as (robot, hand, held):
+        plain_wait = robot.wait
 
         def shaken(duration_s: float) -> None:
-            hand.mount.hang(0.1 if int(robot.lockstep.now_s * 4.0) % 2 else 0.3, plan.lever_m)
+            hand.mount.hang(0.1 if int(robot.lockstep.now_s * 4.0) % 2 else 0.3, Plan(()).lever_m)
             plain_wait(duration_s)
 
         robot.wait = shaken  # type: ignore[method-assign]
@@ -59,8 +72,6 @@ def test_an_arm_that_never_rests_is_not_read(tmp_path: Path) -> None:
         plain_wait(0.1)
         with pytest.raises(BenchError, match="no longer holds its pose"):
             held.read()
-    finally:
-        robot.close()
 
 
 def test_a_load_that_the_motor_does_not_lift_is_reported(tmp_path: Path) -> None:
@@ -80,14 +91,8 @@ def test_a_load_that_the_motor_does_not_lift_is_reported(tmp_path: Path) -> None
 def test_a_weight_that_slips_off_between_the_approaches_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    joint, plan = "left_adduction", Plan(("left_adduction",))
-    robot, hand = simulated_bench(bench_configuration(), joint, plan, 5, tmp_path / "log.mcap")
-    try:
-        hand.hold_level(joint, nothing)
-        arm(robot)
-        hand.release(nothing)
+    with held_arm("left_adduction", 5, tmp_path) as (_, hand, held):
         hand.hang(Step(1, 200.0), nothing)
-        held = HeldJoint(robot, joint)
         settled = HeldJoint._settled
 
         def slipping(self: HeldJoint) -> Side:
@@ -98,8 +103,6 @@ def test_a_weight_that_slips_off_between_the_approaches_is_reported(
         monkeypatch.setattr(HeldJoint, "_settled", slipping)
         with pytest.raises(MovedError, match=r"differ by \+3\.[0-9] A, as if the load had changed"):
             held.read()
-    finally:
-        robot.close()
 
 
 def samples(angle_slope: float = 0.0, current_slope: float = 0.0, noise_a: float = 0.2) -> list[Sample]:

@@ -15,7 +15,7 @@ from experiments.loadcell.analysis.coefficients import INSERTION, SHEAR, Analyse
 from experiments.loadcell.analysis.force_motion import Insertion, Pace
 from experiments.loadcell.measurement import list_remarks
 from experiments.loadcell.preparation import CellSettings, examine_lines
-from experiments.loadcell.recording import AVERAGED, RAW, likeness, load_counted
+from experiments.loadcell.recording import AVERAGED, RAW, correlation, load_counted
 from experiments.loadcell.stage import ManualStage, Trial
 from experiments.loadcell.trial_checks import list_problems
 from experiments.loadcell.trials import KEEP, measure, record
@@ -86,9 +86,9 @@ def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) ->
 def test_samples_are_alike_by_what_averages_them_and_not_by_a_drift_or_a_coarse_step(seed: int) -> None:
     random = Random(seed)
     single_n = [random.gauss(0.0, 0.008) for _ in range(80)]
-    assert abs(likeness([force_n + 0.001 * place for place, force_n in enumerate(single_n)])) < 0.4
-    assert 0.5 < likeness([fmean(single_n[place : place + 4]) for place in range(76)]) < 1.0
-    assert likeness([0.1] * 40 + [0.2] * 40) == 0.0
+    assert abs(correlation([force_n + 0.001 * place for place, force_n in enumerate(single_n)])) < 0.4
+    assert 0.5 < correlation([fmean(single_n[place : place + 4]) for place in range(76)]) < 1.0
+    assert correlation([0.1] * 40 + [0.2] * 40) == 0.0
 
 
 def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:
@@ -213,7 +213,7 @@ def test_an_amplifier_too_slow_for_the_stroke_is_reported_first(make: Make) -> N
     with pytest.raises(BenchError, match="too slow"):
         laboratory.measure(CellSettings(scale_n=1.0))
     assert "RATE pin" in laboratory.operator.reported[1] and "--speed 0.02" in laboratory.operator.reported[1]
-    assert not laboratory.notebook.has_entries
+    assert not laboratory.notebook.entries
 
 
 def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:

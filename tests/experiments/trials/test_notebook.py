@@ -14,13 +14,13 @@ PLAN = {"weights_g": (10, 20), "joint": "right_sweep"}
 
 def test_what_was_measured_is_there_again(tmp_path: Path) -> None:
     first = Notebook(tmp_path / "new", PLAN)
-    assert not first.has_entries
+    assert not first.entries
     first.write("10 g", {"torque_nm": 0.1})
     first.write("20 g", {"torque_nm": 0.2})
     first.write("10 g", {"torque_nm": 0.11})
     first.forget("20 g")
     again = Notebook(tmp_path / "new", PLAN)
-    assert again.has_entries and again.entries == first.entries == {"10 g": {"torque_nm": 0.11}}
+    assert again.entries and again.entries == first.entries == {"10 g": {"torque_nm": 0.11}}
 
 
 def test_every_entry_is_on_the_disk_at_once(tmp_path: Path) -> None:
