@@ -15,6 +15,7 @@ from drivers.can.can_port import CanPort, SlcanPort, open_port
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.can.port_health import BusState
+from drivers.can.slcan_serial import SlcanSerial
 from simulation.devices.slcan_adapter import SlcanAdapter, decode_line, encode_line
 from tests.waiting import wait_until
 
@@ -216,3 +217,23 @@ def test_an_unplugged_adapter_is_reported_and_raises_nothing(bench: Bench) -> No
     assert other.port.failed_sends == 1
     assert "Input/output error" in other.port.last_error and "Input/output error" in other.port.last_send_error
     other.port.close()
+
+
+def test_what_was_read_is_given_out_byte_by_byte(bench: Bench) -> None:
+    master, slave = os.openpty()
+
+    class Port:
+        in_waiting = 3
+
+        def fileno(self) -> int:
+            return slave
+
+        def close(self) -> None:
+            os.close(slave)
+
+    serial = SlcanSerial(Port())
+    os.write(master, b"abc\n")
+    wait_until(lambda: serial.in_waiting == 3)
+    assert [serial.read(1) for _ in range(4)] == [b"a", b"b", b"c", b""]
+    serial.close()
+    os.close(master)

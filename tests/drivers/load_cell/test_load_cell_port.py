@@ -109,3 +109,11 @@ def test_the_unit_of_a_line_is_converted(tmp_path: Path) -> None:
     cable.port.calibration = LoadCellCalibration("N", 1.0)
     assert cable.run(1.0)[-1].force_n == pytest.approx(FORCE_N, abs=1e-3)
     cable.close()
+
+
+def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
+    for _ in range(100):
+        cable.amplifier.waiting = b"\xff" * 60
+        cable.amplifier.deliver()
+        cable.port.read(1.0)
+    assert cable.port.malformed_lines > 20

@@ -361,3 +361,9 @@ def test_closing_closes_the_ports(bench: Bench) -> None:
     bench.drives.close()
     bench.report("left_sweep", GET_IQ, 0.0, 5.0)
     assert bench.drives.read(1.0)[0].current_stamp_s == NEVER_S
+
+
+def test_reading_transmits_nothing(bench: Bench) -> None:
+    bench.drives.read(0.0)
+    bench.report_everything(1.0)
+    assert bench.silent()
