@@ -115,7 +115,7 @@ def test_a_log_of_a_foreign_configuration_says_so(tmp_path: Path) -> None:
     recorder = Recorder(path, "[robot]\ncolour = 'green'\n", {})
     recorder.put(EVENT_KIND, EVENT.encode(0.0, "nothing"))
     assert recorder.close(20.0)
-    with pytest.raises(LogError, match="not one of this version"):
+    with pytest.raises(LogError, match="does not accept its configuration"):
         read_walk(path)
 
 

@@ -66,14 +66,15 @@ class SyntheticWalk:
     def __init__(self) -> None:
         target = SimpleNamespace(stride=-1, phase=Phase.REST)
         plant = SimpleNamespace(body_m=0.0, arms=[SimpleNamespace(sweep_rad=radians(30.0))])
-        gait = SimpleNamespace(commanded_depth_m=0.03)
         geometry = SimpleNamespace(flipper_length_m=ARM_M)
-        self.target, self.plant, self.gait = target, plant, gait
+        self.target, self.plant = target, plant
         lockstep: Any = SimpleNamespace(
             now_s=0.0,
             robot=SimpleNamespace(plant=plant),
             loop=SimpleNamespace(
-                controller=SimpleNamespace(target=target, gait=gait), configuration=SimpleNamespace(geometry=geometry)
+                controller=SimpleNamespace(target=target),
+                configuration=SimpleNamespace(geometry=geometry),
+                stride_depth_m=0.03,
             ),
         )
         self.lockstep = lockstep
@@ -92,7 +93,7 @@ def test_a_stride_lasts_from_one_insertion_to_the_next() -> None:
     synthetic.live(0, Phase.STANCE, 0.08)
     synthetic.live(0, Phase.SWING, 0.09)
     assert synthetic.record.strides == []
-    synthetic.gait.commanded_depth_m = 0.04
+    synthetic.lockstep.loop.stride_depth_m = 0.04
     synthetic.live(1, Phase.INSERTION, 0.10)
     (first,) = synthetic.record.strides
     assert first.step_m == pytest.approx(0.08)
