@@ -92,7 +92,7 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     rest(robot)  # on a slow computer, reading the log takes longer than the robot may be left unattended
     strides = strides_by_method(walked.strides, log, robot.configuration, plan.flipper, METHODS)
     own = strides[configured_method(robot.configuration.estimation)]
-    entry: Entry = {"mud": trial.mud, "trial": trial.number, "strides": strides}
+    entry: Entry = {"mud": trial.group, "trial": trial.number, "strides": strides}
     entry |= {"truths": bench.bed.truths(plan.flipper), "from_s": walked.from_s, "to_s": after["now_s"]}
     entry |= _profile_and_remarks(log, own, robot.configuration, plan.flipper)
     invalid = moved_text(before_m, after["body_x_m"], INVALID_M)

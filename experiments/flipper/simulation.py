@@ -46,6 +46,6 @@ def flipper_bench(
     robot, lockstep = simulated_bench(folder, bench_configuration(), track, seed, True, disturbances)
 
     def position_m(trial: PlannedTrial, prepared: int) -> float:
-        return STRIP_M * list(muds).index(trial.mud) + TRIAL_M * (prepared + 1)
+        return STRIP_M * list(muds).index(trial.group) + TRIAL_M * (prepared + 1)
 
     return robot, CarriedBed(robot, lockstep, position_m)

@@ -77,7 +77,7 @@ def run_flipper(plan: Plan, session: Session, truth_path: Path | None) -> Findin
     """Make the trials and report them. Raises BenchError."""
     truth = load_truth(truth_path) if truth_path else None
     simulated = partial(flipper_bench, session.folder, plan.muds, SEED)
-    bench = open_bench(session, plan.identity, simulated, lambda trial: INSTRUCTIONS)
+    bench = open_bench(session, plan.identity, lambda trial: INSTRUCTIONS, simulated)
     configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
     report = report_of(plan, entries, configuration, truth, bench.notebook.left_out)
     sections = sections_of(report, plan, entries, configuration)

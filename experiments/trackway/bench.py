@@ -3,18 +3,18 @@
 After section III-D of the paper. Each trial begins with the sweep axes over the beginning of the first mud; the body's
 position there is the zero of the track. The trials of the gaits alternate, so that a mud that dries or softens with
 time affects all gaits alike. A walk is stopped when the plates go down past the last mud, after 90 s in one mud, or by
-a fault. A walk that the operator or a fault stopped counts only if the operator says so. Its strides are read from the
-log (log_strides.py), and the table is the same as for the simulated trackway.
+a fault. The operator decides on each walk; one that the operator or a fault stopped is repeated unless a key keeps it.
+The strides are read from the log (log_strides.py), and the table is the same as for the simulated trackway.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
 from math import isfinite, radians, sin
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from experiments.robot.bench_robot import (
     RAISING_S,
@@ -23,20 +23,19 @@ from experiments.robot.bench_robot import (
     BenchRobot,
     Status,
     arm,
-    ask_to_clear_faults,
     disarm,
     follow_walk,
     mode_reason,
     wait_until,
 )
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.trackway.depth_rule import DepthRule
+from experiments.trackway.depth_rule import DepthRule, constant_depth
 from experiments.trackway.log_strides import walked_strides
 from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
 from experiments.trackway.report import Settings, TrackwayReport, table_report
 from experiments.trackway.simulation import STUCK_S
 from experiments.trackway.walk import Walk, WalkedStride, speed_m_s, walk_of
-from experiments.trials.notebook import Notebook
+from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
+from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.counted_nouns import counted
@@ -44,49 +43,10 @@ from firmware_host.operator.counted_nouns import counted
 PATIENCE_S = 900.0  # longest time of a whole walk
 UNSEEN_S = 2.0  # longest time without a pose, before or during a walk: the end of the track is unknown then
 BACKWARDS_M = 0.2  # distance behind the start; no mud pushes the body back so far
-POLL_S = 0.05  # interval at which the status and the prompt are checked
+POLL_S = 0.05  # interval at which the status is checked
 PAST_END = ""  # name of the mud past the end of the trackway
 UNSEEN = "the pose of the body is lost: check that the cameras see the robot's markers"
 BACKWARDS = "the measured position falls while the robot walks: reverse pose.axis, or the sign of metres_per_count"
-KEEP = "k"
-ANSWERS = {GO_ON: "keep it", REDO: "walk it again", SKIP: "leave it out"}
-ANSWERS_IF_STOPPED = {GO_ON: "walk it again", KEEP: "keep it", SKIP: "leave it out"}
-
-
-class Trackway(Protocol):
-    """The operator's work between two trials."""
-
-    def prepare(self, trial: str) -> BenchRobot:
-        """Return the robot at the start of a levelled track."""
-
-    def evaluate(self, summary: str, stopped: bool) -> str:
-        """Return GO_ON to count the trial, SKIP to leave it out, or REDO. `stopped`: it ended early."""
-
-
-class PromptedTrackway:
-    """A Trackway that asks the operator on the terminal."""
-
-    def __init__(self, robot: BenchRobot, operator: Operator) -> None:
-        self._robot = robot
-        self._operator = operator
-
-    def prepare(self, trial: str) -> BenchRobot:
-        disarm(self._robot)
-        ask_to_clear_faults(self._robot, self._operator)
-        question = (
-            f"{trial}. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take"
-            " your hands away: the robot walks next"
-        )
-        self._operator.ask(question, {GO_ON: "the robot may walk"}, self._wait)
-        ask_to_clear_faults(self._robot, self._operator)
-        return self._robot
-
-    def evaluate(self, summary: str, stopped: bool) -> str:
-        answer = self._operator.ask(summary, ANSWERS_IF_STOPPED if stopped else ANSWERS, self._wait)
-        return {GO_ON: REDO, KEEP: GO_ON}.get(answer, answer) if stopped else answer
-
-    def _wait(self) -> None:
-        self._robot.wait(POLL_S)
 
 
 @dataclass(frozen=True)
@@ -109,12 +69,6 @@ class End(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LoggedWalk(Walk):
-    stopped: bool
-    logged: LoggedTime
-
-
-@dataclass(frozen=True)
 class BenchSettings(Settings):
     muds: Sequence[Mud]
 
@@ -133,7 +87,7 @@ class Plan:
     depths_m: tuple[float, ...] = tuple(FIXED_DEPTHS_M.values())
 
     @property
-    def identity(self) -> dict[str, object]:
+    def identity(self) -> Entry:
         """The settings that must not change when an experiment is continued."""
         return {
             "experiment": "trackway",
@@ -142,16 +96,18 @@ class Plan:
         }
 
     @property
-    def rules(self) -> tuple[DepthRule, ...]:
-        """The fixed depths, and the adaptive gait by the method that the robot is configured with."""
-        fixed = (DepthRule(f"{100.0 * depth_m:g} cm", depth_m) for depth_m in self.depths_m)
-        return (*fixed, DepthRule(ADAPTIVE, 0.0, "configured"))
+    def rules(self) -> dict[str, DepthRule]:
+        """By name: the fixed depths, and the adaptive gait by the method that the robot is configured with."""
+        fixed = [constant_depth(depth_m) for depth_m in self.depths_m]
+        return {rule.name: rule for rule in (*fixed, DepthRule(ADAPTIVE, 0.0, "configured"))}
 
-    def orders(self) -> Iterator[tuple[str, DepthRule]]:
-        """Yield each trial's key in the notebook and its rule."""
-        for trial in range(1, self.trials + 1):
-            for rule in self.rules:
-                yield f"{rule.name}, trial {trial}", rule
+    @property
+    def planned(self) -> list[PlannedTrial]:
+        return [
+            PlannedTrial(f"{rule}, trial {number}", rule, number, self.trials)
+            for number in range(1, self.trials + 1)
+            for rule in self.rules
+        ]
 
     def mud_at(self, position_m: float) -> str:
         """Name the mud at a position of the plates: PAST_END after the last, and the first also before the start."""
@@ -159,31 +115,16 @@ class Plan:
         return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if position_m < end_m), PAST_END)
 
 
-def run(plan: Plan, trackway: Trackway, notebook: Notebook, show: Show) -> BenchReport:
-    """Walk every trial that is not in the notebook yet. Raises BenchError where the robot cannot walk."""
-    orders = list(plan.orders())
-    for done, (key, rule) in enumerate(orders):
-        show(done, len(orders))
-        while key not in notebook.entries:
-            _walk_trial(plan, key, rule, trackway, notebook)
-    return report_of(plan, notebook)
+def run(bench: Bench, plan: Plan, show: Show) -> None:
+    """Walk every trial that is not in the notebook yet. Raises BenchError."""
+    conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
 
 
-def _walk_trial(plan: Plan, key: str, rule: DepthRule, trackway: Trackway, notebook: Notebook) -> None:
-    trial = f"{key} of {plan.trials}"
-    robot = trackway.prepare(trial)
-    arm_m = robot.configuration.geometry.flipper_length_m
-    walk = walk_over(robot, plan, rule)
-    verdict = trackway.evaluate(trial_text(trial, walk), walk.stopped)
-    if verdict == REDO:
-        return
-    notebook.write(key, walk.entry | {"arm_m": arm_m, "skipped": verdict == SKIP, "logged": walk.logged})
-
-
-def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
-    """Walk one trial, from torque on to torque off. Raises BenchError, with torque off where the robot answers."""
+def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
+    """Walk one trial, from torque on to torque off. Raises InvalidTrialError for one that was stopped, BenchError."""
+    robot, rule = bench.robot, plan.rules[trial.group]
     _require_pose(robot)
-    arm(robot)
+    arm(robot, bench.operator)
     before = _require_pose(robot)
     start_m = before["body_x_m"]
     robot.call("walk", **({} if rule.method else {"depth_m": rule.depth_m}))
@@ -194,18 +135,19 @@ def walk_over(robot: BenchRobot, plan: Plan, rule: DepthRule) -> LoggedWalk:
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
     strides = walked_strides(log, robot.configuration, lambda position_m: plan.mud_at(position_m - start_m))
-    shifted = [stride._replace(position_m=stride.position_m - start_m) for stride in strides]
+    walk = Walk([stride._replace(position_m=stride.position_m - start_m) for stride in strides], end.why)
     logged = LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"])
-    return LoggedWalk(shifted, end.why, end.stopped, logged)
+    if end.stopped:
+        raise InvalidTrialError(summary_of(walk), walk.entry | {"logged": logged, "remarks": []})
+    return walk.entry | {"logged": logged, "remarks": [summary_of(walk)]}
 
 
 def _require_pose(robot: BenchRobot) -> Status:
-    """Return a status with the body's position. Raises BenchError, with torque off, where there is none."""
+    """Return a status with the body's position. Raises BenchError where there is none."""
     status: Status = robot.call("status")
     begun_s = status["now_s"]
     while status["body_x_m"] is None:
         if status["now_s"] - begun_s > UNSEEN_S:
-            disarm(robot)
             why = status["pose"]["trouble"] or "no pose arrives from motion capture or rail encoder; see [pose]."
             raise BenchError(f"the position of the body is not known: {why} 'mudskipper check' says what to do")
         robot.wait(POLL_S)
@@ -252,45 +194,41 @@ class Progress:
         return End(f"stuck in {mud or 'the end'}") if stuck else None
 
 
-def trial_text(key: str, walk: Walk) -> str:
-    """Summarise a trial in one line."""
+def summary_of(walk: Walk) -> str:
     with_pose = _with_pose(walk)
     speed = f"{100.0 * speed_m_s(with_pose):.1f} cm/s" if with_pose else "no stride with a pose"
     lost = len(walk.strides) - len(with_pose)
     lost_text = f", {lost} of them without a pose" if lost else ""
     fault = f"; {walk.fault}" if walk.fault else ""
-    return f"{key}: {counted(len(walk.strides), 'stride')}{lost_text}, {speed}{fault}"
+    return f"{counted(len(walk.strides), 'stride')}{lost_text}, {speed}{fault}"
 
 
 def _with_pose(walk: Walk) -> list[WalkedStride]:
     return [stride for stride in walk.strides if isfinite(stride.step_m)]
 
 
-def first_walks(plan: Plan, notebook: Notebook) -> dict[str, LoggedTime]:
+def first_walks(plan: Plan, entries: Mapping[str, Entry]) -> dict[str, LoggedTime]:
     """Return the first walk of each gait that counts, by its key in the notebook."""
     first: dict[str, tuple[str, LoggedTime]] = {}
-    for key, rule in plan.orders():
-        entry = notebook.entries[key]
-        if entry["strides"] and not entry["skipped"] and "logged" in entry:
-            first.setdefault(rule.name, (key, LoggedTime(*entry["logged"])))
+    for trial in plan.planned:
+        entry = entries.get(trial.key)
+        if entry and entry["strides"] and "logged" in entry:
+            first.setdefault(trial.group, (trial.key, LoggedTime(*entry["logged"])))
     return dict(first.values())
 
 
-def report_of(plan: Plan, notebook: Notebook) -> BenchReport:
-    """Report all trials. Strides without a position or a length are only counted; those past the end are left out."""
-    walks: dict[str, list[Walk]] = {rule.name: [] for rule in plan.rules}
-    ends: dict[str, Counter[str]] = {rule.name: Counter() for rule in plan.rules}
-    without_pose, left_out, arm_m = 0, 0, 0.0
-    for key, rule in plan.orders():
-        entry = notebook.entries[key]
-        if entry["skipped"]:
-            left_out += 1
-            continue
-        walk, arm_m = walk_of(entry), entry["arm_m"]
+def report_of(plan: Plan, entries: Mapping[str, Entry], arm_m: float) -> BenchReport:
+    """Report the trials that count. Strides without a position are only counted; those past the end are left out."""
+    walks: dict[str, list[Walk]] = {rule: [] for rule in plan.rules}
+    ends: dict[str, Counter[str]] = {rule: Counter() for rule in plan.rules}
+    counting, without_pose = [trial for trial in plan.planned if trial.key in entries], 0
+    for trial in counting:
+        walk = walk_of(entries[trial.key])
         located = _with_pose(walk)
         without_pose += len(walk.strides) - len(located)
-        walks[rule.name].append(Walk([stride for stride in located if stride.mud != PAST_END], walk.fault))
-        ends[rule.name][walk.fault or "past the end"] += 1
+        walks[trial.group].append(Walk([stride for stride in located if stride.mud != PAST_END], walk.fault))
+        ends[trial.group][walk.fault or "past the end"] += 1
     lengths_cm = {mud.name: 100.0 * mud.length_m for mud in plan.muds}
     report = table_report(walks, arm_m, ends, BenchSettings(plan.trials, lengths_cm, plan.muds))
+    left_out = len(plan.planned) - len(counting)
     return BenchReport(**vars(report), left_out=left_out, strides_without_position=without_pose)

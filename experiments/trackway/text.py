@@ -1,16 +1,98 @@
-"""The tables of the trackway experiment for the screen and for its page."""
+"""The trackway's finding, simulated or at the bench: sections with tables and pictures, and tables for the screen.
+
+The figures of walks against time, the paper's figure 8 B to E, come from the logs in the experiment's folder.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from statistics import fmean
 
+from experiments.pictures.recorded_walk import RecordedWalk, numbered_walk
 from experiments.reports.mud_names import mud_label
+from experiments.reports.mud_styles import file_name
+from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import number, table
-from experiments.trackway.bench import BenchReport
+from experiments.robot.log_copies import cut_log
+from experiments.robot.prompt import Operator
+from experiments.trackway import bench, simulation
+from experiments.trackway.bench import BenchReport, LoggedTime
 from experiments.trackway.paper_table import PAPER_TABLE
 from experiments.trackway.report import SpeedCell, TrackwayReport
 from experiments.trackway.simulation import SimulatedReport
+from experiments.trials.mud_trials import open_bench, run_trials
+from experiments.trials.notebook import Notebook
+from experiments.trials.session import Finding, Session
+from firmware_host.log.log_folder import first_path, run_files
+from firmware_host.log_reading.log_reader import LogError, read_log, read_logs
 from firmware_host.operator.counted_nouns import counted
+
+INSTRUCTIONS = (
+    "Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take your hands away: "
+    "the robot walks next"
+)
+WALKS_AND_TABLE = (
+    "Left, as in the paper's figure 8: the first walk of each gait. Right: Table I, the paper's three trials as grey "
+    "bars and ours as dots, each with one standard deviation."
+)
+AGAINST_TIME = (
+    "{}, as figure 8 B to E of the paper: forces, coefficients and depth, then position and steps, against time. The"
+    " shade changes where the robot noticed another mud; 'mudskipper plot' draws the same of any walk."
+)
+
+
+def run_simulated(plan: simulation.Plan, session: Session) -> Finding:
+    return _finding(simulation.run(plan, Notebook(session.folder, plan.identity), session.show))
+
+
+def run_at_bench(plan: bench.Plan, session: Session) -> Finding:
+    """Make the trials and report them. Raises BenchError."""
+    robot_bench = open_bench(session, plan.identity, lambda trial: INSTRUCTIONS)
+    configuration, entries, logs = run_trials(robot_bench, session, lambda: bench.run(robot_bench, plan, session.show))
+    report = bench.report_of(plan, entries, configuration.geometry.flipper_length_m)
+    figures = walk_figures(bench.first_walks(plan, entries), session.folder, session.operator)
+    return _finding(report, logs, figures)
+
+
+def _finding(report: TrackwayReport, logs: Sequence[Path] = (), walks: Sequence[Figure] = ()) -> Finding:
+    from experiments.trackway.plots import plot_trackway  # matplotlib takes its time
+
+    text = trackway_text(report)
+    table = Figure("trackway", WALKS_AND_TABLE, partial(plot_trackway, report))
+    sections = [Section("Table I", screen=text, figures=[table])]
+    if walks:
+        sections.append(Section("Walks against time", "The first walk of each gait that counts.", figures=walks))
+    return Finding(report, "The trackway: Table I of the paper", sections, text, logs)
+
+
+def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, operator: Operator) -> list[Figure]:
+    """Make the figure of each walk whose log is there, and tell the operator why another walk has none."""
+    from experiments.pictures.walk_plot import plot_walk
+
+    figures = []
+    for key, logged in walks.items():
+        try:
+            walk = logged_walk(folder, logged)
+        except LogError as problem:
+            operator.report(f"{key} is not drawn: {problem}")
+        else:
+            figures.append(Figure(f"figure8_{file_name(key)}", AGAINST_TIME.format(key), partial(plot_walk, walk)))
+    return figures
+
+
+def logged_walk(folder: Path, logged: LoggedTime) -> RecordedWalk:
+    """Read a walk from the segments of its log that hold it; others may be missing. Raises LogError."""
+    run, from_s, to_s = logged
+    segments = run_files(folder / first_path(folder, run).name)
+    held = [path for path in segments if len(cut_log(read_log(path, from_s=from_s), from_s, to_s).ticks)]
+    if not held:
+        raise LogError(f"its log is not in {folder}")
+    return numbered_walk(held[0], cut_log(read_logs(held, from_s=from_s), from_s, to_s))
+
+
+# tables
 
 
 def trackway_text(report: TrackwayReport) -> str:

@@ -37,12 +37,12 @@ Truths = dict[int, dict[str, float | None]]  # N/m³ by stride and coefficient
 
 class PlannedTrial(NamedTuple):
     key: str  # in the notebook
-    mud: str
+    group: str  # the mud or the gait whose trials are repetitions
     number: int  # from 1
-    of: int  # trials in this mud
+    of: int  # trials of the group
 
     def __str__(self) -> str:
-        return f"{mud_text(self.mud)}, trial {self.number} of {self.of}"
+        return f"{mud_text(self.group)}, trial {self.number} of {self.of}"
 
 
 class InvalidTrialError(Exception):
@@ -175,16 +175,17 @@ def why_not_simulated(muds: Iterable[str]) -> str | None:
 def open_bench(
     session: Session,
     plan: Entry,
-    simulated: Callable[[], tuple[BenchRobot, MudBed]],
     instructions: Callable[[PlannedTrial], str],
+    simulated: Callable[[], tuple[BenchRobot, MudBed]] | None = None,
 ) -> Bench:
-    """Connect to the daemon's robot, or make a simulated one.
+    """Connect to the daemon's robot, or make a simulated one in a session without a daemon.
 
     `plan` is the notebook's: options that must be the same when an experiment continues. `instructions` say how the
     operator prepares a trial.
     """
     notebook = Notebook(session.folder, plan)
     if session.socket is None:
+        assert simulated is not None
         return Bench(*simulated(), session.operator, notebook)
     robot = DaemonRobot(session.socket)
     return Bench(robot, PromptedBed(robot, session.operator, instructions), session.operator, notebook)
@@ -195,9 +196,7 @@ def run_trials(
 ) -> tuple[Configuration, dict[str, Entry], list[Path]]:
     """Run trials; return the robot's configuration, the entries that count, and the logs.
 
-    The robot is left at rest, however they end.
-
-    Raises BenchError where no entry counts.
+    The robot is left at rest, however they end. Raises BenchError where no entry counts.
     """
     try:
         configuration = bench.robot.configuration

@@ -66,7 +66,7 @@ FINDINGS = "The paper's findings, and ours by its law below the default method's
 def run_walk(plan: Plan, session: Session, truth_path: Path | None) -> Finding:
     """Make the walks and report them. Raises BenchError."""
     truth = load_truth(truth_path) if truth_path else None
-    bench = open_bench(session, plan.identity, partial(walking_bench, session.folder, plan, SEED), _instructions)
+    bench = open_bench(session, plan.identity, _instructions, partial(walking_bench, session.folder, plan, SEED))
     configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
     report = report_of(plan, entries, configuration, truth, bench.notebook.left_out)
     sections = sections_of(report, plan, entries, configuration, truth)

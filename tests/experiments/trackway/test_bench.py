@@ -1,166 +1,98 @@
-"""Table I through the daemon's calls: every trial counts once, stops where it should, and stays in the notebook."""
+"""Table I through the daemon's calls: every walk stops where it should, and the table is made from its log."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from control.modes import Mode
-from control.rate import PERIOD_S
 from experiments.reports.report_page import to_json
-from experiments.robot.bench_robot import BenchError, arm
+from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.robot.prompt import SKIP
 from experiments.trackway.bench import (
-    KEEP,
     UNSEEN_S,
-    LoggedWalk,
+    BenchReport,
     Mud,
     Plan,
     Progress,
-    PromptedTrackway,
     first_walks,
+    measure,
     report_of,
     run,
-    trial_text,
-    walk_over,
+    summary_of,
 )
 from experiments.trackway.plots import plot_trackway
 from experiments.trackway.text import trackway_text
-from experiments.trackway.walk import StrideRecord, Walk, WalkedStride
+from experiments.trackway.walk import Walk, WalkedStride
+from experiments.trials.mud_trials import Bench, InvalidTrialError, counted_entries
 from experiments.trials.notebook import Notebook
-from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading.log_reader import read_log
+from experiments.trials.simulated_bed import CarriedBed, simulated_bench
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
-from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
+from simulation.mud.disturbances import NONE
 from simulation.mud.track import Track
 from tests.scripted_operator import ScriptedOperator
 
 SHORT = Plan((Mud("48.5", 0.3), Mud("53.1", 0.3)), trials=1, depths_m=(0.03,))
 TINY = Plan((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
+COPIES, BEYOND_M = 3, 0.5  # fresh trackways in a row, and the length of mud after each
 
 
-class SimulatedTrackway:
-    """A robot of its own for each trial, and an operator with scripted verdicts."""
-
-    def __init__(self, folder: Path, verdicts: Iterator[str], capture: MotionCaptureParameters = AT_EVERY_TICK) -> None:
-        self.folder, self.verdicts, self.capture = folder, verdicts, capture
-        self.prepared: list[str] = []
-        self.reported: list[str] = []
-        self.truth: list[StrideRecord] = []
-
-    def prepare(self, trial: str) -> LockstepRobot:
-        self.prepared.append(trial)
-        configuration = simulated_configuration()
-        recorder = FileRecorder(self.folder / f"{len(self.prepared)}.mcap", configuration)
-        track = Track([(mud.length_m, MUDS[mud.name]) for mud in SHORT.muds])
-        lockstep = Lockstep(configuration, track, recorder=recorder, motion_capture=self.capture)
-        self.truth.append(StrideRecord(lockstep, track))
-        return WatchedRobot(lockstep, recorder, self.truth[-1])
-
-    def evaluate(self, reported: str, stopped: bool) -> str:
-        self.reported.append(reported)
-        return next(self.verdicts)
+def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = AT_EVERY_TICK) -> Bench:
+    segments = [(mud.length_m, MUDS[mud.name]) for mud in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
+    track, configuration = Track(segments * COPIES), simulated_configuration()
+    robot, lockstep = simulated_bench(folder, configuration, track, 1, False, NONE, motion_capture=capture)
+    bed = CarriedBed(robot, lockstep, lambda trial, prepared: prepared * track.length_m / COPIES)
+    return Bench(robot, bed, ScriptedOperator(*answers), Notebook(folder, {}))
 
 
-class WatchedRobot(LockstepRobot):
-    """A robot that records the plant's strides once a tick."""
-
-    def __init__(self, lockstep: Lockstep, recorder: FileRecorder, truth: StrideRecord) -> None:
-        super().__init__(lockstep, recorder)
-        self._truth = truth
-
-    def wait(self, duration_s: float) -> None:
-        for _ in range(round(duration_s / PERIOD_S)):
-            self.lockstep.step()
-            self._truth.update()
+def walk_all(bench: Bench, plan: Plan) -> BenchReport:
+    run(bench, plan, lambda done, total: None)
+    bench.robot.close()
+    return report_of(plan, counted_entries(bench.notebook), 0.12)
 
 
-class LevellingOperator(ScriptedOperator):
-    """Asserts that the robot cannot move while hands are in the mud."""
-
-    def __init__(self, robot: LockstepRobot) -> None:
-        super().__init__()
-        self.robot = robot
-
-    def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        assert self.robot.call("status")["mode"] == "idle"
-        return super().ask(question, answers, meanwhile)
-
-
-def test_torque_is_off_while_the_operator_levels_the_mud(tmp_path: Path) -> None:
-    robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("any")
-    arm(robot)
-    operator = LevellingOperator(robot)
-    PromptedTrackway(robot, operator).prepare("3 cm, trial 1 of 3")
-    assert operator.asked == [
-        "3 cm, trial 1 of 3. Torque is off: level the mud, and put the sweep axes over the beginning of the first mud."
-        " Take your hands away: the robot walks next"
+def test_every_gait_is_walked_past_the_end_and_reported(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path)
+    report = walk_all(bench, SHORT)
+    operator = bench.operator
+    assert isinstance(operator, ScriptedOperator)
+    assert [message.partition(": ")[0] for message in operator.reported] == [
+        "3 cm, trial 1 of 1",
+        "adaptive, trial 1 of 1",
     ]
-    robot.close()
-
-
-def always(verdict: str) -> Iterator[str]:
-    while True:
-        yield verdict
-
-
-def silent(done: int, total: int) -> None:
-    """Show no progress."""
-
-
-def test_the_table_from_the_log_is_that_of_the_plant(tmp_path: Path) -> None:
-    trackway = SimulatedTrackway(tmp_path, always(GO_ON))
-    report = run(SHORT, trackway, Notebook(tmp_path, {}), silent)
-    assert trackway.prepared == ["3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
-    assert [reported.partition(": ")[0] for reported in trackway.reported] == trackway.prepared
     assert {tuple(ends) for ends in report.ends.values()} == {("past the end",)}
-    for rule, record in zip(("3 cm", "adaptive"), trackway.truth, strict=True):
-        reported, true = report.walks[rule][0], [stride for stride in record.strides if stride.position_m < 0.6]
-        assert len(reported) == len(true) >= 5
-        for stride, truth in zip(reported, true, strict=True):
-            assert stride.mud == truth.mud
-            assert stride.step_cm == pytest.approx(100.0 * truth.step_m, abs=0.05)
-            assert stride.duration_s == pytest.approx(truth.duration_s, abs=0.01)
+    for (strides,) in report.walks.values():
+        assert list(dict.fromkeys(stride.mud for stride in strides)) == ["48.5", "53.1"]
+        assert 0.0 < strides[0].position_cm < 12.0 < strides[-1].position_cm < 60.0
     json.dumps(to_json(report), allow_nan=False)
     plot_trackway(report, tmp_path / "trackway.png")
     assert "Table I" in trackway_text(report)
 
 
-def test_a_repeated_trial_counts_once_a_skipped_one_never_and_a_continued_experiment_repeats_none(
-    tmp_path: Path,
-) -> None:
-    trackway, notebook = SimulatedTrackway(tmp_path, iter([REDO, GO_ON])), Notebook(tmp_path, {})
-    with pytest.raises(StopIteration):  # the operator has gone
-        run(TINY, trackway, notebook, silent)
-    assert trackway.prepared == ["3 cm, trial 1 of 1", "3 cm, trial 1 of 1", "adaptive, trial 1 of 1"]
-    again, notebook = SimulatedTrackway(tmp_path / "again", always(SKIP)), Notebook(tmp_path, {})
-    report = run(TINY, again, notebook, silent)
-    assert again.prepared == ["adaptive, trial 1 of 1"]
-    ((key, logged),) = first_walks(TINY, notebook).items()
-    counted = read_log(tmp_path / "2.mcap")
-    assert (key, logged.run) == ("3 cm, trial 1", counted.metadata["run_id"])
-    walked_s = counted.ticks["stamp_s"][counted.ticks["mode"] == Mode.WALKING]
-    assert logged.from_s < walked_s[0] < walked_s[-1] < logged.to_s
-    assert len(report.walks["3 cm"]) == 1 and report.walks["adaptive"] == []
-    assert report.table["adaptive"]["48.5"].mean is None
+def test_a_walk_that_is_left_out_is_in_no_figure(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path, SKIP)
+    report = walk_all(bench, TINY)
+    assert list(first_walks(TINY, counted_entries(bench.notebook))) == ["adaptive, trial 1"]
+    assert report.walks["3 cm"] == [] and len(report.walks["adaptive"]) == 1
+    assert report.table["3 cm"]["48.5"].mean is None
+    assert "Trials left out: 1." in trackway_text(report)
+    plot_trackway(report, tmp_path / "trackway.png")
 
 
 def test_the_robot_does_not_walk_without_a_pose(tmp_path: Path) -> None:
-    trackway = SimulatedTrackway(tmp_path, always(GO_ON), MotionCaptureParameters(rate_hz=0.001))
+    bench = make_bench(tmp_path, capture=MotionCaptureParameters(rate_hz=0.001))
     with pytest.raises(BenchError, match="the position of the body is not known"):
-        run(TINY, trackway, Notebook(tmp_path, {}), silent)
+        measure(bench, TINY, TINY.planned[0])
 
 
 def test_strides_without_a_pose_are_reported_and_not_counted(tmp_path: Path) -> None:
     capture = MotionCaptureParameters(rate_hz=120.0, dropouts_per_s=1.0, dropout_s=0.4)
-    trackway = SimulatedTrackway(tmp_path, always(GO_ON), capture)
-    report = run(TINY, trackway, Notebook(tmp_path, {}), silent)
+    report = walk_all(make_bench(tmp_path, capture=capture), TINY)
     assert report.strides_without_position > 0
     json.dumps(to_json(report), allow_nan=False)
 
@@ -172,7 +104,7 @@ def test_a_mud_extends_from_its_border_to_the_next(position_m: float, mud: str) 
     assert SHORT.mud_at(position_m) == mud
 
 
-class AlteredRobot(WatchedRobot):
+class AlteredRobot(LockstepRobot):
     """A robot whose status has an altered position, and which gets another request while it walks."""
 
     pose: Callable[[float, float | None], float | None]
@@ -188,35 +120,38 @@ class AlteredRobot(WatchedRobot):
         return answer | {"body_x_m": self.pose(answer["now_s"], answer["body_x_m"])}
 
 
-def altered_walk(
+def stopped_walk(
     folder: Path, pose: Callable[[float, float | None], float | None], asked: tuple[float, str] = (0.0, "")
-) -> tuple[LoggedWalk, float]:
-    """A trial, and when it was over."""
-    robot = SimulatedTrackway(folder, always(GO_ON)).prepare("one")
+) -> tuple[Walk, str, float]:
+    """Return an invalid trial's walk, why it is invalid, and when it was over."""
+    bench = make_bench(folder)
+    robot = bench.robot
     robot.__class__ = AlteredRobot
     assert isinstance(robot, AlteredRobot)
     robot.pose, robot.asked = pose, asked
-    walk = walk_over(robot, SHORT, SHORT.rules[0])
+    with pytest.raises(InvalidTrialError) as invalid:
+        measure(bench, SHORT, SHORT.planned[0])
     assert robot.call("status")["mode"] in ("idle", "fault")
-    return walk, robot.lockstep.now_s
+    assert invalid.value.entry
+    return Walk(invalid.value.entry["strides"], invalid.value.entry["fault"]), str(invalid.value), robot.lockstep.now_s
 
 
 def test_a_robot_whose_pose_is_lost_stops(tmp_path: Path) -> None:
-    walk, over_s = altered_walk(tmp_path, lambda now_s, x_m: x_m if now_s < 4.0 else None)
-    assert "pose of the body is lost" in walk.fault
+    walk, why, over_s = stopped_walk(tmp_path, lambda now_s, x_m: x_m if now_s < 4.0 else None)
+    assert "pose of the body is lost" in walk.fault and walk.fault in why
     assert over_s < 4.0 + UNSEEN_S + 5.0
     assert walk.strides  # from its log
 
 
 def test_a_pose_of_the_wrong_sign_stops_the_walk(tmp_path: Path) -> None:
-    walk, _ = altered_walk(tmp_path, lambda now_s, x_m: x_m and -x_m)
+    walk, *_ = stopped_walk(tmp_path, lambda now_s, x_m: x_m and -x_m)
     assert "reverse pose.axis" in walk.fault
 
 
 @pytest.mark.parametrize(("asked", "reported"), [("stop", "was stopped"), ("disarm", "torque was switched off")])
-def test_a_walk_that_another_client_stops_is_marked_as_stopped(tmp_path: Path, asked: str, reported: str) -> None:
-    walk, _ = altered_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
-    assert reported in walk.fault and walk.stopped
+def test_a_walk_that_another_client_stops_is_invalid(tmp_path: Path, asked: str, reported: str) -> None:
+    walk, *_ = stopped_walk(tmp_path, lambda now_s, x_m: x_m, (5.0, asked))
+    assert reported in walk.fault
 
 
 @pytest.mark.parametrize(
@@ -235,29 +170,7 @@ def test_a_walk_that_arrives_or_gets_stuck_is_not_marked_as_stopped(
     assert end and end.why.startswith(why) and end.stopped is stopped
 
 
-@pytest.mark.parametrize("stopped", [False, True])
-def test_a_stopped_walk_is_repeated_unless_the_operator_says_otherwise(stopped: bool, tmp_path: Path) -> None:
-    robot = SimulatedTrackway(tmp_path, always(GO_ON)).prepare("one")
-    verdicts = {
-        answer: PromptedTrackway(robot, ScriptedOperator(answer)).evaluate("one", stopped)
-        for answer in (GO_ON, SKIP, KEEP if stopped else REDO)
-    }
-    robot.close()
-    assert verdicts == ({GO_ON: REDO, SKIP: SKIP, KEEP: GO_ON} if stopped else {GO_ON: GO_ON, SKIP: SKIP, REDO: REDO})
-
-
 def test_a_trial_is_summarised_in_one_line() -> None:
     stride = WalkedStride("48.5", 0.0, 0.03, 0.1, 2.0, 0.0)
-    assert trial_text("3 cm, trial 1", Walk([stride], "")) == "3 cm, trial 1: 1 stride, 5.0 cm/s"
-    assert trial_text("3 cm, trial 1", Walk([stride, stride], "")).startswith("3 cm, trial 1: 2 strides, ")
-
-
-def test_a_report_without_any_trial_still_has_table_and_picture(tmp_path: Path) -> None:
-    left_out = {"strides": [], "fault": "", "arm_m": 0.12, "skipped": True}
-    notebook = Notebook(tmp_path, {})
-    for key, _ in TINY.orders():
-        notebook.write(key, left_out)
-    report = report_of(TINY, notebook)
-    assert "Trials left out: 2." in trackway_text(report)
-    plot_trackway(report, tmp_path / "trackway.png")
-    assert (tmp_path / "trackway.png").stat().st_size > 0
+    assert summary_of(Walk([stride], "")) == "1 stride, 5.0 cm/s"
+    assert summary_of(Walk([stride, stride], "stuck in 48.5")) == "2 strides, 5.0 cm/s; stuck in 48.5"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.trackway.bench import LoggedTime
-from experiments.trackway.walk_figures import logged_walk, walk_figures
+from experiments.trackway.text import logged_walk, walk_figures
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
