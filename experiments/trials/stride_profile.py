@@ -1,4 +1,4 @@
-"""One stride of one flipper from a log, row by row: angles, depths, loads and forces, as the daemon recorded them.
+"""A stride or walk of one flipper from a log, row by row: angles, depths, loads and forces as the daemon recorded them.
 
 Forces and loads are the estimator's at that time, with the zero that it had then. Rows without motion are thinned, so
 that a stride with pauses of 3 s stays small.
@@ -6,7 +6,7 @@ that a stride with pauses of 3 s stays small.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,14 +20,14 @@ Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
 STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION)
-STROKE_PERIOD, REST_PERIOD = 2, 20  # rows per row that stays
+STROKE_PERIOD, REST_PERIOD, WALK_PERIOD = 2, 20, 5  # rows per row that stays
 DIGITS = 6  # after the point: a microsecond, a micrometre, a micronewton
 
 
 class StrideProfile(NamedTuple):
-    """Times from the first row on; NaN where nothing is known."""
+    """NaN where nothing is known."""
 
-    time_s: Floats
+    time_s: Floats  # of a stride from its first row on, of a walk by the robot's clock
     phase: NDArray[np.int64]  # commanded
     sweep_rad: Floats
     adduction_rad: Floats
@@ -45,23 +45,32 @@ class StrideProfile(NamedTuple):
 
 def profile_of(log: Log, flipper: str, start_s: float) -> StrideProfile:
     """Return the stride under way at `start_s`; no rows where there is none."""
-    ticks, side = log.ticks, FLIPPERS.index(flipper)
-    ticks = ticks[ticks["mode"] == Mode.WALKING]
+    ticks = log.ticks[log.ticks["mode"] == Mode.WALKING]
     later = np.flatnonzero(ticks["stamp_s"] >= start_s)
     rows = ticks[ticks["stride"] == ticks["stride"][later[0]]] if len(later) else ticks[:0]
-    rows = rows[rows["stride"] >= 0]
+    profile = _profile_of_rows(rows[rows["stride"] >= 0], flipper)
+    return profile._replace(time_s=profile.time_s - profile.time_s[:1])
+
+
+def profile_of_walk(log: Log, flipper: str) -> StrideProfile:
+    """Return the rows of all strides, thinned for a picture."""
+    return _profile_of_rows(log.ticks[log.ticks["mode"] == Mode.WALKING][::WALK_PERIOD], flipper)
+
+
+def _profile_of_rows(rows: NDArray[np.void], flipper: str) -> StrideProfile:
+    side = FLIPPERS.index(flipper)
     return StrideProfile(
-        rows["stamp_s"] - (rows["stamp_s"][0] if len(rows) else 0.0),
-        rows["phase"].astype(np.int64),
-        rows["angle_rad"][:, 2 * side],
-        rows["angle_rad"][:, 2 * side + 1],
-        rows["depth_m"][:, side],
-        rows["depth_command_m"],
-        rows["sweep_load_nm"][:, side],
-        rows["adduction_load_nm"][:, side],
-        rows["force_x_n"][:, side],
-        rows["force_z_n"][:, side],
-        rows["body_x_m"],
+        time_s=rows["stamp_s"],
+        phase=rows["phase"].astype(np.int64),
+        sweep_rad=rows["angle_rad"][:, 2 * side],
+        adduction_rad=rows["angle_rad"][:, 2 * side + 1],
+        depth_m=rows["depth_m"][:, side],
+        depth_command_m=rows["depth_command_m"],
+        sweep_nm=rows["sweep_load_nm"][:, side],
+        adduction_nm=rows["adduction_load_nm"][:, side],
+        force_x_n=rows["force_x_n"][:, side],
+        force_z_n=rows["force_z_n"][:, side],
+        body_m=rows["body_x_m"],
     )
 
 
@@ -82,21 +91,14 @@ def thinned(profile: StrideProfile) -> StrideProfile:
 
 def profile_row(profile: StrideProfile) -> dict[str, list[float | None]]:
     """Convert to JSON lists."""
-    return row_of_columns(profile._asdict())
+    return {name: [_known(value) for value in column.tolist()] for name, column in profile._asdict().items()}
 
 
 def profile_from_row(row: Mapping[str, Any]) -> StrideProfile:
-    return StrideProfile(**columns_of_row(row, StrideProfile._fields))
+    """Convert from JSON lists; a column that an older notebook does not have is empty."""
+    columns: dict[str, Any] = {name: np.array(row.get(name, ()), np.float64) for name in StrideProfile._fields}
+    return StrideProfile(**columns | {"phase": np.array(row["phase"], np.int64)})
 
 
-def row_of_columns(columns: Mapping[str, NDArray[Any]]) -> dict[str, list[float | None]]:
-    return {name: [known(value) for value in column.tolist()] for name, column in columns.items()}
-
-
-def columns_of_row(row: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    """Convert from JSON lists; phases are integers."""
-    return {name: np.array(row[name], np.int64 if name == "phase" else np.float64) for name in names}
-
-
-def known(value: float) -> float | None:
+def _known(value: float) -> float | None:
     return round(value, DIGITS) if np.isfinite(value) else None

@@ -28,14 +28,13 @@ from experiments.robot.bench_robot import (
     wait_until,
     walk,
 )
-from experiments.trackway.bench import Mud, reach_of
+from experiments.trackway.bench import UNSEEN, UNSEEN_S, Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
-from experiments.trials.stride_profile import profile_of, profile_row, slip_m, thinned
+from experiments.trials.stride_profile import profile_of, profile_of_walk, profile_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
-from experiments.walk.walk_profile import walk_profile_of, walk_profile_row
 from firmware_host.log_reading.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
@@ -44,7 +43,6 @@ SOFT = ("53.1", "51.2")
 SOFT_DEPTHS_M = (0.03, 0.05)
 METHODS = (DEFAULT, PAPER, COMPENSATED)
 BORDER_M = 0.03  # a plate closer to a border than this may be in either mud
-LOST_S = 2.0  # longest time without a pose in a walk that began with one
 STUCK_S, ADVANCED_M = 60.0, 0.03  # longest time in which the body advances by less
 SLIP_ALLOWANCE = 4  # ordered strides, as a multiple of those of a robot that never slips
 DRAWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start from a standing body
@@ -135,8 +133,8 @@ def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     made = count_strides(fetch_strides(robot, before["strides_closed"]))
     log = robot.record(before["now_s"], after["now_s"])
     entry = _entry(bench, plan, trial, log, before["strides_closed"])
-    profile = walk_profile_row(walk_profile_of(log, plan.flipper))
-    entry |= {"start_m": start_m, "course": profile, "remarks": remarks + [end] * bool(end)}
+    profile = profile_of_walk(log, plan.flipper)
+    entry |= {"start_m": start_m, "course": profile_row(profile), "remarks": remarks + [end] * bool(end)}
     _add_slips(entry, log, plan.flipper, robot.configuration.geometry.flipper_length_m)
     if after["notice"]:
         raise InvalidTrialError(after["notice"], entry)
@@ -184,7 +182,8 @@ class Advance:
         if self._start_m is None:
             return None
         if body_m is None:
-            self._require_recent_pose(now_s)
+            if now_s - self._seen_s > UNSEEN_S:
+                raise InvalidTrialError(UNSEEN)
             return None
         self._seen_s = now_s
         if body_m > self._farthest_m + ADVANCED_M:
@@ -194,10 +193,6 @@ class Advance:
         if now_s - self._advanced_s > STUCK_S:
             return f"the robot got stuck after {100.0 * (self._farthest_m - self._start_m):.0f} cm"
         return None
-
-    def _require_recent_pose(self, now_s: float) -> None:
-        if now_s - self._seen_s > LOST_S:
-            raise InvalidTrialError("the pose of the body is lost: check that the cameras see the robot's markers")
 
 
 def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:

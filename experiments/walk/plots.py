@@ -18,11 +18,10 @@ from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.notebook import Entry
-from experiments.trials.stride_profile import profile_from_row
+from experiments.trials.stride_profile import StrideProfile, profile_from_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import Plan
 from experiments.walk.report import LocatedStride, SoftMud
-from experiments.walk.walk_profile import WalkProfile, walk_profile_of_row
 
 THIN: dict[str, Any] = {"linewidth": 0.8}
 METHOD_STYLES: dict[str, dict[str, Any]] = {
@@ -45,7 +44,7 @@ DEPTH_STYLES: dict[float, dict[str, Any]] = {
 
 def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[LocatedStride], reach_m: float, path: Path) -> None:
     """Draw position, forces and coefficients of one walk against time: figure 6."""
-    profile = walk_profile_of_row(walk["course"])
+    profile = profile_from_row(walk["course"])
     own = [each for each in strides if each.trial == walk["trial"]]
     begun_s = float(profile.time_s[0])
     borders_s = _borders_s(plan, walk, profile, own, reach_m)
@@ -68,7 +67,7 @@ def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[LocatedStride], re
 
 
 def _borders_s(
-    plan: Plan, walk: Entry, profile: WalkProfile, own: Sequence[LocatedStride], reach_m: float
+    plan: Plan, walk: Entry, profile: StrideProfile, own: Sequence[LocatedStride], reach_m: float
 ) -> list[float]:
     """Return when the plates first went down past each border; by the order of the strides where there is no pose."""
     found = []
@@ -88,7 +87,7 @@ def _name_muds(panel: Axes, plan: Plan, edges_s: Sequence[float], begun_s: float
         panel.annotate(mud_text(mud.name), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
 
 
-def _plot_position(panel: Axes, walk: Entry, profile: WalkProfile, begun_s: float) -> None:
+def _plot_position(panel: Axes, walk: Entry, profile: StrideProfile, begun_s: float) -> None:
     panel.set_ylabel("body (cm)")
     if walk["start_m"] is None:
         panel.text(0.5, 0.5, "no pose", transform=panel.transAxes, ha="center", color=GREY)
@@ -96,7 +95,7 @@ def _plot_position(panel: Axes, walk: Entry, profile: WalkProfile, begun_s: floa
     panel.plot(profile.time_s - begun_s, 100.0 * (profile.body_m - walk["start_m"]), color=INK, linewidth=1.2)
 
 
-def _plot_force(panel: Axes, profile: WalkProfile, force_n: Any, begun_s: float, label: str) -> None:
+def _plot_force(panel: Axes, profile: StrideProfile, force_n: Any, begun_s: float, label: str) -> None:
     """Draw a force coloured by phase, as in the paper; the line is grey outside of the strokes."""
     time_s = profile.time_s - begun_s
     panel.plot(time_s, force_n, color="#bbbbbb", **THIN)

@@ -8,8 +8,15 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.trials.stride_profile import profile_from_row, profile_of, profile_row, slip_m, thinned
-from experiments.walk.walk_profile import PERIOD_ROWS, walk_profile_of, walk_profile_of_row, walk_profile_row
+from experiments.trials.stride_profile import (
+    WALK_PERIOD,
+    profile_from_row,
+    profile_of,
+    profile_of_walk,
+    profile_row,
+    slip_m,
+    thinned,
+)
 from tests.experiments.synthetic_strides import make_log, make_profile, make_ticks
 
 STROKE = [Phase.INSERTION] * 30 + [Phase.PAUSE] * 100 + [Phase.STANCE] * 30
@@ -71,10 +78,6 @@ def test_a_course_is_the_same_out_of_the_notebook() -> None:
     assert np.isnan(read.force_x_n).all()
 
 
-def test_a_walk_is_thin_and_the_same_out_of_the_notebook() -> None:
+def test_a_walk_has_the_rows_of_all_its_strides_thinned() -> None:
     log = make_log(make_ticks(STROKE, 0, 0.0), make_ticks(STROKE, 1, 2.0))
-    profile = walk_profile_of(log, "left")
-    assert len(profile.time_s) == 2 * len(STROKE) // PERIOD_ROWS
-    read = walk_profile_of_row(json.loads(json.dumps(walk_profile_row(profile))))
-    assert np.array_equal(read.phase, profile.phase)
-    assert np.allclose(read.time_s, profile.time_s)
+    assert len(profile_of_walk(log, "left").time_s) == 2 * len(STROKE) // WALK_PERIOD
