@@ -12,11 +12,11 @@ from experiments.estimation.evaluation import (
     SINGLE_WATERS,
     WALKING_WATERS,
     Plan,
-    estimation_finding,
     evaluate,
     report_of,
     with_layers,
 )
+from experiments.estimation.text import estimation_finding
 from simulation.mud.clay import Clay, clay_of_water
 
 

@@ -6,8 +6,8 @@ import argparse
 
 from command_line.experiments.conduct import conduct, refuse
 from experiments.faults import matrix
-from experiments.faults.matrix import faults_finding
 from experiments.faults.phases import PHASES
+from experiments.faults.text import faults_finding
 
 
 def run_faults(options: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from experiments.mud_fit import mud_fit
 from experiments.mud_fit.mud_fit import fit_finding
 from experiments.reports.mud_names import mud_name
 from experiments.sweep import sweep
-from experiments.sweep.sweep import sweep_finding
+from experiments.sweep.text import sweep_finding
 from experiments.trackway import bench, simulation
 from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
 from experiments.trackway.text import run_at_bench, run_simulated

@@ -18,11 +18,9 @@ from control.records import StrideEstimate
 from estimation.mud import EstimationParameters, PaperEstimationParameters
 from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, PlateRow, error_rows, plate_rows
-from experiments.reports.mud_names import mud_text
-from experiments.reports.text_tables import number, table
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.trials.parallel_trials import run_parallel
-from experiments.trials.session import Finding, Show, screen_finding
+from experiments.trials.session import Show
 from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
 from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances
@@ -190,41 +188,3 @@ def report_of(plan: Plan, outcome: Outcome) -> EstimationReport:
             torque_error=TORQUE_ERROR if plan.torque else 0.0,
         ),
     )
-
-
-def estimation_finding(report: EstimationReport) -> Finding:
-    from experiments.estimation.plots import plot_errors  # matplotlib takes its time
-
-    return screen_finding(report.experiment, report, estimation_text(report), partial(plot_errors, report))
-
-
-def estimation_text(report: EstimationReport) -> str:
-    heads = ["median", "p95", "bias", "in 95 %", "strides", "bounds", "hold", "not valid"]
-    rows = [["setup", "mud", "", "method", *heads]]
-    for row in report.errors:
-        errors = [_percent(value) for value in (row.median, row.p95, row.bias, row.coverage)]
-        counts = [str(row.strides), str(row.bounds), _percent(row.bounds_hold), str(row.not_valid)]
-        rows.append([row.setup, mud_text(row.mud), row.coefficient, row.method, *errors, *counts])
-    return "\n\n".join([table(rows), _plates_text(report.plates), _boundaries_text(report.boundaries)])
-
-
-def _plates_text(plates: Sequence[PlateRow]) -> str:
-    rows = [["setup", "mud", "", "upright / leaning plate", "estimate / upright", "fraction due to the lean"]]
-    for row in plates:
-        ratios = [number(row.upright_over_leaning), number(row.estimate_over_upright), _percent(row.lean_fraction)]
-        rows.append([row.setup, mud_text(row.mud), row.coefficient, *ratios])
-    return "The paper's upright plate (section II-E)\n" + table(rows)
-
-
-def _boundaries_text(boundaries: Sequence[BoundaryRow]) -> str:
-    if not boundaries:
-        return "Mud boundaries: no walk over any"
-    rows = [["from", "to", "transitions", "followed within two strides", "most strides"]]
-    for row in boundaries:
-        counts = [str(row.transitions), _percent(row.within_two), str(row.most_strides)]
-        rows.append([mud_text(row.before), mud_text(row.after), *counts])
-    return "Mud boundaries\n" + table(rows)
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100.0 * value:.1f} %"

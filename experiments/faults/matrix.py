@@ -16,9 +16,8 @@ from experiments.faults.cell import run_cell
 from experiments.faults.evaluation import Cell
 from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES
 from experiments.faults.phases import PHASES
-from experiments.reports.text_tables import number, table
 from experiments.trials.parallel_trials import run_parallel
-from experiments.trials.session import Ending, Finding, Show, screen_finding
+from experiments.trials.session import Show
 
 FAULTS = tuple(dict.fromkeys(mode.fault for mode in FAILURE_MODES))
 
@@ -116,32 +115,3 @@ def _summary(cells: Sequence[Cell]) -> ModeSummary:
         peak_torque_nm=max(cell.peak_torque_nm for cell in cells),
         travel_rad=max((cell.travel_rad for cell in cells if cell.travel_rad is not None), default=None),
     )
-
-
-def faults_finding(report: FaultsReport) -> Finding:
-    from experiments.faults.plots import plot_faults  # matplotlib takes its time
-
-    ending = Ending.DONE if report.ok == len(report.cells) else Ending.UNHEALTHY
-    return screen_finding(report.experiment, report, faults_text(report), partial(plot_faults, report), ending)
-
-
-def faults_text(report: FaultsReport) -> str:
-    head = ["fault", "reaction", "ok", "slowest (ticks)", "bound (ticks)", "peak torque (N·m)", "travel (rad)"]
-    rows = [
-        [
-            row.mode_name,
-            row.reaction.replace("_", " "),
-            f"{row.ok}/{row.cells}",
-            number(row.slowest_ticks, 0),
-            number(row.bound_ticks, 0),
-            number(row.peak_torque_nm, 2),
-            number(row.travel_rad, 2),
-        ]
-        for row in report.faults
-    ]
-    failed = [
-        f"{cell.mode_name} in {cell.phase}, seed {cell.seed}: {'; '.join(cell.why)}"
-        for cell in report.cells
-        if not cell.ok
-    ]
-    return "\n".join([table([head, *rows]), "", *failed, f"{report.ok} of {len(report.cells)} cells ok"])

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from statistics import fmean, median
 
-from experiments.reports.text_tables import number, table
 from experiments.trackway.depth_rule import METHODS, chosen_by, configuration_for
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
@@ -30,7 +29,7 @@ from experiments.trackway.one_mud import (
 from experiments.trackway.report import count_failures
 from experiments.trackway.walk import Walk
 from experiments.trials.parallel_trials import run_parallel
-from experiments.trials.session import Finding, Show, screen_finding
+from experiments.trials.session import Show
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
 
@@ -155,27 +154,3 @@ def _count(walks: Sequence[Walk], skipped: int) -> tuple[int, Mapping[str, int],
     counted = [walk.strides[skipped:] for walk in walks]
     faults = sorted({walk.fault for walk in walks if walk.fault})
     return sum(len(strides) for strides in counted), count_failures(counted, arm_m), faults
-
-
-def sweep_finding(report: SweepReport) -> Finding:
-    from experiments.sweep.plots import plot_sweep  # matplotlib takes its time
-
-    return screen_finding(report.experiment, report, sweep_text(report), partial(plot_sweep, report))
-
-
-def sweep_text(report: SweepReport) -> str:
-    methods = report.settings.methods
-    heads = [f"{method}: depth, speed (cm/s), % of best, failed" for method in methods]
-    rows = [["strength", "best depth", "speed (cm/s)", *heads]]
-    for mud in report.strengths:
-        cells = [_cell(mud.methods[method]) for method in methods]
-        rows.append([f"{mud.strength_pa:g} Pa", f"{mud.best.depth_cm:g} cm", f"{mud.best.mean:.2f}", *cells])
-    title = "Speed at the best constant depth, and where each method settles (after its second stride)"
-    return f"{title}\n{table(rows)}"
-
-
-def _cell(settled: SettledMethod) -> str:
-    failed = sum(settled.failures.values())
-    fault = ", fault" if settled.faults else ""
-    fraction = "-" if settled.fraction_of_best is None else f"{100.0 * settled.fraction_of_best:3.0f} %"
-    return f"{number(settled.depth_cm, 2)} cm  {settled.mean:5.2f}  {fraction}  {failed}/{settled.strides}{fault}"

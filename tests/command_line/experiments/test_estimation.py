@@ -20,7 +20,8 @@ import command_line.experiments.estimation
 from command_line import exit_codes
 from command_line.main import main
 from experiments.estimation.boundaries import BoundaryRow
-from experiments.estimation.evaluation import Outcome, Plan, estimation_text, report_of
+from experiments.estimation.evaluation import Outcome, Plan, report_of
+from experiments.estimation.text import estimation_text
 from experiments.reports.error_table import ErrorRow, PlateRow
 from simulation.mud.clay import MUDS, Clay
 from tests.command_line.command_lines import refusal
