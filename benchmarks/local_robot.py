@@ -1,4 +1,4 @@
-"""Runs the daemon and the simulated robot as processes on local buses, for benchmarks that kill or soak them."""
+"""Runs the daemon and the simulated robot as processes on local buses, for benchmarks that kill or time them."""
 
 from __future__ import annotations
 
@@ -12,39 +12,32 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from firmware_host.operator.status_client import NoDaemonError, StatusClient
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 
 LONGEST_WAIT_S = 60.0
 
 
-def start(module: str, configuration: Path) -> subprocess.Popen[bytes]:
-    """Starts a module as the leader of a session of its own."""
-    command = [sys.executable, "-m", module, "--config", str(configuration)]
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen(command, start_new_session=True, stdout=quiet, stderr=quiet)
-
-
 def kill_session(process: subprocess.Popen[bytes]) -> None:
-    """Kills a process of `start` with its children."""
+    """Kills a process of LocalRobot with its children."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
-def wait_for(condition: Callable[[], bool], longest_s: float = LONGEST_WAIT_S, period_s: float = 0.02) -> bool:
+def wait_for(condition: Callable[[], bool]) -> bool:
     """Waits for a condition, in which a daemon may not answer yet; returns whether it came about."""
-    deadline_s = time.monotonic() + longest_s
+    deadline_s = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < deadline_s:
         with suppress(NoDaemonError, OSError):
             if condition():
                 return True
-        time.sleep(period_s)
+        time.sleep(0.005)
     return False
 
 
 class LocalRobot:
-    """Owns the processes of a robot, which starts at once, and of its daemon."""
+    """Owns the processes of a robot, which starts at once, and of its daemon. Each leads a session of its own."""
 
     def __init__(self, folder: Path, log_lines: str = "") -> None:
         """`log_lines`: further lines of the configuration's log section."""
@@ -52,12 +45,16 @@ class LocalRobot:
         self.configuration = write_local_setup(folder, self.logs)
         text = self.configuration.read_text(encoding="utf-8")
         self.configuration.write_text(text.replace("[log]\n", f"[log]\n{log_lines}"), encoding="utf-8")
-        self._robot = start("simulation.harness.peer", self.configuration)
-        self._daemon: subprocess.Popen[bytes] | None = None
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._start("simulation.harness.peer")
 
     def start_daemon(self) -> subprocess.Popen[bytes]:
-        self._daemon = start("firmware_host.daemon", self.configuration)
-        return self._daemon
+        return self._start("firmware_host.daemon")
+
+    def _start(self, module: str) -> subprocess.Popen[bytes]:
+        command, quiet = [sys.executable, "-m", module, "--config", str(self.configuration)], subprocess.DEVNULL
+        self._processes.append(subprocess.Popen(command, start_new_session=True, stdout=quiet, stderr=quiet))
+        return self._processes[-1]
 
     def call(self, method: str, **params: Any) -> Any:
         """Calls the daemon on a connection of its own."""
@@ -67,12 +64,26 @@ class LocalRobot:
         finally:
             client.close()
 
-    def replace_robot(self) -> None:
-        """Replaces the robot by a new one: its joints are in range and its drives start again."""
-        kill_session(self._robot)
-        self._robot = start("simulation.harness.peer", self.configuration)
+    def walk_until(self, phase: str) -> bool:
+        """Arms and walks; returns whether this phase, or `hold` before the walk, was reached without a fault."""
+        if not self._reaches("idle"):
+            return False
+        with suppress(CallRefusedError):
+            self.call("arm")
+            if self._reaches("hold") and phase != "hold":
+                self.call("walk", depth_m=0.03)
+        return self._reaches(phase)
+
+    def _reaches(self, mode_or_phase: str) -> bool:
+        report: dict[str, Any] = {}
+
+        def is_decided() -> bool:
+            report.update(self.call("status"))
+            ready = report["mode"] != "idle" or report["fault"] is None
+            return ready and bool({report["mode"], report["phase"]} & {mode_or_phase, "fault", "damping"})
+
+        return wait_for(is_decided) and mode_or_phase in (report["mode"], report["phase"])
 
     def end(self) -> None:
-        if self._daemon is not None:
-            kill_session(self._daemon)
-        kill_session(self._robot)
+        for process in reversed(self._processes):
+            kill_session(process)

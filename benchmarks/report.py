@@ -1,7 +1,8 @@
-"""Runs every benchmark: it parses the arguments, measures, and prints one JSON object, or tables and a verdict.
+"""Runs every benchmark: reads the options, measures, and prints one JSON object that ends in a verdict.
 
-A benchmark of figures does not judge them: it ends with status 0, and its verdict says whether its bar was reached. A
-benchmark that looks for defects ends with status 1 where its bar is missed. One line on a terminal shows the progress.
+A benchmark of speed does not judge its figures: it ends with status 0, and its verdict says whether its bar was
+reached. One of stress looks for defects and ends with status 1 where its bar is missed. One line on a terminal shows
+the progress.
 """
 
 from __future__ import annotations
@@ -9,71 +10,38 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from inspect import Parameter, getfile, getmodule, signature
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from experiments.reports.text_tables import table
-
 FAST_FOLDER = Path("/dev/shm")  # spares the disk
 
 
-def new_parser(module: str, description: str | None) -> argparse.ArgumentParser:
+def run_benchmark(measure: Callable[..., dict[str, Any]], arguments: Sequence[str] | None = None) -> int:
+    """Calls `measure` with an empty folder and the options, prints its report, and returns the exit status.
+
+    The keyword-only arguments of `measure` are the options; each has a default, which fixes its type.
+    """
+    path = Path(getfile(measure))
     parser = argparse.ArgumentParser(
-        prog=f"python -m {module}",
-        description=description,
+        prog=f"python -m benchmarks.{path.parent.name}.{path.stem}",
+        description=getattr(getmodule(measure), "__doc__", None),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")
-    return parser
-
-
-def run_benchmark(
-    parser: argparse.ArgumentParser,
-    arguments: Sequence[str] | None,
-    measure: Callable[[argparse.Namespace, Path], dict[str, Any]],
-    finds_defects: bool = False,
-) -> int:
-    """Runs `measure` with the options and an empty folder, prints its report, and returns the exit status."""
-    options = parser.parse_args(arguments)
+    parser.add_argument("--json", action="store_true", help="print the report on one line")
+    for name, option in signature(measure).parameters.items():
+        if option.kind is Parameter.KEYWORD_ONLY:
+            kind = type(option.default)
+            parser.add_argument(f"--{name.replace('_', '-')}", type=kind, default=option.default, help="%(default)s")
+    options = vars(parser.parse_args(arguments))
+    indent = None if options.pop("json") else 1
     with TemporaryDirectory(prefix="mud-", dir=FAST_FOLDER if FAST_FOLDER.is_dir() else None) as folder:
-        report = {"benchmark": parser.prog.split(".")[-1]} | measure(options, Path(folder))
-    Progress(1.0).clear()
-    print(json.dumps(report) if options.json else "\n".join([*report_lines(report), report["verdict"]]))
-    return 1 if finds_defects and not report["reached"] else 0
-
-
-def report_lines(report: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    """Yields the figures of a report: records with equal keys as one table, any other value on a line of its own."""
-    for name, value in report.items():
-        rows = record_rows(value)
-        if rows:
-            yield f"{prefix}{name}:\n{table(rows)}\n"
-        elif isinstance(value, dict) and any(isinstance(inner, dict | list) for inner in value.values()):
-            yield from report_lines(value, f"{prefix}{name} ")
-        elif name != "verdict":
-            yield f"{prefix}{name}: {cell_text(value)}"
-
-
-def record_rows(records: Any) -> list[list[str]]:
-    """Returns the rows of a table, head first; none where the value is not a collection of records with equal keys."""
-    named = records if isinstance(records, dict) else dict(enumerate(records if isinstance(records, list) else [], 1))
-    values = list(named.values())
-    if not values or not all(isinstance(value, dict) and value.keys() == values[0].keys() for value in values):
-        return []
-    if any(isinstance(inner, dict) for value in values for inner in value.values()):
-        return []
-    return [["", *values[0]], *([str(name), *map(cell_text, value.values())] for name, value in named.items())]
-
-
-def cell_text(value: Any) -> str:
-    """Writes a value on one line."""
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {cell_text(inner)}" for name, inner in value.items()) or "none"
-    if isinstance(value, list):
-        return "; ".join(map(cell_text, value)) or "none"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+        report = {"benchmark": path.stem} | measure(Path(folder), **options)
+    show_progress(1, 1, "done\n")
+    print(json.dumps(report, indent=indent))
+    return 1 if path.parent.name == "stress" and not report["reached"] else 0
 
 
 def evaluated(report: dict[str, Any], bar: str, reached: bool) -> dict[str, Any]:
@@ -88,18 +56,7 @@ def summary_us(durations_s: Sequence[float]) -> dict[str, float]:
     return {name: round(1e6 * ordered[round(fraction * last)], 2) for name, fraction in fractions.items()}
 
 
-class Progress:
-    """One line on a terminal's stderr, silent anywhere else."""
-
-    def __init__(self, total: float) -> None:
-        self._total = total
-        self._shown = sys.stderr.isatty()
-
-    def show(self, done: float, what: str) -> None:
-        if self._shown:
-            fraction = min(1.0, done / self._total)
-            print(f"\r\033[K{fraction:4.0%}  {what}", end="", file=sys.stderr, flush=True)
-
-    def clear(self) -> None:
-        if self._shown:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
+def show_progress(done: float, total: float, what: str) -> None:
+    """Writes one line on a terminal's stderr, and nothing anywhere else."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{min(1.0, done / total):4.0%}  {what}", end="", file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""Measures the cost of one flipper's estimator: the time of a sample and of a stride's end, and the memory.
+"""Measures the cost of one flipper's estimator: the time of a sample and of a stride's end.
 
 The flipper walks strides of 3 cm (benchmarks/speed/synthetic_walk.py). Every figure is the median over the strides of
 one run in one process, with garbage collection off as in the daemon. The samples within a stroke are timed together;
@@ -8,27 +8,15 @@ alternates with ours, stride by stride, so both see the same machine.
 
 from __future__ import annotations
 
-import argparse
-import gc
 import sys
-import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Any
 
-from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
-from benchmarks.speed.synthetic_walk import (
-    DRIVE,
-    GEOMETRY,
-    K_E,
-    K_P,
-    K_S,
-    Sample,
-    later,
-    stride_samples,
-)
+from benchmarks.report import evaluated, run_benchmark, show_progress
+from benchmarks.speed.synthetic_walk import DRIVE, GEOMETRY, K_E, K_P, K_S, Sample, later, stride_samples
 from control.rate import PERIOD_S
 from control.records import Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
@@ -91,11 +79,11 @@ class TimedWalk:
         }
 
 
-def measure_strides(strides: int, progress: Progress) -> dict[str, Any]:
+def measure_strides(strides: int) -> dict[str, Any]:
     samples = stride_samples()
     walks = {name: TimedWalk(flipper, samples) for name, flipper in new_flippers().items()}
     for stride in range(WARM_UP_STRIDES + strides):
-        progress.show(stride, "strides")
+        show_progress(stride, WARM_UP_STRIDES + strides, "strides")
         for walk in walks.values():
             if stride == WARM_UP_STRIDES:
                 walk.forget()
@@ -103,42 +91,9 @@ def measure_strides(strides: int, progress: Progress) -> dict[str, Any]:
     return {name: walk.report() for name, walk in walks.items()}
 
 
-def measure_memory(strides: int, progress: Progress, done: float) -> dict[str, float]:
-    """Bytes that Python holds more after the last stride than after the first tenth of them.
-
-    Each reading follows a collection, which also empties Python's own lists of freed tuples.
-    """
-    flipper, samples = new_flippers()["default"], stride_samples()
-    stride_s, settled, held_bytes = samples[-1].now_s + PERIOD_S, max(1, strides // 10), 0
-    tracemalloc.start()
-    for stride in range(strides):
-        progress.show(done + stride, "memory")
-        for sample in samples:
-            (moved,) = later([sample], stride * stride_s)
-            flipper.update(*moved)
-        if stride + 1 == settled:
-            held_bytes, _ = _traced_bytes()
-    now_bytes, peak_bytes = _traced_bytes()
-    tracemalloc.stop()
-    return {
-        "strides": strides,
-        "held_bytes": now_bytes,
-        "peak_bytes": peak_bytes,
-        "growth_bytes": now_bytes - held_bytes,
-    }
-
-
-def _traced_bytes() -> tuple[int, int]:
-    gc.collect()
-    return tracemalloc.get_traced_memory()
-
-
-def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    strides, memory_strides = options.strides, options.memory_strides
-    progress = Progress(WARM_UP_STRIDES + strides + memory_strides)
+def measure(folder: Path, *, strides: int = 200) -> dict[str, Any]:
     freeze_garbage()
-    report: dict[str, Any] = {"strides": strides, "methods": measure_strides(strides, progress)}
-    report["memory"] = measure_memory(memory_strides, progress, WARM_UP_STRIDES + strides)
+    report: dict[str, Any] = {"strides": strides, "methods": measure_strides(strides)}
     report |= {"bar_sample_us": BAR_SAMPLE_US, "bar_close_us": BAR_CLOSE_US}
     ours = report["methods"]["default"]
     reached = ours["sample_mean_us"] <= BAR_SAMPLE_US and ours["close_total_us"] <= BAR_CLOSE_US
@@ -146,12 +101,5 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return evaluated(report, bar, reached)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("benchmarks.speed.estimator_cost", __doc__)
-    parser.add_argument("--strides", type=int, default=200, help="timed, of each method")
-    parser.add_argument("--memory-strides", type=int, default=1000, help="in which the memory may not grow")
-    return run_benchmark(parser, arguments, measure)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_benchmark(measure))

@@ -84,7 +84,7 @@ VARIANTS: dict[str, Callable[[Path], PortPair]] = {
     "mock": mock_pair,
     "local": lambda channel: python_can_pair("mudskipper_local", channel),
     "socketcan": lambda channel: socketcan_pair(SocketcanPort),
-    "socketcan by python-can": lambda channel: socketcan_pair(PythonCanPort),
+    "python-can": lambda channel: socketcan_pair(PythonCanPort),
 }
 
 

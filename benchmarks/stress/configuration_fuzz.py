@@ -9,20 +9,20 @@ example), but no tick may raise an exception, and a disarmed robot may send no f
 
 from __future__ import annotations
 
-import argparse
-import resource
 import sys
 import time
+import traceback
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
+from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.stress.can_fuzz import is_forbidden, is_ours, open_third_node
-from benchmarks.stress.malformed_configurations import CandidateFile, MalformedConfigurations
+from benchmarks.stress.malformed_configurations import CandidateFile, next_file
+from benchmarks.stress.resources import peak_kib
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.configuration.configuration import Configuration
@@ -56,23 +56,23 @@ class Fuzzing:
         self.bugs.append(f"{file.kind}: {what[:300]}")
 
 
-def fuzz(count: int, seed: int, folder: Path, progress: Progress) -> Fuzzing:
-    source, found, path = MalformedConfigurations(seed), Fuzzing(), folder / "candidate.toml"
+def fuzz(count: int, seed: int, path: Path) -> Fuzzing:
+    chance, found = Random(seed), Fuzzing()
     for number in range(count):
-        file = source.next_file()
+        file = next_file(chance)
         path.write_bytes(file.data)
         found.kinds[file.kind] += 1
         read = load(file, path, found)
         if read is not None:
             found.accepted[file.kind] += 1
             try_out(file, read, sum(found.accepted.values()) % ARMED_FRACTION == 0, found)
-        progress.show(number, "files")
+        show_progress(number, count, "files")
     return found
 
 
 def load(file: CandidateFile, path: Path, found: Fuzzing) -> Configuration | World | None:
     """Reads a file as the daemon or the simulated robot does."""
-    peak_kib, begin_s = _peak_kib(), time.thread_time()
+    before_kib, begin_s = peak_kib(), time.thread_time()
     read: Configuration | World | None = None
     try:
         read = load_world(path) if file.is_world else load_configuration(path)
@@ -87,12 +87,8 @@ def load(file: CandidateFile, path: Path, found: Fuzzing) -> Configuration | Wor
     else:
         if file.wrong_key:
             found.note(file, f"{file.wrong_key} was accepted")
-    _measure(file, time.thread_time() - begin_s, _peak_kib() - peak_kib, found)
+    _measure(file, time.thread_time() - begin_s, peak_kib() - before_kib, found)
     return read
-
-
-def _peak_kib() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _measure(file: CandidateFile, duration_s: float, memory_kib: float, found: Fuzzing) -> None:
@@ -127,10 +123,8 @@ def try_out(file: CandidateFile, read: Configuration | World, armed: bool, found
             for problem in idle(robot):
                 found.note(file, f"after disarming: {problem}")
     except Exception as problem:  # noqa: BLE001
-        place = problem.__traceback__
-        while place is not None and place.tb_next is not None:
-            place = place.tb_next
-        where = f"{Path(place.tb_frame.f_code.co_filename).name}, line {place.tb_lineno}" if place else ""
+        place = traceback.extract_tb(problem.__traceback__)[-1]
+        where = f"{Path(place.filename).name}, line {place.lineno}"
         found.note(file, f"accepted, then {type(problem).__name__}: {problem} ({where})")
 
 
@@ -177,13 +171,14 @@ def _stays(robot: Lockstep, mode: Mode, duration_s: float) -> bool:
     return robot.loop.mode is mode
 
 
-def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
+def measure(folder: Path, *, configurations: int = 10_000, seed: int = 1) -> dict[str, Any]:
+    found = fuzz(configurations, seed, folder / "candidate.toml")
     report = {
-        "configurations": sum(found.kinds.values()),
+        "configurations": configurations,
         "seed": seed,
         "kinds": dict(found.kinds),
         "accepted": {kind: found.accepted[kind] for kind in found.kinds},
-        "accepted_fraction": round(sum(found.accepted.values()) / max(1, sum(found.kinds.values())), 3),
+        "accepted_fraction": round(sum(found.accepted.values()) / configurations, 3),
         "tried": dict(found.tried),
         "longest_ms": round(1e3 * found.longest_s, 1),
         "longest_kind": found.longest_kind,
@@ -191,22 +186,9 @@ def report_of(found: Fuzzing, seed: int) -> dict[str, Any]:
         "bugs": len(found.bugs),
         "first_bugs": found.bugs[:20],
     }
-    return evaluated(
-        report, "refused with messages or accepted and working, within 1 s and 64 MiB each", not found.bugs
-    )
-
-
-def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    count = options.configurations
-    return report_of(fuzz(count, options.seed, folder, Progress(count)), options.seed)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("benchmarks.stress.configuration_fuzz", __doc__)
-    parser.add_argument("--configurations", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure)
+    bar = "refused with messages or accepted and working, within 1 s and 64 MiB each"
+    return evaluated(report, bar, not found.bugs)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_benchmark(measure))

@@ -8,21 +8,20 @@ of the last row shows how much is missing at the end.
 
 from __future__ import annotations
 
-import argparse
 import os
-import random
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
 
 from benchmarks.local_robot import LONGEST_WAIT_S, LocalRobot, kill_session, wait_for
-from benchmarks.report import Progress, evaluated, new_parser, run_benchmark
+from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.stress.resources import children_of
 from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
 from firmware_host.log_reading.log_reader import Log, read_log
@@ -30,6 +29,8 @@ from firmware_host.log_reading.recovery import recover_all
 
 BAR_S = 1.0  # of rows at a log's end
 VICTIMS = ("daemon", "writer", "both", "all")  # all: the whole session, with a recovery that may be running
+LATEST_KILL_S = 2.5  # after the start: in the first or the second segment
+SUMMED = ("missing_inside", "doubled", "recovered", "segments", "ticks")
 
 
 def wait_for_log(robot: LocalRobot, known: set[str]) -> None:
@@ -131,47 +132,29 @@ def kill_once(robot: LocalRobot, victim: str, after_s: float) -> dict[str, Any]:
     return {"victim": victim, "after_s": round(after_s, 3)} | found
 
 
-def kill_many(count: int, seed: int, folder: Path, progress: Progress) -> list[dict[str, Any]]:
-    chance = random.Random(seed)
-    robot = LocalRobot(folder, "segment_s = 1.5\nrest_hz = 0.0\n")
-    kills = []
-    try:
-        for number in range(count):
-            victim = VICTIMS[number % len(VICTIMS)]
-            progress.show(number, f"kills, now the {victim}")
-            kills.append(kill_once(robot, victim, chance.uniform(0.0, 4.0)))
-    finally:
-        robot.end()
-    return kills
-
-
 def sums_of(kills: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "worst_end_s": max(kill["missing_at_end_s"] for kill in kills),
         "without_a_tick": sum(kill["ticks"] == 0 for kill in kills),
-        "missing_inside": sum(kill["missing_inside"] for kill in kills),
-        "doubled": sum(kill["doubled"] for kill in kills),
         "unsound": sum(bool(kill["problems"]) for kill in kills),
-        "recovered": sum(kill["recovered"] for kill in kills),
-        "segments": sum(kill["segments"] for kill in kills),
-        "ticks": sum(kill["ticks"] for kill in kills),
-    }
+    } | {name: sum(kill[name] for kill in kills) for name in SUMMED}
 
 
-def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    rounds = kill_many(options.kills, options.seed, folder, Progress(options.kills))
+def measure(folder: Path, *, kills: int = 100, seed: int = 1) -> dict[str, Any]:
+    chance, rounds = Random(seed), []
+    robot = LocalRobot(folder, "segment_s = 1.5\nrest_hz = 0.0\n")
+    try:
+        for number in range(kills):
+            victim = VICTIMS[number % len(VICTIMS)]
+            show_progress(number, kills, f"kills, now the {victim}")
+            rounds.append(kill_once(robot, victim, chance.uniform(0.0, LATEST_KILL_S)))
+    finally:
+        robot.end()
     sums = sums_of(rounds)
     reached = not (sums["missing_inside"] or sums["doubled"] or sums["unsound"]) and sums["worst_end_s"] <= BAR_S
-    report = {"kills": len(rounds), "seed": options.seed, "sums": sums, "rounds": rounds}
+    report = {"kills": kills, "seed": seed, "sums": sums, "rounds": rounds}
     return evaluated(report, f"every log opens, at most {BAR_S:g} s missing at its end, nothing else", reached)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("benchmarks.stress.log_kills", __doc__)
-    parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, finds_defects=True)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_benchmark(measure))

@@ -5,8 +5,8 @@ Each begins with valid requests, which must be answered whether or not the rest 
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
+from random import Random
 from typing import Any, NamedTuple
 
 import msgpack
@@ -19,92 +19,69 @@ VALUES: tuple[Any, ...] = (
     *(msgpack.ExtType(7, b"abc"), msgpack.Timestamp(1, 2)),
 )
 HEADERS: tuple[bytes, ...] = (
-    b"\xdc\x20\x00",
-    b"\xdd\x00\x00\x20\x00",
-    b"\xde\x20\x00",
-    b"\xdf\xff\xff\xff\xff",
-    b"\x81\xa1a",
-    b"\x94",
+    *(b"\xdc\x20\x00", b"\xdd\x00\x00\x20\x00", b"\xde\x20\x00", b"\xdf\xff\xff\xff\xff", b"\x81\xa1a", b"\x94"),
+    *(b"\xdb\x00\x00\x10\x00", b"\xc9\x00\x00\x10\x00\x05", b"\xc6\xff\xff\xff\xff", b"\x94\x00\x01", b"\xc1"),
 )
-HEADERS += (b"\xdb\x00\x00\x10\x00", b"\xc9\x00\x00\x10\x00\x05", b"\xc6\xff\xff\xff\xff", b"\x94\x00\x01", b"\xc1")
 
 
 class Stream(NamedTuple):
     kind: str
     valid: int  # requests at its beginning, numbered from 1
-    data: bytes
+    pieces: list[bytes]  # as they may arrive
 
 
-class MalformedStreams:
-    """Owns the random numbers; the same seed makes the same streams."""
+def next_stream(chance: Random) -> Stream:
+    kind, valid = chance.choice(list(KINDS)), chance.choice((0, 0, 1, 1, 2, 4))
+    prefix = b"".join(msgpack.packb([0, number + 1, "hello", {}]) for number in range(valid))
+    data = prefix + KINDS[kind](chance)
+    cuts = sorted(chance.randrange(len(data) + 1) for _ in range(chance.choice((0, 0, 0, 0, 1, 2, 3))))
+    return Stream(kind, valid, [data[low:high] for low, high in zip([0, *cuts], [*cuts, len(data)], strict=True)])
 
-    def __init__(self, seed: int) -> None:
-        self._chance = random.Random(seed)
-        self._makers: dict[str, Callable[[], bytes]] = {
-            "random": lambda: self._chance.randbytes(self._chance.randrange(300)),
-            "mutated": lambda: self._mutate(self._requests(1, 3)),
-            "truncated": self._truncated,
-            "concatenated": lambda: self._requests(2, 6) + self._mutate(self._requests(1, 6)),
-            "nested": self._nested,
-            "malformed values": lambda: msgpack.packb(self._malformed_message()),
-            "valid": lambda: b"",
-        }
 
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        return tuple(self._makers)
+def requests(chance: Random, fewest: int, most: int) -> bytes:
+    return b"".join(msgpack.packb(request(chance)) for _ in range(chance.randint(fewest, most)))
 
-    def next_stream(self) -> Stream:
-        kind = self._chance.choice(self.kinds)
-        valid = self._chance.choice((0, 0, 1, 1, 2, 4))
-        prefix = b"".join(msgpack.packb([0, number + 1, "hello", {}]) for number in range(valid))
-        return Stream(kind, valid, prefix + self._makers[kind]())
 
-    def pieces(self, data: bytes) -> list[bytes]:
-        """Splits a stream as it may arrive."""
-        if self._chance.random() < 0.7:
-            return [data]
-        cuts = sorted(self._chance.randrange(len(data) + 1) for _ in range(self._chance.randint(1, 3)))
-        return [data[low:high] for low, high in zip([0, *cuts], [*cuts, len(data)], strict=True)]
+def request(chance: Random) -> list[Any]:
+    names = chance.sample(PARAMS, chance.randint(0, 2))
+    params = {name: chance.choice((0, 1, 5, 0.02, 0.5, None)) for name in names}
+    return [0, chance.randrange(100, 2**32), chance.choice(METHODS), params]
 
-    def choose(self, fraction: float) -> bool:
-        return self._chance.random() < fraction
 
-    def _requests(self, fewest: int, most: int) -> bytes:
-        count = self._chance.randint(fewest, most)
-        return b"".join(msgpack.packb(self._request()) for _ in range(count))
+def malformed_values(chance: Random) -> bytes:
+    message = request(chance)
+    message[3] = {name: chance.choice(VALUES) for name in PARAMS}
+    if chance.random() < 0.3:
+        message[chance.randrange(4)] = chance.choice(VALUES)
+    if chance.random() < 0.1:
+        message.insert(chance.randrange(5), chance.choice(VALUES))
+    return bytes(msgpack.packb(message))
 
-    def _request(self) -> list[Any]:
-        names = self._chance.sample(PARAMS, self._chance.randint(0, 2))
-        params = {name: self._chance.choice((0, 1, 5, 0.02, 0.5, None)) for name in names}
-        return [0, self._chance.randrange(100, 2**32), self._chance.choice(METHODS), params]
 
-    def _malformed_message(self) -> Any:
-        message = self._request()
-        message[3] = {name: self._chance.choice(VALUES) for name in PARAMS}
-        if self.choose(0.3):
-            message[self._chance.randrange(4)] = self._chance.choice(VALUES)
-        if self.choose(0.1):
-            message.insert(self._chance.randrange(5), self._chance.choice(VALUES))
-        return message
+def mutated(chance: Random, fewest: int, most: int) -> bytes:
+    """Replaces, inserts and removes bytes of requests."""
+    data = bytearray(requests(chance, fewest, most))
+    for _ in range(chance.randint(1, 5)):
+        index, removed, inserted = chance.randrange(len(data) + 1), *chance.choice(((1, 1), (0, 3), (3, 0)))
+        data[index : index + removed] = chance.randbytes(inserted)
+    return bytes(data)
 
-    def _mutate(self, data: bytes) -> bytes:
-        changed = bytearray(data)
-        for _ in range(self._chance.randint(1, 5)):
-            index = self._chance.randrange(len(changed) + 1)
-            match self._chance.randrange(3):
-                case 0:
-                    changed[index : index + 1] = self._chance.randbytes(1)
-                case 1:
-                    changed[index:index] = self._chance.randbytes(self._chance.randint(1, 4))
-                case _:
-                    del changed[index : index + self._chance.randint(1, 4)]
-        return bytes(changed)
 
-    def _truncated(self) -> bytes:
-        data = self._requests(1, 3)
-        return data[: self._chance.randrange(len(data))]
+def truncated(chance: Random) -> bytes:
+    data = requests(chance, 1, 3)
+    return data[: chance.randrange(len(data))]
 
-    def _nested(self) -> bytes:
-        header = self._chance.choice(HEADERS)
-        return (header * self._chance.randint(1, 1500))[:6000] + self._requests(0, 1)
+
+def nested(chance: Random) -> bytes:
+    return (chance.choice(HEADERS) * chance.randint(1, 1500))[:6000] + requests(chance, 0, 1)
+
+
+KINDS: dict[str, Callable[[Random], bytes]] = {
+    "random": lambda chance: chance.randbytes(chance.randrange(300)),
+    "mutated": lambda chance: mutated(chance, 1, 3),
+    "truncated": truncated,
+    "concatenated": lambda chance: requests(chance, 2, 6) + mutated(chance, 1, 6),
+    "nested": nested,
+    "malformed values": malformed_values,
+    "valid": lambda chance: b"",
+}

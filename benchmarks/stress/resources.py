@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import os
+import resource
 from pathlib import Path
-from typing import NamedTuple
 
 PAGE_KIB = os.sysconf("SC_PAGE_SIZE") / 1024.0
-
-
-class Holding(NamedTuple):
-    resident_kib: float
-    descriptors: int
-    threads: int
 
 
 def resident_kib(process: int | str = "self") -> float:
     return PAGE_KIB * int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
 
 
-def holding(process: int | str = "self") -> Holding:
-    folder = Path(f"/proc/{process}")
-    return Holding(resident_kib(process), len(os.listdir(folder / "fd")), len(os.listdir(folder / "task")))
+def peak_kib() -> float:
+    """Returns the largest resident memory that this process ever had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def descriptors(process: int | str = "self") -> int:
+    return len(os.listdir(f"/proc/{process}/fd"))
+
+
+def threads() -> int:
+    return len(os.listdir("/proc/self/task"))
 
 
 def children_of(parent: int) -> list[int]:

@@ -10,26 +10,24 @@ times; the growth is that of the second half, because the walking robot fills it
 
 from __future__ import annotations
 
-import argparse
-import socket
 import sys
 import time
-from array import array
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import msgpack
 
 from benchmarks.example_robot import load_example
-from benchmarks.report import Progress, evaluated, new_parser, run_benchmark, summary_us
-from benchmarks.stress.malformed_streams import MalformedStreams, Stream
+from benchmarks.report import evaluated, run_benchmark, show_progress
+from benchmarks.stress.malformed_streams import Stream, next_stream
 from benchmarks.stress.resources import resident_kib
+from benchmarks.stress.stream_client import StreamClient
 from control.rate import PERIOD_S
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.log.recorder import NullRecorder
+from firmware_host.loop_timing import Histogram
 from firmware_host.operator.lease import Lease
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Group, Peer, Rights
@@ -42,7 +40,7 @@ BAR_KIB = 1024.0
 AT_ONCE = MOST_CLIENTS - 1  # the reference client has the last connection
 LONGEST_WAIT_TICKS = 1 + MOST_CLIENTS
 LONGEST_BATCH_TICKS = 600
-SAMPLES = 100_000  # of durations that are stored
+HURRIED_FRACTION = 0.1  # of the streams
 RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
 REFERENCE = Peer(400, 2000, frozenset({71}))
 PEERS = (
@@ -57,23 +55,21 @@ class Bench:
     """Owns the socket, its robot, the time, and the counts."""
 
     def __init__(self, folder: Path, seed: int) -> None:
-        self.streams = MalformedStreams(seed)
+        self.chance = Random(seed)
         self.robot = Lockstep(load_example(), Track([(1000.0, MUDS["48.5"])]))
-        lease = Lease()
         calls = OperatorCalls(self.robot.loop, NullRecorder(), [], lambda: self.now_s)
         self._next_peers = [REFERENCE]
         self.socket = StatusSocket(folder / "s", {}, RIGHTS, lambda connection: self._next_peers.pop(0))
         self.socket.methods = self._counted(calls.methods)
-        self.socket.on_hang_up = lease.hang_up
+        self.socket.on_hang_up = Lease().hang_up
         self.bugs: list[str] = []
         self.socket.report_bug = self.bugs.append
         self.now_s = 1000.0
         self.kinds: Counter[str] = Counter()
         self.valid = self.unanswered = self.answers = self.ticks = 0
         self.most_calls_a_tick = self.longest_wait_ticks = self._calls = 0
-        self.durations_s = array("d", bytes(8 * SAMPLES))
-        self.longest_s = 0.0
-        self.reference = self._connect()
+        self.durations = Histogram()
+        self.reference = StreamClient(self.socket.path, [])
         self.tick()
 
     def _counted(self, methods: Methods) -> Methods:
@@ -86,123 +82,95 @@ class Bench:
 
         return {name: counted(name) for name in methods}
 
-    def _connect(self) -> socket.socket:
-        client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        client.connect(str(self.socket.path))
-        client.setblocking(False)
-        return client
-
     def tick(self) -> None:
         self.now_s += PERIOD_S
         self._calls = 0
         start_s = time.thread_time()
         self.socket.serve(self.now_s)
-        duration_s = time.thread_time() - start_s
-        self.durations_s[self.ticks % SAMPLES] = duration_s
-        self.longest_s = max(self.longest_s, duration_s)
+        self.durations.add(time.thread_time() - start_s)
         self.most_calls_a_tick = max(self.most_calls_a_tick, self._calls)
         self.ticks += 1
 
     def run_batch(self, count: int) -> None:
         self.robot.step()  # so that it executes the requests
-        senders = []
-        for number in range(count):
-            self._next_peers.append(PEERS[number % len(PEERS)])
-            senders.append(Sender(self._connect(), self.streams.next_stream(), self.streams))
+        self._next_peers += [PEERS[number % len(PEERS)] for number in range(count)]
+        streams = [next_stream(self.chance) for _ in range(count)]
+        clients = [
+            StreamClient(self.socket.path, stream.pieces, hurried=self.chance.random() < HURRIED_FRACTION)
+            for stream in streams
+        ]
         for _ in range(count):
             self.tick()
-        self._ask_reference(senders)
+        self._ask_reference(clients)
         for _ in range(LONGEST_BATCH_TICKS):
-            if all(sender.is_done() for sender in senders):
+            for client in clients:
+                client.step()
+            if all(map(_is_done, clients, streams)):
                 break
             self.tick()
-        for sender in senders:
-            self._count(sender)
+        for client, stream in zip(clients, streams, strict=True):
+            self._count(client, stream)
         while self.socket.counters["clients"] > 1:
             self.tick()
 
-    def _ask_reference(self, senders: list[Sender]) -> None:
+    def _ask_reference(self, others: list[StreamClient]) -> None:
         """Asks as the reference client while the others send."""
-        for sender in senders:
-            sender.send()
-        self.reference.send(msgpack.packb([0, 1, "status", {}]))
-        answer, waited = msgpack.Unpacker(raw=False), 0
-        while not any(True for _ in answer):
+        number = self.ticks
+        self.reference.pieces.append(msgpack.packb([0, number, "status", {}]))
+        for waited in range(LONGEST_BATCH_TICKS):
+            for client in (*others, self.reference):
+                client.step()
+            if number in self.reference.answers:
+                self.reference.answers.clear()
+                self.longest_wait_ticks = max(self.longest_wait_ticks, waited)
+                return
             self.tick()
-            waited += 1
-            for sender in senders:
-                sender.send()
-            with suppress(BlockingIOError):
-                answer.feed(self.reference.recv(65536))
-            if waited > LONGEST_BATCH_TICKS:
-                raise RuntimeError("the reference client is not answered any more")
-        self.longest_wait_ticks = max(self.longest_wait_ticks, waited)
+        raise RuntimeError("the reference client is not answered any more")
 
-    def _count(self, sender: Sender) -> None:
-        self.kinds[sender.stream.kind] += 1
-        self.answers += len(sender.answered)
-        if not sender.hurried:
-            self.valid += sender.stream.valid
-            self.unanswered += sum(n + 1 not in sender.answered for n in range(sender.stream.valid))
-        sender.client.close()
+    def _count(self, client: StreamClient, stream: Stream) -> None:
+        self.kinds[stream.kind] += 1
+        self.answers += len(client.answers)
+        if not client.hurried:
+            self.valid += stream.valid
+            self.unanswered += len(_unanswered(client, stream))
+        client.close()
 
     def close(self) -> None:
         self.reference.close()
         self.socket.close()
 
 
-class Sender:
-    """Owns one stream in transit, and the numbers of its answered requests."""
-
-    def __init__(self, client: socket.socket, stream: Stream, streams: MalformedStreams) -> None:
-        self.client = client
-        self.stream = stream
-        self.hurried = streams.choose(0.1)  # hangs up as soon as it has sent all
-        self.answered: list[Any] = []
-        self._pieces = streams.pieces(stream.data)
-        self._unpacker = msgpack.Unpacker(raw=False)
-        self._closed = False
-
-    def send(self) -> None:
-        """Sends the next piece."""
-        if not self._pieces:
-            return
-        with suppress(BrokenPipeError, ConnectionResetError, BlockingIOError):
-            self.client.send(self._pieces.pop(0))
-        if self.hurried and not self._pieces:
-            self.client.close()
-            self._closed = True
-
-    def is_done(self) -> bool:
-        """Returns whether all is sent and answered, or the connection closed."""
-        self.send()
-        if not self._closed:
-            self._receive()
-        wanted = self.stream.valid
-        return not self._pieces and (self._closed or sum(n + 1 in self.answered for n in range(wanted)) == wanted)
-
-    def _receive(self) -> None:
-        try:
-            data = self.client.recv(65536)
-        except BlockingIOError:
-            return
-        except ConnectionResetError:
-            data = b""
-        self._closed = not data
-        self._unpacker.feed(data)
-        self.answered += [number for _, number, _, _ in self._unpacker]
+def _unanswered(client: StreamClient, stream: Stream) -> set[int]:
+    return set(range(1, stream.valid + 1)) - client.answers.keys()
 
 
-def fuzz(streams: int, seed: int, folder: Path, progress: Progress) -> dict[str, Any]:
+def _is_done(client: StreamClient, stream: Stream) -> bool:
+    """Returns whether all is sent and answered, or the connection closed."""
+    return client.closed or not (client.pieces or _unanswered(client, stream))
+
+
+def fuzz(bench: Bench, streams: int) -> list[float]:
+    """Sends all streams; returns ten readings of the process's memory, in KiB."""
+    sent, readings = 0, list[float]()
+    while sent < streams:
+        count = min(AT_ONCE, streams - sent)
+        bench.run_batch(count)
+        sent += count
+        if sent >= streams * (len(readings) + 1) / 10:
+            readings.append(resident_kib())
+        show_progress(sent, streams, "streams")
+    return readings
+
+
+def measure(folder: Path, *, streams: int = 200_000, seed: int = 1) -> dict[str, Any]:
     bench = Bench(folder, seed)
     freeze_garbage()
     start_s = time.monotonic()
     try:
-        readings = _send(bench, streams, progress)
+        readings_kib = fuzz(bench, streams)
     finally:
         bench.close()
-    samples = min(bench.ticks, SAMPLES)
-    return {
+    report = {
         "streams": streams,
         "seed": seed,
         "seconds": round(time.monotonic() - start_s, 1),
@@ -215,47 +183,15 @@ def fuzz(streams: int, seed: int, folder: Path, progress: Progress) -> dict[str,
         "counters": bench.socket.counters,
         "most_calls_a_tick": bench.most_calls_a_tick,
         "longest_wait_ticks": bench.longest_wait_ticks,
-        "serve_us": summary_us(bench.durations_s[:samples]) | {"longest": round(1e6 * bench.longest_s, 1)},
-        "readings": readings,
-        "growth_kib": readings[-1]["resident_kib"] - readings[len(readings) // 2]["resident_kib"],
+        "serve_us": bench.durations.summary(),
+        "readings_kib": readings_kib,
+        "growth_kib": (growth_kib := readings_kib[-1] - readings_kib[len(readings_kib) // 2]),
     }
-
-
-def _send(bench: Bench, streams: int, progress: Progress) -> list[dict[str, float]]:
-    """Sends all streams; returns ten readings of the process's memory."""
-    sent, readings = 0, list[dict[str, float]]()
-    while sent < streams:
-        count = min(AT_ONCE, streams - sent)
-        bench.run_batch(count)
-        sent += count
-        if sent >= streams * (len(readings) + 1) / 10:
-            readings.append({"streams": sent, "resident_kib": resident_kib()})
-        progress.show(sent, "streams")
-    return readings
-
-
-def reached(report: dict[str, Any]) -> bool:
-    return (
-        report["unanswered"] == 0
-        and not report["bugs"]
-        and report["most_calls_a_tick"] <= 1
-        and report["longest_wait_ticks"] <= LONGEST_WAIT_TICKS
-        and report["growth_kib"] < BAR_KIB
-    )
-
-
-def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    report = fuzz(options.streams, options.seed, folder, Progress(options.streams))
+    sound = bench.unanswered == 0 and not bench.bugs and bench.most_calls_a_tick <= 1
+    reached = sound and bench.longest_wait_ticks <= LONGEST_WAIT_TICKS and growth_kib < BAR_KIB
     bar = f"every valid request answered, one a tick, no bug, memory growth below {BAR_KIB:.0f} KiB"
-    return evaluated(report, bar, reached(report))
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = new_parser("benchmarks.stress.socket_fuzz", __doc__)
-    parser.add_argument("--streams", type=int, default=200_000)
-    parser.add_argument("--seed", type=int, default=1)
-    return run_benchmark(parser, arguments, measure, finds_defects=True)
+    return evaluated(report, bar, reached)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_benchmark(measure))
