@@ -11,9 +11,8 @@ from drivers.load_cell.stage_encoder import StageEncoderSettings
 from experiments.estimation.evaluation import SINGLE_WATERS
 from experiments.loadcell.analysis.force_motion import StageSettings
 from experiments.loadcell.comparison import CompareError, load_flipper
-from experiments.loadcell.measurement import BenchSettings
 from experiments.loadcell.preparation import CellSettings
-from experiments.loadcell.run import run_loadcell
+from experiments.loadcell.run import BenchSettings, run_loadcell
 from experiments.loadcell.stage import water_of
 from experiments.loadcell.trials import TrialPlan
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from control.plate import submerged_part
 from experiments.loadcell.analysis.coefficients import (
@@ -18,7 +18,6 @@ from experiments.loadcell.analysis.coefficients import (
     depths_of,
     volume_m3,
 )
-from experiments.loadcell.analysis.curve_fit import Array
 from experiments.loadcell.analysis.force_motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings
 from experiments.loadcell.comparison import Compared
 from experiments.reports.mud_names import mud_text
@@ -35,37 +34,34 @@ def plot_mud(
     trials: Sequence[AnalysedTrial], coefficients: Mapping[str, MudCoefficient], settings: StageSettings, path: Path
 ) -> None:
     """Plot all trials of one mud from their beginnings, with the model by the mud's coefficients."""
-    figure, axes = plt.subplots(2, 2, figsize=(12.0, 7.2), constrained_layout=True, height_ratios=(1.5, 1.0))
-    (vertical, shear), (depth, curve) = axes
-    for panel in (vertical, shear, curve):
-        panel.axhline(0.0, color="grey", linewidth=0.6)
+    figure = Figure(figsize=(12.0, 7.2), layout="constrained")
+    (vertical, shear), (depth, curve) = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
     strokes = [trial for trial in trials if isinstance(trial.motion, Insertion)]
     for i, trial in enumerate(strokes):
-        _plot_insertion(vertical, depth, curve, trial, settings, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+        look = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.0}
+        _plot_insertion((vertical, depth, curve), trial, settings, look, f"trial {i + 1}")
     if strokes:
         _plot_vertical_model(vertical, curve, strokes[-1], coefficients, settings)
     drags = [trial for trial in trials if isinstance(trial.motion, Shear)]
-    over_travel = bool(drags) and all(trial.is_measured for trial in drags)
     for i, trial in enumerate(drags):
-        _plot_shear(shear, trial, over_travel, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+        _plot_shear(shear, trial, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
     if drags:
-        _plot_shear_model(shear, drags[-1], over_travel, coefficients["k_s"], settings)
+        _plot_shear_model(shear, drags[-1], coefficients["k_s"], settings)
     _name_axes(vertical, shear, depth, curve)
-    _name_panels(shear, depth, curve, over_travel, {trial.is_measured for trial in strokes})
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
 
 
 def _plot_insertion(
-    vertical: Axes, depth: Axes, curve: Axes, trial: AnalysedTrial, settings: StageSettings, colour: str, label: str
+    panels: tuple[Axes, Axes, Axes], trial: AnalysedTrial, settings: StageSettings, look: dict[str, Any], label: str
 ) -> None:
+    """Plot force and depth against time, and force against depth."""
     motion, profile, depths_m = trial.motion, trial.profile, depths_of(trial, settings)
     assert isinstance(motion, Insertion) and profile is not None and depths_m is not None
     end_s = profile.times_s[-1] if trial.extraction is None else trial.extraction.out_s
     shown = (profile.times_s > motion.surface_s - BEFORE_S) & (profile.times_s < end_s + AFTER_S)
     since_s, forces_n = profile.times_s[shown] - motion.surface_s, profile.forces_n[shown] - motion.level_n
     depths_cm = 100.0 * np.where(depths_m[shown] < -SHOWN_ABOVE_M, np.nan, depths_m[shown])
-    look: dict[str, Any] = {"color": colour, "linewidth": 1.0}
+    vertical, depth, curve = panels
     vertical.plot(since_s, forces_n, label=label, **look)
     depth.plot(since_s, depths_cm, **look)
     wet = depths_cm >= -0.2
@@ -94,59 +90,46 @@ def _plot_vertical_model(
         curve.plot(100.0 * fraction * even_m, per_m3 * volume_m3(settings, fraction * even_m), **MODEL)
 
 
-def _plot_shear(panel: Axes, trial: AnalysedTrial, over_travel: bool, colour: str, label: str) -> None:
+def _plot_shear(panel: Axes, trial: AnalysedTrial, colour: str, label: str) -> None:
     motion, profile = trial.motion, trial.profile
     assert isinstance(motion, Shear) and profile is not None
     zero_n = -trial.recorded.zero_n if profile.turned else trial.recorded.zero_n
     shown = profile.times_s > motion.begin_s - BEFORE_S
-    along = _travel_cm(trial) if over_travel else profile.times_s - motion.begin_s
-    panel.plot(along[shown], profile.forces_n[shown] - zero_n, color=colour, linewidth=1.0, label=label)
+    since_s, forces_n = profile.times_s[shown] - motion.begin_s, profile.forces_n[shown] - zero_n
+    panel.plot(since_s, forces_n, color=colour, linewidth=1.0, label=label)
 
 
-def _travel_cm(trial: AnalysedTrial) -> Array:
-    return np.asarray(100.0 * trial.positions_m) if trial.positions_m is not None else np.empty(0)
-
-
-def _plot_shear_model(
-    panel: Axes, trial: AnalysedTrial, over_travel: bool, k_s: MudCoefficient, settings: StageSettings
-) -> None:
-    motion, profile = trial.motion, trial.profile
-    assert isinstance(motion, Shear) and profile is not None
-    moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
-    along = np.array([motion.steady_from_s, motion.steady_to_s])
-    along = np.interp(along, profile.times_s, _travel_cm(trial)) if over_travel else along - motion.begin_s
-    panel.plot(along, [k_s.value * moment_m3] * 2, label="model", **MODEL)
+def _plot_shear_model(panel: Axes, trial: AnalysedTrial, k_s: MudCoefficient, settings: StageSettings) -> None:
+    motion = trial.motion
+    assert isinstance(motion, Shear)
+    force_n = k_s.value * submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
+    steady_s = [motion.steady_from_s - motion.begin_s, motion.steady_to_s - motion.begin_s]
+    panel.plot(steady_s, [force_n, force_n], label="model", **MODEL)
 
 
 def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
-    vertical.set_title("insertion, hold, extraction", fontsize="medium")
-    shear.set_title("horizontal shear", fontsize="medium")
-    vertical.set_ylabel("force on the plate (N), up positive")
-    shear.set_ylabel("force against the drag (N)")
-    depth.set_ylabel("depth (cm)")
+    for panel, title, x, y in (
+        (vertical, "insertion, hold, extraction", "", "force on the plate (N), up positive"),
+        (shear, "horizontal shear", "time since the force began (s)", "force against the drag (N)"),
+        (depth, "depth", "time since the surface (s)", "depth (cm)"),
+        (curve, "force over depth", "depth (cm)", "force (N)"),
+    ):
+        panel.set(xlabel=x, ylabel=y)
+        panel.set_title(title, fontsize="medium")
+        if panel is not depth:
+            panel.axhline(0.0, color="grey", linewidth=0.6)
     depth.invert_yaxis()
-    curve.set_ylabel("force (N)")
-    curve.set_xlabel("depth (cm)")
     depth.sharex(vertical)
-    depth.set_xlabel("time since the surface (s)")
     for panel in (vertical, shear):
         if panel.get_legend_handles_labels()[0]:
             panel.legend(fontsize="small", loc="upper right" if panel is vertical else "lower center", ncols=2)
 
 
-def _name_panels(shear: Axes, depth: Axes, curve: Axes, over_travel: bool, measured: set[bool]) -> None:
-    found = "as measured" if measured == {True} else "as found from the force"
-    found = "measured or found from the force" if len(measured) == 2 else found
-    depth.set_title(f"depth, {found}", fontsize="medium")
-    curve.set_title("force over the measured depth" if measured == {True} else "force over depth", fontsize="medium")
-    shear.set_xlabel("measured travel of the stage (cm)" if over_travel else "time since the force began (s)")
-
-
 def plot_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]], path: Path) -> None:
     """Plot the mean with two standard errors, and every trial."""
-    figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.6), constrained_layout=True)
+    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
     names, looks = list(muds), looks_of(list(muds))
-    for panel, name in zip(panels, COEFFICIENTS, strict=True):
+    for panel, name in zip(figure.subplots(1, 3), COEFFICIENTS, strict=True):
         for column, mud in enumerate(names):
             coefficient = muds[mud][name]
             values = np.array(coefficient.trials) / N_CM3
@@ -154,46 +137,25 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]], path: Pa
             value, two_errors = coefficient.value / N_CM3, 2.0 * coefficient.std_error / N_CM3
             panel.errorbar(column, value, two_errors, ecolor=INK, capsize=3, linestyle="", **mark_of(looks[mud]))
         panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
-        panel.set_xlim(-0.6, len(names) - 0.4)
-        panel.set_ylim(0.0, None)
-        panel.set_xlabel("mud")
-        panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
+        panel.set(xlim=(-0.6, len(names) - 0.4), ylim=(0.0, None), xlabel="mud", ylabel=f"{LABELS[name]} (N/cm³)")
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
 
 
 def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
     """Plot the flipper's coefficients against the load cell's, as the paper's figure 5 G to I."""
-    figure, panels = plt.subplots(1, 3, figsize=(11.0, 3.9), constrained_layout=True)
-    looks = looks_of(list(dict.fromkeys(row.mud for row in rows)))
+    figure = Figure(figsize=(11.0, 3.9), layout="constrained")
+    looks, panels = looks_of(list(dict.fromkeys(row.mud for row in rows))), figure.subplots(1, 3)
     for panel, name in zip(panels, COEFFICIENTS, strict=True):
-        of_name = [row for row in rows if row.coefficient == name]
-        ends = [row.sensed + 2.0 * row.sensed_std_error for row in of_name]
-        ends += [row.truth + 2.0 * row.truth_std_error for row in of_name]
-        reach = 1.05 * max(ends, default=N_CM3) / N_CM3
+        reach = 0.0
+        for row in (row for row in rows if row.coefficient == name):
+            x, y = row.truth / N_CM3, row.sensed / N_CM3
+            x_errors, y_errors = 2.0 * row.truth_std_error / N_CM3, 2.0 * row.sensed_std_error / N_CM3
+            look = {"linestyle": "", "ecolor": INK, "capsize": 3, "label": mud_text(row.mud)} | mark_of(looks[row.mud])
+            panel.errorbar(x, y, y_errors, x_errors, lolims=row.at_least, **look)
+            reach = max(reach, 1.05 * (x + x_errors), 1.05 * (y + y_errors))
+        reach = reach or 1.05
         panel.plot([0.0, reach], [0.0, reach], color="grey", linewidth=1.2, zorder=0)
-        for row in of_name:
-            _plot_pair(panel, row, looks[row.mud])
-        panel.set_xlim(0.0, reach)
-        panel.set_ylim(0.0, reach)
-        panel.set_aspect("equal")
+        panel.set(xlim=(0.0, reach), ylim=(0.0, reach), aspect="equal", ylabel="by the flipper (N/cm³)")
         panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
-        panel.set_ylabel("by the flipper (N/cm³)")
     panels[0].legend(fontsize="small", title="mud", loc="upper left")
     figure.savefig(path, dpi=DOTS_PER_INCH)
-    plt.close(figure)
-
-
-def _plot_pair(panel: Axes, row: Compared, look: dict[str, Any]) -> None:
-    panel.errorbar(
-        row.truth / N_CM3,
-        row.sensed / N_CM3,
-        xerr=2.0 * row.truth_std_error / N_CM3,
-        yerr=2.0 * row.sensed_std_error / N_CM3,
-        linestyle="",
-        ecolor=INK,
-        lolims=row.at_least,
-        capsize=3,
-        label=mud_text(row.mud),
-        **mark_of(look),
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,16 +64,8 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
     """Return the name of the format that reads the lines; `name` is the wanted one or "auto". Raises BenchError."""
     port = recorder.port
     recorder.listen(LISTENING_S)
-    if not port.line.recent:
-        recorder.listen(STARTING_S)
+    _require_text(recorder, port.line, "amplifier", "--baud")
     arrivals, lines = port.arrivals, list(port.line.recent)
-    if not lines:
-        raise BenchError(
-            f"nothing arrives on {port.line.path} at {port.line.baud} baud: check the amplifier's power and cable, "
-            "that it sends without being asked, and that this is its port"
-        )
-    if arrivals.text < TEXT_FRACTION:
-        raise BenchError(wrong_baud(port.line, recorder, "--baud", "a load cell's amplifier"))
     found = find_format(lines)
     if name == AUTO:
         if found is None:
@@ -93,23 +85,13 @@ def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageS
     encoder = recorder.encoder
     if encoder is None:
         return
-    if not encoder.line.recent:
-        recorder.listen(STARTING_S)
-    arrivals, path = encoder.arrivals, encoder.settings.path
-    if not arrivals.lines:
-        raise BenchError(
-            f"nothing arrives on {path} at {encoder.settings.baud} baud: check the encoder's power and cable, that it "
-            f"sends without being asked, and that this is its port; {OR_WITHOUT}"
-        )
-    if arrivals.text < TEXT_FRACTION:
-        message = wrong_baud(encoder.line, recorder, "--position-baud", "an encoder's counter")
-        raise BenchError(f"{message}; {OR_WITHOUT}")
-    if arrivals.readable < READABLE_FRACTION:
+    _require_text(recorder, encoder.line, "encoder", "--position-baud", f"; {OR_WITHOUT}")
+    if encoder.arrivals.readable < READABLE_FRACTION:
         label = encoder.settings.label
         expected = f"a label {label!r} and a whole number" if label else "a whole number"
         raise BenchError(
-            f"the lines on {path} are not {expected}, but such as {_quote(list(encoder.line.recent))}: give their "
-            f"first characters as --position-label, make the counter send its count alone, {OR_WITHOUT}"
+            f"the lines on {encoder.settings.path} are not {expected}, but such as {_quote(encoder.line.recent)}: give "
+            f"their first characters as --position-label, make the counter send its count alone, {OR_WITHOUT}"
         )
     rate_hz = encoder.line.clock.rate_hz or 0.0
     between_m = settings.speed_m_s / (rate_hz or 1.0)
@@ -120,8 +102,8 @@ def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageS
         )
 
 
-def _quote(lines: Sequence[bytes]) -> str:
-    return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in lines[-2:])
+def _quote(lines: Iterable[bytes]) -> str:
+    return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in [*lines][-2:])
 
 
 def _advise_column(lines: Sequence[bytes]) -> str:
@@ -139,17 +121,27 @@ def _can_read(name: str, lines: Sequence[bytes]) -> bool:
     return sum(line_format.decode(line) is not None for line in lines) > 0.8 * len(lines)
 
 
-def wrong_baud(line: SerialLine, recorder: CellRecorder, option: str, device: str) -> str:
+def _require_text(recorder: CellRecorder, line: SerialLine, device: str, option: str, otherwise: str = "") -> None:
+    """Raises BenchError where nothing arrives, or bytes of another baud rate."""
+    if not line.recent:
+        recorder.listen(STARTING_S)
+    if not line.recent:
+        raise BenchError(
+            f"nothing arrives on {line.path} at {line.baud} baud: check the {device}'s power and cable, that it sends "
+            f"without being asked, and that this is its port{otherwise}"
+        )
+    if text_fraction(line.recent) < TEXT_FRACTION:
+        raise BenchError(_wrong_baud(recorder, line, device, option) + otherwise)
+
+
+def _wrong_baud(recorder: CellRecorder, line: SerialLine, device: str, option: str) -> str:
     """Try all common baud rates; return a message with the one at which text arrives."""
     recorder.report(f"no text arrives on {line.path} at {line.baud} baud: other rates are tried")
     line.close()
     for baud in COMMON_BAUDS:
         if baud != line.baud and _is_text(line, baud, recorder.clock):
             return f"{line.baud} is not the baud rate of {line.path}: at {baud} it sends text. Use {option} {baud}"
-    return (
-        f"no text arrives on {line.path} at {line.baud} baud, nor at any common rate: is it {device} that sends lines "
-        "of text?"
-    )
+    return f"no text arrives on {line.path}, at any common rate: is it an {device} that sends lines of text?"
 
 
 def _is_text(line: SerialLine, baud: int, clock: BenchClock) -> bool:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import csv
 import re
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,11 @@ from drivers.load_cell.load_cell_port import LoadCellPort, Sample
 from drivers.load_cell.stage_encoder import StageEncoder, StagePosition
 from experiments.loadcell.analysis.coefficients import Recorded
 from experiments.loadcell.analysis.contact import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, noise_of
+from experiments.loadcell.analysis.curve_fit import Array
 from experiments.loadcell.analysis.stage_track import StagePositions
 from experiments.robot.bench_errors import BenchError
 from experiments.trials.notebook import Notebook
+from simulation.test_rig.load_cell_bench import EmulatedBench
 
 POLL_S = 0.005
 TARE_S = 1.0
@@ -36,18 +38,17 @@ AVERAGED = (
 FOLLOWING = 0.01  # gain per sample of the tracking of a drifting zero
 
 
-class BenchClock(Protocol):
-    def now_s(self) -> float: ...
-
-    def pass_time(self, duration_s: float) -> None: ...
-
-
 class WallClock:
+    """The time at a real bench."""
+
     def now_s(self) -> float:
         return time.monotonic()
 
     def pass_time(self, duration_s: float) -> None:
         time.sleep(duration_s)
+
+
+BenchClock = WallClock | EmulatedBench
 
 
 class Tare(NamedTuple):
@@ -64,23 +65,21 @@ class Tare(NamedTuple):
         return self.samples >= LEAST_CORRELATED and self.correlation > AVERAGED_CORRELATION
 
 
-class StrokePositions(NamedTuple):
-    """The encoder's lines during a stroke."""
+class LineProblems(NamedTuple):
+    """The problems of a serial line during a stroke."""
 
-    positions: list[StagePosition]
     garbled_lines: int
     drop_outs: int
-    breaks: int  # unplugged or restarted: positions before and after have different zeros
+    breaks: int  # unplugged, or a restarted encoder: positions before and after have different zeros
 
 
 class StrokeRecording(NamedTuple):
-    """The samples of a stroke, and the problems of the line."""
+    """The lines of a stroke, and the problems of both devices."""
 
     samples: list[Sample]
-    garbled_lines: int
-    drop_outs: int
-    unpluggings: int
-    position: StrokePositions | None = None  # where the stage has an encoder
+    problems: LineProblems
+    positions: list[StagePosition]
+    position_problems: LineProblems | None  # where the stage has an encoder
 
     @property
     def overloads(self) -> int:
@@ -156,27 +155,22 @@ class CellRecorder:
         """Record until `stroke_s` after the contact, or until the patience ends without a contact."""
         self.await_port()
         self.drain()
-        port = self.port
-        garbled, drop_outs, unpluggings = port.malformed_lines, port.line.clock.drop_outs, port.line.unpluggings
-        before = _count_problems(self.encoder)
+        before, positions_before = self._count_problems(), _count_position_problems(self.encoder)
         samples, begin_s = list[Sample](), self.clock.now_s()
         contact = _Contact(noise_n)
         end_s = begin_s + patience_s
-        while self.clock.now_s() < end_s and port.line.is_there:
+        while self.clock.now_s() < end_s and self.port.line.is_there:
             fresh = self.poll()
             samples += fresh
             if contact.handle(fresh):
                 end_s = self.clock.now_s() + stroke_s
-        positions, after = self._positions, _count_problems(self.encoder)
-        self._positions = []
+        positions, self._positions = self._positions, []
+        of_positions = _difference(_count_position_problems(self.encoder), positions_before) if self.encoder else None
         self.await_port()
-        return StrokeRecording(
-            samples,
-            port.malformed_lines - garbled,
-            port.line.clock.drop_outs - drop_outs,
-            port.line.unpluggings - unpluggings,
-            StrokePositions(positions, *(b - a for a, b in zip(before, after, strict=True))) if self.encoder else None,
-        )
+        return StrokeRecording(samples, _difference(self._count_problems(), before), positions, of_positions)
+
+    def _count_problems(self) -> LineProblems:
+        return LineProblems(self.port.malformed_lines, self.port.line.clock.drop_outs, self.port.line.unpluggings)
 
 
 def correlation(forces_n: Sequence[float]) -> float:
@@ -188,9 +182,14 @@ def correlation(forces_n: Sequence[float]) -> float:
     return float(apart_n[1:] @ apart_n[:-1] / (apart_n @ apart_n))
 
 
-def _count_problems(encoder: StageEncoder | None) -> tuple[int, int, int]:
-    """Return the numbers of garbled lines, drop-outs and breaks."""
-    return (0, 0, 0) if encoder is None else (encoder.counts.malformed, encoder.line.clock.drop_outs, encoder.breaks)
+def _count_position_problems(encoder: StageEncoder | None) -> LineProblems:
+    if encoder is None:
+        return LineProblems(0, 0, 0)
+    return LineProblems(encoder.counts.malformed, encoder.line.clock.drop_outs, encoder.breaks)
+
+
+def _difference(after: LineProblems, before: LineProblems) -> LineProblems:
+    return LineProblems(*(b - a for a, b in zip(before, after, strict=True)))
 
 
 class _Contact:
@@ -229,6 +228,7 @@ class _Contact:
 
 RAW = "raw"
 FORCE_COLUMNS, POSITION_COLUMNS = ("t_s", "force_n", "overloaded"), ("t_s", "place_m")  # as in earlier files
+FORCE_FORMAT, POSITION_FORMAT = "%.6f,%.6f,%d", "%.6f,%.8f"
 
 
 def raw_name(key: str, attempt: int, what: str = "") -> str:
@@ -236,32 +236,31 @@ def raw_name(key: str, attempt: int, what: str = "") -> str:
     return f"{RAW}/{plain}_{attempt}{what}.csv"
 
 
-def write_samples(path: Path, samples: Iterable[Sample]) -> None:
-    rows = ((f"{each.stamp_s:.6f}", f"{each.force_n:.6f}", int(each.overloaded)) for each in samples)
-    _write_rows(path, FORCE_COLUMNS, rows)
+def write_samples(path: Path, samples: Sequence[Sample]) -> None:
+    _write_rows(path, FORCE_COLUMNS, [FORCE_FORMAT % sample for sample in samples])
 
 
-def write_positions(path: Path, positions: Iterable[StagePosition]) -> None:
-    rows = ((f"{each.stamp_s:.6f}", f"{each.position_m:.8f}") for each in positions)
-    _write_rows(path, POSITION_COLUMNS, rows)
+def write_positions(path: Path, positions: Sequence[StagePosition]) -> None:
+    _write_rows(path, POSITION_COLUMNS, [POSITION_FORMAT % position for position in positions])
 
 
-def _write_rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+def _write_rows(path: Path, head: Sequence[str], rows: Sequence[str]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(head)
-        writer.writerows(rows)
+    path.write_text("\r\n".join([",".join(head), *rows, ""]), encoding="utf-8", newline="")
+
+
+def _read_columns(path: Path, names: Sequence[str]) -> Array:
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = [[float(row[name]) for name in names] for row in csv.DictReader(file)]
+    return np.array(rows).reshape(-1, len(names)).T
 
 
 def load_recorded(folder: Path, key: str, entry: dict[str, Any]) -> Recorded:
     """Read one trial. Raises OSError, ValueError for a file of another kind."""
-    with (folder / entry["file"]).open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["overloaded"] == "0"]
-    times_s = np.array([float(row["t_s"]) for row in rows])
-    forces_n = np.array([float(row["force_n"]) for row in rows])
-    zero_n = (entry["zero_before_n"] + entry["zero_after_n"]) / 2.0
-    return Recorded(key, entry["mud"], entry["kind"], times_s, forces_n, zero_n, _load_positions(folder, entry))
+    times_s, forces_n, overloaded = _read_columns(folder / entry["file"], FORCE_COLUMNS)
+    valid, zero_n = overloaded == 0.0, (entry["zero_before_n"] + entry["zero_after_n"]) / 2.0
+    positions = _load_positions(folder, entry)
+    return Recorded(key, entry["mud"], entry["kind"], times_s[valid], forces_n[valid], zero_n, positions)
 
 
 def _load_positions(folder: Path, entry: dict[str, Any]) -> StagePositions | None:
@@ -269,10 +268,7 @@ def _load_positions(folder: Path, entry: dict[str, Any]) -> StagePositions | Non
     position = entry.get("position")
     if not position or position["breaks"] or not position["places"]:
         return None
-    with (folder / position["file"]).open(newline="", encoding="utf-8") as file:
-        rows = [(float(row["t_s"]), float(row["place_m"])) for row in csv.DictReader(file)]
-    times_s, positions_m = np.array(rows).T
-    return StagePositions(times_s, positions_m)
+    return StagePositions(*_read_columns(folder / position["file"], POSITION_COLUMNS))
 
 
 def load_counted(folder: Path, notebook: Notebook) -> list[Recorded]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from functools import partial
 from math import isfinite
 from typing import Any
@@ -15,7 +14,7 @@ from experiments.loadcell.analysis.coefficients import CALLIPERS_M, COEFFICIENTS
 from experiments.loadcell.analysis.force_motion import RATE_EXPONENT, Insertion, StageSettings
 from experiments.loadcell.analysis.stage_track import common_alignment
 from experiments.loadcell.comparison import OTHER_PLATE, Compared
-from experiments.loadcell.measurement import Results
+from experiments.loadcell.evaluation import Results
 from experiments.loadcell.plots import plot_coefficients, plot_comparison, plot_mud
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.mud_names import mud_text
@@ -24,23 +23,17 @@ from experiments.reports.text_tables import TitledRows
 from experiments.reports.value_text import N_CM3, repeatability_text, value_text
 
 TITLE = "Ground truth of mud from a load cell"
+ACCURACY = "docs/explanation/bench_accuracy.md"
 METHOD = (
     "A plate on a load cell is dragged through the mud, and in other trials lowered, held and lifted (the paper's "
     "section II-E). k_p and k_e are fitted by F = k V over the way down and over the last three quarters of the way "
-    "up, V being the submerged volume; k_s by F = k ∫ζ dA to the mean over the second half of the drag.\n\n"
-    "The paper gives its coefficients in figures only, so this page does not list them."
+    "up, V being the submerged volume; k_s by F = k ∫ζ dA to the mean over the second half of the drag."
 )
-UNCONNECTED = (
-    "The stage has no encoder: the time and speed of its motion are found from the force, as those of a stage of one "
-    "speed."
-)
+UNCONNECTED = "The stage has no encoder: its motion is found from the force, as that of a stage of one speed."
 MEASURED = (
-    "An encoder measured the stage's position. k_p and k_e are fitted against the measured depth, from the surface "
-    "that the force shows, over the samples in which the stage had moved for 2 mm since it last rested; k_s to "
-    "the mean over the second half of the measured travel, from 5 mm after a rest. Mud resists more at a higher speed: "
-    "the drags show how much, and the coefficients are those at the set speed."
+    "An encoder measured the stage's position: depths count from the surface that the force shows, and samples at rest "
+    "do not count. The coefficients are those at the set speed."
 )
-UNKNOWN_PLATE = "a plate of unknown size"
 HEADING = "Coefficients ± one standard error of the trials ± one of the bench; see the report for their parts"
 COMPARED = "Flipper and load cell; see the report for the effects of plate and path alone"
 
@@ -53,25 +46,15 @@ def errors_text(muds: Mapping[str, Mapping[str, MudCoefficient]], plan: TrialPla
         largest[name] = max(largest[name], each.shared_error / each.value)
     fractions = ", ".join(f"{100.0 * fraction:.1f} % of {name}" for name, fraction in largest.items())
     return (
-        "The first ± is one standard error of the trials: their scatter with Student's factor, or their own errors of "
-        "samples, speed, surface, lag and rate where these are larger. Two of them contain the truth in 19 of 20 cases "
-        "or more, except for k_s without an encoder, whose trials agree better than the calibration is known. The "
-        "misfit of the law is no part of it: k is the least-squares fit to the mud's own curve, and belongs to its "
-        "depth. The second ± is the error that no repetition shows, since it is alike in all trials: depth "
+        "The first ± is one standard error of the trials. The second ± is alike in all trials: depth "
         f"± {1000.0 * plan.depth_error_m:g} mm (--depth-error), callipers ± {1000.0 * CALLIPERS_M:g} mm on width and "
-        f"thickness, and the reading of the calibration, together at most {fractions}. The weights are taken as exact, "
-        "and so is an amplifier that prints grams or newtons. A depth that an encoder measured has no error of a ruler."
+        f"thickness, and the reading of the calibration, together at most {fractions}. k is the least-squares fit to "
+        f"the mud's own curve and belongs to its depth; {ACCURACY} explains both errors."
     )
 
 
-def comparison_text(results: Results, settings: StageSettings) -> str:
-    flipper, own = results.flipper, _plate_text(asdict(settings), "plate_")
-    plate = flipper.get("plate_m")
-    other = _plate_text(plate, "", "") if isinstance(plate, dict) else UNKNOWN_PLATE
-    text = (
-        f"On the grey line the flipper measures the same as the load cell. The load cell carried {own}, upright; the "
-        f"flipper {other}, leaning. {OTHER_PLATE} A difference beyond that is the flipper's error."
-    )
+def comparison_text(flipper: Mapping[str, Any], settings: StageSettings) -> str:
+    text = f"On the grey line the flipper measures the same as the load cell. {OTHER_PLATE}"
     depth_m = (flipper.get("settings") or {}).get("depth_m")
     if isinstance(depth_m, int | float) and abs(depth_m - settings.depth_m) > 1e-6:
         text += (
@@ -81,15 +64,8 @@ def comparison_text(results: Results, settings: StageSettings) -> str:
     return text
 
 
-def _plate_text(plate: Mapping[str, Any], before: str, after: str = "_m") -> str:
-    sides = [plate.get(f"{before}{side}{after}") for side in ("width", "height", "thickness")]
-    if not all(isinstance(side, int | float) for side in sides):
-        return UNKNOWN_PLATE
-    width_m, height_m, thickness_m = (float(side) for side in sides if side is not None)
-    return f"a plate of {100.0 * width_m:g} x {100.0 * height_m:g} cm, {1000.0 * thickness_m:g} mm thick"
-
-
-def make_sections(results: Results, plan: TrialPlan) -> list[Section]:
+def make_sections(results: Results, plan: TrialPlan, flipper: Mapping[str, Any]) -> list[Section]:
+    """`flipper` is the summary of the experiment that is compared, or empty."""
     rows, draw = coefficient_rows(results.muds), partial(plot_coefficients, results.muds)
     figures = [Figure("coefficients", "Mean of the trials with two standard errors; grey: every trial.", draw)]
     text = "\n\n".join([METHOD, *position_texts(results.trials), errors_text(results.muds, plan)])
@@ -98,7 +74,7 @@ def make_sections(results: Results, plan: TrialPlan) -> list[Section]:
         rows, draw = compared_rows(results.compared), partial(plot_comparison, results.compared)
         caption = "Flipper against load cell, two standard errors; grey: both are equal."
         figures = [Figure("comparison", caption, draw)]
-        text = comparison_text(results, plan.settings)
+        text = comparison_text(flipper, plan.settings)
         sections.append(Section("Compared with the flipper", text, rows=rows, figures=figures))
     if results.remarks:
         sections.append(Section("Remarks", "\n\n".join(results.remarks)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from random import Random
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from control.records import UNKNOWN
 from drivers.load_cell.line_formats import GRAVITY_M_S2
@@ -22,7 +22,6 @@ from simulation.test_rig.load_cell_bench import RELAXATION, EmulatedBench, clay_
 from simulation.test_rig.plate_stage import CarriedPlate
 
 HEAVIEST_G = 50000.0
-MANUAL_PATIENCE_S, SIMULATED_PATIENCE_S = 60.0, 5.0
 SIMULATED_WEIGHTS_G = (0.0, 500.0)
 SETTLING_S = 0.5
 PAPER_HOLD_S = 3.0
@@ -38,40 +37,23 @@ class Trial(NamedTuple):
         return f"{self.mud}/{self.kind}/{self.number}"
 
 
-class Stage(Protocol):
-    patience_s: float  # longest time until a stroke has begun
-
-    def weigh(self, which: int) -> float:
-        """Hang the lighter (0) or the heavier (1) weight on the cell; return its force in newtons."""
-
-    def prepare(self, trial: Trial, trials: int) -> str:
-        """Level fresh mud with the plate clear above it; return GO_ON, SKIP, or REDO for the trial before."""
-
-    def lower(self) -> None:
-        """Bring the plate to the depth of a shear."""
-
-    def start(self, trial: Trial) -> None:
-        """Order the stroke, which begins after an unknown delay."""
-
-    def lift(self) -> None:
-        """Bring the plate clear of the mud and clean it."""
-
-
 class ManualStage:
-    """A Stage that the operator moves. `meanwhile` reads the load cell during each prompt."""
+    """A stage that the operator moves. `meanwhile` reads the load cell during each prompt."""
 
-    patience_s = MANUAL_PATIENCE_S
+    patience_s = 60.0  # longest time until a stroke has begun
 
     def __init__(self, settings: StageSettings, operator: Operator, meanwhile: Callable[[], None]) -> None:
         self._settings, self._operator, self._meanwhile = settings, operator, meanwhile
 
     def weigh(self, which: int) -> float:
+        """Hang the lighter (0) or the heavier (1) weight on the cell; return its force in newtons."""
         name = ("lighter one, or nothing", "heavier one, near the largest force that you expect")[which]
         question = f"Calibration: hang a known weight on the cell, the {name}, and let it rest. How many grams is it?"
         grams = self._operator.ask_number(question, 0.0, HEAVIEST_G, self._meanwhile)
         return grams / 1000.0 * GRAVITY_M_S2
 
     def prepare(self, trial: Trial, trials: int) -> str:
+        """Level fresh mud with the plate clear above it; return GO_ON, SKIP, or REDO for the trial before."""
         along = "along the drag" if trial.kind == SHEAR else "upright, along the stroke"
         question = (
             f"Mud {trial.mud}, {trial.kind} {trial.number} of {trials}: re-mix and level the mud, wipe the plate, hang "
@@ -81,10 +63,12 @@ class ManualStage:
         return self._operator.ask(question, answers, self._meanwhile)
 
     def lower(self) -> None:
+        """Bring the plate to the depth of a shear."""
         depth_cm = 100.0 * self._settings.depth_m
         self._operator.ask(f"Lower the plate {depth_cm:g} cm into the mud. Ready?", {GO_ON: "yes"}, self._meanwhile)
 
     def start(self, trial: Trial) -> None:
+        """Order the stroke, which begins after an unknown delay."""
         settings = self._settings
         stroke = f"drag it {100.0 * settings.shear_path_m:g} cm"
         if trial.kind == INSERTION:
@@ -94,14 +78,15 @@ class ManualStage:
         )
 
     def lift(self) -> None:
+        """Bring the plate clear of the mud and clean it."""
         question = "Lift the plate clear of the mud, wipe it, and take your hands off. Ready?"
         self._operator.ask(question, {GO_ON: "yes"}, self._meanwhile)
 
 
 class SimulatedStage:
-    """A Stage on the emulated bench. Its strokes begin after a random delay."""
+    """The same motions on the emulated bench. Strokes begin after a random delay."""
 
-    patience_s = SIMULATED_PATIENCE_S
+    patience_s = 5.0
 
     def __init__(
         self, settings: StageSettings, bench: EmulatedBench, plates: Mapping[str, CarriedPlate], seed: int
@@ -138,6 +123,9 @@ class SimulatedStage:
 
     def _finish(self) -> None:
         self._bench.pass_time(max(0.0, self._bench.stage.ends_s - self._bench.now_s()) + SETTLING_S)
+
+
+Stage = ManualStage | SimulatedStage
 
 
 # simulated muds

@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.loadcell.analysis.coefficients import AnalysedTrial
 from experiments.loadcell.analysis.force_motion import Insertion, Shear
-from experiments.loadcell.recording import StrokePositions, StrokeRecording, Tare
+from experiments.loadcell.recording import StrokeRecording, Tare
 
 FORCE_ALONE = "the trial is evaluated by its force alone, which assumes a stage of one speed"
 LEAST_DRIFT_N, DRIFT_FRACTION = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
@@ -21,19 +21,19 @@ FLAT_SAMPLES = 8  # equal samples at the largest force: a cell that saturates wi
 def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, before: Tare, after: Tare) -> list[str]:
     """Return messages on everything that may make a trial invalid."""
     problems, recorded = list[str](), analysed.recorded
-    if stroke.unpluggings:
+    if stroke.problems.breaks:
         problems.append("the load cell was unplugged during the trial")
     if stroke.overloads or is_clipped(recorded.forces_n):
         problems.append(
             "the load cell was at its limit: the force is beyond its range. Take a cell of a larger range, a smaller "
             "plate, or a lower gain of the amplifier"
         )
-    lines = len(stroke.samples) + stroke.garbled_lines
-    if stroke.garbled_lines > GARBLED_FRACTION * lines:
-        problems.append(f"{stroke.garbled_lines} of {lines} lines were garbled: check cable and ground")
+    garbled = stroke.problems.garbled_lines
+    lines = len(stroke.samples) + garbled
+    if garbled > GARBLED_FRACTION * lines:
+        problems.append(f"{garbled} of {lines} lines were garbled: check cable and ground")
     problems += [each for each in (analysed.problem, analysed.remark) if each]
-    if stroke.position is not None:
-        problems += _list_position_problems(analysed, stroke.position)
+    problems += _list_position_problems(analysed, stroke)
     moved_n = abs(after.force_n - before.force_n)
     largest_n = float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
     if moved_n > max(LEAST_DRIFT_N, DRIFT_FRACTION * largest_n):
@@ -49,16 +49,19 @@ def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, before: Tare
     return problems
 
 
-def _list_position_problems(analysed: AnalysedTrial, stroke: StrokePositions) -> list[str]:
-    if stroke.breaks:
+def _list_position_problems(analysed: AnalysedTrial, stroke: StrokeRecording) -> list[str]:
+    of_line = stroke.position_problems
+    if of_line is None:
+        return []
+    if of_line.breaks:
         return [f"the stage's encoder was unplugged or restarted during the trial: {FORCE_ALONE}"]
     if not stroke.positions:
         return [f"the stage's encoder sent no position: {FORCE_ALONE}"]
     missing = _fraction_without_position(analysed)
     if missing > MISSING_FRACTION:
         return [
-            f"the stage's position is unknown for {100.0 * missing:.0f} % of its strokes ({stroke.garbled_lines} "
-            f"garbled lines, {stroke.drop_outs} gaps): check the encoder's cable and connectors"
+            f"the stage's position is unknown for {100.0 * missing:.0f} % of its strokes ({of_line.garbled_lines} "
+            f"garbled lines, {of_line.drop_outs} gaps): check the encoder's cable and connectors"
         ]
     return []
 

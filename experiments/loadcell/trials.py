@@ -17,7 +17,6 @@ from experiments.loadcell.analysis.force_motion import StageSettings, wide_pace
 from experiments.loadcell.recording import (
     AVERAGED,
     CellRecorder,
-    StrokePositions,
     StrokeRecording,
     Tare,
     load_recorded,
@@ -121,13 +120,17 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
     stroke = recorder.record(before.noise_n, stage.patience_s, longest_s)
     name, position_name = raw_name(trial.key, attempt), raw_name(trial.key, attempt, "_position")
     write_samples(bench.folder / name, stroke.samples)
-    if stroke.position is not None:
-        write_positions(bench.folder / position_name, stroke.position.positions)
     stage.lift()
     after = recorder.tare()
     entry = _make_entry(trial, name, recorder, stroke, before, after)
-    if stroke.position is not None:
-        entry["position"] = _make_position_entry(position_name, recorder, stroke.position)
+    if recorder.encoder is not None and stroke.position_problems is not None:
+        write_positions(bench.folder / position_name, stroke.positions)
+        entry["position"] = {
+            "file": position_name,
+            "places": len(stroke.positions),
+            "rate_hz": recorder.encoder.line.clock.rate_hz,
+            **stroke.position_problems._asdict(),
+        }
     recorded = load_recorded(bench.folder, trial.key, entry)
     analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
     if analysed.pace and (remark := speed_remark(analysed.pace, plan.settings, SINGLE_SPEED_BOUND)):
@@ -186,21 +189,9 @@ def _make_entry(
         "noise_n": before.noise_n,
         "rate_hz": recorder.port.line.clock.rate_hz,
         "samples": len(stroke.samples),
-        "garbled_lines": stroke.garbled_lines,
-        "drop_outs": stroke.drop_outs,
-        "unpluggings": stroke.unpluggings,
+        "garbled_lines": stroke.problems.garbled_lines,
+        "drop_outs": stroke.problems.drop_outs,
+        "unpluggings": stroke.problems.breaks,
         "overloads": stroke.overloads,
         "calibration": recorder.port.calibration._asdict(),
-    }
-
-
-def _make_position_entry(name: str, recorder: CellRecorder, stroke: StrokePositions) -> dict[str, Any]:
-    encoder = recorder.encoder
-    return {
-        "file": name,
-        "places": len(stroke.positions),
-        "rate_hz": None if encoder is None else encoder.line.clock.rate_hz,
-        "garbled_lines": stroke.garbled_lines,
-        "drop_outs": stroke.drop_outs,
-        "breaks": stroke.breaks,
     }

@@ -57,7 +57,8 @@ class EmulatedBench:
         self.amplifier = EmulatedAmplifier(self.stage.mean_force_n, amplifier or AmplifierParameters(), link, seed)
         self.encoder: EmulatedStageEncoder | None = None
         if encoder is not None:
-            self.encoder = EmulatedStageEncoder(self.stage.travelled_m, encoder, position_link(link), seed + 1)
+            encoder_link = link.with_name(f"{link.name}_position")
+            self.encoder = EmulatedStageEncoder(self.stage.travelled_m, encoder, encoder_link, seed + 1)
         self.events: list[Event] = []
         self._now_s = 0.0
         self.stage.mean_force_n(0.0)
@@ -83,10 +84,6 @@ class EmulatedBench:
         self.amplifier.close()
         if self.encoder is not None:
             self.encoder.close()
-
-
-def position_link(link: Path) -> Path:
-    return link.with_name(f"{link.name}_position")
 
 
 def execute(bench: EmulatedBench, words: list[str]) -> str:

@@ -13,10 +13,10 @@ import pytest
 from drivers.load_cell.load_cell_port import LoadCellPort
 from experiments.loadcell.analysis.coefficients import INSERTION, SHEAR, AnalysedTrial
 from experiments.loadcell.analysis.force_motion import Insertion, Pace
-from experiments.loadcell.measurement import list_remarks
+from experiments.loadcell.evaluation import list_remarks
 from experiments.loadcell.preparation import CellSettings, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, correlation, load_counted
-from experiments.loadcell.stage import ManualStage, Trial
+from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
 from experiments.loadcell.trial_checks import list_problems
 from experiments.loadcell.trials import KEEP, measure, record
 from experiments.robot.bench_robot import BenchError
@@ -33,16 +33,10 @@ def make(tmp_path: Path) -> Iterator[Make]:
         yield build
 
 
-class Idle:
-    """A Stage that does nothing."""
+class Idle(SimulatedStage):
+    """A stage that does not move."""
 
     patience_s = 0.5
-
-    def weigh(self, which: int) -> float:
-        return 0.0
-
-    def prepare(self, trial: Trial, trials: int) -> str:
-        return GO_ON
 
     def lower(self) -> None: ...
 
@@ -75,7 +69,7 @@ def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make)
 def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) -> None:
     smeared, sharp = make(amplifier=AmplifierParameters(averaged=4)), make()
     for laboratory in (smeared, sharp):
-        bench = replace(laboratory.trial_bench, stage=Idle())
+        bench = replace(laboratory.trial_bench, stage=Idle(SETTINGS, laboratory.bench, {}, 1))
         for number in (1, 2):
             record(bench, Trial("lawful", INSERTION, number), laboratory.plan, 1)
     assert [each for each in smeared.operator.reported if AVERAGED in each] == [f"lawful/insertion/1: {AVERAGED}"]
