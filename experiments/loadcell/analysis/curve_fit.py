@@ -55,9 +55,13 @@ def fit_curve(
     return CurveFit(point, _std_errors(residuals, point, remaining), factors, float(samples @ samples))
 
 
-def saved_by(richer: CurveFit, plain: CurveFit, samples: int) -> float:
-    """Return the improvement in logarithms of the number of samples: 1 is Schwarz's price of a factor."""
-    return float(samples * np.log(plain.square / richer.square) / np.log(samples))
+def cheaper_fit(plain: CurveFit, richer: CurveFit, factor: int, sign: float, price: float, samples: int) -> CurveFit:
+    """Return the richer fit where its factor has the right sign and pays for itself.
+
+    The improvement is in logarithms of the number of samples: 1 is Schwarz's price of a factor.
+    """
+    saved = float(samples * np.log(plain.square / richer.square) / np.log(samples))
+    return richer if sign * richer.factors[factor] > 0.0 and saved > price else plain
 
 
 Residuals = Callable[[Array], tuple[Array, Array]]

@@ -16,6 +16,8 @@ is any chain of straight lines over the depth.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
+from math import nan
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 from experiments.loadcell.analysis.contact import CONTACT_FRACTION, CONTACT_NOISES, LEAST_FORCE_N, Profile, StrokeError
-from experiments.loadcell.analysis.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
+from experiments.loadcell.analysis.curve_fit import Array, CurveFit, Prior, cheaper_fit, fit_curve
 
 BEFORE_S, AFTER_S = 0.25, 0.2  # of the fit, around the way down
 YIELD_M = 0.001  # over which a jump grows
@@ -72,28 +74,30 @@ class Pace(NamedTuple):
     """Speed and ramp of a stage, with relative uncertainties."""
 
     speed_m_s: float
-    acceleration_m_s2: float
-    speed_uncertainty: float
-    acceleration_uncertainty: float
+    acceleration_m_s2: float = nan  # a hand has no ramp
+    speed_uncertainty: float = nan
+    acceleration_uncertainty: float = nan
 
 
 class Insertion(NamedTuple):
+    """A stroke; its parts of the force are NaN where an encoder measured the motion."""
+
     surface_s: float
     surface_std_error_s: float
     stop_s: float
     pace: Pace
     level_n: float
-    jump_n: float
-    rise_n: float  # from surface to full depth, without the jump
-    slowing_n: float  # by which the force changes as the stage stops, 0 or less
     residual_n: float
+    jump_n: float = nan
+    rise_n: float = nan  # from surface to full depth, without the jump
+    slowing_n: float = nan  # by which the force changes as the stage stops, 0 or less
 
 
 class Extraction(NamedTuple):
     lift_s: float
     out_s: float
     level_n: float
-    out_std_error_s: float
+    out_std_error_s: float = nan
 
 
 class Shear(NamedTuple):
@@ -118,44 +122,21 @@ def find_insertion(profile: Profile, settings: StageSettings, expected: Pace) ->
     t, y = times_s[window], profile.forces_n[window]
     if np.count_nonzero((t >= touched_s) & (t <= top_s)) < 6:
         raise StrokeError("fewer than 6 samples on the way down: use a faster amplifier or a slower stage")
-    kink, jump = (_best_fit(t, y, touched_s, settings, expected, profile.noise_n, jumps) for jumps in (False, True))
-    pays = jump.factors[JUMP] > 0.0 and saved_by(jump, kink, len(y)) > JUMP_PRICE
-    return _insertion(jump if pays else kink, depth_m, len(y))
-
-
-def _best_fit(
-    t: Array, y: Array, touched_s: float, settings: StageSettings, expected: Pace, noise_n: float, jumps: bool
-) -> CurveFit:
-    """Include the loss of slower mud only where it pays, since it looks like a longer ramp."""
-    plain, slow = (_fit(t, y, touched_s, settings, expected, noise_n, jumps, slows) for slows in (False, True))
-    pays = slow.factors[SLOWING] < 0.0 and saved_by(slow, plain, len(y)) > SLOWING_PRICE
-    return slow if pays else plain
-
-
-def _fit(
-    t: Array,
-    y: Array,
-    touched_s: float,
-    settings: StageSettings,
-    expected: Pace,
-    noise_n: float,
-    jumps: bool,
-    slows: bool,
-) -> CurveFit:
     prior = Prior(
         np.array([0.0, np.log(expected.speed_m_s), np.log(expected.acceleration_m_s2)]),
         np.array([np.inf, expected.speed_uncertainty, expected.acceleration_uncertainty]),
     )
-    since_s = t - touched_s
-    starts = STARTS if expected.speed_uncertainty > NARROW else ((0.0, 0.0),)
-    best = fit_curve(
-        lambda parameters: _shapes(since_s, parameters, settings.depth_m, jumps, slows),
-        y,
-        [prior.means + np.array([-0.005, speed, ramp]) for speed, ramp in starts],
-        prior,
-        noise_n,
+    shifts = STARTS if expected.speed_uncertainty > NARROW else ((0.0, 0.0),)
+    starts = [prior.means + np.array([-0.005, speed, ramp]) for speed, ramp in shifts]
+
+    def fit(jumps: bool, slows: bool) -> CurveFit:
+        return fit_curve(partial(_shapes, t - touched_s, depth_m, jumps, slows), y, starts, prior, profile.noise_n)
+
+    kink, jump = (  # the loss of slower mud looks like a longer ramp
+        cheaper_fit(fit(jumps, False), fit(jumps, True), SLOWING, -1.0, SLOWING_PRICE, len(y))
+        for jumps in (False, True)
     )
-    return best._replace(parameters=best.parameters + np.array([touched_s, 0.0, 0.0]))
+    return _insertion(cheaper_fit(kink, jump, JUMP, 1.0, JUMP_PRICE, len(y)), touched_s, depth_m, len(y))
 
 
 def _pace_of(parameters: Array, depth_m: float) -> tuple[float, float]:
@@ -165,7 +146,7 @@ def _pace_of(parameters: Array, depth_m: float) -> tuple[float, float]:
     return speed_m_s, max(ramp_m_s2, 0.55 * speed_m_s * speed_m_s / depth_m)
 
 
-def _shapes(t: Array, parameters: Array, depth_m: float, jumps: bool, slows: bool) -> Array:
+def _shapes(t: Array, depth_m: float, jumps: bool, slows: bool, parameters: Array) -> Array:
     speed_m_s, acceleration_m_s2 = _pace_of(parameters, depth_m)
     depths_m, fractions = descent(t - parameters[0], speed_m_s, acceleration_m_s2, depth_m)
     wet = np.clip(depths_m / YIELD_M, 0.0, 1.0)
@@ -193,9 +174,9 @@ def descent(since_s: Array, speed_m_s: float, acceleration_m_s2: float, depth_m:
     )
 
 
-def _insertion(fit: CurveFit, depth_m: float, samples: int) -> Insertion:
+def _insertion(fit: CurveFit, touched_s: float, depth_m: float, samples: int) -> Insertion:
     speed_m_s, acceleration_m_s2 = _pace_of(fit.parameters, depth_m)
-    surface_s = float(fit.parameters[0])
+    surface_s = float(fit.parameters[0] + touched_s)
     return Insertion(
         surface_s=surface_s,
         surface_std_error_s=float(fit.std_errors[0]),
@@ -297,4 +278,4 @@ def _falls_s(times_s: Array, is_low: NDArray[np.bool_], from_s: float) -> float:
     for i in np.flatnonzero(is_low & (times_s > from_s)):
         if np.all(is_low[(times_s >= times_s[i]) & (times_s < times_s[i] + LOW_S)]):
             return float(times_s[i])
-    return float("nan")
+    return nan

@@ -6,7 +6,7 @@ to the set speed.
 
 from __future__ import annotations
 
-from math import hypot, nan
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +27,7 @@ from experiments.loadcell.analysis.coefficients import (
 )
 from experiments.loadcell.analysis.contact import Profile, StrokeError
 from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.force_motion import (
-    REVERSAL_FRACTION,
-    Extraction,
-    Insertion,
-    Pace,
-    Shear,
-    StageSettings,
-)
+from experiments.loadcell.analysis.force_motion import REVERSAL_FRACTION, StageSettings
 from experiments.loadcell.analysis.measured_motion import (
     LEAST_SAMPLES,
     Mask,
@@ -64,36 +57,32 @@ def analyse_measured(trial: Recorded, profile: Profile, settings: StageSettings,
 
 
 def _insertion(trial: Recorded, stroke: PositionedProfile, expected: Alignment) -> AnalysedTrial:
-    motion, profile, settings = find_insertion(stroke, expected), stroke.profile, stroke.settings
-    unsure_m = hypot(motion.surface_std_error_m, stroke.track.interpolation_error_m)
-    opposing_n, rates = (
-        profile.forces_n - motion.level_n,
-        expected.rate_uncertainty * stroke.speed_terms(motion.alignment.lag_s),
-    )
-    coefficients = {"k_p": _slope(motion, settings, opposing_n, motion.down, motion.deepest_m, unsure_m, rates)}
-    extraction, remark = None, _insertion_remark(profile, motion, settings)
-    if np.count_nonzero(motion.up) >= LEAST_SAMPLES:
-        unsure_m = hypot(unsure_m, motion.mean_speed_m_s * motion.alignment.lag_uncertainty_s)
-        to_m = (1.0 - REVERSAL_FRACTION) * motion.deepest_m
-        opposing_n = motion.up_level_n - profile.forces_n
-        coefficients["k_e"] = _slope(motion, settings, opposing_n, motion.up, to_m, unsure_m, rates)
-        extraction = Extraction(motion.lift_s, motion.out_s, motion.up_level_n, nan)
+    measured, profile, settings = find_insertion(stroke, expected), stroke.profile, stroke.settings
+    motion, lag = measured.motion, measured.alignment
+    rates = expected.rate_uncertainty * stroke.speed_terms(lag.lag_s)
+    unsure_m = hypot(measured.surface_std_error_m, stroke.track.interpolation_error_m)
+    opposing_n = profile.forces_n - motion.level_n
+    coefficients = {"k_p": _slope(measured, settings, opposing_n, measured.down, measured.deepest_m, unsure_m, rates)}
+    has_extraction, remark = np.count_nonzero(measured.up) >= LEAST_SAMPLES, _insertion_remark(stroke, measured)
+    if has_extraction:
+        unsure_m = hypot(unsure_m, motion.pace.speed_m_s * lag.lag_uncertainty_s)
+        to_m = (1.0 - REVERSAL_FRACTION) * measured.deepest_m
+        opposing_n = measured.extraction.level_n - profile.forces_n
+        coefficients["k_e"] = _slope(measured, settings, opposing_n, measured.up, to_m, unsure_m, rates)
     else:
-        coefficients["k_e"], remark = (
-            UNKNOWN_COEFFICIENT,
-            "no extraction: the encoder did not see the plate come up. Was it lifted out in time?",
-        )
+        coefficients["k_e"] = UNKNOWN_COEFFICIENT
+        remark = "no extraction: the encoder did not see the plate come up. Was it lifted out in time?"
     return AnalysedTrial(
         trial,
         profile,
-        _as_insertion(motion),
-        extraction,
+        motion,
+        measured.extraction if has_extraction else None,
         coefficients,
         remark=remark,
-        shared_uncertainty=_rate_uncertainty(motion, motion.down | motion.up, rates),
-        positions_m=motion.depths_m,
+        shared_uncertainty=_rate_uncertainty(measured, measured.down | measured.up, rates),
+        positions_m=measured.depths_m,
         position_error_m=unsure_m,
-        alignment=motion.alignment,
+        alignment=lag,
     )
 
 
@@ -132,12 +121,13 @@ def _slope(
     return Coefficient(float(volumes_m3 @ even_n / (volumes_m3 @ volumes_m3)), uncertainty)
 
 
-def _insertion_remark(profile: Profile, motion: MeasuredInsertion, settings: StageSettings) -> str:
-    largest_n = float(np.max(np.abs(profile.forces_n[motion.down] - motion.level_n)))
-    if abs(motion.deepest_m / settings.depth_m - 1.0) > DEPTH_BOUND:
+def _insertion_remark(stroke: PositionedProfile, measured: MeasuredInsertion) -> str:
+    profile, motion, set_m = stroke.profile, measured.motion, stroke.settings.depth_m
+    largest_n = float(np.max(np.abs(profile.forces_n[measured.down] - motion.level_n)))
+    if abs(measured.deepest_m / set_m - 1.0) > DEPTH_BOUND:
         return (
-            f"the plate went {100.0 * motion.deepest_m:.1f} cm deep by the encoder, and {100.0 * settings.depth_m:g} "
-            "cm was set: coefficients of a mud depend on the depth; or --position-step is not its travel per count"
+            f"the plate went {100.0 * measured.deepest_m:.1f} cm deep by the encoder, and {100.0 * set_m:g} cm was "
+            "set: coefficients of a mud depend on the depth; or --position-step is not its travel per count"
         )
     if motion.residual_n > max(RESIDUAL_NOISES * profile.noise_n, RESIDUAL_FRACTION * largest_n):
         return (
@@ -147,26 +137,11 @@ def _insertion_remark(profile: Profile, motion: MeasuredInsertion, settings: Sta
     return ""
 
 
-def _as_insertion(motion: MeasuredInsertion) -> Insertion:
-    """Convert to the record of a stroke that was found from the force; a hand has no ramp."""
-    return Insertion(
-        surface_s=motion.surface_s,
-        surface_std_error_s=motion.surface_std_error_m / motion.mean_speed_m_s,
-        stop_s=motion.stop_s,
-        pace=Pace(motion.mean_speed_m_s, nan, nan, nan),
-        level_n=motion.level_n,
-        jump_n=nan,
-        rise_n=nan,
-        slowing_n=nan,
-        residual_n=motion.residual_n,
-    )
-
-
 def _shear(trial: Recorded, stroke: PositionedProfile, expected: Alignment) -> AnalysedTrial:
-    motion, profile, settings = find_shear(stroke, expected.lag_s), stroke.profile, stroke.settings
-    zero_n = -trial.zero_n if profile.turned else trial.zero_n
-    felt_n, speed_terms = (profile.forces_n - zero_n)[motion.steady], motion.speed_terms[motion.steady]
-    travels_m = np.clip(np.gradient(motion.travels_m[motion.steady]), 1e-9, None)
+    measured, profile, settings = find_shear(stroke, expected.lag_s), stroke.profile, stroke.settings
+    zero_n, steady = -trial.zero_n if profile.turned else trial.zero_n, measured.steady
+    felt_n, speed_terms = (profile.forces_n - zero_n)[steady], stroke.speed_terms(expected.lag_s)[steady]
+    travels_m = np.clip(np.gradient(measured.travels_m[steady]), 1e-9, None)
     forces_n = felt_n / (1.0 + expected.rate_fraction * speed_terms)
     mean_n = float(np.average(forces_n, weights=travels_m))
     if mean_n <= 0.0:
@@ -174,16 +149,15 @@ def _shear(trial: Recorded, stroke: PositionedProfile, expected: Alignment) -> A
     rate_n = mean_n * expected.rate_uncertainty * float(np.average(speed_terms, weights=travels_m))
     error_n, remark = steadiness(forces_n)
     moment_m3 = submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
-    steady_s = profile.times_s[motion.steady]
     return AnalysedTrial(
         trial,
         profile,
-        Shear(motion.begin_s, float(steady_s[0]), float(steady_s[-1]), motion.mean_speed_m_s),
+        measured.motion,
         None,
         {"k_s": Coefficient(mean_n / moment_m3, hypot(error_n, rate_n) / moment_m3)},
         remark=remark,
         shared_uncertainty=abs(rate_n) / mean_n,
-        positions_m=motion.travels_m,
+        positions_m=measured.travels_m,
         position_error_m=stroke.track.interpolation_error_m,
         alignment=fit_rate(felt_n, speed_terms),
     )

@@ -21,8 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.loadcell.analysis.contact import LEAST_FORCE_N, StrokeError
-from experiments.loadcell.analysis.curve_fit import Array, CurveFit, Prior, fit_curve, saved_by
-from experiments.loadcell.analysis.force_motion import JUMP_PRICE, KNOTS, REVERSAL_FRACTION, YIELD_M
+from experiments.loadcell.analysis.curve_fit import Array, CurveFit, Prior, cheaper_fit, fit_curve
+from experiments.loadcell.analysis.force_motion import (
+    JUMP_PRICE,
+    KNOTS,
+    REVERSAL_FRACTION,
+    YIELD_M,
+    Extraction,
+    Insertion,
+    Pace,
+    Shear,
+)
 from experiments.loadcell.analysis.stage_track import RESTING_FRACTION, Alignment, PositionedProfile
 
 Mask = NDArray[np.bool_]
@@ -46,20 +55,14 @@ WRONG_AXIS = "is the encoder on the axis that moves, and is --position-step its 
 class MeasuredInsertion(NamedTuple):
     """An insertion and extraction, by the samples of the force."""
 
+    motion: Insertion  # its speed is the mean on the way down in the mud, with equal weight for equal travel
+    extraction: Extraction
     depths_m: Array  # NaN where the position is unknown
     speed_factors: Array  # g
     down: Mask  # samples in the mud on the way down that count
     up: Mask
-    level_n: float
-    up_level_n: float
     alignment: Alignment
     surface_std_error_m: float
-    residual_n: float
-    surface_s: float
-    stop_s: float
-    lift_s: float
-    out_s: float
-    mean_speed_m_s: float  # on the way down in the mud, with equal weight for equal travel
 
     @property
     def deepest_m(self) -> float:
@@ -146,8 +149,7 @@ def _best_fit(stroke: PositionedProfile, expected: Alignment, window: _Window, s
     kink, jump = (
         fit_curve(partial(_shapes, stroke, window, jumps), y, starts, prior, noise_n) for jumps in (False, True)
     )
-    pays = jump.factors[2] > 0.0 and saved_by(jump, kink, len(y)) > JUMP_PRICE
-    return jump if pays else kink
+    return cheaper_fit(kink, jump, 2, 1.0, JUMP_PRICE, len(y))
 
 
 def _shapes(stroke: PositionedProfile, window: _Window, jumps: bool, parameters: Array) -> Array:
@@ -178,21 +180,24 @@ def _insertion(stroke: PositionedProfile, window: _Window, fit: CurveFit) -> Mea
     wet = np.flatnonzero(depths_m > 0.0)
     bottom = np.flatnonzero(depths_m > np.nanmax(depths_m) - BOTTOM_M)
     down = window.down & (depths_m > 0.0)
+    speed_m_s, surface_std_error_m = _mean_speed_m_s(stroke.speeds_m_s(lag_s)[down]), float(fit.std_errors[0])
+    level_n, up_level_n = float(fit.factors[0]), float(fit.factors[-1 if window.has_air else 0])
     return MeasuredInsertion(
+        motion=Insertion(
+            surface_s=float(times_s[wet[0]]),
+            surface_std_error_s=surface_std_error_m / speed_m_s,
+            stop_s=float(times_s[bottom[0]]),
+            pace=Pace(speed_m_s),
+            level_n=level_n,
+            residual_n=sqrt(fit.square / np.count_nonzero(window.down | window.up)),
+        ),
+        extraction=Extraction(float(times_s[bottom[-1]]), float(times_s[wet[-1]]), up_level_n),
         depths_m=depths_m,
         speed_factors=stroke.speed_factors(lag_s, rate_fraction),
         down=down,
         up=window.up & (depths_m > 0.0),
-        level_n=float(fit.factors[0]),
-        up_level_n=float(fit.factors[-1 if window.has_air else 0]),
         alignment=Alignment(lag_s, rate_fraction, float(fit.std_errors[1]), float(fit.std_errors[2])),
-        surface_std_error_m=float(fit.std_errors[0]),
-        residual_n=sqrt(fit.square / np.count_nonzero(window.down | window.up)),
-        surface_s=float(times_s[wet[0]]),
-        stop_s=float(times_s[bottom[0]]),
-        lift_s=float(times_s[bottom[-1]]),
-        out_s=float(times_s[wet[-1]]),
-        mean_speed_m_s=_mean_speed_m_s(stroke.speeds_m_s(lag_s)[down]),
+        surface_std_error_m=surface_std_error_m,
     )
 
 
@@ -202,20 +207,15 @@ def _mean_speed_m_s(speeds_m_s: Array) -> float:
 
 
 class MeasuredShear(NamedTuple):
+    motion: Shear
     travels_m: Array  # of the stage by the samples of the force; NaN where the position is unknown
-    speed_terms: Array
     steady: Mask  # the samples of the second half that count
-    begin_s: float
-    mean_speed_m_s: float
 
 
 def find_shear(stroke: PositionedProfile, lag_s: float) -> MeasuredShear:
     """Raises StrokeError where the encoder did not see half of the travel."""
-    travels_m, speeds_m_s, set_m = (
-        stroke.mean_positions_m(lag_s),
-        stroke.speeds_m_s(lag_s),
-        stroke.settings.shear_path_m,
-    )
+    travels_m, speeds_m_s = stroke.mean_positions_m(lag_s), stroke.speeds_m_s(lag_s)
+    times_s, set_m = stroke.profile.times_s, stroke.settings.shear_path_m
     known = np.isfinite(travels_m)
     travelled_m = float(np.max(travels_m[known], initial=0.0))
     if travelled_m < 0.5 * set_m:
@@ -228,5 +228,7 @@ def find_shear(stroke: PositionedProfile, lag_s: float) -> MeasuredShear:
     steady &= (travels_m > travelled_m / 2.0) & (travels_m < 0.99 * travelled_m)
     if np.count_nonzero(steady) < 8:
         raise StrokeError("fewer than 8 samples with force and position in the second half of the travel")
-    mean_m_s = _mean_speed_m_s(speeds_m_s[steady])
-    return MeasuredShear(travels_m, stroke.speed_terms(lag_s), steady, float(stroke.profile.times_s[begin]), mean_m_s)
+    from_s, to_s = float(times_s[steady][0]), float(times_s[steady][-1])
+    return MeasuredShear(
+        Shear(float(times_s[begin]), from_s, to_s, _mean_speed_m_s(speeds_m_s[steady])), travels_m, steady
+    )
