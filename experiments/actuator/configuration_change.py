@@ -7,7 +7,6 @@ replaced atomically, so a power cut leaves the old or the new one, and the old o
 from __future__ import annotations
 
 import os
-import tempfile
 import tomllib
 from collections.abc import Mapping, MutableMapping, Sequence
 from difflib import unified_diff
@@ -20,6 +19,7 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
 
 from experiments.actuator.fit import JointFit
+from experiments.reports.whole_files import whole_file
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import Operator
 from experiments.trials.session import Ending, Session
@@ -154,16 +154,10 @@ def replace_file(path: Path, before: str, after: str) -> Path:
 def _write(path: Path, text: str, like: Path) -> None:
     """Write atomically, with the owner and the permissions of another file."""
     status = like.stat()
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-            os.fchmod(file.fileno(), status.st_mode & 0o777)
-            if (os.geteuid(), os.getegid()) != (status.st_uid, status.st_gid):
-                os.fchown(file.fileno(), status.st_uid, status.st_gid)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+    with whole_file(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
+        os.fchmod(file.fileno(), status.st_mode & 0o777)
+        if (os.geteuid(), os.getegid()) != (status.st_uid, status.st_gid):
+            os.fchown(file.fileno(), status.st_uid, status.st_gid)
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,11 +1,13 @@
-"""The report of the actuator calibration: the paper's figure 3 and its numbers next to ours, and what to set."""
+"""The report of the actuator calibration, for programs and for people: the paper's numbers next to ours."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
-from math import degrees, isfinite, nan
+from math import isfinite, nan
 from statistics import fmean, stdev
+from typing import Any
 
 from experiments.actuator.fit import (
     PAPER_CONSTANT_NM_A,
@@ -13,61 +15,125 @@ from experiments.actuator.fit import (
     PAPER_RMSE_NM,
     Entry,
     JointFit,
+    paper_rmse_nm,
     repeatability,
 )
-from experiments.actuator.friction import SWING_RAD
-from experiments.actuator.plan import Plan
+from experiments.actuator.plan import Plan, steps_of
 from experiments.actuator.plots import plot_errors, plot_friction, plot_torques
-from experiments.actuator.summary import list_left_out
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import Rows, TitledRows
 from experiments.reports.value_text import fraction_text, value_text
 
+Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
 TITLE = "Actuator calibration"
 CONSTANTS = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"
 FRICTION = "Friction and offset ± one standard error"
 
-METHOD = """\
-A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one pass
-through all weights, each of which is hung again; the empty arm is read before and after each pass, as the tare.
-The held angle is raised until the loaded arm itself is level, so that every weight has the same lever and meets the
-same cogging of the magnets. The level is approached from below and from above: the mean of the two currents is the
-load.
-
-The line is current on torque, since the weights are known better than the currents: k_t is one over its slope.
-Friction is the work of the empty arm's current over loops of {swing_deg:.0f} degrees to either side, in which weight,
-magnets and inertia do no net work. Slow and quick loops separate dry from viscous friction. Half the difference between
-the two approaches at rest is less ("at rest at least"): a held joint comes to rest before friction reaches its maximum.
-
-± is one standard error; the true value is within two of them in about 19 of 20 calibrations. That of k_t is from the
-scatter of the readings and from errors that are alike in all of them: the lever, by at most {lever_mm:g} mm, and the
-weights, by at most {weight_percent:g} % (--lever-tolerance, --weight-tolerance). A millimetre of {lever_cm:g} cm is
-{millimetre_percent:.1f} % of k_t. That of the offset includes the tare's scatter and the friction at rest."""
-
-DEFINITIONS = """\
-RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant as it is
-configured (the paper's is its manufacturer's) and nothing fitted. Compare it with the paper's 0.0134 and
-0.0127, printed there as N/m (section III-A). The paper does not say whether it subtracted the weight of the arm;
-here it is subtracted. "RMSE fitted" is stricter and not in the paper: each trial by the constant that the other trials
-gave (a single trial by its own). Set that constant, repeat the experiment, and the first will be what the second is.
-
-Repeatability is the paper's as we read it: the standard deviation over the trials of a weight, relative to their mean,
-averaged over the weights. The paper gives one number for both joints. The lightest weights make nearly all of it, as
-the tables by weight show."""
-
-SETTING = """\
-The constant is set in two files, and both must agree. torque_constant_nm_a of [drive.JOINT] in the
-configuration turns the current that the drive reports into torque: every force and coefficient is proportional to it.
-odrv0.axis0.config.motor.torque_constant in the drive (over USB with odrivetool, then save_configuration) turns the
-torque that is commanded into current. The reported current itself does not depend on either. While only one of them
-is set, the robot measures forces correctly and applies wrong ones, or the other way round.
-
-60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. ODrive
-counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. This
-experiment shows which of them is true for these drives."""
+METHOD = (
+    "A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one "
+    "pass through all weights, with the empty arm before and after it as the tare. The mean of two approaches, from "
+    "below and from above, is the load; k_t is one over the slope of current over torque. Friction is the work of the "
+    "current over loops of the empty arm; half the difference between the approaches at rest is less. "
+    "docs/how-to/bench.md explains the measurement.\n\n"
+    "± is one standard error. That of k_t is from the scatter of the readings and from errors that are alike in all of "
+    "them: the lever, by at most {lever_mm:g} mm, and the weights, by at most {weight_percent:g} % (--lever-tolerance, "
+    "--weight-tolerance). A millimetre of {lever_cm:g} cm is {millimetre_percent:.1f} % of k_t."
+)
+DEFINITIONS = (
+    "RMSE is by the paper's definition: the root mean square of k_t I - m g l over all readings, with the constant as "
+    "it is configured and nothing fitted; the weight of the arm is subtracted. Compare it with the paper's 0.0134 and "
+    '0.0127, printed there as N/m (section III-A). "RMSE fitted" takes each trial by the constant that the other '
+    "trials gave.\n\n"
+    "Repeatability is the standard deviation over the trials of a weight, relative to their mean, averaged over the "
+    "weights. The lightest weights make nearly all of it, as the tables by weight show."
+)
+SETTING = (
+    "The constant is set in two files, and both must agree. torque_constant_nm_a of [drive.JOINT] in the configuration "
+    "turns the reported current into torque. odrv0.axis0.config.motor.torque_constant in the drive (over USB with "
+    "odrivetool, then save_configuration) turns the commanded torque into current.\n\n"
+    "60/(2π KV) = 0.083 N·m/A for 115 rpm/V is the constant of a motor whose current is counted as direct current. "
+    "ODrive counts the peak of the phase current, for which the same motor gives 8.27/KV = 0.0719. This experiment "
+    "shows which of them is true for these drives."
+)
 
 
-def make_sections(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits: Sequence[JointFit]) -> list[Section]:
+@dataclass(frozen=True)
+class LeftOut:
+    """A reading that was skipped, or kept as doubtful and not fitted."""
+
+    joint: str
+    trial: int
+    weight_g: float
+    why: str
+
+
+@dataclass(frozen=True)
+class ActuatorReport:
+    plan: Plan
+    joints: Sequence[Mapping[str, Any]]  # of the fits
+    not_fitted: Sequence[str]
+    left_out: Sequence[LeftOut]
+    readings: Readings
+    applied: str | None  # a message on the configuration file
+    paper: Mapping[str, Any] = field(
+        default_factory=lambda: {
+            "rmse_nm": PAPER_RMSE_NM,
+            "repeatability": PAPER_REPEATABILITY,
+            "torque_constant_nm_a": PAPER_CONSTANT_NM_A,
+        }
+    )
+    experiment: str = "actuator"
+
+
+def make_report(plan: Plan, readings: Readings, fits: Sequence[JointFit], applied: str | None = None) -> ActuatorReport:
+    fitted = {fit.joint for fit in fits}
+    return ActuatorReport(
+        plan=plan,
+        joints=[_joint_entries(fit) for fit in fits],
+        not_fitted=[joint for joint in plan.joints if joint not in fitted],
+        left_out=list_left_out(plan, readings),
+        readings=readings,
+        applied=applied,
+    )
+
+
+def _joint_entries(fit: JointFit) -> dict[str, Any]:
+    """Name the constants of one joint for programs; NaN where they are unknown."""
+    return {
+        "joint": fit.joint,
+        "readings": fit.line.readings,
+        "direction": fit.direction,
+        "torque_constant_nm_a": fit.constant_nm_a,
+        "torque_constant_error_nm_a": fit.constant_error_nm_a,
+        "torque_constant_scatter_nm_a": fit.line.constant_error_nm_a,
+        "torque_constant_tolerance_nm_a": fit.torque_error * fit.constant_nm_a,
+        "configured_nm_a": fit.configured_nm_a,
+        "rmse_configured_nm": fit.rmse_configured_nm,
+        "rmse_fitted_nm": fit.rmse_fitted_nm,
+        "paper_rmse_nm": paper_rmse_nm(fit.joint),
+        "repeatability": fit.repeatability,
+        "offset_nm": fit.offset_nm,
+        "offset_error_nm": fit.offset_error_nm,
+        "friction_nm": fit.friction_nm[0],
+        "friction_error_nm": fit.friction_nm[1],
+        "viscous_nm_s": fit.viscous_nm_s[0],
+        "viscous_error_nm_s": fit.viscous_nm_s[1],
+        "rest_friction_nm": fit.rest_friction_a * fit.constant_nm_a,
+        "tare_nm": fit.tare_nm,
+        "tare_spread_nm": fit.tare_spread_nm,
+    }
+
+
+def list_left_out(plan: Plan, readings: Readings) -> list[LeftOut]:
+    return [
+        LeftOut(joint, step.trial, step.weight_g, why)
+        for joint, entries in readings.items()
+        for step in steps_of(plan)
+        if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
+    ]
+
+
+def make_sections(plan: Plan, readings: Readings, fits: Sequence[JointFit]) -> list[Section]:
     sections = []
     if fits:
         sections.append(Section("Torque constants", DEFINITIONS, rows=constant_rows(fits), figures=_figures(fits)))
@@ -83,7 +149,6 @@ def make_sections(plan: Plan, readings: Mapping[str, Mapping[str, Entry]], fits:
 
 def _method(plan: Plan) -> str:
     return METHOD.format(
-        swing_deg=degrees(SWING_RAD),
         lever_mm=1000.0 * plan.lever_tolerance_m,
         weight_percent=100.0 * plan.weight_tolerance,
         lever_cm=100.0 * plan.lever_m,
@@ -93,69 +158,32 @@ def _method(plan: Plan) -> str:
 
 def constant_rows(fits: Sequence[JointFit]) -> Rows:
     """List one line per joint, and the paper's numbers last."""
-    head = [
-        "joint",
-        "k_t (N·m/A)",
-        "configured (N·m/A)",
-        "RMSE (N·m)",
-        "RMSE fitted (N·m)",
-        "repeatability",
-        "readings",
-    ]
-    rows = [
-        [
-            fit.joint,
-            value_text(fit.constant_nm_a, fit.constant_error_nm_a),
-            f"{fit.configured_nm_a:g}",
-            f"{fit.rmse_configured_nm:.4f}",
-            f"{fit.rmse_fitted_nm:.4f}",
-            fraction_text(fit.repeatability),
-            str(fit.line.readings),
-        ]
-        for fit in fits
-    ]
-    paper = [
-        [f"paper, {kind}", "-", f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", fraction_text(PAPER_REPEATABILITY)]
-        for kind, rmse_nm in PAPER_RMSE_NM.items()
-    ]
-    return [head, *rows, *([*row, "-"] for row in paper)]
+    errors = ("RMSE (N·m)", "RMSE fitted (N·m)")
+    rows = [["joint", "k_t (N·m/A)", "configured (N·m/A)", *errors, "repeatability", "readings"]]
+    for fit in fits:
+        constant = value_text(fit.constant_nm_a, fit.constant_error_nm_a)
+        rmse = (f"{fit.rmse_configured_nm:.4f}", f"{fit.rmse_fitted_nm:.4f}")
+        count = str(fit.line.readings)
+        rows.append([fit.joint, constant, f"{fit.configured_nm_a:g}", *rmse, fraction_text(fit.repeatability), count])
+    for kind, rmse_nm in PAPER_RMSE_NM.items():
+        known = [f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", fraction_text(PAPER_REPEATABILITY)]
+        rows.append([f"paper, {kind}", "-", *known, "-"])
+    return rows
 
 
 def friction_rows(fits: Sequence[JointFit]) -> Rows:
-    head = [
-        "joint",
-        "dry friction (N·m)",
-        "viscous (N·m·s)",
-        "at rest at least (N·m)",
-        "offset (N·m)",
-        "empty arm (N·m)",
-    ]
-    rows = [
-        [
-            fit.joint,
-            value_text(*fit.friction_nm),
-            value_text(*fit.viscous_nm_s),
-            f"{fit.rest_friction_a * fit.constant_nm_a:.4f}",
-            value_text(fit.offset_nm, fit.offset_error_nm),
-            value_text(fit.tare_nm, fit.tare_spread_nm),
-        ]
-        for fit in fits
-    ]
-    return [head, *rows]
+    kinds = ("dry friction (N·m)", "viscous (N·m·s)", "at rest at least (N·m)")
+    rows = [["joint", *kinds, "offset (N·m)", "empty arm (N·m)"]]
+    for fit in fits:
+        at_rest = f"{fit.rest_friction_a * fit.constant_nm_a:.4f}"
+        others = (value_text(fit.offset_nm, fit.offset_error_nm), value_text(fit.tare_nm, fit.tare_spread_nm))
+        rows.append([fit.joint, value_text(*fit.friction_nm), value_text(*fit.viscous_nm_s), at_rest, *others])
+    return rows
 
 
 def _weight_rows(fit: JointFit) -> Rows:
-    head = [
-        "weight",
-        "trials",
-        "τ_ext (N·m)",
-        "τ_sense configured (N·m)",
-        "τ_sense fitted (N·m)",
-        "error fitted (mN·m)",
-        "spread fitted (mN·m)",
-        "repeatability",
-    ]
-    rows = []
+    sensed = ("τ_sense configured (N·m)", "τ_sense fitted (N·m)", "error fitted (mN·m)", "spread fitted (mN·m)")
+    rows = [["weight", "trials", "τ_ext (N·m)", *sensed, "repeatability"]]
     for weight_g in sorted({load.weight_g for load in fit.loads}):
         loads = [load for load in fit.loads if load.weight_g == weight_g]
         external_nm = fmean(load.torque_nm for load in loads)
@@ -166,39 +194,31 @@ def _weight_rows(fit: JointFit) -> Rows:
         error_mnm = round(1e3 * (fitted_nm - external_nm), 1) + 0.0  # without a minus before zero
         spread = [f"{1e3 * spread_nm:.1f}" if isfinite(spread_nm) else "-", fraction_text(repeatability(loads))]
         rows.append([f"{weight_g:g} g", str(len(loads)), *torques, f"{error_mnm:+.1f}", *spread])
-    return [head, *rows]
+    return rows
 
 
 def _figures(fits: Sequence[JointFit]) -> list[Figure]:
+    torques = (
+        "Torque by the motor's current against the weights' own, as in the paper's figure 3: with the configured and "
+        "with the fitted constant. Grey: where both are equal, give or take the paper's RMSE."
+    )
+    errors = (
+        "Errors of the torque by the fitted constant, each trial by the constant of the others; the bar is the mean of "
+        "the trials. Grey band: the paper's RMSE, which is that of its configured constant."
+    )
     return [
-        Figure(
-            "torques",
-            "Torque by the motor's current against the weights' own, as in the paper's figure 3: with the configured"
-            " and with the fitted constant. Grey: where both are equal, give or take the paper's RMSE.",
-            partial(plot_torques, fits),
-        ),
-        Figure(
-            "errors",
-            "Errors of the torque by the fitted constant, each trial by the constant of the others; the bar is the"
-            " mean of the trials. Grey band: the paper's RMSE, which is that of its configured constant.",
-            partial(plot_errors, fits),
-        ),
+        Figure("torques", torques, partial(plot_torques, fits)),
+        Figure("errors", errors, partial(plot_errors, fits)),
     ]
 
 
 def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
     """Return no figure for readings without loops."""
-    if not all(fit.loops for fit in fits):
-        return []
-    return [
-        Figure(
-            "friction",
-            "Torque of friction on loops of the empty arm at two speeds:"
-            " each loop, and the line whose height at zero is dry friction and whose slope is viscous. Dotted: what"
-            " acts at rest. The paper neglects friction.",
-            partial(plot_friction, fits),
-        )
-    ]
+    caption = (
+        "Torque of friction on loops of the empty arm at two speeds: each loop, and the line whose height at zero is "
+        "dry friction and whose slope is viscous. Dotted: what acts at rest. The paper neglects friction."
+    )
+    return [Figure("friction", caption, partial(plot_friction, fits))] * all(fit.loops for fit in fits)
 
 
 def make_tables(fits: Sequence[JointFit]) -> list[TitledRows]:

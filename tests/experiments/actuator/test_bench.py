@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from experiments.actuator.bench import FALLS, RobotBench
 from experiments.actuator.plan import Plan
+from experiments.actuator.run import FALLS, RobotBench
 from experiments.robot.bench_errors import BenchError, DaemonLostError, RobotInUseError
 from experiments.robot.bench_robot import ALONE
 from tests.experiments.still_robot import StillRobot

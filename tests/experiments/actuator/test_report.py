@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import isnan
 
 from experiments.actuator.fit import JointFit, fit_joint
-from experiments.actuator.report import constant_rows, make_sections
-from experiments.actuator.summary import make_report
+from experiments.actuator.report import constant_rows, make_report, make_sections
 from tests.experiments.actuator.test_fit import PLAN, Entries, make_entries
 
 
