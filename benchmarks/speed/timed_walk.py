@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from time import perf_counter
 from typing import Any
 
 from benchmarks.report import summary_us
-from benchmarks.speed.stage_marks import STAGES, StageMarks, marking_cost_s
 from benchmarks.speed.wirings import Wiring
 from control.controller import WalkOrder
 from control.modes import Mode
-from control.rate import PERIOD_S, RATE_HZ
+from control.rate import RATE_HZ
 from control.records import JOINTS
-from drivers.can.can_port import CanPort
 from drivers.drive_types import make_drives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
@@ -28,36 +26,46 @@ from simulation.mud.track import paper_track
 
 BLOCK_TICKS = round(RATE_HZ)
 WARM_UP_S = 4.0  # part of it moves the flippers to the start of the first stride
+STAGES = {  # in their order, by the loop's method that begins each
+    "read": "drives.read",  # drain the buses, decode
+    "pose": "pose.read",  # simulated here
+    "estimate": "learning.update",  # both flippers
+    "adapt": "_adapt_gait",  # no stride closes
+    "mode": "_examine",  # examine, request, next mode
+    "controller": "controller.step",  # gait, inverse kinematics, PD
+    "limits": "_limit",
+    "command": "_command",  # encode and send four torques
+    "record": "_record",  # row packing and the pipe
+}
 
 
-class Traffic:
-    """Counts the frames that pass the loop's ports while it is attached to them."""
+class StageMarks:
+    """Owns the times at which the current tick entered its stages; a stage lasts until the next begins.
 
-    def __init__(self, ports: Iterable[CanPort]) -> None:
-        self.received = self.sent = 0
-        self._ports = tuple(ports)
+    The loop's own methods are wrapped while the marks are attached, so the loop knows nothing of it.
+    """
+
+    def __init__(self, loop: Loop) -> None:
+        self.moments_s: list[float] = []
+        paths = [path.rpartition(".") for path in STAGES.values()]
+        self._entries = [(getattr(loop, part) if part else loop, name) for part, _, name in paths]
 
     @contextmanager
     def attached(self) -> Iterator[None]:
-        for port in self._ports:
-            self._count(port)
+        for owner, name in self._entries:
+            setattr(owner, name, self._marked(getattr(owner, name)))
         yield
-        for port in self._ports:
-            del port.receive, port.send
+        for owner, name in self._entries:
+            delattr(owner, name)
 
-    def _count(self, port: CanPort) -> None:
-        receive, send = port.receive, port.send
+    def _marked(self, method: Callable[..., Any]) -> Callable[..., Any]:
+        mark = self.moments_s.append
 
-        def counted_receive() -> Sequence[Any]:
-            frames = receive()
-            self.received += len(frames)
-            return frames
+        def marked_method(*arguments: Any) -> Any:
+            mark(perf_counter())
+            return method(*arguments)
 
-        def counted_send(frame: Any) -> None:
-            self.sent += 1
-            send(frame)
-
-        vars(port).update(receive=counted_receive, send=counted_send)
+        return marked_method
 
 
 class Samples:
@@ -87,17 +95,12 @@ class TimedWalk:
         self.walk.loop = Loop(configuration, drives, pose, recorder, clock)
         self.recorder = recorder
         self.marks = StageMarks(self.walk.loop)
-        self.traffic = Traffic(wiring.loop.values())
         self.samples = Samples()
 
     def warm_up(self) -> None:
-        """Walks for a while; the second half of it counts the frames."""
         self.walk.arm()
         self.walk.walk(WalkOrder(self.walk.loop.configuration.adaptation.initial_depth_m))
-        self.walk.run_for(WARM_UP_S / 2.0)
-        with self.traffic.attached():
-            self.walk.run_for(WARM_UP_S / 2.0)
-        self.marking_s = marking_cost_s(self.marks)
+        self.walk.run_for(WARM_UP_S)
         freeze_garbage()
 
     def run_blocks(self) -> None:
@@ -128,7 +131,7 @@ class TimedWalk:
         moments_s.clear()
         _, closing = self._tick()
         moments_s.append(perf_counter())
-        durations_s = (max(0.0, end_s - start_s - self.marking_s) for start_s, end_s in pairwise(moments_s))
+        durations_s = (end_s - start_s for start_s, end_s in pairwise(moments_s))
         return dict(zip(STAGES, durations_s, strict=True)), closing
 
     def _add_stages(self, stages: dict[str, float], closing: bool) -> None:
@@ -139,14 +142,11 @@ class TimedWalk:
                 self.samples.stages[stage].append(duration_s)
 
     def report(self) -> dict[str, Any]:
-        samples, ticks = self.samples, WARM_UP_S / 2.0 / PERIOD_S
+        samples = self.samples
         return {
             "whole_us": summary_us(samples.whole) | {"ticks": len(samples.whole)},
             "whole_closing_us": summary_us(samples.whole_closing) | {"ticks": len(samples.whole_closing)},
             "stages_us": {stage: summary_us(durations_s) for stage, durations_s in samples.stages.items()},
             "adapt_closing_us": summary_us(samples.adapt_closing) | {"ticks": len(samples.adapt_closing)},
-            "marking_us": round(1e6 * self.marking_s, 3),
-            "frames_received": round(self.traffic.received / ticks, 2),
-            "frames_sent": round(self.traffic.sent / ticks, 2),
             "dropped_rows": self.recorder.dropped,
         }

@@ -7,13 +7,82 @@ nowhere else. The pages of docs/reference include them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import MISSING
+from itertools import groupby
 from pathlib import Path
 
+from control.gait.gait import PROTOCOLS
 from docs.generate.command_line import commands, exit_statuses
-from docs.generate.configuration import sections
 from docs.generate.faults import failures, faults, modes, reactions
-from docs.generate.log import topics
-from docs.generate.socket import methods
+from docs.generate.markdown import code, table
+from firmware_host.configuration.key_reference import Key, configuration_keys, is_required
+from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.schema import Field
+from firmware_host.operator.socket_methods import METHODS, Level, Parameter, SocketMethod
+
+RIGHTS = {Level.ANYONE: "every user who may connect", Level.READ: "`read_group`", Level.DRIVE: "`drive_group`"}
+
+
+def sections() -> Iterator[str]:
+    for section, keys in groupby(configuration_keys(), lambda key: key.section):
+        yield f"## [{section}]"
+        rows = [_key_row(key) for key in keys]
+        if section == "gait":
+            names = " or ".join(f'"{name}"' for name in PROTOCOLS)
+            rows.insert(0, (code("protocol"), "", names, '`"walking"`', "preset that the other keys change"))
+        yield from table(("key", "unit", "bounds", "default", "meaning"), rows)
+
+
+def _key_row(key: Key) -> tuple[str, str, str, str, str]:
+    bounds = f"{key.bounds.minimum:.10g} to {key.bounds.maximum:.10g}" if key.bounds else key.kind
+    default = "required" if is_required(key) else "" if key.default is MISSING else code(_toml(key.default))
+    return code(key.name), key.unit, bounds, default, key.meaning
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else f"{value:.10g}"
+
+
+def topics() -> Iterator[str]:
+    for kind in ROW_KINDS:
+        yield f"## {kind.topic}"
+        yield ""
+        yield f"Message type `{kind.schema_name}`."
+        yield from table(("field", "type", "meaning"), map(_field_row, kind.fields))
+
+
+def _field_row(field: Field) -> tuple[str, str, str]:
+    return code(field.name), f"{field.kind}[{field.length}]" if field.length else field.kind, field.meaning
+
+
+def methods() -> Iterator[str]:
+    for name, method in METHODS.items():
+        yield f"## {name}"
+        yield ""
+        yield f"{method.meaning} Permitted to: {RIGHTS[method.level]}."
+        yield from _parameters(method)
+        yield f"Answer: {method.answer}."
+        if method.answer_keys:
+            rows = [(", ".join(map(code, keys.split(", "))), text) for keys, text in method.answer_keys.items()]
+            yield from table(("key", "meaning"), rows)
+        yield ""
+
+
+def _parameters(method: SocketMethod) -> Iterator[str]:
+    if method.parameters:
+        yield from table(
+            ("parameter", "type", "unit", "bounds", "default", "meaning"), map(_parameter_row, method.parameters)
+        )
+    else:
+        yield ""
+
+
+def _parameter_row(parameter: Parameter) -> tuple[str, str, str, str, str, str]:
+    default = "required" if parameter.required else "" if parameter.default is None else code(parameter.default)
+    return code(parameter.name), str(parameter.type), parameter.unit, parameter.bounds, default, parameter.meaning
+
 
 TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "commands": commands,

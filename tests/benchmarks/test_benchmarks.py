@@ -17,7 +17,7 @@ import pytest
 from benchmarks.behaviour import differences
 from benchmarks.report import run_benchmark, show_progress, summary_us
 from benchmarks.speed import lockstep_speed
-from benchmarks.speed.stage_marks import STAGES
+from benchmarks.speed.timed_walk import STAGES
 from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
 from benchmarks.stress.can_fuzz import is_forbidden
@@ -49,7 +49,6 @@ def report_of(name: str, *arguments: str) -> dict[str, Any]:
 
 
 def test_tick_time() -> None:
-    """Position and current come every 2 ms, four other messages every 100 ms, of four drives; four torques go out."""
     report = report_of("tick_time", "--seconds", "1")
     assert report["bar_us"] == 200.0
     assert set(report["variants"]) == set(VARIANTS)
@@ -57,9 +56,7 @@ def test_tick_time() -> None:
         assert set(figures["stages_us"]) == set(STAGES)
         assert all(set(stage) == SUMMARY for stage in figures["stages_us"].values())
         assert set(figures["whole_us"]) == SUMMARY | {"ticks"}
-        assert figures.keys() >= {"whole_closing_us", "adapt_closing_us", "marking_us", "dropped_rows"}
-        assert figures["frames_received"] == pytest.approx(4 * (2 / 0.002 + 4 / 0.1) / 380.0, abs=0.1)
-        assert figures["frames_sent"] == 4.0
+        assert figures.keys() >= {"whole_closing_us", "adapt_closing_us", "dropped_rows"}
 
 
 def test_loop_jitter() -> None:
