@@ -90,7 +90,7 @@ def record_lockstep(folder: Path) -> None:
     """Operates one robot by SCHEDULE and writes its rows and every answer."""
     rows = RowList()
     robot = Lockstep(load_example(), paper_track(), seed=3, recorder=rows)
-    methods = OperatorCalls(robot.loop, rows, [], lambda: robot.now_s).methods
+    methods = OperatorCalls(robot.loop, [], lambda: robot.now_s).methods
     caller = Caller(0, Peer(0, 0, frozenset()), Level.DRIVE)
     answers = []
     for requests, run_s in SCHEDULE:

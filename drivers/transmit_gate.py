@@ -140,7 +140,8 @@ class GatedPort:
         torque_nm = table.decode_torque(frame.data)
         problem = self._gate.torque_problem(torque_nm, self._sent_nm[identifier])
         if problem:
-            self._gate.refuse(f"Node {table.node_id} got no torque in place of {torque_nm:.4g} N·m: {problem}.")
+            what = f"The torque command of {torque_nm:.4g} N·m to node {table.node_id}"
+            self._gate.refuse(f"{what} was replaced by zero torque: {problem}.")
             torque_nm, frame = 0.0, frame._replace(data=table.zero_torque)
         self._sent_nm[identifier] = torque_nm
         self._port.send(frame)

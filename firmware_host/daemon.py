@@ -15,29 +15,29 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
 from control.rate import RATE_HZ
 from drivers.can.reopening_port import ReopeningPort
+from drivers.drive import Drives
 from drivers.drive_types import make_drives
 from drivers.fault_injection.failing_port import failing_ports
-from drivers.fault_injection.failing_pose import failing_pose
+from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import Failures
-from drivers.pose.pose_port import OpenedPose, PoseSourceError
+from drivers.pose.pose_port import OpenedPose, PoseSource, PoseSourceError
 from firmware_host.buses import BusError, reopening_ports
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
-from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, LoopParameters
+from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
-from firmware_host.fault_injection.failing_recorder import failing_recorder
-from firmware_host.fault_injection.failing_time import failing_clock, failing_ticker
+from firmware_host.fault_injection.failing_host import FailingClock, FailingRecorder, FailingTicker
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
 from firmware_host.log.log_folder import first_path, new_run_id
-from firmware_host.log.recorder import NullRecorder, Recorder
+from firmware_host.log.recorder import NullRecorder, Recorder, Recording
 from firmware_host.loop import Loop
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Rights, load_rights
@@ -131,33 +131,34 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         stack.callback(drives.close)
         pose = open_pose(configuration.pose)
         stack.callback(pose.close)
-        recorder = failing_recorder(open_recorder(configuration), failures)
+        recorder = open_recorder(configuration)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
-        wall_clock = failing_clock(time.time, failures)
-        loop = Loop(configuration, drives, failing_pose(pose, failures), recorder, wall_clock=wall_clock)
+        loop = _make_loop(configuration, drives, pose, recorder, failures)
         warnings: list[str] = []
-        calls = OperatorCalls(loop, recorder, warnings, time.monotonic)
+        calls = OperatorCalls(loop, warnings, time.monotonic)
         status.methods = with_failures(calls.methods, failures, loop.events.report, time.monotonic)
-        _serve_loop(status, loop)
+        status.on_hang_up = loop.lease.hang_up
+        status.is_protected = lambda caller: caller == loop.lease.holder
+        status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
-        warnings += _prepare(configuration.loop)
+        warnings += prepare_loop(configuration.loop.priority, configuration.loop.cpu, configuration.loop.lock_memory)
+        _print_warnings("", warnings)
         return _run_loop(loop, buses, pose, failures, status, notifier, shutdown)
 
 
-def _serve_loop(status: StatusSocket, loop: Loop) -> None:
-    """Connect the socket to the loop's lease and log."""
-    status.on_hang_up = loop.lease.hang_up
-    status.is_protected = lambda caller: caller == loop.lease.holder
-    status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
+def _make_loop(
+    configuration: Configuration, drives: Drives, pose: PoseSource, recorder: Recording, failures: Failures | None
+) -> Loop:
+    if failures is None:
+        return Loop(configuration, drives, pose, recorder)
+    pose, recorder = FailingPose(pose, failures), FailingRecorder(recorder, failures)
+    return Loop(configuration, drives, pose, recorder, wall_clock=FailingClock(time.time, failures))
 
 
-def _prepare(parameters: LoopParameters) -> list[str]:
-    """Prepare the process for real time; prints and returns what could not be provided."""
-    warnings = prepare_loop(parameters.priority, parameters.cpu, parameters.lock_memory)
+def _print_warnings(program: str, warnings: Iterable[str]) -> None:
     for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    return warnings
+        print(f"{program}warning: {warning}", file=sys.stderr)
 
 
 def _run_loop(
@@ -169,12 +170,13 @@ def _run_loop(
     notifier: SystemdNotifier,
     shutdown: Shutdown,
 ) -> int:
-    ticker, watchdog = failing_ticker(Ticker(), failures, loop.events.report), WatchdogFeed(notifier)
+    watchdog, ticker = WatchdogFeed(notifier), Ticker()
+    wait = ticker.wait if failures is None else FailingTicker(ticker, failures, loop.events.report).wait
     notifier.send("READY=1", "STATUS=running")
     now_s = time.monotonic()
     try:
         while not shutdown.step(loop, now_s):
-            tick = ticker.wait()
+            tick = wait()
             now_s = tick.now_s
             loop.tick(tick)
             status.serve(now_s)
@@ -226,8 +228,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rights = load_rights(configuration.status)
     except ConfigurationError as problem:
         return _refuse([f"mudskipperd: {message}" for message in problem.problems], EXIT_CONFIGURATION)
-    for warning in configuration.warnings:
-        print(f"mudskipperd: warning: {warning}", file=sys.stderr)
+    _print_warnings("mudskipperd: ", configuration.warnings)
     if options.check_config:
         return 0
     shutdown = Shutdown()

@@ -11,9 +11,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 
-from control.controller import ALL_TRUSTED, RESTING, WalkOrder
+from control.controller import ALL_TRUSTED, RESTING, Controller, WalkOrder
+from control.depth.gait_choice import quickest
 from control.fault_latch import FaultLatch
 from control.faults import Fault, Reaction
+from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.rate import PERIOD_S
@@ -31,12 +33,11 @@ from control.records import (
 from drivers.drive import Drives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.control_setup import make_controller
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.log.recorder import Recording
-from firmware_host.log.row_packing import TickRecord, stride_row, tick_row
+from firmware_host.log.row_packing import stride_row, tick_row
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
-from firmware_host.loop_events import LoopEvents, ModeChange
+from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
 from firmware_host.operator.fault_texts import fault_message, refusal_text
@@ -68,7 +69,7 @@ class Loop:
         self.events = LoopEvents(recorder, configuration.motion.longest_hold_s)
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
-        self.controller = make_controller(configuration)
+        self.controller = _make_controller(configuration)
         self.fault_monitor = FaultMonitor(configuration, drives, period_s)
         self.faults = FaultLatch(period_s)
         self.mode = Mode.BOOT
@@ -183,14 +184,8 @@ class Loop:
         """Change to this mode, if it is another one: log it, and arm or disarm the drives."""
         if mode is self.mode:
             return
-        change = ModeChange(
-            before=self.mode,
-            after=mode,
-            fault=self.fault,
-            rested=self.health.rested,
-            flippers_up=self.controller.is_up(self.states),
-        )
-        self.events.report_mode_change(now_s, change)
+        flippers_up = self.controller.is_up(self.states)
+        self.events.report_mode_change(now_s, self.mode, mode, self.fault, self.health.rested, flippers_up)
         if mode is Mode.WALKING:
             self.learning.reset(self.controller.order.depth_m)
         if mode is Mode.ARMING:
@@ -236,19 +231,7 @@ class Loop:
 
     def _record(self, tick: Tick) -> None:
         tick_s = self._clock() - tick.now_s
-        record = TickRecord(
-            tick=tick,
-            tick_s=tick_s,
-            missed_ticks=self.missed_ticks,
-            mode=self.mode,
-            target=self.target,
-            stride_depth_m=self.stride_depth_m,
-            states=self.states,
-            reading=self.learning.reading,
-            body=self.body,
-            sent=self.sent,
-        )
-        self.recorder.put(TICK_KIND, tick_row(record))
+        self.recorder.put(TICK_KIND, tick_row(tick, tick_s, self))
         if self.controller.recovery.events:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
@@ -296,3 +279,20 @@ class Loop:
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         refused = refusal(self.mode, request, health)
         return refusal_text(refused) if refused else None
+
+
+def _make_controller(configuration: Configuration) -> Controller:
+    recovery = Recovery(
+        configuration.recovery,
+        configuration.geometry,
+        quickest(configuration.adaptation, configuration.geometry, configuration.gait),
+        configuration.joint_ranges,
+    )
+    return Controller(
+        configuration.gait,
+        configuration.geometry,
+        configuration.gains,
+        configuration.arm,
+        configuration.motion,
+        recovery,
+    )

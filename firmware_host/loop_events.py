@@ -8,22 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import inf
-from typing import NamedTuple
 
 from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.operator.fault_texts import fault_advice, fault_message
-
-
-class ModeChange(NamedTuple):
-    before: Mode
-    after: Mode
-    fault: Fault | None  # the worst present fault that is more than a warning
-    rested: bool  # the pose was held for the longest permitted time
-    flippers_up: bool
-
 
 REQUEST_PERIOD_S = 1.0
 MAX_REQUESTS = 64  # texts to remember; each names its sender
@@ -92,17 +82,21 @@ class LoopEvents:
     def report_end_of_move(self, now_s: float, reason: str) -> None:
         self._notify(now_s, f"the joints stopped on their way: {reason}")
 
-    def report_mode_change(self, now_s: float, change: ModeChange) -> None:
-        """Log a change of mode with its cause; the notice says why torque went off or a walk ended."""
-        before, after, fault = change.before, change.after, change.fault
+    def report_mode_change(
+        self, now_s: float, before: Mode, after: Mode, fault: Fault | None, rested: bool, flippers_up: bool
+    ) -> None:
+        """Log a change of mode with its cause; the notice says why torque went off or a walk ended.
+
+        `fault` is the worst that is more than a warning; `rested`: the pose was held for the longest permitted time.
+        """
         because = f": {fault_message(fault)}" if fault else ""
         self.report(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
         if after in (Mode.ARMING, Mode.WALKING):
             self.notice = ""
         if fault and before in ENERGISED:
             self.notice = f"stopped by {fault.name}: {fault_advice(fault)}"
-        if before is Mode.HOLD and after is Mode.IDLE and change.rested:
+        if before is Mode.HOLD and after is Mode.IDLE and rested:
             held_s = self._longest_hold_s
             self._notify(now_s, f"the pose was held for {held_s:g} s without a request: torque went off by itself")
-        if before is Mode.STOPPING and after is Mode.HOLD and not change.flippers_up:
+        if before is Mode.STOPPING and after is Mode.HOLD and not flippers_up:
             self._notify(now_s, "the flippers did not come out of the mud")

@@ -11,9 +11,8 @@ from control.faults import Fault
 from control.limits import LimitedTorques
 from control.modes import Mode
 from control.mud_estimate import MudEstimate
-from control.rate import PERIOD_S
 from control.records import BodyPose, DriveStates, Joints, Phase
-from drivers.can.can_port import BusState, CanPort
+from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth
 from drivers.pose.pose_port import PoseReport
 from firmware_host.log.recorder import LogReport
@@ -27,7 +26,7 @@ class AgedFault(NamedTuple):
 
 
 class BusReport(NamedTuple):
-    """The state of one CAN bus, and its counts since the start."""
+    """The state of one CAN bus, and its counts since the start, under the names that the port gives them."""
 
     name: str
     state: BusState
@@ -84,7 +83,7 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
         moving=loop.controller.moving,
         may_be_in_mud=loop.controller.cut_short,
         fault=loop.fault,
-        faults=tuple(AgedFault(fault, faults.age_ticks(fault) * PERIOD_S) for fault in faults.present),
+        faults=tuple(AgedFault(fault, faults.age_ticks(fault) * loop.period_s) for fault in faults.present),
         blocking=tuple(faults.blocking()),
         notice=loop.events.notice,
         unlogged_requests=loop.events.requests.unlogged,
@@ -94,7 +93,10 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
         depth_m=loop.stride_depth_m,
         states=loop.states,
         drives=drives.health,
-        buses=tuple(_bus_report(name, port) for name, port in drives.ports.items()),
+        buses=tuple(
+            BusReport(name, *(getattr(port, count) for count in BusReport._fields[1:]))
+            for name, port in drives.ports.items()
+        ),
         frames=FrameCounts(drives.unknown_frames, drives.malformed_frames, drives.refused_commands),
         body=loop.body,
         pose=loop.pose.report(),
@@ -102,19 +104,8 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
         winding_temperatures_c=loop.fault_monitor.winding_temperatures_c,
         strides=tuple(learning.strides),
         strides_closed=learning.strides_closed,
-        mud=learning.mud_estimate,
+        mud=learning.estimator.mud_estimate,
         rate_hz=loop.timing.rate_hz,
         missed_ticks=loop.missed_ticks,
         log=loop.recorder.report(),
-    )
-
-
-def _bus_report(name: str, port: CanPort) -> BusReport:
-    return BusReport(
-        name=name,
-        state=port.state,
-        last_error=port.last_error,
-        error_frames=port.error_frames,
-        failed_sends=port.failed_sends,
-        lost_frames=port.lost_frames,
     )

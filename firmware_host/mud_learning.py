@@ -6,21 +6,29 @@ Once a stride, in swing, the depth of the next stride is chosen. An insertion th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 from control.controller import Controller
+from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthAdaptation, DepthChoice, Method
+from control.depth.gait_choice import GaitAdaptation
+from control.depth.paper_choice import PaperAdaptation
 from control.faults import Fault, FaultKind
-from control.mud_estimate import MudEstimate
+from control.gait.gait import GaitParameters
+from control.geometry import FlipperGeometry
 from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstimate
 from estimation.mud import MudEstimator, MudReading
-from estimation.mud_map import MapRow
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.control_setup import choice_text, make_adaptation
 
 FIRM_TICKS = 3  # with a high load until an insertion ends: one outlier does not end it
 STORED_STRIDES = 200  # for clients of the status socket
 LARGEST_N_M3 = 1e10  # 10 kN/cm³, a thousand times the stiffest mud
+
+METHODS: dict[Method, Callable[[AdaptationParameters, FlipperGeometry, GaitParameters], Adaptation]] = {
+    "default": DepthAdaptation,
+    "paper": PaperAdaptation,
+    "gait": GaitAdaptation,
+}
 
 
 class ClosedStride(NamedTuple):
@@ -41,7 +49,8 @@ class MudLearning:
             configuration.estimation,
             configuration.adaptation.body_drag_n,
         )
-        self.adaptation = make_adaptation(configuration)
+        method = METHODS[configuration.adaptation.method]
+        self.adaptation = method(configuration.adaptation, configuration.geometry, configuration.gait)
         self.reading = MudReading()
         self.strides: list[ClosedStride] = []
         self.strides_closed = 0  # since the start
@@ -55,14 +64,6 @@ class MudLearning:
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
         self.reading = self.estimator.update(now_s, phase, states, body)
-
-    @property
-    def mud_estimate(self) -> MudEstimate:
-        return self.estimator.mud_estimate
-
-    def map_rows(self) -> Sequence[MapRow]:
-        """The mud along the track since the walk began."""
-        return self.estimator.map.rows()
 
     def step(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
         """Adapt the gait in this tick; returns the strides that closed, and messages for the log."""
@@ -91,7 +92,7 @@ class MudLearning:
         parameters = choice.gait or gait.parameters
         changes = (choice.depth_m, parameters) != (gait.next_depth_m, gait.next_parameters)
         gait.next_depth_m, gait.next_parameters = choice.depth_m, parameters
-        return [choice_text(choice)] if changes else []
+        return [_choice_text(choice)] if changes else []
 
     def _is_firm(self, controller: Controller) -> bool:
         """Whether an insertion of an adaptive walk has met solid mud."""
@@ -110,3 +111,8 @@ class MudLearning:
 
 def _is_wild(estimate: Estimate) -> bool:
     return estimate.valid and not (abs(estimate.value) < LARGEST_N_M3 and estimate.std_error < LARGEST_N_M3)
+
+
+def _choice_text(choice: DepthChoice) -> str:
+    sweep = f", sweep {choice.gait.sweep_angle_deg:g} degrees" if choice.gait else ""
+    return f"depth {choice.depth_m:.4f} m{sweep}: {choice.reason}{', slips' if choice.slips else ''}"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from drivers.pose.natnet_port import NatNetPort
+from drivers.pose.natnet_sockets import AXES, parse_axis
 from drivers.pose.pose_port import NoPose, OpenedPose, PosePort
 from drivers.pose.rail_encoder import RailEncoder
-from drivers.pose.track_axis import AXES, parse_axis
 from firmware_host.configuration.configuration import PoseParameters
 
 

@@ -45,17 +45,8 @@ def open_log(path: Paths) -> OpenedLog:
     """Reads an MCAP log, or several segments of one run. Raises LogError."""
     paths = _as_paths(path)
     log = read_logs(paths)
-    return OpenedLog(
-        paths=paths,
-        ticks=log.ticks,
-        strides=_as_array(log.strides, STRIDE),
-        events=_as_array(log.events, EVENT),
-        metadata=log.metadata,
-        configuration_text=log.configuration_text,
-        complete=log.complete,
-        unknown_fields=log.unknown_fields,
-        missing_fields=log.missing_fields,
-    )
+    arrays = {"strides": _as_array(log.strides, STRIDE), "events": _as_array(log.events, EVENT)}
+    return OpenedLog(paths=paths, **(log._asdict() | arrays))
 
 
 def replay(path: Paths, method: Method | None = None, configuration: Configuration | None = None) -> Replay:

@@ -8,9 +8,11 @@ from firmware_host.log.rows import EVENT, EVENT_KIND
 
 class EventRecorder(NullRecorder):
     def __init__(self) -> None:
+        self.kinds: list[int] = []  # of all rows
         self.texts: list[str] = []
 
     def put(self, kind_index: int, payload: bytes) -> bool:
+        self.kinds.append(kind_index)
         if kind_index == EVENT_KIND:
             self.texts.append(EVENT.decode(payload)["text"])
         return True

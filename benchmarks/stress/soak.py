@@ -89,7 +89,7 @@ class SoakedLoop:
         self.recorder.watch()
         failures = Failures(configuration.bus, seed)
         self.robot = Lockstep(configuration, self._track(), seed, self.recorder, failures=failures)
-        calls = OperatorCalls(self.robot.loop, self.recorder, [], self._now_s)
+        calls = OperatorCalls(self.robot.loop, [], self._now_s)
         self.socket = StatusSocket(folder / "s", {}, load_rights(configuration.status))
         self.socket.methods = with_failures(calls.methods, failures, self.robot.loop.events.report, self._now_s)
         self.bugs: list[str] = []

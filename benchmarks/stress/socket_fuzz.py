@@ -26,7 +26,6 @@ from benchmarks.stress.resources import resident_kib
 from benchmarks.stress.stream_client import StreamClient
 from control.rate import PERIOD_S
 from firmware_host.computer.realtime import freeze_garbage
-from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop_timing import Histogram
 from firmware_host.operator.lease import Lease
 from firmware_host.operator.operator_calls import OperatorCalls
@@ -57,7 +56,7 @@ class Bench:
     def __init__(self, folder: Path, seed: int) -> None:
         self.chance = Random(seed)
         self.robot = Lockstep(load_example(), Track([(1000.0, MUDS["48.5"])]))
-        calls = OperatorCalls(self.robot.loop, NullRecorder(), [], lambda: self.now_s)
+        calls = OperatorCalls(self.robot.loop, [], lambda: self.now_s)
         self._next_peers = [REFERENCE]
         self.socket = StatusSocket(folder / "s", {}, RIGHTS, lambda connection: self._next_peers.pop(0))
         self.socket.methods = self._counted(calls.methods)

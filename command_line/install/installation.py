@@ -73,7 +73,8 @@ def _carry_out(options: argparse.Namespace, system: System, plan: Plan, find: Fi
     if options.dry_run:
         print("\n".join(("would:", *(f"  {step}" for step in plan.steps))))
         return exit_codes.OK
-    missing = _missing_programs(plan, find)
+    programs = {step.words[0]: None for step in plan.steps if isinstance(step, Command)}
+    missing = [program for program in programs if find(program) is None]
     if missing:
         complain(f"{', '.join(missing)}: not installed. This needs systemd with udev and systemd-networkd")
         return exit_codes.UNHEALTHY
@@ -81,18 +82,13 @@ def _carry_out(options: argparse.Namespace, system: System, plan: Plan, find: Fi
     return _perform_all(plan, system.run)
 
 
-def _missing_programs(plan: Plan, find: Find) -> list[str]:
-    programs = {step.words[0]: None for step in plan.steps if isinstance(step, Command)}
-    return [program for program in programs if find(program) is None]
-
-
 def _perform_all(plan: Plan, run: Run) -> int:
     os.umask(0o022)  # everyone may read the installed files
     for number, step in enumerate(plan.steps):
         try:
             perform(step, run)
-        except StepError as problem:
-            complain(f"could not {step}: {problem}")
+        except (StepError, OSError) as problem:
+            complain(f"could not {step}: {getattr(problem, 'strerror', None) or problem}")
             complain(f"done before that: {number} of {len(plan.steps)} steps. Fix it and run this command again")
             return exit_codes.UNHEALTHY
     print("done")

@@ -53,9 +53,6 @@ class System(NamedTuple):
     def is_enabled(self, unit: str) -> bool:
         return self.run(self.command("systemctl", "is-enabled", unit).words).text.strip() == "enabled"
 
-    def is_active(self, unit: str) -> bool:
-        return self.live and self.run(("systemctl", "is-active", unit)).text.strip() == "active"
-
 
 def source_folder() -> Path:
     """Returns systemd/ of a working tree, or the environment's share/ where the package is installed."""
@@ -135,7 +132,8 @@ def _commands(system: System, changed: set[str]) -> Iterator[Step]:
 def plan_removal(system: System, purge: bool) -> Plan:
     """Also removes files that were copied without this command, where they are unchanged."""
     root, plan, before = system.root, Plan([], []), _load_manifest(system.root)
-    if system.is_enabled(SERVICE) or system.is_active(SERVICE):
+    query = ("systemctl", "is-active", SERVICE)
+    if system.is_enabled(SERVICE) or (system.live and system.run(query).text.strip() == "active"):
         now = ("--now",) if system.live else ()
         plan.steps.append(system.command("systemctl", "disable", *now, SERVICE))
     for path, text in load_sources(system.prefix).items():
@@ -143,13 +141,17 @@ def plan_removal(system: System, purge: bool) -> Plan:
     link = root / LINK
     if link.is_symlink() and link.readlink() == system.prefix / "bin" / "mudskipper":
         plan.steps.append(Remove(link))
-    _plan_reloading(plan, system)
+    removed = {step.path for step in plan.steps if isinstance(step, Remove)}
+    for path, command in ((UNIT, ("systemctl", "daemon-reload")), (NETWORK, ("networkctl", "reload"))):
+        if system.live and root / path in removed:
+            plan.steps.append(Command(command))
     if purge:
         plan.steps.extend(Remove(root / path) for path in OWNED if (root / path).exists())
-        if system.live and SERVICE in _users(root):
+        users = {line.partition(":")[0] for line in _text_of(root / "etc/passwd").splitlines()}
+        if system.live and SERVICE in users:
             plan.steps.append(Command(("userdel", SERVICE)))
     else:
-        _plan_manifest(plan, root, before)
+        _plan_manifest(plan, root, removed, before)
     return plan
 
 
@@ -165,27 +167,14 @@ def _plan_removal_of(plan: Plan, path: Path, known_digests: set[str | None], pur
         plan.notes.append(f"{path} was edited and stays; --purge removes it")
 
 
-def _plan_reloading(plan: Plan, system: System) -> None:
-    removed = {step.path for step in plan.steps if isinstance(step, Remove)}
-    if system.live and system.root / UNIT in removed:
-        plan.steps.append(Command(("systemctl", "daemon-reload")))
-    if system.live and system.root / NETWORK in removed:
-        plan.steps.append(Command(("networkctl", "reload")))
-
-
-def _plan_manifest(plan: Plan, root: Path, before: dict[str, str]) -> None:
+def _plan_manifest(plan: Plan, root: Path, removed: set[Path], before: dict[str, str]) -> None:
     """Keeps the digests of the files that stay."""
-    removed = {step.path for step in plan.steps if isinstance(step, Remove)}
     left = {path: digest for path, digest in before.items() if (root / path).exists() and root / path not in removed}
     if left != before:
         plan.steps.append(WriteFile(root / MANIFEST, json.dumps(left, indent=1) + "\n"))
     staying = [str(root / path) for path in OWNED if (root / path).exists()]
     if staying:
         plan.notes.append(f"{', '.join(staying)}: stays; --purge removes it")
-
-
-def _users(root: Path) -> set[str]:
-    return {line.partition(":")[0] for line in _text_of(root / "etc/passwd").splitlines()}
 
 
 def _load_manifest(root: Path) -> dict[str, str]:

@@ -62,14 +62,7 @@ Step = WriteFile | MakeLink | Remove | Command
 
 
 def perform(step: Step, run: Run) -> None:
-    """Raises StepError."""
-    try:
-        _perform(step, run)
-    except OSError as problem:
-        raise StepError(problem.strerror or str(problem)) from problem
-
-
-def _perform(step: Step, run: Run) -> None:
+    """Raises StepError, and OSError."""
     match step:
         case WriteFile(path, text):
             temporary = _temporary_path(path)

@@ -192,15 +192,11 @@ def _show_items(options: Options, items: list[dict[str, Any]]) -> int:
         print(json.dumps(items))
     else:
         for item in items:
-            print(_check_line(item))
+            mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
+            overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force'"
+            fix = f"\n       -> {item['fix']}{overruled}" if item["fix"] and not item["ok"] else ""
+            print(f"{mark} {item['id']:24} {item['text']}{fix}")
     return exit_codes.OK if all(item["ok"] for item in items) else exit_codes.UNHEALTHY
-
-
-def _check_line(item: dict[str, Any]) -> str:
-    mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
-    overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force'"
-    fix = f"\n       -> {item['fix']}{overruled}" if item["fix"] and not item["ok"] else ""
-    return f"{mark} {item['id']:24} {item['text']}{fix}"
 
 
 def status_text(report: dict[str, Any]) -> str:

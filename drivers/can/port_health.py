@@ -80,10 +80,9 @@ def _reported_state(class_bits: int, data: bytes) -> BusState | None:
                 return state
     if class_bits & RESTARTED:
         return BusState.ACTIVE
-    return _counted_state(max(data[6], data[7])) if class_bits & COUNTERS else None
-
-
-def _counted_state(errors: int) -> BusState:
+    if not class_bits & COUNTERS:
+        return None
+    errors = max(data[6], data[7])
     if errors >= PASSIVE_ERRORS:
         return BusState.PASSIVE
     return BusState.WARNING if errors >= WARNING_ERRORS else BusState.ACTIVE

@@ -94,8 +94,10 @@ class SocketcanPort(PortHealth):
             if kind == SO_TIMESTAMPNS:
                 seconds, nanoseconds = STAMP.unpack(value)
                 stamp_s = seconds + 1e-9 * nanoseconds + clock_s
-            elif kind == SO_RXQ_OVFL:
-                self._on_overflow(value)
+            elif kind == SO_RXQ_OVFL:  # lost frames since the socket's opening, modulo 2³²
+                (count,) = COUNT.unpack(value)
+                self.lost_frames += (count - self._kernel_count) % COUNT_RANGE
+                self._kernel_count = count
         if len(encoded) != FRAME_BYTES or encoded[LENGTH_BYTE] > DATA_MAX_BYTES:
             return self._on_long_frame(encoded, stamp_s)
         word, length, payload = FRAME_LAYOUT.unpack(encoded)
@@ -116,12 +118,6 @@ class SocketcanPort(PortHealth):
             self.on_failed_read(problem)
             return None
         return frame._replace(stamp_s=stamp_s)
-
-    def _on_overflow(self, value: bytes) -> None:
-        """Counts lost frames from the kernel's count, which begins at the socket's opening, modulo 2³²."""
-        (count,) = COUNT.unpack(value)
-        self.lost_frames += (count - self._kernel_count) % COUNT_RANGE
-        self._kernel_count = count
 
     def send(self, frame: Frame) -> None:
         try:

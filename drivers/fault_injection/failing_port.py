@@ -149,30 +149,23 @@ class FailingPort:
             failure = self._failures.of(component)
             if failure is None:
                 continue
-            if component == self._bus:
-                data = self._after_bus(frame.data, failure)
-            elif component.endswith(".error"):
+            data: bytes | None
+            if component.endswith(".error"):
                 data = self._with_error(frame, failure)
             else:
-                data = self._after_drive(frame, failure)
+                data = self._after_failure(frame, failure, of_bus=component == self._bus)
             if data is None:
                 return None
             frame = frame if data is frame.data else frame._replace(data=data)
         return frame
 
-    def _after_bus(self, data: bytes, failure: Failure) -> bytes | None:
+    def _after_failure(self, frame: Frame, failure: Failure, of_bus: bool) -> bytes | None:
+        """Returns the changed payload, or None. A bus corrupts half of its frames, and a stuck one still hears."""
         if failure.kind in SILENT or failure.kind is FailureKind.INTERMITTENT and self._failures.loses():
             return None
-        if failure.kind is FailureKind.GARBAGE and self._failures.loses():
-            return corrupted(data, self._failures.random)
-        return data
-
-    def _after_drive(self, frame: Frame, failure: Failure) -> bytes | None:
-        if failure.kind is FailureKind.OFF or failure.kind is FailureKind.INTERMITTENT and self._failures.loses():
-            return None
-        if failure.kind is FailureKind.GARBAGE:
+        if failure.kind is FailureKind.GARBAGE and (not of_bus or self._failures.loses()):
             return corrupted(frame.data, self._failures.random)
-        if failure.kind is FailureKind.STUCK:
+        if failure.kind is FailureKind.STUCK and not of_bus:
             return self._first_since(failure, frame)
         return frame.data
 

@@ -53,8 +53,3 @@ class FailingPose:
             self._late.popleft()
         arrival_s, late = self._late[0]
         return late._replace(stamp_s=now_s) if arrival_s <= now_s and isfinite(late.x_m) else BodyPose()
-
-
-def failing_pose(pose: PoseSource, failures: Failures | None) -> PoseSource:
-    """Returns the pose source itself where no failures may be injected."""
-    return pose if failures is None else FailingPose(pose, failures)

@@ -270,7 +270,8 @@ class OdriveAxis:
         self._transmit(codec.CLEAR_ERRORS, 0)
 
     def request_version(self) -> None:
-        self._request(codec.GET_VERSION)
+        """Asks for the version by a remote frame."""
+        self._outlet.send(Frame(arbitration_id(self.parameters.node_id, codec.GET_VERSION), is_remote=True))
 
     def request_watchdog(self) -> None:
         """Asks for the watchdog's settings where their numbers in the drive's build are known."""
@@ -279,10 +280,6 @@ class OdriveAxis:
             return
         for endpoint in (endpoints.enable, endpoints.timeout):
             self._transmit(codec.RX_SDO, codec.SDO_READ, endpoint, 0)
-
-    def _request(self, message: Message) -> None:
-        """Asks for a message by a remote frame."""
-        self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), is_remote=True))
 
     def _transmit(self, message: Message, *values: float) -> None:
         self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values)))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from itertools import chain
 from math import isfinite
 
 from control.limits import JointLimits
@@ -47,9 +48,11 @@ class OdriveDrives:
         self.axes = tuple(
             OdriveAxis(joint, parameters[joint], outlets[parameters[joint].bus], endpoints) for joint in JOINTS
         )
-        self._receivers = [(port, self._receivers_on(name)) for name, port in self.ports.items()]
-        for port, receivers in self._receivers:
-            port.listen_to(receivers)
+        self._receivers: list[tuple[CanPort, dict[int, Callable[[bytes, float], None]]]] = []
+        for name, port in self.ports.items():
+            tables = (axis.receivers.items() for axis in self.axes if axis.parameters.bus == name)
+            self._receivers.append((port, dict(chain.from_iterable(tables))))
+            port.listen_to(self._receivers[-1][1])
         self.reset()
 
     def reset(self) -> None:
@@ -76,13 +79,6 @@ class OdriveDrives:
                     self.malformed_frames += 1
         a, b, c, d = self.axes
         return Joints(a.state, b.state, c.state, d.state)
-
-    def _receivers_on(self, bus: str) -> dict[int, Callable[[bytes, float], None]]:
-        table: dict[int, Callable[[bytes, float], None]] = {}
-        for axis in self.axes:
-            if axis.parameters.bus == bus:
-                table.update(axis.receivers)
-        return table
 
     @property
     def _lost(self) -> int:

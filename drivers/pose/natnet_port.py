@@ -33,10 +33,9 @@ from drivers.pose.natnet_codec import (
     decode_server_info,
     message_of,
 )
-from drivers.pose.natnet_sockets import NatNetParameters, NatNetSockets, parse_version
+from drivers.pose.natnet_sockets import Direction, NatNetParameters, NatNetSockets, parse_version
 from drivers.pose.pose_port import STALE_S, PoseReport, PoseSourceError
 from drivers.pose.pose_timing import LeastDelay, PoseForecast
-from drivers.pose.track_axis import Direction
 
 LONGEST_GAP_S = 0.5  # after a longer one a pose is accepted when a second one follows
 REQUEST_S = 1.0  # between requests; Motive forgets a client that is silent for several seconds

@@ -1,4 +1,4 @@
-"""The configuration and the UDP sockets of a NatNet client: one joins the multicast group, one sends requests.
+"""The configuration of a NatNet client, and its UDP sockets: one joins the multicast group, one sends requests.
 
 A server that does not multicast sends its frames to the socket that sent the requests. Nothing here waits.
 """
@@ -11,6 +11,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from math import hypot, isfinite
 from struct import pack
 from typing import Annotated
 
@@ -19,6 +20,8 @@ from drivers.pose.natnet_codec import LONGEST_PACKET, NEWEST, OLDEST, NatNetVers
 
 MOST_PACKETS_PER_READ = 16  # of each socket; frames at 240 Hz are fewer than one in a tick
 ANY_ADDRESS = "0.0.0.0"
+Direction = tuple[float, float, float]  # a unit vector along the track, in the frame of the cameras
+AXES: dict[str, Direction] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,23 @@ class NatNetParameters:
     latency_s: Annotated[float, Bounds(0.0, 0.2), Meaning("of every frame, in addition to what the frame reports")] = (
         0.0
     )
+
+
+def parse_axis(axis: object) -> Direction | None:
+    """Returns a unit vector from "x", "-z" or three numbers; None for anything else."""
+    if isinstance(axis, str):
+        direction = AXES.get(axis.removeprefix("-"))
+        if direction is None or not axis.startswith("-"):
+            return direction
+        x, y, z = direction
+        return -x, -y, -z
+    if not isinstance(axis, list | tuple) or len(axis) != 3:
+        return None
+    if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in axis):
+        return None
+    x, y, z = axis
+    length = hypot(x, y, z)
+    return (x / length, y / length, z / length) if isfinite(length) and length > 0.0 else None
 
 
 def parse_version(text: str) -> NatNetVersion | None:

@@ -93,9 +93,6 @@ class PosePort:
         self._socket = _listen(path)
         self.poses = self.malformed_messages = 0
         self._now_s = NEVER_S
-        self.reset()
-
-    def reset(self) -> None:
         self._pose = BodyPose()
 
     def read(self, now_s: float) -> BodyPose:

@@ -40,7 +40,7 @@ class LockstepRobot:
         """`recorder` is the one of the lockstep."""
         self.lockstep = lockstep
         self._recorder = recorder
-        self._methods = OperatorCalls(lockstep.loop, recorder, [], lambda: lockstep.now_s).methods
+        self._methods = OperatorCalls(lockstep.loop, [], lambda: lockstep.now_s).methods
         self._log = recorder.path
 
     @property

@@ -45,47 +45,33 @@ class CanLink(NamedTuple):
 
 
 def parse_links(text: str) -> dict[str, CanLink]:
-    """Returns the CAN interfaces in the output of `ip`, without malformed ones."""
-    links: Any = None
-    with suppress(ValueError):
-        links = json.loads(text)
-    links = links if isinstance(links, list) else []
-    wanted = [link for link in links if isinstance(link, dict) and link.get("link_type") == "can"]
-    return {link.name: link for link in map(_parse_link, wanted)}
+    """Returns the CAN interfaces in the output of `ip`. Raises ValueError for another output."""
+    try:
+        wanted = [link for link in json.loads(text) if link.get("link_type") == "can"]
+        return {link.name: link for link in map(_parse_link, wanted)}
+    except (AttributeError, KeyError, TypeError, OverflowError) as problem:
+        raise ValueError("not the output of 'ip -json link show'") from problem
 
 
 def _parse_link(link: dict[str, Any]) -> CanLink:
-    info, flags = _table(link, "linkinfo"), link.get("flags")
-    details = _table(info, "info_data")
-    timing = _table(details, "bittiming")
+    info = link.get("linkinfo", {})
+    details = info.get("info_data", {})
+    timing = details.get("bittiming", {})
     return CanLink(
-        name=str(link.get("ifname", "")),
-        up=isinstance(flags, list) and "UP" in flags,
-        kind=str(info.get("info_kind", "")),
-        state=str(details.get("state", "")),
-        bit_rate_bit_s=int(_number(timing.get("bitrate"), 0.0)),
-        sample_point=_number(timing.get("sample_point"), nan),
-        restart_ms=int(_number(details.get("restart_ms"), -1.0)),
-        queue_frames=int(_number(link.get("txqlen"), 0.0)),
+        name=link["ifname"],
+        up="UP" in link["flags"],
+        kind=info.get("info_kind", ""),
+        state=details.get("state", ""),
+        bit_rate_bit_s=int(timing.get("bitrate", 0)),
+        sample_point=float(timing.get("sample_point", nan)),
+        restart_ms=int(details.get("restart_ms", -1)),
+        queue_frames=int(link.get("txqlen", 0)),
     )
-
-
-def _table(within: dict[str, Any], key: str) -> dict[str, Any]:
-    value = within.get(key)
-    return value if isinstance(value, dict) else {}
-
-
-def _number(value: object, otherwise: float) -> float:
-    if isinstance(value, str | int | float):
-        with suppress(ValueError):
-            number = float(value)
-            return number if isfinite(number) else otherwise
-    return otherwise
 
 
 def read_links(root: Path = Path("/")) -> dict[str, CanLink]:
     """Returns the links by name, from iproute2, or else from /sys."""
-    with suppress(OSError, subprocess.SubprocessError):
+    with suppress(OSError, subprocess.SubprocessError, ValueError):
         command = ["ip", "-details", "-json", "link", "show"]
         return parse_links(subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=True).stdout)
     return read_sys_links(root)

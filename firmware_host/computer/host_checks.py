@@ -23,12 +23,9 @@ from firmware_host.computer.host_facts import (
     Mount,
     Thread,
     can_interrupts,
-    governors,
-    is_realtime,
     isolated_processors,
-    kernel_text,
     mount_of,
-    processors,
+    read_text,
 )
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
@@ -42,7 +39,9 @@ VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # in memory, or likely so: 
 UNSAFE = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs", "fuse"})  # without a journal
 OURS = "mudskipper"  # name of the service, its user, its group and this distribution
 STATE_FOLDER = ("var", "lib", OURS)  # StateDirectory= of the unit
-PACKAGES = ("control", "drivers", "estimation", "simulation")
+PACKAGES = (  # the top-level names that this distribution installs
+    "command_line", "control", "drivers", "estimation", "experiments", "firmware_host", "mudskipper", "simulation",
+)  # fmt: skip
 
 
 class Account(NamedTuple):
@@ -59,16 +58,20 @@ def this_account() -> Account:
 
 def examine_host(root: Path, loop: LoopParameters, limits: Limits | None, priority: int | None) -> Iterator[Finding]:
     """`priority` is that of the running loop, None where no daemon runs."""
-    yield examine_kernel(is_realtime(root), kernel_text(root))
+    yield _examine_kernel(root)
     yield from examine_limits(loop, limits)
     if priority is not None:
         yield examine_priority(loop.priority, priority)
-    yield examine_governor(governors(root))
-    yield examine_processor(loop.cpu, isolated_processors(root), processors(root))
+    yield _examine_governor(root)
+    present = len(list((root / "sys/devices/system/cpu").glob("cpu[0-9]*")))
+    yield examine_processor(loop.cpu, isolated_processors(root), present)
     yield examine_interrupts(priority or loop.priority, can_interrupts(root))
 
 
-def examine_kernel(realtime: bool, release: str) -> Finding:
+def _examine_kernel(root: Path) -> Finding:
+    release, version = (read_text(root / "proc/sys/kernel" / name) for name in ("osrelease", "version"))
+    realtime = read_text(root / "sys/kernel/realtime") == "1" or "PREEMPT_RT" in version.replace(" RT", "_RT")
+    release = release or "unknown"
     text = f"{release}, real-time" if realtime else f"{release} is no real-time kernel: ticks may be late"
     fix = "a kernel with PREEMPT_RT, such as Debian's linux-image-rt-amd64 or -arm64"
     return ok_if(realtime, "kernel", text, fix)
@@ -99,7 +102,9 @@ def examine_priority(wanted: int, actual: int) -> Finding:
     return ok_if(actual >= wanted, "loop.priority", text, fix, Level.FAIL)
 
 
-def examine_governor(names: set[str]) -> Finding:
+def _examine_governor(root: Path) -> Finding:
+    paths = (root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor")
+    names = {read_text(path) for path in paths} - {""}
     if not names:
         return ok("governor", "the processors' clock is not scaled by this kernel")
     text, fast = ", ".join(sorted(names)), names == {"performance"}

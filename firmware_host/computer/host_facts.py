@@ -49,15 +49,6 @@ def read_text(path: Path) -> str:
     return ""
 
 
-def is_realtime(root: Path) -> bool:
-    reported = read_text(root / "sys/kernel/realtime") == "1"
-    return reported or "PREEMPT_RT" in read_text(root / "proc/sys/kernel/version").replace("PREEMPT RT", "PREEMPT_RT")
-
-
-def kernel_text(root: Path) -> str:
-    return read_text(root / "proc/sys/kernel/osrelease") or "unknown"
-
-
 def process_limits(root: Path, pid: int | None) -> Limits | None:
     """Returns the limits of a process, or of this one; root may exceed them."""
     if pid is None and os.geteuid() == 0:
@@ -83,21 +74,12 @@ def _limit(text: str) -> float:
     return float(text) if text.isdigit() else 0.0
 
 
-def governors(root: Path) -> set[str]:
-    folder = root / "sys/devices/system/cpu"
-    return {read_text(path) for path in folder.glob("cpu[0-9]*/cpufreq/scaling_governor")} - {""}
-
-
 def isolated_processors(root: Path) -> set[int]:
     """Returns the numbers in a list such as 2-3,5."""
     found: set[int] = set()
     for first, last in re.findall(r"(\d+)(?:-(\d+))?", read_text(root / "sys/devices/system/cpu/isolated")):
         found.update(range(int(first), int(last or first) + 1))
     return found
-
-
-def processors(root: Path) -> int:
-    return len(list((root / "sys/devices/system/cpu").glob("cpu[0-9]*")))
 
 
 def can_interrupts(root: Path) -> list[Thread]:

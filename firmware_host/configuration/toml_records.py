@@ -36,11 +36,7 @@ class ConfigurationError(Exception):
 def _readable(message: str) -> str:
     if len(message) > LONGEST_MESSAGE:
         message = f"{message[: LONGEST_MESSAGE // 2]} [...] {message[-LONGEST_MESSAGE // 2 :]}"
-    return message if message.isprintable() else "".join(map(_printable, message))
-
-
-def _printable(character: str) -> str:
-    return character if character.isprintable() else repr(character)[1:-1]
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in message)
 
 
 @dataclass(frozen=True)
@@ -179,22 +175,16 @@ def _values(hints: Mapping[str, Any], model: BaseModel) -> dict[str, Any]:
 
 def _as_records(hint: Any, value: Any) -> Any:
     """Turns models back into the records that they were made from."""
-    if changes := _changes(hint):
-        return _changed(changes, value)
+    if changes := _changes(hint):  # only the fields that the file sets; the part that makes the record has the others
+        given = value.model_fields_set if isinstance(value, BaseModel) else ()
+        hints = _hints(changes.record, changes.without)
+        return {name: _as_records(hints[name], getattr(value, name)) for name in hints if name in given}
     record = _record_in(hint)
     if get_origin(hint) is dict and record:
         return {name: record(**_values(_hints(record), model)) for name, model in value.items()}
     if get_origin(hint) is list and record:
         return [record(**_values(_hints(record), model)) for model in value]
     return hint(**_values(_hints(hint), value)) if isinstance(value, BaseModel) else value
-
-
-def _changed(changes: ChangesOf, value: Any) -> dict[str, Any]:
-    """Returns only the fields that the file sets; the part that makes the record has the others."""
-    if not isinstance(value, BaseModel):  # the section is not there
-        return {}
-    hints = _hints(changes.record, changes.without)
-    return {name: _as_records(hints[name], getattr(value, name)) for name in hints if name in value.model_fields_set}
 
 
 def _key(location: tuple[str | int, ...]) -> str:

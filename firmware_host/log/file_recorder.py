@@ -8,14 +8,14 @@ from pathlib import Path
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import new_run_id
-from firmware_host.log.recorder import HEALTHY, LogReport
+from firmware_host.log.recorder import NullRecorder
 from firmware_host.software_version import build_metadata
 
 ROWS_AT_ONCE = 1000
 
 
-class FileRecorder:
-    """A Recording. Owns the file and the rows that are not in it yet. Every method may raise OSError."""
+class FileRecorder(NullRecorder):
+    """Owns the file and the rows that are not in it yet. Every method may raise OSError."""
 
     def __init__(self, path: Path, configuration: Configuration, metadata: dict[str, str] | None = None) -> None:
         """`path` must not exist yet."""
@@ -26,9 +26,7 @@ class FileRecorder:
             "configuration_text": configuration.text,
             "metadata": known,
         }
-        self.path: Path | None = path
-        self.dropped = 0
-        self.writer_alive = True
+        self.path = path
         self._file = LogFile(path, opening)
         self._rows: list[tuple[int, bytes]] = []
 
@@ -46,9 +44,6 @@ class FileRecorder:
         """Makes every row so far readable."""
         self._write()
         self._file.flush()
-
-    def report(self) -> LogReport:
-        return HEALTHY
 
     def close(self, timeout_s: float = 0.0) -> bool:
         """Finishes the file, however long that takes."""

@@ -70,13 +70,16 @@ class LogFile:
         self._writer = Writer(stream, chunk_size=1 << 40, compression=CompressionType.LZ4)
         self._wall_offset_ns = int(opening["wall_minus_monotonic_ns"])
         self._latest_ns = min(max(0, self._wall_offset_ns), LATEST_NS)
+        self._channels: list[int] = []
         self._sequences = [0] * len(kinds)
         self._chunk_bytes = self._safe_bytes = 0
         try:
             lock_file(self._file.fileno(), path)
             copy_owner(path)
             self._write_opening(opening["configuration_text"], opening["metadata"])
-            self._channels = [self._register_channel(kind) for kind in kinds]
+            for kind in kinds:
+                schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.definition.encode())
+                self._channels.append(self._writer.register_channel(kind.topic, "cdr", schema))
             self._write_out()
             self._synchronise()
         except OSError:
@@ -89,10 +92,6 @@ class LogFile:
         self._writer.add_metadata(METADATA, metadata | offset)
         now_ns = time.time_ns()
         self._writer.add_attachment(now_ns, now_ns, ATTACHMENT, "application/toml", configuration_text.encode())
-
-    def _register_channel(self, kind: RowKind) -> int:
-        schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.definition.encode())
-        return self._writer.register_channel(kind.topic, "cdr", schema)
 
     @property
     def length(self) -> int:

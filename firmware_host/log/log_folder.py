@@ -197,7 +197,7 @@ def why_not_read(path: Path, problem: OSError) -> str:
     """Says why a file cannot be read and, where permission is missing, what to do."""
     if not isinstance(problem, PermissionError):
         return f"{path}: {problem.strerror or problem}"
-    visible = next((parent for parent in (path, *path.absolute().parents) if _is_visible(parent)), path)
+    visible = next((parent for parent in (path, *path.absolute().parents) if os.path.exists(parent)), path)
     group = f"the group of {visible}, then log in again"
     return f"{path}: you may not read it: have root add you to {group}, or do this as root"
 
@@ -206,11 +206,3 @@ def why_not_moved(path: Path, problem: OSError) -> str:
     if not isinstance(problem, PermissionError):
         return f"{path}: {problem.strerror or problem}"
     return f"{path}: only the daemon's own user and root may move logs: do this as root"
-
-
-def _is_visible(path: Path) -> bool:
-    try:
-        path.stat()
-    except OSError:
-        return False
-    return True

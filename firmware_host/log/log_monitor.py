@@ -15,9 +15,6 @@ class LogMonitor:
 
     def __init__(self, bounds: FaultBounds) -> None:
         self._bounds = bounds
-        self.reset()
-
-    def reset(self) -> None:
         self._dropped = 0
 
     def update(self, report: LogReport) -> list[Fault]:

@@ -22,7 +22,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from fcntl import F_SETPIPE_SZ, fcntl
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import present_path
@@ -49,6 +49,7 @@ class LogReport(NamedTuple):
     slowest_write_s: float  # in the last ten seconds, an unfinished one included
 
 
+REPORT_TYPES = (bool, int, str, float, int, float)  # of its fields, in the message of the writer after the log's path
 HEALTHY = LogReport(  # until the writer reports
     alive=True, dropped=0, problem="", free_fraction=1.0, free_bytes=1 << 62, slowest_write_s=0.0
 )
@@ -182,8 +183,10 @@ class Recorder:
     def _accept(self, line: bytes) -> bool:
         """Returns whether the line is a report: output of any other kind must not end the loop."""
         try:
-            path, report = _decode_report(json.loads(line))
-        except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+            path, *values = json.loads(line)
+            path = Path(path)
+            report = LogReport(*(kind(value) for kind, value in zip(REPORT_TYPES, values, strict=True)))
+        except (TypeError, ValueError, OverflowError, RecursionError):
             self.malformed_reports += 1
             return False
         self.path = path
@@ -197,7 +200,7 @@ class Recorder:
         assert self._writer.stdin is not None and self._writer.stdout is not None
         deadline_s = time.monotonic() + timeout_s
         if self._unreported and self.writer_alive:
-            _wait_for_room(self._pipe, timeout_s)
+            select.select([], [self._pipe], [], timeout_s)  # waits for room
             self._write(self._loss_report())
         self.writer_alive = False
         self._writer.stdin.close()
@@ -214,19 +217,6 @@ class Recorder:
         return status == 0
 
 
-def _decode_report(fields: dict[str, Any]) -> tuple[Path, LogReport]:
-    """Returns the log's path and state; `dropped` counts only the rows that the writer dropped."""
-    report = LogReport(
-        alive=True,
-        dropped=int(fields["dropped"]),
-        problem=str(fields["problem"]),
-        free_fraction=float(fields["free_fraction"]),
-        free_bytes=int(fields["free_bytes"]),
-        slowest_write_s=float(fields["slowest_write_s"]),
-    )
-    return Path(fields["path"]), report
-
-
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:
     """Ctrl-C, the service's stop and its watchdog reach the writer too, so it starts with their signals blocked."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGABRT})
@@ -235,12 +225,6 @@ def _start_writer(path: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-
-
-def _wait_for_room(pipe: int, timeout_s: float) -> None:
-    poll = select.poll()
-    poll.register(pipe, select.POLLOUT)
-    poll.poll(timeout_s * 1e3)
 
 
 def _shorten(row: bytes) -> bytes:

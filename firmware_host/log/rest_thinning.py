@@ -33,10 +33,6 @@ class RestThinning:
         self._every = max(1, round(RATE_HZ / rest_hz)) if rest_hz > 0.0 else 1
         self._full_ticks = round(full_s * RATE_HZ)
         self._held: deque[tuple[int, bytes]] = deque(maxlen=self._full_ticks)
-        self.reset()
-
-    def reset(self) -> None:
-        self._held.clear()
         self._mode = -1
         self._rested = 0  # ticks since torque or a change of mode
         self._resting = False

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import FreeSpace, free_space
-from firmware_host.log.recorder import HEADER, PIPE_BYTES, STAMP
+from firmware_host.log.recorder import HEADER, PIPE_BYTES, STAMP, LogReport
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments
 
@@ -58,16 +58,10 @@ class Reporter:
         space = FreeSpace(0.0, 0)
         with suppress(OSError):  # a disk that does not even answer this has no room
             space = free_space(log.path.parent)
-        report = {
-            "path": str(log.path),
-            "dropped": log.dropped,
-            "problem": log.problem[:LONGEST_MESSAGE],
-            "free_fraction": space.free_fraction,
-            "free_bytes": space.free_bytes,
-            "slowest_write_s": max(self._slowest_s, default=0.0),
-        }
+        problem, slowest_s = log.problem[:LONGEST_MESSAGE], max(self._slowest_s, default=0.0)
+        report = LogReport(True, log.dropped, problem, *space, slowest_s)  # `dropped` counts those of the writer only
         with suppress(OSError):  # the loop is busy or has ended
-            os.write(self._pipe, json.dumps(report).encode() + b"\n")
+            os.write(self._pipe, json.dumps([str(log.path), *report]).encode() + b"\n")
 
 
 def write_log(pipe: int, reports: int, path: Path) -> bool:

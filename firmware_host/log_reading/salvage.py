@@ -13,7 +13,6 @@ from contextlib import suppress
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
 
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -21,7 +20,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from firmware_host.log.log_file import ATTACHMENT, METADATA
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS
-from firmware_host.log.schema import LayoutError, RowKind
+from firmware_host.log.schema import LayoutError
 from firmware_host.log_reading.chunks import RECORD_HEAD, Row, open_chunk, split_records
 from firmware_host.log_reading.log_reader import (
     DAMAGE,
@@ -41,23 +40,76 @@ CHUNK_OPCODE = 6
 LARGEST_CHUNK = 16 << 20  # bytes, when opened
 
 
-class Salvage(NamedTuple):
-    """Everything that a damaged file still holds."""
+class Salvage:
+    """Everything that a damaged file still holds. Owns the layouts and the sequence numbers of its rows."""
 
-    metadata: dict[str, str]
-    configuration_text: str
-    kinds: list[RowKind]  # as the file describes them, in the order of ROW_KINDS
-    rows: list[tuple[int, bytes]]  # number of the kind, encoded row
-    lost: int  # in damaged places
-    foreign: int  # rows of unknown topics
-    wall_offset_ns: int
-    ended: bool  # the writer finished the file
+    def __init__(self) -> None:
+        self.metadata: dict[str, str] = {}
+        self.configuration_text = ""
+        self.kinds = list(ROW_KINDS)  # as the file describes them
+        self.rows: list[tuple[int, bytes]] = []  # number of the kind, encoded row
+        self.wall_offset_ns = 0
+        self.ended = False  # the writer finished the file
+        self._number_of_channel = {number + 1: number for number in range(len(ROW_KINDS))}  # as LogFile numbers them
+        self._schemas: dict[int, Schema] = {}
+        self._sequences: list[set[int]] = [set() for _ in ROW_KINDS]
+        self._foreign: set[tuple[int, int, int]] = set()
 
     @property
     def last_stamp_s(self) -> float:
         number, row = self.rows[-1] if self.rows else (EVENT_KIND, b"")
         stamp_s = self.kinds[number].stamp_s(row)
         return stamp_s if isfinite(stamp_s) else 0.0
+
+    @property
+    def lost(self) -> int:
+        """Rows whose numbers are missing before the last one found."""
+        return sum(max(found) + 1 - len(found) for found in self._sequences if found)
+
+    @property
+    def foreign(self) -> int:
+        """Rows of unknown topics."""
+        return len(self._foreign)
+
+    def read_head(self, contents: bytes) -> None:
+        """Reads the metadata and the configuration, which precede the first chunk, as far as they can be read."""
+        reader = StreamReader(BytesIO(contents), emit_chunks=True, record_size_limit=len(contents))
+        with suppress(*DAMAGE):
+            for record in reader.records:
+                match record:
+                    case Metadata(name=name) if name == METADATA:
+                        self.metadata = dict(record.metadata)
+                    case Attachment(name=name) if name == ATTACHMENT:
+                        self.configuration_text = record.data.decode()
+                    case Chunk():
+                        break
+
+    def add(self, record: Row | Schema | Channel) -> None:
+        """Raises LayoutError."""
+        match record:
+            case Row():
+                self._add_row(record)
+            case Schema():
+                self._schemas[record.id] = record
+            case Channel():
+                self._number_of_channel.pop(record.id, None)
+                number = KIND_OF_TOPIC.get(record.topic)
+                if number is not None:
+                    self.kinds[number] = described_kind(number, self._schemas.get(record.schema_id))
+                    self._number_of_channel[record.id] = number
+
+    def _add_row(self, row: Row) -> None:
+        number = self._number_of_channel.get(row.channel_id)
+        if number is None:
+            self._foreign.add((row.channel_id, row.sequence, hash(row.data)))
+            return
+        if row.sequence in self._sequences[number] or not self.kinds[number].fits(row.data):
+            return
+        if not self.rows:
+            with suppress(ValueError, OverflowError):  # of a stamp that is not finite
+                self.wall_offset_ns = row.log_time_ns - round(self.kinds[number].stamp_s(row.data) * 1e9)
+        self._sequences[number].add(row.sequence)
+        self.rows.append((number, row.data))
 
 
 def count_readable_rows(contents: bytes) -> int:
@@ -83,47 +135,21 @@ def salvage_rows(path: Path, contents: bytes, watch: Watch = unwatched) -> Salva
         raise LogError(
             f"{path}: left as it is: another program has compressed it again, which cannot be recovered here"
         )
-    metadata, configuration_text = _read_head(contents)
-    sorter = _RowSorter()
+    salvage = Salvage()
+    if contents.startswith(MCAP0_MAGIC):
+        salvage.read_head(contents)
     try:
         for chunk in _find_chunks(contents, watch):
-            sorter.add(chunk)
+            for record in chunk:
+                salvage.add(record)
     except LayoutError as error:
         raise LogError(f"{path}: left as it is: {error}; {OTHER_VERSION}") from None
-    if not sorter.rows and not metadata:
+    if not salvage.rows and not salvage.metadata:
         raise LogError(f"{path}: nothing of a log can be found in it; remove it")
-    offset_ns = sorter.wall_offset_ns
     with suppress(KeyError, ValueError):
-        offset_ns = int(metadata.pop("wall_minus_monotonic_ns"))
-    return Salvage(
-        metadata=metadata,
-        configuration_text=configuration_text,
-        kinds=sorter.kinds,
-        rows=sorter.rows,
-        lost=sorter.lost,
-        foreign=sorter.foreign,
-        wall_offset_ns=offset_ns,
-        ended=contents.endswith(MCAP0_MAGIC) and len(contents) > len(MCAP0_MAGIC),
-    )
-
-
-def _read_head(contents: bytes) -> tuple[dict[str, str], str]:
-    """Returns the metadata and the configuration, which precede the first chunk, as far as they can be read."""
-    metadata: dict[str, str] = {}
-    text = ""
-    if not contents.startswith(MCAP0_MAGIC):
-        return metadata, text
-    reader = StreamReader(BytesIO(contents), emit_chunks=True, record_size_limit=len(contents))
-    with suppress(*DAMAGE):
-        for record in reader.records:
-            match record:
-                case Metadata(name=name) if name == METADATA:
-                    metadata = dict(record.metadata)
-                case Attachment(name=name) if name == ATTACHMENT:
-                    text = record.data.decode()
-                case Chunk():
-                    break
-    return metadata, text
+        salvage.wall_offset_ns = int(salvage.metadata.pop("wall_minus_monotonic_ns"))
+    salvage.ended = contents.endswith(MCAP0_MAGIC) and len(contents) > len(MCAP0_MAGIC)
+    return salvage
 
 
 def _find_chunks(contents: bytes, watch: Watch) -> Iterator[list[Row | Schema | Channel]]:
@@ -145,57 +171,3 @@ def _find_chunks(contents: bytes, watch: Watch) -> Iterator[list[Row | Schema | 
             chunk = Chunk("lz4", contents[data:end], last_ns, first_ns, checksum, size)
             yield list(split_records(open_chunk(chunk)))
             position = end
-
-
-class _RowSorter:
-    """Owns the rows found so far, their layouts and their sequence numbers."""
-
-    def __init__(self) -> None:
-        self.rows: list[tuple[int, bytes]] = []
-        self.kinds = list(ROW_KINDS)
-        self.wall_offset_ns = 0
-        self._number_of_channel = {number + 1: number for number in range(len(ROW_KINDS))}  # as LogFile numbers them
-        self._schemas: dict[int, Schema] = {}
-        self._sequences: list[set[int]] = [set() for _ in ROW_KINDS]
-        self._foreign: set[tuple[int, int, int]] = set()
-
-    @property
-    def lost(self) -> int:
-        """Rows whose numbers are missing before the last one found."""
-        return sum(max(found) + 1 - len(found) for found in self._sequences if found)
-
-    @property
-    def foreign(self) -> int:
-        """Rows of unknown topics."""
-        return len(self._foreign)
-
-    def add(self, records: list[Row | Schema | Channel]) -> None:
-        """Raises LayoutError."""
-        for record in records:
-            match record:
-                case Row():
-                    self._add_row(record)
-                case Schema():
-                    self._schemas[record.id] = record
-                case Channel():
-                    self._add_channel(record)
-
-    def _add_channel(self, channel: Channel) -> None:
-        self._number_of_channel.pop(channel.id, None)
-        number = KIND_OF_TOPIC.get(channel.topic)
-        if number is not None:
-            self.kinds[number] = described_kind(number, self._schemas.get(channel.schema_id))
-            self._number_of_channel[channel.id] = number
-
-    def _add_row(self, row: Row) -> None:
-        number = self._number_of_channel.get(row.channel_id)
-        if number is None:
-            self._foreign.add((row.channel_id, row.sequence, hash(row.data)))
-            return
-        if row.sequence in self._sequences[number] or not self.kinds[number].fits(row.data):
-            return
-        if not self.rows:
-            with suppress(ValueError, OverflowError):  # of a stamp that is not finite
-                self.wall_offset_ns = row.log_time_ns - round(self.kinds[number].stamp_s(row.data) * 1e9)
-        self._sequences[number].add(row.sequence)
-        self.rows.append((number, row.data))

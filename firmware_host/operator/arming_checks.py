@@ -20,9 +20,10 @@ from firmware_host.operator.reports import check_item
 
 HEARING = "check its power, wiring, node id and cyclic message periods (docs/how-to/odrive.md)"
 SIGNALS = ("position", "current", "heartbeat")
+UNWATCHED = ", but never its temperature: the currents alone guard it"
 
 
-def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[dict[str, Any]]:
+def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
     """All lines, also those that permit arming."""
     now = take_snapshot(loop)
     lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
@@ -32,7 +33,7 @@ def arming_checks(loop: Loop, log_text: str, warnings: Sequence[str]) -> list[di
         lost = f", {bus.lost_frames} frames lost" if bus.lost_frames else ""
         lines[f"bus.{bus.name}"] = f"{bus.error_frames} error frames, {bus.failed_sends} failed sends{lost}"
     lines["loop"] = f"{now.rate_hz:.1f} Hz, {now.missed_ticks} ticks missed since the start"
-    lines["log"] = log_text
+    lines["log"] = str(loop.recorder.path or "off")
     pose = now.pose
     if pose.source:
         lines["pose"] = pose.message
@@ -66,28 +67,16 @@ def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> d
 def _drive_lines(health: DriveHealth, state: DriveState) -> dict[str, str]:
     """The lines of a drive, its joint and its watchdog."""
     joint = health.joint
-    if not state.heard:
-        return {f"drive.{joint}": _unheard_text(state)}
-    lines = {f"drive.{joint}": _drive_text(health, state), f"joint.{joint}": _joint_text(state)}
+    stamps_s = (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s)
+    missing = [signal for signal, stamp_s in zip(SIGNALS, stamps_s, strict=True) if not isfinite(stamp_s)]
+    if missing:
+        return {f"drive.{joint}": f"not heard: no {', '.join(missing)} yet"}
+    unwatched = not isfinite(state.temperature_stamp_s)
+    heat = f", {state.temperature_c:.0f} degrees C" if isfinite(state.temperature_c) else ""
+    lines = {
+        f"drive.{joint}": f"heard, firmware {health.firmware or 'unknown'}{UNWATCHED if unwatched else ''}",
+        f"joint.{joint}": f"at {degrees(state.angle_rad):.1f} degrees{heat}",
+    }
     if isfinite(health.watchdog_s):
         lines[f"watchdog.{joint}"] = f"trips after {health.watchdog_s:g} s" if health.watchdog_s else "off"
     return lines
-
-
-def _drive_text(health: DriveHealth, state: DriveState) -> str:
-    version = f"firmware {health.firmware or 'unknown'}"
-    unwatched = (
-        "" if isfinite(state.temperature_stamp_s) else ", but never its temperature: the currents alone guard it"
-    )
-    return f"heard, {version}{unwatched}"
-
-
-def _joint_text(state: DriveState) -> str:
-    heat = f", {state.temperature_c:.0f} degrees C" if isfinite(state.temperature_c) else ""
-    return f"at {degrees(state.angle_rad):.1f} degrees{heat}"
-
-
-def _unheard_text(state: DriveState) -> str:
-    stamps_s = (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s)
-    missing = [signal for signal, stamp_s in zip(SIGNALS, stamps_s, strict=True) if not isfinite(stamp_s)]
-    return f"not heard: no {', '.join(missing)} yet"

@@ -31,28 +31,13 @@ class Caller(NamedTuple):
         return f"uid {self.peer.uid} (process {self.peer.pid})"
 
 
-class RequestBudget:
-    """A token bucket: BURST requests at once, REQUESTS_PER_S in the long run."""
-
-    def __init__(self) -> None:
-        self._requests, self._at_s = BURST, -inf
-
-    def allows(self, now_s: float) -> bool:
-        self._requests = min(BURST, self._requests + REQUESTS_PER_S * max(0.0, now_s - self._at_s))
-        self._at_s = now_s
-        return self._requests >= 1.0
-
-    def spend(self) -> None:
-        self._requests -= 1.0
-
-
 class Client:
-    """Owns one connection and its buffers."""
+    """Owns one connection, its buffers and its budget of requests."""
 
     def __init__(self, connection: socket.socket, caller: Caller) -> None:
         self.connection = connection
         self.caller = caller
-        self.budget = RequestBudget()
+        self.budget, self._budget_s = BURST, -inf
         self.outgoing = bytearray()
         self.closing = False  # rejected: nothing more is read or answered
         self.ended = False  # disconnected: its earlier requests still count
@@ -60,6 +45,12 @@ class Client:
         self._unpacker = make_unpacker(READ_BYTES)
         self._received = self._read = 0  # bytes in total, and bytes of complete messages
         self._begun_s = inf  # when the first part of an incomplete request arrived
+
+    def may_request(self, now_s: float) -> bool:
+        """Fill the token bucket: BURST requests at once, REQUESTS_PER_S in the long run. Each request takes one."""
+        self.budget = min(BURST, self.budget + REQUESTS_PER_S * max(0.0, now_s - self._budget_s))
+        self._budget_s = now_s
+        return self.budget >= 1.0
 
     def receive(self) -> None:
         """Raises OSError, or MalformedError for a request that is too long."""

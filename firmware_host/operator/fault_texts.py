@@ -22,9 +22,12 @@ BUSY = "end other programs on this computer; 'mudskipper check' shows real-time 
 ENCODER = "check encoder, magnet and cable, then 'mudskipper clear'"
 
 
+SAME = ""
+
+
 class FaultText(NamedTuple):
     meaning: str  # the fault in general, for the documentation
-    message: str | Callable[[Fault], str]  # what happened, a template over `subject` and the fault's values
+    message: str | Callable[[Fault], str]  # what happened, over `subject` and the fault's values; SAME as the meaning
     what_to_do: str  # continues a sentence: no capital letter, no full stop
 
 
@@ -187,12 +190,8 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         _stuck,
         "free it by hand, then 'mudskipper clear', and walk less deep",
     ),
-    FaultKind.TORQUE_NOT_FINITE: FaultText(
-        "A torque was not a finite number.", "A torque was not a finite number.", REPORT
-    ),
-    FaultKind.COMMAND_REFUSED: FaultText(
-        "The transmit gate refused a command.", "The transmit gate refused a command.", REPORT
-    ),
+    FaultKind.TORQUE_NOT_FINITE: FaultText("A torque was not a finite number.", SAME, REPORT),
+    FaultKind.COMMAND_REFUSED: FaultText("The transmit gate refused a command.", SAME, REPORT),
     FaultKind.LOOP_OVERRUN: FaultText("The loop missed a tick.", "The loop missed {missed} of its ticks.", BUSY),
     FaultKind.LOOP_LAGGING: FaultText(
         "The loop missed six ticks in a row, or a tenth of a hundred.",
@@ -214,9 +213,7 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         "look at the strides in the log; the next depth is the first one of the walk",
     ),
     FaultKind.POSE_LOST: FaultText(
-        "The body's position is no longer reported.",
-        "The body's position is no longer reported.",
-        "check the motion capture and its bridge",
+        "The body's position is no longer reported.", SAME, "check the motion capture and its bridge"
     ),
     FaultKind.LEASE_LOST: FaultText(
         "The program that held the lease disconnected or did not renew it.",
@@ -230,17 +227,13 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
     ),
     FaultKind.LOG_UNWRITABLE: FaultText(
         "The log cannot be written.",
-        "The log cannot be written.",
+        SAME,
         "fix what the message names: the log's folder, its permissions, or its disk",
     ),
     FaultKind.DISK_SLOW: FaultText(
         "The log's disk is slow.", "One write to the log's disk took {write_s:.1f} s.", "use another card or disk"
     ),
-    FaultKind.RECORDER_DEAD: FaultText(
-        "The log's writer has died: nothing is recorded.",
-        "The log's writer has died: nothing is recorded.",
-        "restart the daemon",
-    ),
+    FaultKind.RECORDER_DEAD: FaultText("The log's writer has died: nothing is recorded.", SAME, "restart the daemon"),
     FaultKind.ROWS_LOST: FaultText(
         "The log lost rows.", "The log has lost {rows} rows so far.", "use another card or disk"
     ),
@@ -261,7 +254,8 @@ def fault_message(fault: Fault) -> str:
 
 def exact_message(fault: Fault) -> str:
     """Return the message with its values; raises KeyError or ValueError if one is missing or is no number."""
-    template, values = FAULT_TEXTS[fault.kind].message, dict(fault.values)
+    text, values = FAULT_TEXTS[fault.kind], dict(fault.values)
+    template = text.message or text.meaning
     message = template(fault) if callable(template) else template.format(subject=fault.subject, **values)
     reason = str(values.get("reason", "")).rstrip(".")
     return f"{message.rstrip('.')}: {reason}." if reason else message

@@ -15,7 +15,6 @@ from control.controller import WalkOrder
 from control.faults import Blocks, Fault
 from control.modes import Mode, Request
 from control.records import JOINTS
-from firmware_host.log.recorder import Recording
 from firmware_host.loop import Loop
 from firmware_host.loop_snapshot import LoopSnapshot, take_snapshot
 from firmware_host.operator.arming_checks import arming_checks
@@ -36,10 +35,9 @@ def validated(name: str, method: Method) -> Method:
 
 
 class OperatorCalls:
-    def __init__(self, loop: Loop, recorder: Recording, warnings: list[str], clock: Callable[[], float]) -> None:
+    def __init__(self, loop: Loop, warnings: list[str], clock: Callable[[], float]) -> None:
         self._loop = loop
         self._lease = loop.lease
-        self._recorder = recorder
         self._warnings = warnings
         self._clock = clock
         self._version = software_version()
@@ -47,25 +45,22 @@ class OperatorCalls:
     @property
     def methods(self) -> Methods:
         methods: dict[str, Method] = {
-            "hello": self.hello,
+            "hello": lambda params, caller: {"name": self._loop.configuration.robot.name, "version": self._version},
             "status": self.status,
             "strides": self.strides,
-            "map": self.map,
-            "check": self.check,
-            "arm": self._as_holder(self.arm),
+            "map": lambda params, caller: map_report(self._loop.learning.estimator.map.rows()),
+            "check": lambda params, caller: arming_checks(self._loop, self._warnings),
+            "arm": self._as_holder(lambda params, caller: self._request(caller, Request.ARM, forced=params["force"])),
             "walk": self._as_holder(self.walk),
             "move": self._as_holder(self.move),
             "stop": lambda params, caller: self._request(caller, Request.STOP),
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
             "clear": lambda params, caller: self._request(caller, Request.CLEAR),
-            "lease": self.lease,
+            "lease": lambda params, caller: self._renew_lease(caller, params["for_s"]),
             "release": self.release,
             "reset_timing": self.reset_timing,
         }
         return {name: validated(name, method) for name, method in methods.items()}
-
-    def hello(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
-        return {"name": self._loop.configuration.robot.name, "version": self._version}
 
     def status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
         loop, now = self._loop, take_snapshot(self._loop)
@@ -95,17 +90,14 @@ class OperatorCalls:
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": _bus_report(now),
-            "log": self._log(now),
-        }
-
-    def _log(self, now: LoopSnapshot) -> dict[str, Any]:
-        return {
-            "path": str(self._recorder.path) if self._recorder.path else None,
-            "dropped": now.log.dropped,
-            "writer_alive": now.log.alive,
-            "problem": now.log.problem,
-            "free_fraction": known(now.log.free_fraction),
-            "slowest_write_s": known(now.log.slowest_write_s),
+            "log": {
+                "path": str(loop.recorder.path) if loop.recorder.path else None,
+                "dropped": now.log.dropped,
+                "writer_alive": now.log.alive,
+                "problem": now.log.problem,
+                "free_fraction": known(now.log.free_fraction),
+                "slowest_write_s": known(now.log.slowest_write_s),
+            },
         }
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
@@ -115,15 +107,6 @@ class OperatorCalls:
             stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
             for closed in wanted[:STRIDES_PER_ANSWER]
         ]
-
-    def map(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
-        return map_report(self._loop.learning.map_rows())
-
-    def check(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
-        return arming_checks(self._loop, str(self._recorder.path or "off"), self._warnings)
-
-    def arm(self, params: dict[str, Any], caller: Caller) -> str:
-        return self._request(caller, Request.ARM, forced=params["force"])
 
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
         adaptation, depth_m = self._loop.configuration.adaptation, params["depth_m"]
@@ -157,9 +140,6 @@ class OperatorCalls:
             raise RefusedError(fault_message(loop.fault))
         loop.move(angles_rad, self._clock(), str(caller))
         return "accepted"
-
-    def lease(self, params: dict[str, Any], caller: Caller) -> str:
-        return self._renew_lease(caller, params["for_s"])
 
     def _renew_lease(self, caller: Caller, for_s: float) -> str:
         is_new, now_s = self._lease.holder != caller, self._clock()

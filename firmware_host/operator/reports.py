@@ -15,6 +15,7 @@ from control.records import FLIPPERS, Estimate, StrideEstimate
 from estimation.mud_map import Mapped, MapRow
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
+JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
 
 
 def known(value: float) -> float | None:
@@ -22,18 +23,9 @@ def known(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def estimate_report(estimate: Estimate) -> dict[str, Any]:
-    return {
-        "value": known(estimate.value),
-        "std_error": known(estimate.std_error),
-        "samples": estimate.samples,
-        "valid": estimate.valid,
-        "reason": estimate.reason,
-        "at_least": estimate.at_least,
-    }
-
-
-JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
+def estimate_report(estimate: Estimate | Coefficient | Mapped) -> dict[str, Any]:
+    """Return the estimate of one coefficient; k in N/m³, at `depth_m` where it has one."""
+    return {name: known(value) if isinstance(value, float) else value for name, value in estimate._asdict().items()}
 
 
 def stride_report(stride: StrideEstimate) -> dict[str, Any]:
@@ -43,32 +35,24 @@ def stride_report(stride: StrideEstimate) -> dict[str, Any]:
         for name, value in asdict(stride).items()
         if name not in COEFFICIENTS
     }
-    return report | {name: estimate_report(getattr(stride, name)) for name in COEFFICIENTS}
+    return report | _coefficient_reports(stride)
 
 
-def coefficient_report(coefficient: Coefficient | Mapped | None) -> dict[str, Any] | None:
-    """Return the estimate of one coefficient; k in N/m³ at `depth_m`."""
-    if coefficient is None:
-        return None
-    return {name: known(value) if isinstance(value, float) else value for name, value in coefficient._asdict().items()}
+def _coefficient_reports(record: object) -> dict[str, Any]:
+    """Return the estimates of a record's three coefficients; None for one that is not known."""
+    found = {name: getattr(record, name) for name in COEFFICIENTS}
+    return {name: estimate and estimate_report(estimate) for name, estimate in found.items()}
 
 
 def mud_estimate_report(mud_estimate: MudEstimate) -> dict[str, Any]:
     """Return the estimate of both flippers together, and of each."""
-    together = {name: coefficient_report(getattr(mud_estimate, name)) for name in COEFFICIENTS}
-    apart = {
-        flipper: {name: coefficient_report(getattr(mud_estimate.of(flipper), name)) for name in COEFFICIENTS}
-        for flipper in FLIPPERS
-    }
-    return together | apart | {"boundary": mud_estimate.boundary}
+    apart = {flipper: _coefficient_reports(mud_estimate.of(flipper)) for flipper in FLIPPERS}
+    return _coefficient_reports(mud_estimate) | apart | {"boundary": mud_estimate.boundary}
 
 
 def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
     """Return one row for each piece of the track that a stride has measured."""
-    return [
-        {"place_m": row.position_m} | {name: coefficient_report(getattr(row, name)) for name in COEFFICIENTS}
-        for row in rows
-    ]
+    return [{"place_m": row.position_m} | _coefficient_reports(row) for row in rows]
 
 
 def check_item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from enum import IntEnum, StrEnum
 from math import isfinite
 from typing import Any, NamedTuple
 
+from control.bounds import Bounds
 from control.records import JOINTS
 from drivers.fault_injection.failures import LONGEST_S as LONGEST_FAILURE_S
 from drivers.fault_injection.failures import SHORTEST_S as SHORTEST_FAILURE_S
@@ -52,8 +53,7 @@ class Parameter(NamedTuple):
     type: Type
     meaning: str
     unit: str = ""
-    minimum: float | None = None  # both bounds are inclusive
-    maximum: float | None = None
+    range: Bounds | None = None
     bounds_note: str = ""  # bounds that the configuration sets
     default: bool | int | float | None = None
     required: bool = False
@@ -62,10 +62,9 @@ class Parameter(NamedTuple):
     @property
     def bounds(self) -> str:
         """The permitted values, for messages and documentation."""
-        unit = f" {self.unit}" if self.unit else ""
-        if self.minimum is None or self.maximum is None:
+        if self.range is None:
             return self.bounds_note
-        return f"from {self.minimum:.15g} to {self.maximum:.15g}{unit}"
+        return f"from {self.range.minimum:.15g} to {self.range.maximum:.15g} {self.unit}".rstrip()
 
     def value_in(self, params: Mapping[str, Any]) -> Any:
         """Return the value in the parameters of a request, or the default; raises RefusedError."""
@@ -74,7 +73,7 @@ class Parameter(NamedTuple):
         if absent or (value is None and self.null_is_default):
             return self.default
         if not self._accepts(value):
-            bounds = f" {self.bounds}" if self.minimum is not None else ""
+            bounds = f" {self.bounds}" if self.range else ""
             raise RefusedError(f"{self.name} = {value!r:.60}: must be {REQUIREMENTS[self.type]}{bounds}")
         return value
 
@@ -90,7 +89,7 @@ class Parameter(NamedTuple):
                 fits = isinstance(value, int | float) and isfinite(value)
         if not fits or isinstance(value, bool):
             return False
-        return self.minimum is None or self.maximum is None or self.minimum <= value <= self.maximum
+        return self.range is None or self.range.minimum <= value <= self.range.maximum
 
 
 class SocketMethod(NamedTuple):
@@ -110,26 +109,41 @@ class SocketMethod(NamedTuple):
         return {parameter.name: parameter.value_in(params) for parameter in self.parameters}
 
 
-def _angle(joint: str) -> Parameter:
-    bounds = "inside of the joint's configured range"
-    meaning = f"angle that the {joint} joint moves to"
-    return Parameter(f"{joint}_rad", Type.NUMBER, meaning, "rad", bounds_note=bounds)
-
-
+LEASE_RANGE = Bounds(SHORTEST_LEASE_S, LONGEST_LEASE_S)
+TAKE_OVER = "end the lease of another program, whose connection then stays refused"
 LEASE = (
+    Parameter("take_over", Type.FLAG, TAKE_OVER, default=False),
+    Parameter("lease_s", Type.NUMBER, "also take the lease, or renew it, for this time", "s", LEASE_RANGE),
+)
+IN_RANGE = "inside of the joint's configured range"
+ANGLES = tuple(
+    Parameter(f"{joint}_rad", Type.NUMBER, f"angle that the {joint} joint moves to", "rad", bounds_note=IN_RANGE)
+    for joint in JOINTS
+)
+SINCE = Parameter(
+    "since", Type.INTEGER, "number of the first stride wanted", range=Bounds(0, LARGEST_INTEGER), default=0
+)
+STRIDES = Parameter(
+    "strides", Type.INTEGER, "number of strides; 0 walks until a stop", range=Bounds(0, MAX_STRIDES), default=0
+)
+DEPTH = Parameter(
+    "depth_m",
+    Type.NUMBER,
+    "fixed depth of every stride; without it, or with null, the depth adapts from adaptation.initial_depth_m on",
+    "m",
+    bounds_note="more than 0, at most adaptation.max_depth_m",
+    null_is_default=True,
+)
+FAILURE = (
+    Parameter("component", Type.TEXT, 'what fails; "all" with kind "ok"', required=True),
+    Parameter("kind", Type.TEXT, 'how it fails; "ok" ends the failure', required=True),
     Parameter(
-        "take_over",
-        Type.FLAG,
-        "end the lease of another program, whose connection then stays refused",
-        default=False,
-    ),
-    Parameter(
-        "lease_s",
+        "for_s",
         Type.NUMBER,
-        "also take the lease, or renew it, for this time",
+        "how long it fails",
         "s",
-        minimum=SHORTEST_LEASE_S,
-        maximum=LONGEST_LEASE_S,
+        bounds_note=f"from {SHORTEST_FAILURE_S:g} to {LONGEST_FAILURE_S:g} s",
+        default=USUAL_S,
     ),
 )
 STATUS_KEYS = {
@@ -183,16 +197,7 @@ METHODS: dict[str, SocketMethod] = {
     "strides": SocketMethod(
         Level.READ,
         f"Report the strides that were learned from, oldest first, at most {STRIDES_PER_ANSWER} in one answer.",
-        (
-            Parameter(
-                "since",
-                Type.INTEGER,
-                "number of the first stride wanted",
-                minimum=0,
-                maximum=LARGEST_INTEGER,
-                default=0,
-            ),
-        ),
+        (SINCE,),
         answer="a list of maps, with every field of a stride in the log; the most important are",
         answer_keys=STRIDE_KEYS,
     ),
@@ -223,33 +228,12 @@ METHODS: dict[str, SocketMethod] = {
         (Parameter("force", Type.FLAG, "overrule faults that are not mandatory", default=False), *LEASE),
     ),
     "walk": SocketMethod(
-        Level.DRIVE,
-        "Walk, with a depth that adapts to the mud or is fixed.",
-        (
-            Parameter(
-                "depth_m",
-                Type.NUMBER,
-                "fixed depth of every stride; without it, or with null, the depth adapts"
-                " from adaptation.initial_depth_m on",
-                "m",
-                bounds_note="more than 0, at most adaptation.max_depth_m",
-                null_is_default=True,
-            ),
-            Parameter(
-                "strides",
-                Type.INTEGER,
-                "number of strides; 0 walks until a stop",
-                minimum=0,
-                maximum=MAX_STRIDES,
-                default=0,
-            ),
-            *LEASE,
-        ),
+        Level.DRIVE, "Walk, with a depth that adapts to the mud or is fixed.", (DEPTH, STRIDES, *LEASE)
     ),
     "move": SocketMethod(
         Level.DRIVE,
         "Move joints slowly to angles while the robot holds its pose; at least one joint is required.",
-        (*map(_angle, JOINTS), *LEASE),
+        (*ANGLES, *LEASE),
         refuses_unknown=True,
     ),
     "stop": SocketMethod(Level.ANYONE, "End a walk or a move; a walk ends with the flippers raised."),
@@ -258,35 +242,14 @@ METHODS: dict[str, SocketMethod] = {
     "lease": SocketMethod(
         Level.DRIVE,
         "Take or renew the lease: if it is not renewed in time, the robot stops. Only its holder moves the robot.",
-        (
-            Parameter(
-                "for_s",
-                Type.NUMBER,
-                "time within which it is renewed",
-                "s",
-                minimum=SHORTEST_LEASE_S,
-                maximum=LONGEST_LEASE_S,
-                required=True,
-            ),
-        ),
+        (Parameter("for_s", Type.NUMBER, "time within which it is renewed", "s", LEASE_RANGE, required=True),),
     ),
     "release": SocketMethod(Level.DRIVE, "End one's own lease, or one that was lost."),
     "reset_timing": SocketMethod(Level.DRIVE, "Start the statistics of the loop's timing again."),
     "fail": SocketMethod(
         Level.DRIVE,
         "Make a component fail on purpose, if failures.allowed permits it.",
-        (
-            Parameter("component", Type.TEXT, 'what fails; "all" with kind "ok"', required=True),
-            Parameter("kind", Type.TEXT, 'how it fails; "ok" ends the failure', required=True),
-            Parameter(
-                "for_s",
-                Type.NUMBER,
-                "how long it fails",
-                "s",
-                bounds_note=f"from {SHORTEST_FAILURE_S:g} to {LONGEST_FAILURE_S:g} s",
-                default=USUAL_S,
-            ),
-        ),
+        FAILURE,
         answer="a list of maps: what fails now",
         answer_keys=FAILURE_KEYS,
     ),

@@ -76,7 +76,9 @@ class StatusSocket:
             elif descriptor in self._clients:
                 self._handle_events(descriptor, events)
         self._answer_next(now_s)
-        self._drop_overdue(now_s)
+        for descriptor in [each for each, client in self._clients.items() if client.is_overdue(now_s)]:
+            self._too_slow += 1
+            self._drop(descriptor)
 
     def _accept(self) -> None:
         try:
@@ -88,23 +90,20 @@ class StatusSocket:
         except OSError:
             return connection.close()
         level = self._rights.level(peer)
+        connection.setblocking(False)
         refused = self._rights.refusal_to_connect(level)
         if refused:
-            return self._refuse_connection(connection, refused)
+            self._not_permitted += 1
+            with connection, suppress(OSError):  # the client may have disconnected already
+                connection.send(msgpack.packb([RESPONSE, None, refused, None]))
+            return None
         self._accepted += 1
         if len(self._clients) >= MOST_CLIENTS:
             self._drop_for(peer)
-        connection.setblocking(False)
         caller = Caller(self._accepted, peer, level)
         client = self._clients[connection.fileno()] = Client(connection, caller)
         client.watched = select.EPOLLIN
         return self._poll.register(connection.fileno(), client.watched)
-
-    def _refuse_connection(self, connection: socket.socket, message: str) -> None:
-        self._not_permitted += 1
-        connection.setblocking(False)
-        with connection, suppress(OSError):  # the client may have disconnected already
-            connection.send(msgpack.packb([RESPONSE, None, message, None]))
 
     def _drop_for(self, newcomer: Peer) -> None:
         """Drop the longest silent client of the user with the most connections; of equal users, the less privileged."""
@@ -138,7 +137,7 @@ class StatusSocket:
     def _answer_next(self, now_s: float) -> None:
         """Answer the first client in turn whose request rate permits it."""
         for descriptor in self._waiting:
-            if self._clients[descriptor].budget.allows(now_s):
+            if self._clients[descriptor].may_request(now_s):
                 del self._waiting[descriptor]
                 return self._answer_one(descriptor, now_s)
         return None
@@ -152,7 +151,7 @@ class StatusSocket:
             self._reject(client, str(problem))
         else:
             if request is not None:
-                client.budget.spend()
+                client.budget -= 1.0
                 self._waiting[descriptor] = None  # another request may follow
                 self._answer(client, *request)
         self._flush(descriptor)
@@ -201,12 +200,6 @@ class StatusSocket:
         if wanted != client.watched:
             client.watched = wanted
             self._poll.modify(client.connection.fileno(), wanted)
-
-    def _drop_overdue(self, now_s: float) -> None:
-        overdue = [descriptor for descriptor, client in self._clients.items() if client.is_overdue(now_s)]
-        for descriptor in overdue:
-            self._too_slow += 1
-            self._drop(descriptor)
 
     def _drop(self, descriptor: int) -> None:
         client = self._clients.pop(descriptor)

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drivers.pose.natnet_sockets import parse_version
+from drivers.pose.natnet_sockets import AXES, parse_axis, parse_version
 from drivers.pose.pose_port import PoseSender
-from drivers.pose.track_axis import AXES, parse_axis
 from firmware_host.configuration.configuration import PoseParameters
 from simulation.body.plant import Plant
 from simulation.devices.motion_capture import OF_THE_PAPER, CameraFrame, MotionCapture

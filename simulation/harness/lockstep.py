@@ -16,11 +16,11 @@ from control.records import JOINTS
 from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
 from drivers.fault_injection.failing_port import failing_ports
-from drivers.fault_injection.failing_pose import failing_pose
+from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import USUAL_S, Failures, begin_text, end_text
+from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.fault_injection.failing_recorder import failing_recorder
-from firmware_host.fault_injection.failing_time import Stalls, failing_clock
+from firmware_host.fault_injection.failing_host import FailingClock, FailingRecorder, Stalls
 from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick
@@ -95,9 +95,11 @@ class Lockstep:
         )
         wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
         ports = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
-        pose = failing_pose(SimulatedPose(self.robot.plant, motion_capture, seed + 1), failures)
-        rows = failing_recorder(recorder or NullRecorder(), failures)
-        wall_clock = failing_clock(self._now_s, failures)
+        pose: PoseSource = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
+        rows, wall_clock = recorder or NullRecorder(), self._now_s
+        if failures is not None:
+            pose, rows = FailingPose(pose, failures), FailingRecorder(rows, failures)
+            wall_clock = FailingClock(wall_clock, failures)
         self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock, period_s)
         self._can_fail = failures is not None
         self.failures = failures or Failures(configuration.bus)

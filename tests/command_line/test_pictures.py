@@ -237,17 +237,6 @@ def test_frames_are_a_twentieth_of_a_second_apart(two_walks: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["plot", "film"])
-def test_what_is_no_log_is_refused_in_a_sentence(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "broken.mcap").write_bytes(b"not a log")
-    assert "broken.mcap: damaged" in failure(capsys, command, str(tmp_path / "broken.mcap"))
-    assert "No such file" in failure(capsys, command, str(tmp_path / "none.mcap"))
-    assert "not a log" in failure(capsys, command, str(tmp_path / "walk.txt"))
-    assert not list(tmp_path.glob("*.png"))
-
-
-@pytest.mark.parametrize("command", ["plot", "film"])
 def test_an_unknown_walk_and_an_unwritable_file_are_refused(
     command: str, log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

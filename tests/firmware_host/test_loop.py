@@ -16,8 +16,8 @@ from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import SET_INPUT_TORQUE
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
-from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, TICK_KIND
+from firmware_host.log.recorder import HEALTHY
+from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Level, Peer
@@ -26,37 +26,20 @@ from simulation.devices.drive import DriveError, SimulatedDrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
+from tests.recorded_events import EventRecorder
 
 FIRM = Track([(5.0, MUDS["48.5"])])
 Make = Callable[..., Lockstep]
 
 
-class ListRecorder(NullRecorder):
-    """Records rows in a list."""
-
-    def __init__(self) -> None:
-        self.health = HEALTHY
-        self.rows: list[tuple[int, bytes]] = []
-
-    def put(self, kind_index: int, payload: bytes) -> bool:
-        self.rows.append((kind_index, payload))
-        return True
-
-    def report(self) -> LogReport:
-        return self.health
-
-    def texts(self) -> list[str]:
-        return [EVENT.decode(payload)["text"] for kind, payload in self.rows if kind == EVENT_KIND]
-
-
 @pytest.fixture
 def robot(configuration: Configuration) -> Lockstep:
-    return Lockstep(configuration, FIRM, recorder=ListRecorder())
+    return Lockstep(configuration, FIRM, recorder=EventRecorder())
 
 
-def recorder_of(robot: Lockstep) -> ListRecorder:
+def recorder_of(robot: Lockstep) -> EventRecorder:
     recorder = robot.loop.recorder
-    assert isinstance(recorder, ListRecorder)
+    assert isinstance(recorder, EventRecorder)
     return recorder
 
 
@@ -81,12 +64,6 @@ def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Conf
     robot.run_for(1.0)
     assert robot.loop.mode is Mode.BOOT
     assert listener.receive() == []
-
-
-def test_the_loop_arms_only_on_request(robot: Lockstep) -> None:
-    robot.run_for(2.0)
-    assert robot.loop.mode is Mode.IDLE
-    assert not any(state.closed_loop for state in robot.loop.states)
 
 
 def test_arming_holds_the_pose_it_finds_without_a_jerk(robot: Lockstep) -> None:
@@ -303,19 +280,18 @@ def test_every_tick_and_every_stride_is_recorded(robot: Lockstep) -> None:
     robot.arm()
     robot.walk(WalkOrder(0.03, True, 2))
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 10.0)
-    kinds = [kind for kind, _ in recorder_of(robot).rows]
+    kinds = recorder_of(robot).kinds
     assert kinds.count(TICK_KIND) == robot.tick_number
     assert kinds.count(STRIDE_KIND) == robot.loop.learning.strides_closed == 4
-    assert "request walk" in recorder_of(robot).texts()
-    assert "mode hold to walking" in recorder_of(robot).texts()
+    assert "request walk" in recorder_of(robot).texts
+    assert "mode hold to walking" in recorder_of(robot).texts
 
 
 def test_a_dead_log_writer_is_shown_in_the_status(robot: Lockstep) -> None:
     robot.arm()
-    recorder = recorder_of(robot)
-    recorder.health = HEALTHY._replace(alive=False)
+    robot.loop.recorder.report = lambda: HEALTHY._replace(alive=False)  # type: ignore[method-assign]
     robot.step()
-    reported = OperatorCalls(robot.loop, recorder, [], lambda: robot.now_s).methods["status"](
+    reported = OperatorCalls(robot.loop, [], lambda: robot.now_s).methods["status"](
         {}, Caller(1, Peer(1, 0, frozenset()), Level.DRIVE)
     )
     assert reported["fault"]["name"] == "recorder_dead" and not reported["log"]["writer_alive"]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from control.faults import FaultKind
 from control.modes import Mode
-from firmware_host.loop_events import LoopEvents, ModeChange
+from firmware_host.loop_events import LoopEvents
 from tests.recorded_events import EventRecorder
 
+Change = dict[str, Any]
 FAULT = FaultKind.LEASE_LOST.fault(holder="Anna")
 
 
@@ -22,12 +25,12 @@ def events(recorder: EventRecorder) -> LoopEvents:
     return LoopEvents(recorder, longest_hold_s=60.0)
 
 
-def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False, up: bool = True) -> ModeChange:
-    return ModeChange(before, after, FAULT if faulty else None, rested, up)
+def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False, up: bool = True) -> Change:
+    return {"before": before, "after": after, "fault": FAULT if faulty else None, "rested": rested, "flippers_up": up}
 
 
 def test_a_change_of_mode_is_logged_with_its_cause(events: LoopEvents, recorder: EventRecorder) -> None:
-    events.report_mode_change(1.0, change(Mode.WALKING, Mode.STOPPING, faulty=True))
+    events.report_mode_change(1.0, **change(Mode.WALKING, Mode.STOPPING, faulty=True))
     assert recorder.texts == ["mode walking to stopping: Anna held the lease and did not renew it."]
     assert events.notice.startswith("stopped by lease_lost: Anna held the lease and did not renew it. ")
 
@@ -35,9 +38,9 @@ def test_a_change_of_mode_is_logged_with_its_cause(events: LoopEvents, recorder:
 @pytest.mark.parametrize("mode", [Mode.ARMING, Mode.WALKING])
 def test_a_notice_stays_until_the_robot_is_moved_again(events: LoopEvents, mode: Mode) -> None:
     events.report_end_of_move(1.0, "stop was asked for.")
-    events.report_mode_change(2.0, change(Mode.HOLD, Mode.IDLE))
+    events.report_mode_change(2.0, **change(Mode.HOLD, Mode.IDLE))
     assert events.notice == "the joints stopped on their way: stop was asked for."
-    events.report_mode_change(3.0, change(Mode.IDLE, mode))
+    events.report_mode_change(3.0, **change(Mode.IDLE, mode))
     assert events.notice == ""
 
 
@@ -48,10 +51,8 @@ def test_a_notice_stays_until_the_robot_is_moved_again(events: LoopEvents, mode:
         (change(Mode.STOPPING, Mode.HOLD, up=False), "the flippers did not come out of the mud"),
     ],
 )
-def test_a_notice_is_also_in_the_log(
-    events: LoopEvents, recorder: EventRecorder, changed: ModeChange, notice: str
-) -> None:
-    events.report_mode_change(1.0, changed)
+def test_a_notice_is_also_in_the_log(events: LoopEvents, recorder: EventRecorder, changed: Change, notice: str) -> None:
+    events.report_mode_change(1.0, **changed)
     assert events.notice.startswith(notice)
     assert recorder.texts[1:] == [events.notice]
 
@@ -59,6 +60,6 @@ def test_a_notice_is_also_in_the_log(
 @pytest.mark.parametrize(
     "changed", [change(Mode.HOLD, Mode.IDLE), change(Mode.STOPPING, Mode.HOLD), change(Mode.BOOT, Mode.IDLE, True)]
 )
-def test_usual_changes_and_faults_without_torque_leave_no_notice(events: LoopEvents, changed: ModeChange) -> None:
-    events.report_mode_change(1.0, changed)
+def test_usual_changes_and_faults_without_torque_leave_no_notice(events: LoopEvents, changed: Change) -> None:
+    events.report_mode_change(1.0, **changed)
     assert events.notice == ""

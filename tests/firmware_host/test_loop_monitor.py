@@ -11,28 +11,16 @@ from control.monitors.joint_monitor import FaultBounds
 from control.rate import PERIOD_S
 from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LoopMonitor
 from firmware_host.ticker import Tick, Ticker
+from tests.firmware_host.synthetic_clock import SyntheticClock
 
 START_S = 5000.0
 OFFSET_S = 1.7e9  # from the monotonic clock to the wall clock
 
 
-class Clock:
-    """Owns a synthetic time in which a ticker sleeps."""
-
-    def __init__(self) -> None:
-        self.now_s = START_S
-
-    def __call__(self) -> float:
-        return self.now_s
-
-    def sleep(self, duration_s: float) -> None:
-        self.now_s += duration_s
-
-
 def run_monitor(busy_s: Iterable[float]) -> list[list[Fault]]:
     """Return the faults of each tick, with work of `busy_s` before it."""
-    clock = Clock()
-    ticker, monitor = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
+    clock = SyntheticClock(START_S)
+    ticker, monitor = Ticker(clock=clock.read, sleep=clock.sleep), LoopMonitor(FaultBounds())
     reported = []
     for each in busy_s:
         clock.now_s += each
@@ -132,8 +120,8 @@ def test_a_drifting_wall_clock_is_no_fault() -> None:
 
 @given(st.lists(st.floats(0.0, 0.05), max_size=150))
 def test_every_missed_tick_is_reported(busy_s: list[float]) -> None:
-    clock = Clock()
-    ticker, monitor = Ticker(clock=clock, sleep=clock.sleep), LoopMonitor(FaultBounds())
+    clock = SyntheticClock(START_S)
+    ticker, monitor = Ticker(clock=clock.read, sleep=clock.sleep), LoopMonitor(FaultBounds())
     for each in busy_s:
         clock.now_s += each
         tick = ticker.wait()

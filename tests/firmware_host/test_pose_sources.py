@@ -13,9 +13,9 @@ import pytest
 from control.modes import Mode
 from control.records import BodyPose
 from drivers.pose.natnet_port import NatNetPort
+from drivers.pose.natnet_sockets import parse_axis
 from drivers.pose.pose_port import NoPose, PosePort, PoseReport, PoseSender, PoseSourceError
 from drivers.pose.rail_encoder import RailEncoder
-from drivers.pose.track_axis import parse_axis
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, PoseParameters
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -199,7 +199,7 @@ def robot(configuration: Configuration) -> Iterator[Lockstep]:
 
 
 def pose_line(robot: Lockstep) -> dict[str, Any]:
-    (line,) = [item for item in arming_checks(robot.loop, "log", []) if item["id"] == "pose"]
+    (line,) = [item for item in arming_checks(robot.loop, []) if item["id"] == "pose"]
     return line
 
 

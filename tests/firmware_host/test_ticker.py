@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import pytest
 
 from control.rate import PERIOD_S, RATE_HZ
 from firmware_host.ticker import Ticker
+from tests.firmware_host.synthetic_clock import SyntheticClock
 
 
-@dataclass
-class FakeClock:
-    """Time passes by sleeping, and by `work_s`."""
-
-    now_s: float = 100.0
-    oversleep_s: float = 0.0
-    slept_s: list[float] = field(default_factory=list)
-
-    def read(self) -> float:
-        return self.now_s
-
-    def sleep(self, duration_s: float) -> None:
-        assert duration_s > 0.0
-        self.slept_s.append(duration_s)
-        self.now_s += max(duration_s + self.oversleep_s, 1e-6)
-
-
-def make_ticker(clock: FakeClock) -> Ticker:
+def make_ticker(clock: SyntheticClock) -> Ticker:
     return Ticker(PERIOD_S, clock.read, clock.sleep)
 
 
 def test_the_rate_does_not_drift_with_the_work() -> None:
-    clock = FakeClock(oversleep_s=50e-6)
+    clock = SyntheticClock(oversleep_s=50e-6)
     ticker = make_ticker(clock)
     for _ in range(38000):
         ticker.wait()
@@ -41,7 +23,7 @@ def test_the_rate_does_not_drift_with_the_work() -> None:
 
 
 def test_deadlines_that_were_missed_are_skipped_and_counted() -> None:
-    clock = FakeClock()
+    clock = SyntheticClock()
     ticker = make_ticker(clock)
     ticker.wait()
     clock.now_s += 3.4 * PERIOD_S
@@ -51,14 +33,14 @@ def test_deadlines_that_were_missed_are_skipped_and_counted() -> None:
 
 
 def test_lateness_is_measured_from_the_deadline() -> None:
-    clock = FakeClock(oversleep_s=123e-6)
+    clock = SyntheticClock(oversleep_s=123e-6)
     tick = make_ticker(clock).wait()
     assert tick.late_s == pytest.approx(123e-6)
     assert tick.missed == 0
 
 
 def test_a_sleep_that_ends_early_is_continued() -> None:
-    clock = FakeClock(oversleep_s=-1e-4)
+    clock = SyntheticClock(oversleep_s=-1e-4)
     tick = make_ticker(clock).wait()
     assert tick.late_s >= 0.0
     assert len(clock.slept_s) > 1

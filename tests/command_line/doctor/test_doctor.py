@@ -11,11 +11,10 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.doctor import doctor as module
 from command_line.doctor.doctor import examine_all, examine_daemon
 from command_line.main import main
 from control.records import JOINTS
-from firmware_host.computer.findings import Level, fail, ok, warn
+from firmware_host.computer.findings import Level
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from tests.command_line.conftest import Bench
@@ -67,12 +66,6 @@ def test_a_daemon_of_another_version_is_warned_of() -> None:
     found = next(iter(examine_daemon(made_up_status(), "1.1", 0.3)))
     assert found.level is Level.WARN
     assert "1.0" in found.text and "1.1" in found.text
-
-
-def test_the_exit_status_is_0_only_if_nothing_fails(capsys: pytest.CaptureFixture[str]) -> None:
-    assert module._show([ok("a", "fine"), warn("b", "hm", "look")], as_json=False) == exit_codes.OK
-    assert capsys.readouterr().out == f"ok   {'a':22} fine\nwarn {'b':22} hm\n       -> look\n"
-    assert module._show([ok("a", "fine"), fail("b", "bad", "mend")], as_json=True) == exit_codes.UNHEALTHY
 
 
 def test_a_running_daemon_tells_its_process_its_drives_and_its_limits(bench: Bench) -> None:

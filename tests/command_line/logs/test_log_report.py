@@ -101,13 +101,6 @@ def test_a_log_without_a_walk_says_so(
     assert "No complete stride." in page and "there is no walk in this log" in page
 
 
-def test_a_log_that_cannot_be_read_is_told_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "x.mcap").write_bytes(b"nothing")
-    status = main(["log", "report", str(tmp_path / "x.mcap"), "--out", str(tmp_path / "r")])
-    assert status == exit_codes.UNHEALTHY
-    assert "this is not how an MCAP file begins" in capsys.readouterr().err
-
-
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not beside the project")
 def test_the_authors_logs_have_a_page_too(tmp_path: Path) -> None:
     log = LAB_LOGS / "single_12.5N_trial5.csv.gz"

@@ -97,14 +97,6 @@ def test_a_second_daemon_on_the_same_socket_is_refused(bench: Bench) -> None:
     assert "already running" in complaint and "Traceback" not in complaint
 
 
-def test_a_walk_of_two_strides_ends_by_itself(bench: Bench) -> None:
-    before = bench.wait_for(lambda report: True)["strides_closed"]
-    bench.run("arm")
-    bench.run("walk", "--strides", "2")
-    report = bench.wait_for(lambda report: report["mode"] == "hold" and report["strides_closed"] == before + 4)
-    assert report["fault"] is None
-
-
 def test_ctrl_c_ends_a_watch_without_a_message(bench: Bench) -> None:
     command = [sys.executable, "-m", "command_line.main", "watch", "--socket", str(bench.socket)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as watch:

@@ -121,13 +121,6 @@ def test_the_kernel_s_bytes_are_the_frames_in_both_directions(bench: Bench, enco
     assert bench.kernel.recv(64) == encoded
 
 
-def test_frames_keep_their_order_and_nothing_is_waited_for(bench: Bench) -> None:
-    sent = [Frame(number, bytes([number])) for number in range(100)]
-    bench.report(*sent)
-    assert bench.receive() == sent
-    assert bench.receive() == []
-
-
 def test_an_error_frame_is_recognised_before_its_class_bits_look_like_an_id(bench: Bench) -> None:
     looks_like_the_encoder = Frame(0x009, bytes(8), is_error=True)
     bench.report(looks_like_the_encoder, ENCODER)

@@ -7,7 +7,7 @@ from math import isfinite, isnan
 import pytest
 
 from control.records import BodyPose
-from drivers.fault_injection.failing_pose import LATE_S, FailingPose, failing_pose
+from drivers.fault_injection.failing_pose import LATE_S, FailingPose
 from drivers.fault_injection.failures import Failures
 from drivers.pose.pose_port import NO_SOURCE, PoseReport
 
@@ -70,8 +70,3 @@ def test_a_delayed_position_is_an_earlier_one_with_a_fresh_stamp() -> None:
     later = [(now_s, body) for now_s, body in during("slow") if now_s > BEGIN_S + LATE_S + 0.5 * PERIOD_S]
     assert all(isnan(body.x_m) for body in early) and len(early) == 20
     assert all(abs(now_s - LATE_S - body.x_m) < 1.5 * PERIOD_S and body.stamp_s == now_s for now_s, body in later)
-
-
-def test_a_pose_that_may_not_fail_is_not_wrapped() -> None:
-    pose = RisingPose()
-    assert failing_pose(pose, None) is pose

@@ -109,12 +109,6 @@ def test_any_bytes_of_another_length_are_malformed(name: str, data: bytes) -> No
             MESSAGES[name].decode(data)
 
 
-def test_no_two_messages_of_any_two_nodes_share_an_id() -> None:
-    identifiers = [arbitration_id(node, message) for node in range(63) for message in MESSAGES.values()]
-    assert len(set(identifiers)) == 63 * len(MESSAGES)
-    assert max(identifiers) < 0x7E0  # of node 63, which is no address
-
-
 @pytest.mark.parametrize("size", [0, 1, 4, 9])
 def test_an_answer_without_the_value_of_a_parameter_is_malformed(size: int) -> None:
     with pytest.raises(MalformedMessageError, match=f"with {size} bytes"):

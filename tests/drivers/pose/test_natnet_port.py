@@ -15,9 +15,8 @@ import pytest
 from control.records import BodyPose
 from drivers.pose.natnet_codec import NatNetVersion
 from drivers.pose.natnet_port import NatNetPort
-from drivers.pose.natnet_sockets import MOST_PACKETS_PER_READ, NatNetParameters
+from drivers.pose.natnet_sockets import MOST_PACKETS_PER_READ, Direction, NatNetParameters
 from drivers.pose.pose_port import STALE_S, PoseSourceError
-from drivers.pose.track_axis import Direction
 from simulation.devices.natnet_server import (
     LOOPBACK,
     FrameTimes,

@@ -32,7 +32,7 @@ def lines_of(robot: Lockstep, *names: str, warnings: tuple[str, ...] = ()) -> di
     faults = [FAULT_KINDS[name].fault(SUBJECTS.get(FAULT_KINDS[name].part, "")) for name in names]
     robot.loop.faults.reset()
     robot.loop.faults.update(faults, False)
-    items = arming_checks(robot.loop, "logs/a.mcap", warnings)
+    items = arming_checks(robot.loop, warnings)
     robot.loop.faults.reset()
     lines = {item["id"]: item for item in items}
     assert len(lines) == len(items)
@@ -44,7 +44,7 @@ def test_every_line_of_a_ready_robot_is_ok(ready: Lockstep) -> None:
     assert all(item["ok"] and not item["fix"] for item in lines.values())
     expected = {"configuration", "loop", "log", "bus.left", "bus.right"}
     assert set(lines) == expected | {f"{part}.{joint}" for part in ("drive", "joint", "watchdog") for joint in JOINTS}
-    assert lines["log"]["text"] == "logs/a.mcap"
+    assert lines["log"]["text"] == "off"
     assert "firmware 0.6.11" in lines["drive.left_sweep"]["text"]
     assert "30 degrees C" in lines["joint.left_sweep"]["text"]
     assert lines["watchdog.left_sweep"]["text"] == "trips after 0.1 s"
@@ -105,7 +105,7 @@ def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configura
     silent = robot.robot.drives[2]
     silent.cyclic_frames = lambda now_s: iter(())  # type: ignore[method-assign]
     robot.run_for(0.5)
-    items = {item["id"]: item for item in arming_checks(robot.loop, "off", [])}
+    items = {item["id"]: item for item in arming_checks(robot.loop, [])}
     unheard = {identity for identity, item in items.items() if not item["ok"]}
     assert unheard == {"drive.right_sweep"}
     assert items["drive.right_sweep"]["text"] == "not heard: no position, current, heartbeat yet"
@@ -125,7 +125,7 @@ def test_a_drive_without_temperature_is_reported_but_does_not_block_arming(
             frame for frame in everything(now_s) if frame.arbitration_id & 0x1F != 0x15
         )
     robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.blocking(), 3.0)
-    items = {item["id"]: item for item in arming_checks(robot.loop, "off", [])}
+    items = {item["id"]: item for item in arming_checks(robot.loop, [])}
     assert all("the currents alone guard it" in items[f"drive.{joint}"]["text"] for joint in JOINTS)
     assert all(item["ok"] for item in items.values())
     assert robot.loop.faults.reaction is Reaction.NONE

@@ -32,7 +32,7 @@ class Robot:
         self.events = EventRecorder()
         self.steps = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=self.events)
         self.lease = self.steps.loop.lease
-        calls = OperatorCalls(self.steps.loop, self.events, [], lambda: self.steps.now_s)
+        calls = OperatorCalls(self.steps.loop, [], lambda: self.steps.now_s)
         self._methods = calls.methods
         self.names = set(self._methods)
 

@@ -124,14 +124,6 @@ def test_a_client_that_does_not_complete_a_request_is_dropped(served: Served) ->
     assert ask(served, idle, ECHO)  # who asks nothing may stay
 
 
-def test_an_idle_client_stays_connected(served: Served) -> None:
-    client = connect(served)
-    assert ask(served, client, ECHO)
-    served.now_s += 1e6
-    serve(served, 2)
-    assert ask(served, client, ECHO)
-
-
 def test_a_request_in_two_parts_is_answered_if_the_second_is_in_time(served: Served) -> None:
     client = connect(served)
     for _ in range(3):  # each has its own time

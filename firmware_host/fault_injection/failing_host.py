@@ -1,15 +1,19 @@
-"""A ticker that stalls and a wall clock that steps, both on purpose.
+"""Parts of the daemon that fail on purpose: a ticker that stalls, a wall clock that steps, a log that refuses rows.
 
-The stall comes after a tick's work and before the wait for the next deadline, as if the work took too long.
+The stall comes after a tick's work and before the wait for the next deadline, as if the work took too long. The log
+reports the rows that it refused.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
 from drivers.fault_injection.failures import Failure, FailureKind, Failures, end_text
+from firmware_host.log.recorder import STAMP, LogReport, Recording
+from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.ticker import Tick
 
 STALL_S = 0.03  # eleven ticks: longer than a drive may be silent
@@ -65,11 +69,6 @@ class FailingTicker:
         return tick
 
 
-def failing_ticker(ticker: TickSource, failures: Failures | None, report: Callable[[float, str], None]) -> TickSource:
-    """Wrap the ticker, unless no failures are allowed."""
-    return ticker if failures is None else FailingTicker(ticker, failures, report)
-
-
 class FailingClock:
     """A wall clock that steps or stops on purpose."""
 
@@ -89,6 +88,51 @@ class FailingClock:
         return self._stuck_at_s
 
 
-def failing_clock(clock: Callable[[], float], failures: Failures | None) -> Callable[[], float]:
-    """Wrap the clock, unless no failures are allowed."""
-    return clock if failures is None else FailingClock(clock, failures)
+class FailingRecorder:
+    """A Recording that owns the count of the rows that it refused."""
+
+    def __init__(self, recorder: Recording, failures: Failures) -> None:
+        self._recorder = recorder
+        self._failures = failures
+        self._refused = self._unreported = 0
+        self._count()
+
+    def _count(self) -> None:
+        failure = self._failures.of("log")
+        self.dropped = self._recorder.dropped + self._refused
+        self.writer_alive = self._recorder.writer_alive and (failure is None or failure.kind is not FailureKind.OFF)
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        failure = self._failures.of("log")
+        if failure and (failure.kind is not FailureKind.INTERMITTENT or self._failures.loses()):
+            self._refused += 1
+            self._unreported += 1
+            taken = False
+        else:
+            self._report_loss(payload)
+            taken = self._recorder.put(kind_index, payload)
+        self._count()
+        return taken
+
+    @property
+    def path(self) -> Path | None:
+        return self._recorder.path
+
+    def report(self) -> LogReport:
+        report, failure = self._recorder.report(), self._failures.of("log")
+        self._count()
+        if failure is None:
+            return report._replace(dropped=self.dropped)
+        problem = f"the log is failing on purpose: {failure.kind}"
+        return report._replace(alive=self.writer_alive, dropped=self.dropped, problem=problem)
+
+    def _report_loss(self, payload: bytes) -> None:
+        """Report missing rows before the first row after them, with the stamp of that row."""
+        if self._unreported:
+            (stamp_s,) = STAMP.unpack_from(payload)
+            text = f"rows missing here: {self._unreported}, the log was failing on purpose"
+            self._unreported = 0
+            self._recorder.put(EVENT_KIND, EVENT.encode(stamp_s, text))
+
+    def close(self, timeout_s: float) -> bool:
+        return self._recorder.close(timeout_s)

@@ -1,0 +1,162 @@
+"""Parts of the daemon that fail on purpose: a ticker that stalls, a wall clock that steps, a log that loses rows."""
+
+from __future__ import annotations
+
+import pytest
+
+from control.rate import PERIOD_S
+from drivers.fault_injection.failures import Failures
+from firmware_host.fault_injection.failing_host import (
+    CLOCK_STEP_S,
+    SLOW_TICK_S,
+    STALL_S,
+    FailingClock,
+    FailingRecorder,
+    FailingTicker,
+)
+from firmware_host.log.rows import EVENT, EVENT_KIND
+from firmware_host.ticker import Tick, Ticker
+from tests.firmware_host.synthetic_clock import SyntheticClock
+from tests.recorded_events import EventRecorder
+
+
+class Bench:
+    def __init__(self) -> None:
+        self.clock, self.failures = SyntheticClock(), Failures(())
+        self.reported: list[tuple[float, str]] = []
+        ticker = Ticker(PERIOD_S, self.clock.read, self.clock.sleep)
+        report = lambda now_s, text: self.reported.append((now_s, text))  # noqa: E731
+        self.ticker = FailingTicker(ticker, self.failures, report, self.clock.sleep)
+
+    def wait(self, ticks: int) -> list[Tick]:
+        return [self.ticker.wait() for _ in range(ticks)]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_without_a_failure_no_tick_is_missed(bench: Bench) -> None:
+    assert all(tick.missed == 0 and tick.late_s < 1e-9 for tick in bench.wait(100))
+
+
+def test_a_stuck_loop_stalls_once(bench: Bench) -> None:
+    bench.wait(10)
+    bench.failures.begin("loop", "stuck", bench.clock.now_s, 1.0)
+    first, *others = bench.wait(100)
+    assert (first.missed + 1) * PERIOD_S <= STALL_S < (first.missed + 2) * PERIOD_S
+    assert all(tick.missed == 0 for tick in others)
+
+
+def test_a_loop_can_be_stuck_twice(bench: Bench) -> None:
+    for _ in range(2):
+        bench.failures.begin("loop", "stuck", bench.clock.now_s, 1.0)
+        assert [tick.missed > 0 for tick in bench.wait(5)] == [True, False, False, False, False]
+
+
+def test_a_slow_loop_lags_until_its_time_is_over(bench: Bench) -> None:
+    bench.wait(10)
+    begin_s = bench.clock.now_s
+    bench.failures.begin("loop", "slow", begin_s, 1.0)
+    slow = [tick for tick in bench.wait(300) if tick.now_s < begin_s + 1.0]
+    mean_s = (slow[-1].now_s - begin_s) / len(slow)
+    assert SLOW_TICK_S <= mean_s < 2.0 * PERIOD_S
+    assert all(tick.missed == 0 for tick in bench.wait(100))
+
+
+def test_the_end_of_a_failure_is_reported_in_its_tick(bench: Bench) -> None:
+    bench.failures.begin("pose", "off", bench.clock.now_s, 0.02)
+    bench.wait(20)
+    ((now_s, text),) = bench.reported
+    assert text == "end of failing on purpose: pose off"
+    assert 100.02 <= now_s < 100.02 + PERIOD_S
+
+
+def test_a_stuck_clock_continues_afterwards() -> None:
+    wall, failures = SyntheticClock(), Failures(())
+    clock = FailingClock(wall.read, failures)
+    assert clock() == 100.0
+    failures.begin("clock", "stuck", 0.0, 1.0)
+    seen = []
+    for _ in range(3):
+        wall.sleep(1.0)
+        seen.append(clock())
+    failures.end_all()
+    assert seen == [101.0] * 3 and clock() == 103.0
+
+
+def test_a_clock_steps_by_an_hour_and_back() -> None:
+    wall, failures = SyntheticClock(), Failures(())
+    clock = FailingClock(wall.read, failures)
+    failures.begin("clock", "garbage", 0.0, 1.0)
+    assert clock() == 100.0 + CLOCK_STEP_S
+    failures.end_all()
+    assert clock() == 100.0
+
+
+class KeepingRecorder(EventRecorder):
+    """Has lost two rows by itself."""
+
+    dropped = 2
+    closed_in_s = 0.0
+
+    def close(self, timeout_s: float) -> bool:
+        self.closed_in_s = timeout_s
+        return True
+
+
+def put_numbers(recorder: FailingRecorder, numbers: range) -> list[bool]:
+    return [recorder.put(EVENT_KIND, EVENT.encode(float(number), str(number))) for number in numbers]
+
+
+@pytest.mark.parametrize(("kind", "alive"), [("off", False), ("stuck", True)])
+def test_a_failing_log_refuses_rows_and_then_logs_their_number(kind: str, alive: bool) -> None:
+    kept, failures = KeepingRecorder(), Failures(())
+    recorder = FailingRecorder(kept, failures)
+    assert put_numbers(recorder, range(2)) == [True, True]
+    failures.begin("log", kind, 2.0, 3.0)
+    assert put_numbers(recorder, range(2, 5)) == [False] * 3
+    assert (recorder.dropped, recorder.writer_alive) == (5, alive)
+    failures.update(5.0)
+    assert put_numbers(recorder, range(5, 7)) == [True, True]
+    assert kept.texts == ["0", "1", "rows missing here: 3, the log was failing on purpose", "5", "6"]
+    assert (recorder.dropped, recorder.writer_alive) == (5, True)
+
+
+def test_an_intermittent_log_loses_about_half_and_logs_each_gap() -> None:
+    kept, failures = KeepingRecorder(), Failures(())
+    recorder = FailingRecorder(kept, failures)
+    failures.begin("log", "intermittent", 0.0)
+    taken = put_numbers(recorder, range(200))
+    failures.end_all()
+    put_numbers(recorder, range(200, 201))
+    reported = sum(int(text.split()[3].rstrip(",")) for text in kept.texts if text.startswith("rows missing"))
+    assert 60 < sum(taken) < 140
+    assert reported == taken.count(False) == recorder.dropped - 2
+
+
+def test_a_writer_that_died_by_itself_stays_dead() -> None:
+    kept = KeepingRecorder()
+    kept.writer_alive = False
+    assert not FailingRecorder(kept, Failures(())).writer_alive
+
+
+@pytest.mark.parametrize(("kind", "alive"), [("off", False), ("stuck", True), ("intermittent", True)])
+def test_the_report_of_a_failing_log_shows_failure_and_lost_rows(kind: str, alive: bool) -> None:
+    kept, failures = KeepingRecorder(), Failures(())
+    recorder = FailingRecorder(kept, failures)
+    assert recorder.report() == kept.report()._replace(dropped=2)
+    failures.begin("log", kind, 0.0)
+    refused = put_numbers(recorder, range(20)).count(False)
+    report = recorder.report()
+    assert (report.alive, report.dropped, report.free_fraction) == (alive, 2 + refused, kept.report().free_fraction)
+    assert refused and "on purpose" in report.problem and kind in report.problem
+    failures.end_all()
+    assert recorder.report() == kept.report()._replace(dropped=2 + refused)
+    assert recorder.path is kept.path
+
+
+def test_closing_reaches_the_log() -> None:
+    kept = KeepingRecorder()
+    assert FailingRecorder(kept, Failures(())).close(3.0) and kept.closed_in_s == 3.0
