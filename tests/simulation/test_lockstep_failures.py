@@ -10,7 +10,6 @@ from control.records import NO_TORQUE, Phase
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
-from firmware_host.operator.fault_texts import fault_message
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -28,21 +27,10 @@ def make_walking(configuration: Configuration, recorder: NullRecorder | None = N
     return lockstep
 
 
-def test_a_drive_that_is_unplugged_in_a_walk_is_a_silent_drive(configuration: Configuration) -> None:
-    lockstep = make_walking(configuration)
-    began_s = lockstep.now_s
-    lockstep.fail("left_sweep", "off")
-    assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.DAMPING, 0.02)
-    assert lockstep.run_until(lambda: lockstep.loop.mode is Mode.FAULT, 0.1)
-    assert lockstep.loop.fault is not None
-    assert lockstep.loop.fault.name == "drive_silent" and "left_sweep" in fault_message(lockstep.loop.fault)
-    assert lockstep.now_s - began_s < configuration.faults.silence_s + 0.006
-    assert lockstep.loop.sent.torques_nm == NO_TORQUE
-
-
 @pytest.mark.parametrize(
     ("component", "kind", "fault"),
     [
+        ("left_sweep", "off", "drive_silent"),
         ("right_adduction.error", "off", "drive_disarmed"),
         ("right_adduction.error", "stuck", "drive_error"),
         ("left_sweep.command", "off", "drive_error"),  # its watchdog

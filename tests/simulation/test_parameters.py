@@ -10,8 +10,16 @@ from simulation.body.free_body import BodyShape
 from simulation.body.plant import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture import MotionCaptureParameters
+from simulation.harness.world import SegmentText
+from simulation.mud.clay import Layer
+from simulation.mud.disturbances import Disturbances
+from simulation.mud.stones import Stone
+from simulation.mud.track import RandomStrength, Ridges
 
-RECORDS = [BodyShape, MotionCaptureParameters, SimulatedDriveParameters, PlantParameters]
+RECORDS = [
+    *(BodyShape, MotionCaptureParameters, SimulatedDriveParameters, PlantParameters),
+    *(Layer, Stone, Ridges, RandomStrength, Disturbances, SegmentText),
+]
 
 
 @pytest.mark.parametrize("record", RECORDS)
@@ -25,6 +33,6 @@ def test_every_number_has_bounds_around_its_default(record: type) -> None:
             _, bounds = get_args(hint)
             assert isinstance(bounds, Bounds)
             assert bounds.minimum < bounds.maximum
-            assert field.default is MISSING or bounds.minimum <= field.default <= bounds.maximum, field.name
+            assert field.default in (MISSING, None) or bounds.minimum <= field.default <= bounds.maximum, field.name
             bounded += 1
-    assert bounded >= 5
+    assert bounded >= 2

@@ -19,10 +19,10 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick
-from simulation.devices.slcan_adapter import SlcanAdapter
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.drivers.can.slcan_adapter import SlcanAdapter
 from tests.waiting import wait_until
 
 OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O

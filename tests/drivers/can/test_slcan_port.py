@@ -16,7 +16,7 @@ from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.can.port_health import BusState
 from drivers.can.slcan_serial import SlcanSerial
-from simulation.devices.slcan_adapter import SlcanAdapter, decode_line, encode_line
+from tests.drivers.can.slcan_adapter import SlcanAdapter, decode_line, encode_line
 from tests.waiting import wait_until
 
 FRAMES = [

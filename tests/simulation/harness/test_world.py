@@ -3,13 +3,12 @@
 from dataclasses import fields, replace
 from math import isfinite
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.bounds import Bounds
 from control.controller import WalkOrder
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -21,7 +20,6 @@ from simulation.harness.world import (
     FIXED_OF_DRIVE,
     FIXED_OF_ROBOT,
     STRONGEST_PA,
-    SegmentText,
     WorldText,
     load_world,
     parse_world,
@@ -29,7 +27,7 @@ from simulation.harness.world import (
 from simulation.mud.clay import MUDS, Clay, Layer, clay_of_water
 from simulation.mud.disturbances import NONE, Disturbances
 from simulation.mud.stones import Stone
-from simulation.mud.track import LEVEL, RandomStrength, Ridges
+from simulation.mud.track import LEVEL, Ridges
 from tests.folders import EXAMPLE_WORLD
 
 EXAMPLE = EXAMPLE_WORLD
@@ -217,15 +215,6 @@ def test_any_value_anywhere_is_taken_or_refused_by_name(key: str, value: str) ->
         parse_world(f"{key} = {value}\n" + ("" if key == "segment" else SHORTEST))
     except ConfigurationError as problem:
         assert problem.problems and all(problem.problems)
-
-
-@pytest.mark.parametrize("record", [Layer, Stone, Ridges, RandomStrength, Disturbances, SegmentText])
-def test_every_number_of_a_world_has_bounds(record: type) -> None:
-    hints = get_type_hints(record, include_extras=True)
-    for item in fields(record):
-        kinds = get_args(hints[item.name])
-        if kinds and kinds[0] in (int, float, float | None):
-            assert isinstance(kinds[1], Bounds), item.name
 
 
 def test_robot_and_drives_accept_all_fields_of_their_records() -> None:
