@@ -1,21 +1,24 @@
-"""A recorder that keeps the sentences of a log, for tests that look at what was told."""
+"""A recorder that keeps the event texts of a log, for tests that look at what was reported."""
 
 from __future__ import annotations
 
-from firmware_host.log.recorder import NullRecorder
+from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
 
 
 class EventRecorder(NullRecorder):
-    def __init__(self) -> None:
+    """Passes every row on to `log` too, if there is one."""
+
+    def __init__(self, log: Recording | None = None) -> None:
         self.kinds: list[int] = []  # of all rows
         self.texts: list[str] = []
+        self.log = log or NullRecorder()
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         self.kinds.append(kind_index)
         if kind_index == EVENT_KIND:
             self.texts.append(EVENT.decode(payload)["text"])
-        return True
+        return self.log.put(kind_index, payload)
 
     def about(self, word: str) -> list[str]:
         return [text for text in self.texts if word in text]

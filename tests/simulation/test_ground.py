@@ -177,6 +177,6 @@ def test_a_robot_walks_faster_where_buried_stones_hold_its_flippers(configuratio
         lockstep = Lockstep(configuration, Track(soft, stones))
         lockstep.arm()
         lockstep.walk(WalkOrder(0.025, adaptive=False))
-        lockstep.run_for(8.0)
+        lockstep.run_for(4.5)
         distances_m.append(lockstep.robot.plant.body_m)
     assert distances_m[1] > 2.0 * distances_m[0]

@@ -9,22 +9,29 @@ from control.modes import ENERGISED, Mode, Request
 from control.records import NO_TORQUE, Phase
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.recorder import NullRecorder
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.copied_robots import copy_of
 from tests.recorded_events import EventRecorder
 
 TRACK = Track([(2.0, MUDS["48.5"])])
 
 
-def make_walking(configuration: Configuration, recorder: NullRecorder | None = None) -> Lockstep:
-    lockstep = Lockstep(configuration, TRACK, recorder=recorder, failures=Failures(configuration.bus))
+@pytest.fixture(scope="module")
+def sound(configuration: Configuration) -> Lockstep:
+    """A robot that walks and to which nothing has happened yet."""
+    lockstep = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03))
     lockstep.run_for(0.5)
     return lockstep
+
+
+@pytest.fixture
+def lockstep(sound: Lockstep) -> Lockstep:
+    return copy_of(sound)
 
 
 @pytest.mark.parametrize(
@@ -38,10 +45,7 @@ def make_walking(configuration: Configuration, recorder: NullRecorder | None = N
         ("loop", "stuck", "loop_stalled"),
     ],
 )
-def test_each_failure_shows_as_the_fault_that_it_is(
-    configuration: Configuration, component: str, kind: str, fault: str
-) -> None:
-    lockstep = make_walking(configuration)
+def test_each_failure_shows_as_the_fault_that_it_is(lockstep: Lockstep, component: str, kind: str, fault: str) -> None:
     lockstep.fail(component, kind)
     reported = set()
     for _ in range(114):
@@ -51,8 +55,9 @@ def test_each_failure_shows_as_the_fault_that_it_is(
     assert lockstep.loop.fault is not None
 
 
-def test_no_failure_brings_an_exception_out_of_the_loop_nor_torque_without_power(configuration: Configuration) -> None:
-    lockstep = make_walking(configuration)
+def test_no_failure_brings_an_exception_out_of_the_loop_nor_torque_without_power(
+    configuration: Configuration, lockstep: Lockstep
+) -> None:
     limit_nm = configuration.limits.torque_nm
     for component, kind, _ in list(lockstep.failures.table()):
         lockstep.fail(component, kind, 0.05)
@@ -65,8 +70,8 @@ def test_no_failure_brings_an_exception_out_of_the_loop_nor_torque_without_power
     assert not lockstep.failures.failing
 
 
-def test_the_same_failure_is_the_same_to_the_last_bit(configuration: Configuration) -> None:
-    first, second = make_walking(configuration), make_walking(configuration)
+def test_the_same_failure_is_the_same_to_the_last_bit(sound: Lockstep) -> None:
+    first, second = copy_of(sound), copy_of(sound)
     for lockstep in (first, second):
         lockstep.fail("left_sweep", "intermittent", 0.3)
         lockstep.fail("right_sweep.current", "garbage", 0.3)
@@ -77,7 +82,7 @@ def test_the_same_failure_is_the_same_to_the_last_bit(configuration: Configurati
 
 def test_begin_and_end_stand_in_the_log(configuration: Configuration) -> None:
     recorder = EventRecorder()
-    lockstep = make_walking(configuration, recorder)
+    lockstep = Lockstep(configuration, TRACK, recorder=recorder, failures=Failures(configuration.bus))
     lockstep.fail("pose", "off", 0.1)
     lockstep.run_for(0.2)
     assert [text for text in recorder.texts if "on purpose" in text] == [
@@ -86,21 +91,19 @@ def test_begin_and_end_stand_in_the_log(configuration: Configuration) -> None:
     ]
 
 
-def test_a_stalled_loop_misses_ticks_while_the_robot_continues(configuration: Configuration) -> None:
-    lockstep = make_walking(configuration)
+def test_a_stalled_loop_misses_ticks_while_the_robot_continues(lockstep: Lockstep) -> None:
     ticks = lockstep.tick_number
     lockstep.fail("loop", "stuck")
     lockstep.step()
     assert lockstep.loop.missed_ticks == lockstep.tick_number - ticks - 1 == 11
 
 
-def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(configuration: Configuration) -> None:
+def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(lockstep: Lockstep) -> None:
     """The bus goes in an extraction: until its watchdog trips a drive keeps the last torque."""
-    lockstep = make_walking(configuration)
     lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.EXTRACTION, 5.0)
     lockstep.run_for(0.02)
     lockstep.fail("bus.left", "bus-off", 0.5)
-    lockstep.run_for(3.0)
+    lockstep.run_for(1.0)
     arms = lockstep.robot.plant.arms
     assert (abs(arms[0].sweep_rad), abs(arms[0].adduction_rad)) == END_STOPS_RAD
     for by_hand in (False, True):
@@ -108,7 +111,7 @@ def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(c
             lockstep.robot.request_put_back()
             lockstep.run_for(0.5)
         lockstep.loop.request(Request.CLEAR, lockstep.now_s)
-        lockstep.run_for(1.0)
+        lockstep.run_for(0.6)
         beyond = [fault.subject for fault in lockstep.loop.faults.present if fault.name == "joint_position"]
         assert beyond == ([] if by_hand else ["left_sweep", "left_adduction"])
     lockstep.arm()

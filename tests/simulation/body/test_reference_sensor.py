@@ -168,28 +168,39 @@ def test_a_reset_reference_sensor_counts_from_zero() -> None:
     assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [0, 0]
 
 
-def observe_walk(lockstep: Lockstep, depth_m: float, seconds: float) -> list[StrideTruth]:
+def observe_walk(lockstep: Lockstep, strides: int) -> list[StrideTruth]:
+    """Of so many strides of each flipper, 3 cm deep."""
     lockstep.arm()
-    lockstep.walk(WalkOrder(depth_m, adaptive=False))
-    reference, truths = StrokeReference(), []
-    for _ in range(round(seconds / PERIOD_S)):
+    lockstep.walk(WalkOrder(0.03, adaptive=False))
+    reference = StrokeReference()
+    truths: list[StrideTruth] = []
+    while len(truths) < 2 * strides:
         lockstep.step()
         truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target.phase)
     return truths
 
 
-def test_a_walk_has_the_strides_that_the_loop_closes(configuration: Configuration) -> None:
+Observed = tuple[Lockstep, list[StrideTruth]]
+
+
+@pytest.fixture(scope="module")
+def walk_in_soft_mud(configuration: Configuration) -> Observed:
     lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
-    truths = observe_walk(lockstep, 0.03, 6.0)
-    assert len(truths) >= 6
+    return lockstep, observe_walk(lockstep, 4)
+
+
+def test_a_walk_has_the_strides_that_the_loop_closes(walk_in_soft_mud: Observed) -> None:
+    lockstep, truths = walk_in_soft_mud
     closed = [(stride.estimate.flipper, stride.estimate.index) for stride in lockstep.loop.learning.strides]
     assert [(truth.flipper, truth.index) for truth in truths] == closed
     assert all(truth.insertion.deepest_m == pytest.approx(0.03, abs=0.002) for truth in truths)
 
 
-def test_in_soft_mud_slip_and_advance_make_up_the_sweep(configuration: Configuration) -> None:
-    lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
-    truths = [truth for truth in observe_walk(lockstep, 0.03, 8.0) if truth.flipper == "left"]
+def test_in_soft_mud_slip_and_advance_make_up_the_sweep(
+    configuration: Configuration, walk_in_soft_mud: Observed
+) -> None:
+    lockstep, both = walk_in_soft_mud
+    truths = [truth for truth in both if truth.flipper == "left"]
     steps_m = lockstep.robot.plant.body_m / len(truths)
     arc_m = 2.0 * configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
     assert truths[-1].stance.slip_m + steps_m == pytest.approx(arc_m, abs=0.02)  # the body goes on a bit in extraction
@@ -197,7 +208,7 @@ def test_in_soft_mud_slip_and_advance_make_up_the_sweep(configuration: Configura
 
 def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configuration: Configuration) -> None:
     lockstep = Lockstep(
-        replace(configuration, gait=SINGLE_FLIPPER),
+        replace(configuration, gait=replace(SINGLE_FLIPPER, pause_s=0.3)),
         Track([(1.0, MUDS["53.1"])]),
         disturbances=Disturbances(surface_sd_m=0.0015, remoulding=1.0),
         fixed_base=True,
@@ -212,7 +223,7 @@ def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configura
             thrusts_n.append(arm.force.thrust_n)
 
     lockstep.step = recording_step  # type: ignore[method-assign]
-    first = next(truth for truth in observe_walk(lockstep, 0.03, 20.0) if truth.flipper == "left")
+    first = next(truth for truth in observe_walk(lockstep, 1) if truth.flipper == "left")
     stance = first.stance
     assert isfinite(stance.speed_m_s)
     shear_n = measure_shear(

@@ -198,18 +198,25 @@ def test_layers_do_not_change_each_other_s_draws() -> None:
 
 
 def single_flipper(
-    configuration: Configuration, disturbances: Disturbances, track: Track = SOFT, pause_s: float = 0.2
+    configuration: Configuration, disturbances: Disturbances, track: Track = SOFT, pause_s: float = 0.1
 ) -> Lockstep:
-    gait = replace(SINGLE_FLIPPER, stance_speed_m_s=0.3, pause_s=pause_s)  # short holds for a short test
+    """Walks faster and with shorter holds than the paper's, for a short test."""
+    gait = replace(SINGLE_FLIPPER, stance_speed_m_s=0.3, extraction_speed_m_s=0.3, swing_speed_m_s=0.4, pause_s=pause_s)
     lockstep = Lockstep(replace(configuration, gait=gait), track, disturbances=disturbances, fixed_base=True)
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03, adaptive=False))
     return lockstep
 
 
-def truths_of(lockstep: Lockstep, seconds: float) -> list[StrideTruth]:
-    reference, truths = StrokeReference(), []
-    for _ in range(round(seconds / PERIOD_S)):
+def until_phase(lockstep: Lockstep, phase: Phase) -> None:
+    assert lockstep.run_until(lambda: lockstep.loop.target.phase is phase, 5.0)
+
+
+def truths_of(lockstep: Lockstep, strides: int) -> list[StrideTruth]:
+    """Of so many strides of each flipper."""
+    reference = StrokeReference()
+    truths: list[StrideTruth] = []
+    while len(truths) < 2 * strides:
         lockstep.step()
         truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target.phase)
     return truths
@@ -219,10 +226,10 @@ def swing_currents_a(lockstep: Lockstep, strides: int) -> list[float]:
     """Mean adduction current of the left flipper in each swing, and in the air before the first one."""
     means_a = []
     for stride in range(strides):
-        lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.INSERTION, 20.0)
+        until_phase(lockstep, Phase.INSERTION)
         if stride == 0:  # as raised as in swing
             means_a.append(lockstep.loop.states[1].current_a)
-        lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.SWING, 20.0)
+        until_phase(lockstep, Phase.SWING)
         currents_a = []
         while lockstep.loop.target.phase is Phase.SWING:
             lockstep.step()
@@ -233,8 +240,8 @@ def swing_currents_a(lockstep: Lockstep, strides: int) -> list[float]:
 
 def test_clinging_mud_is_felt_in_swing_from_the_first_extraction_on(configuration: Configuration) -> None:
     firm = Track([(5.0, MUDS["48.5"])])  # in which the arms do not sink under their own weight before the walk
-    clean_a = swing_currents_a(single_flipper(configuration, NONE, firm), 3)
-    weighed_a = swing_currents_a(single_flipper(configuration, Disturbances(clinging_n=0.7), firm), 3)
+    clean_a = swing_currents_a(single_flipper(configuration, NONE, firm), 2)
+    weighed_a = swing_currents_a(single_flipper(configuration, Disturbances(clinging_n=0.7), firm), 2)
     assert weighed_a[0] == clean_a[0]
     lever_m = 0.95 * configuration.geometry.flipper_length_m  # its mean over a swing from -30 to 30 degrees
     mean_a = 0.7 * lever_m / configuration.drive["left_adduction"].torque_constant_nm_a
@@ -242,17 +249,10 @@ def test_clinging_mud_is_felt_in_swing_from_the_first_extraction_on(configuratio
         assert 0.55 * mean_a < weighed - clean < 1.45 * mean_a
 
 
-def test_remoulded_mud_lets_the_flipper_through_more_easily_stroke_by_stroke(configuration: Configuration) -> None:
-    truths = truths_of(single_flipper(configuration, Disturbances(remoulding=1.0)), 14.0)
-    left = [truth.clay.strength_pa / MUDS["53.1"].strength_pa for truth in truths if truth.flipper == "left"]
-    assert len(left) >= 4
-    assert left == pytest.approx([0.5 + 0.5 * exp(-0.4 * earlier) for earlier in range(len(left))])
-
-
 def peak_thrusts_n(lockstep: Lockstep, strides: int) -> list[float]:
     arm, peaks_n = lockstep.robot.plant.arms[0], []
     for _ in range(strides):
-        lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.STANCE, 20.0)
+        until_phase(lockstep, Phase.STANCE)
         forces_n = [0.0]
         while lockstep.loop.target.phase is Phase.STANCE:
             lockstep.step()
@@ -261,38 +261,42 @@ def peak_thrusts_n(lockstep: Lockstep, strides: int) -> list[float]:
     return peaks_n
 
 
-def test_repeated_stances_lose_force_as_the_logs_do(configuration: Configuration) -> None:
+def test_repeated_stances_lose_strength_and_force_as_the_logs_do(configuration: Configuration) -> None:
     """15 to 20 % a stroke at first; the pressure from the mud's weight is not remoulded."""
-    remoulded_n = peak_thrusts_n(single_flipper(configuration, Disturbances(remoulding=1.0)), 4)
+    lockstep = single_flipper(configuration, Disturbances(remoulding=1.0))
+    remoulded_n, fractions = [], []
+    for _ in range(4):
+        remoulded_n += peak_thrusts_n(lockstep, 1)
+        fractions.append(lockstep.robot.plant.arms[0].clay.strength_pa / MUDS["53.1"].strength_pa)
+    assert fractions == pytest.approx([0.5 + 0.5 * exp(-0.4 * earlier) for earlier in range(4)])
     assert 0.10 < 1.0 - remoulded_n[1] / remoulded_n[0] < 0.20
     assert all(after_n < before_n for before_n, after_n in pairwise(remoulded_n))
-    steady_n = peak_thrusts_n(single_flipper(configuration, NONE), 3)
-    assert steady_n[1:] == pytest.approx([steady_n[0]] * 2, rel=0.02)
+    steady_n = peak_thrusts_n(single_flipper(configuration, NONE), 2)
+    assert steady_n[1] == pytest.approx(steady_n[0], rel=0.02)
 
 
 def held_thrust_n(lockstep: Lockstep) -> tuple[float, float]:
     """In the pause after the stance: at its beginning and a second later."""
     arm: Arm = lockstep.robot.plant.arms[0]
-    lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.STANCE, 20.0)
-    lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.PAUSE, 20.0)
+    until_phase(lockstep, Phase.STANCE)
+    until_phase(lockstep, Phase.PAUSE)
     lockstep.run_for(0.05)  # to come to rest
     early_n = arm.force.thrust_n
     lockstep.run_for(0.9)
     return early_n, arm.force.thrust_n
 
 
-@pytest.mark.parametrize("relaxation", [0.13, 0.3])
-def test_a_load_relaxes_in_the_holds(configuration: Configuration, relaxation: float) -> None:
+def test_a_load_relaxes_in_the_holds(configuration: Configuration) -> None:
     """In addition to the loss by the mud's rate when a plate stops."""
-    early_n, late_n = held_thrust_n(single_flipper(configuration, Disturbances(relaxation=relaxation), pause_s=1.0))
     plain_early_n, plain_late_n = held_thrust_n(single_flipper(configuration, NONE, pause_s=1.0))
-    assert early_n == pytest.approx(plain_early_n, rel=0.02)
-    assert late_n == pytest.approx((1.0 - relaxation) * plain_late_n, rel=0.08)  # the servo pushes on
+    for relaxation in (0.13, 0.3):
+        early_n, late_n = held_thrust_n(single_flipper(configuration, Disturbances(relaxation=relaxation), pause_s=1.0))
+        assert early_n == pytest.approx(plain_early_n, rel=0.02)
+        assert late_n == pytest.approx((1.0 - relaxation) * plain_late_n, rel=0.08)  # the servo pushes on
 
 
 def test_both_flippers_meet_their_own_surfaces_and_are_as_much_deeper(configuration: Configuration) -> None:
-    truths = truths_of(single_flipper(configuration, Disturbances(surface_sd_m=0.003)), 12.0)
-    assert len(truths) >= 6
+    truths = truths_of(single_flipper(configuration, Disturbances(surface_sd_m=0.003)), 3)
     assert len({truth.surface_m for truth in truths}) == len(truths)
     assert max(truth.surface_m for truth in truths) - min(truth.surface_m for truth in truths) > 0.003
     for truth in truths:
@@ -322,12 +326,12 @@ def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
         lockstep = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), disturbances=disturbances)
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03, adaptive=False))
-        lockstep.run_for(1.0)
+        until_phase(lockstep, Phase.INSERTION)
+        until_phase(lockstep, Phase.SWING)
         rates_rad_s = []
-        for _ in range(round(3.2 / PERIOD_S)):
+        while lockstep.loop.target.phase is Phase.SWING:
             lockstep.step()
-            if lockstep.loop.target.phase is Phase.SWING:
-                rates_rad_s.append(lockstep.robot.plant.velocities_rad_s[1])
+            rates_rad_s.append(lockstep.robot.plant.velocities_rad_s[1])
         spreads.append(pstdev(rates_rad_s))
     none, lab, seldom = spreads
     assert lab < none + 0.5
@@ -340,9 +344,9 @@ def test_the_current_is_as_noisy_as_stated(configuration: Configuration) -> None
         lockstep = Lockstep(configuration, SOFT, disturbances=Disturbances(current_noise_a=noise_a))
         lockstep.run_for(0.5)
         currents_a = []
-        for _ in range(2000):  # of idle drives
+        for _ in range(500):  # of four idle drives
             lockstep.step()
-            currents_a.append(lockstep.loop.states[0].current_a)
+            currents_a += [state.current_a for state in lockstep.loop.states]
         deviations_a.append(pstdev(currents_a))
     assert deviations_a == pytest.approx([0.1, 0.4], rel=0.07)  # 0: the drive's own
 
@@ -367,10 +371,10 @@ def test_seldom_messages_are_read_again_and_again(configuration: Configuration) 
 
 def test_a_clipped_motor_cannot_lift_what_a_free_one_lifts(configuration: Configuration) -> None:
     stiff = Track([(5.0, MUDS["45.3"])])
-    clipped = single_flipper(configuration, Disturbances(current_limit_a=4.0), stiff)
+    clipped = single_flipper(configuration, Disturbances(current_limit_a=5.0), stiff)
     free = single_flipper(configuration, NONE, stiff)
     (clipped_n,), (free_n,) = peak_thrusts_n(clipped, 1), peak_thrusts_n(free, 1)
-    assert clipped_n < 0.6 * free_n
+    assert 0.5 * free_n < clipped_n < 0.7 * free_n
 
 
 @pytest.mark.parametrize("water", MUDS)
@@ -378,7 +382,7 @@ def test_the_robot_walks_in_the_lab_without_a_fault(configuration: Configuration
     lockstep = Lockstep(configuration, Track([(5.0, MUDS[water])]), disturbances=LAB)
     lockstep.arm()
     lockstep.walk(WalkOrder(0.04, adaptive=False))
-    lockstep.run_for(4.0)
+    lockstep.run_for(3.0)
     assert lockstep.loop.mode is Mode.WALKING
     assert lockstep.robot.plant.body_m > 0.05
 
@@ -389,8 +393,7 @@ def test_the_lab_is_the_same_for_the_same_seed_and_another_for_another(configura
         lockstep = Lockstep(configuration, SOFT, seed, disturbances=LAB)
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03, adaptive=False))
-        walks.append(truths_of(lockstep, 2.5))
-    assert len(walks[0]) >= 2
+        walks.append(truths_of(lockstep, 1))
     assert repr(walks[0]) == repr(walks[1])
     surfaces = [{truth.surface_m for truth in walk} for walk in walks]
     assert not surfaces[0] & surfaces[2]
