@@ -21,7 +21,7 @@ stroke. The draws do not depend on which disturbances are on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import cos, exp, sin
 from random import Random
 from typing import Annotated
@@ -46,13 +46,6 @@ class Disturbances:
     current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # 0: the drive's own
     sample_period_s: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # of angle, and of current; 0: the drive's own
     current_limit_a: Annotated[float, Bounds(0.0, 200.0)] = 0.0  # of the motor, whatever the bus allows; 0: none
-
-    def __post_init__(self) -> None:
-        """Raises ValueError for an amount out of its range."""
-        if not all(getattr(self, field.name) >= 0.0 for field in fields(self)):
-            raise ValueError(f"{self}: every amount must be a number of at least 0")
-        if self.remoulding > 1.0 or self.relaxation >= 1.0:
-            raise ValueError(f"{self}: remoulding is at most 1, relaxation less than 1")
 
 
 NONE = Disturbances()

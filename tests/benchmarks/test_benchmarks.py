@@ -27,7 +27,7 @@ from tests.folders import ROOT
 TIMEOUT_S = 240.0  # on a machine that others keep busy
 ALWAYS = {"benchmark", "reached", "verdict"}
 FOLDERS = {
-    "speed": ("tick_time", "loop_jitter", "lockstep_speed", "estimator_cost"),
+    "speed": ("tick_time", "loop_jitter", "lockstep_speed"),
     "stress": (
         "soak", "daemon_kills", "configuration_fuzz", "socket_fuzz", "corrupted_logs", "log_kills", "can_fuzz",
     ),
@@ -170,18 +170,6 @@ def test_log_kills_ends_with_a_status_for_its_bar(
     monkeypatch.setattr(log_kills, "LocalRobot", Mock())
     assert run_benchmark(log_kills.measure, ["--json", "--kills", "1"]) == status
     assert json.loads(capsys.readouterr().out)["reached"] is (status == 0)
-
-
-def test_estimator_cost() -> None:
-    """A stride of 1.58 s has 600 ticks; the law that was put in comes out, so every fit was at work."""
-    report = report_of("estimator_cost", "--strides", "2")
-    phases = {"insertion", "stance", "extraction", "swing"}
-    for figures in report["methods"].values():
-        assert sum(figures["samples"].values()) == pytest.approx(1.58 * 380.0, abs=2.0)
-        assert set(figures["sample_us"]) == set(figures["close_us"]) == set(figures["samples"]) == phases
-        assert figures.keys() >= {"sample_mean_us", "close_total_us"}
-    assert report["methods"]["default"]["k_n_cm3"] == pytest.approx({"k_p": 1.0, "k_s": 0.6, "k_e": 0.7}, rel=0.1)
-    assert report.keys() >= {"bar_sample_us", "bar_close_us"}
 
 
 @pytest.mark.parametrize("name", BENCHMARKS)

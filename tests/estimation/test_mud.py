@@ -1,6 +1,6 @@
 """Both flippers together: whose sample goes where, what the messages' ages do, and what is kept from stride to stride.
 
-The strokes are those of the benchmarks, through mud that keeps the estimator's own laws. That each flipper reads them
+The strokes are synthetic, through mud that keeps the estimator's own laws. That each flipper reads them
 rightly is for its own tests; here it must be told what it would be told alone.
 """
 
@@ -9,7 +9,6 @@ from math import isfinite, nan, pi, sin
 
 import pytest
 
-from benchmarks.speed.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
 from control.joint_pd import ArmMass
 from control.mud_estimate import NOTHING_KNOWN
 from control.rate import PERIOD_S
@@ -28,6 +27,7 @@ from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
 from estimation.recorded_states import NO_AGES_S, recorded_states
 from estimation.strokes.shear import Base
+from tests.estimation.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
 
 Four = tuple[float, float, float, float]
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0

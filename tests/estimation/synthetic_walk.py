@@ -1,4 +1,4 @@
-"""A stride of one flipper at 380 Hz through mud that keeps the estimator's own laws: samples for benchmarks.
+"""A stride of one flipper at 380 Hz through mud that keeps the estimator's own laws: samples for tests.
 
 The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ, what crosses over from the plate's face,
 gravity, inertia and noise, so surface, stance and extraction are found as on a robot.
