@@ -56,9 +56,10 @@ def add_experiments(commands: Commands) -> None:
 
 
 def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -> None:
-    experiment.add_argument("--simulated", action="store_true", help=simulated)
-    experiment.add_argument("--json", action="store_true", help="for machines")
-    experiment.add_argument("--out", type=folder, metavar="DIR", help=out)
+    option = experiment.add_argument
+    option("--simulated", action="store_true", help=simulated)
+    option("--json", action="store_true", help="for machines")
+    option("--out", type=folder, metavar="DIR", help=out)
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:
@@ -73,13 +74,10 @@ def _add_actuator(names: Commands) -> None:
     )
     _add_report(actuator, "a simulated motor holds the weights, without prompts", "for report, pictures and log")
     add_socket(actuator)
-    actuator.add_argument(
-        "--joint", action="append", choices=JOINTS, help="repeatable (default: right_adduction, right_sweep)"
-    )
-    actuator.add_argument(
-        "--lever", type=lever_m, metavar="CM", dest="lever_m", help="axle to weight (default: the flipper's length)"
-    )
-    actuator.add_argument(
+    option = actuator.add_argument
+    option("--joint", action="append", choices=JOINTS, help="repeatable (default: right_adduction, right_sweep)")
+    option("--lever", type=lever_m, metavar="CM", dest="lever_m", help="axle to weight (default: the flipper's length)")
+    option(
         "--lever-tolerance",
         type=between(0.0, 50.0, "mm"),
         default=1.0,
@@ -87,8 +85,8 @@ def _add_actuator(names: Commands) -> None:
         dest="lever_tolerance_mm",
         help="of the lever (default: %(default)g)",
     )
-    actuator.add_argument("--weights", type=weights_g, metavar="G,G,...", help="in grams (default: the paper's)")
-    actuator.add_argument(
+    option("--weights", type=weights_g, metavar="G,G,...", help="in grams (default: the paper's)")
+    option(
         "--weight-tolerance",
         type=between(0.0, 10.0, "%"),
         default=0.1,
@@ -96,13 +94,11 @@ def _add_actuator(names: Commands) -> None:
         dest="weight_tolerance_percent",
         help="of the weights (default: %(default)g)",
     )
-    actuator.add_argument("--trials", type=TRIALS, default=5, metavar="N", help="passes through them (default: 5)")
-    actuator.add_argument("--gravity", type=GRAVITY_M_S2, metavar="M/S2", help="local gravity (default: 9.81)")
-    actuator.add_argument(
-        "--apply", action="store_true", help="write the fitted constants to the configuration, after a prompt"
-    )
-    actuator.add_argument("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
-    actuator.add_argument("--seed", type=int, default=1, help="of the simulated motor")
+    option("--trials", type=TRIALS, default=5, metavar="N", help="passes through them (default: 5)")
+    option("--gravity", type=GRAVITY_M_S2, metavar="M/S2", help="local gravity (default: 9.81)")
+    option("--apply", action="store_true", help="write the fitted constants to the configuration, after a prompt")
+    option("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
+    option("--seed", type=int, default=1, help="of the simulated motor")
 
 
 def _add_flipper(names: Commands) -> None:
@@ -113,12 +109,13 @@ def _add_flipper(names: Commands) -> None:
         "A single flipper on a fixed base: coefficients of muds.",
     )
     _add_bench(flipper)
-    flipper.add_argument("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
-    flipper.add_argument("--trials", type=TRIALS, default=3, metavar="N", help="of each mud (default: 3)")
-    flipper.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
-    flipper.add_argument("--strides", type=TRIALS, default=1, metavar="N", help="of each trial (default: 1)")
-    flipper.add_argument("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
-    flipper.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+    option = flipper.add_argument
+    option("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
+    option("--trials", type=TRIALS, default=3, metavar="N", help="of each mud (default: 3)")
+    option("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    option("--strides", type=TRIALS, default=1, metavar="N", help="of each trial (default: 1)")
+    option("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
+    option("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
 
 
 def _add_walk(names: Commands) -> None:
@@ -126,20 +123,19 @@ def _add_walk(names: Commands) -> None:
         names, "walk", "experiments.mud_trials.run_walk", "The walking robot over several muds: their coefficients."
     )
     _add_bench(walk)
-    walk.add_argument(
+    option = walk.add_argument
+    option(
         "--mud",
         type=mud_length,
         action="append",
         metavar="NAME[=CM]",
         help="as its water in percent, and its length (default: 61), in the order of the trackway",
     )
-    walk.add_argument("--trials", type=TRIALS, default=3, metavar="N", help="over the muds (default: 3)")
-    walk.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
-    walk.add_argument(
-        "--soft", action="append", metavar="NAME", help="mud for additional walks at 3 and at 5 cm, repeatable"
-    )
-    walk.add_argument("--flipper", choices=("left", "right"), default="right", help="to evaluate (default: right)")
-    walk.add_argument("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
+    option("--trials", type=TRIALS, default=3, metavar="N", help="over the muds (default: 3)")
+    option("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
+    option("--soft", action="append", metavar="NAME", help="mud for additional walks at 3 and at 5 cm, repeatable")
+    option("--flipper", choices=("left", "right"), default="right", help="to evaluate (default: right)")
+    option("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
 
 
 def _add_loadcell(names: Commands) -> None:
@@ -150,61 +146,50 @@ def _add_loadcell(names: Commands) -> None:
         loadcell, "stage and load cell are emulated", "for report, pictures and samples; continues the trials there"
     )
     _add_amplifier(loadcell)
-    loadcell.add_argument(
-        "--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent"
-    )
-    loadcell.add_argument("--trials", type=SEEDS, default=5, metavar="N", help="of shear and of insertion (default: 5)")
-    loadcell.add_argument("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: %(default)s)")
-    loadcell.add_argument(
+    option = loadcell.add_argument
+    option("--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent")
+    option("--trials", type=SEEDS, default=5, metavar="N", help="of shear and of insertion (default: 5)")
+    option("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: %(default)s)")
+    option(
         "--depth-error",
         type=between(0.0, 20.0, "mm"),
         default=0.5,
         metavar="MM",
         help="one standard error of the set depth (default: %(default)s)",
     )
-    loadcell.add_argument(
+    option(
         "--plate", type=plate_cm, default=(3.0, 3.5, 0.4), metavar="WxH", help="or WxHxT, in cm (default: 3x3.5x0.4)"
     )
-    loadcell.add_argument(
-        "--speed", type=STAGE_SPEED_M_S, default=0.1, metavar="M/S", help="of the stage (default: 0.1)"
-    )
+    option("--speed", type=STAGE_SPEED_M_S, default=0.1, metavar="M/S", help="of the stage (default: 0.1)")
     _add_stage_encoder(loadcell)
-    loadcell.add_argument("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
-    loadcell.add_argument("--seed", type=int, default=1, metavar="N", help="of the simulation")
+    option("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
+    option("--seed", type=int, default=1, metavar="N", help="of the simulation")
 
 
 def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:
-    loadcell.add_argument(
-        "--port", metavar="PATH", help="of the cell's amplifier; /dev/serial/by-id/... does not change"
-    )
-    loadcell.add_argument(
-        "--baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
-    )
-    loadcell.add_argument(
+    option = loadcell.add_argument
+    option("--port", metavar="PATH", help="of the cell's amplifier; /dev/serial/by-id/... does not change")
+    option("--baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)")
+    option(
         "--format", default="auto", metavar="NAME", help="of its lines: auto, number, indicator, column2, or a pattern"
     )
-    loadcell.add_argument(
-        "--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: that of the lines)"
-    )
-    loadcell.add_argument("--scale", type=positive, metavar="X", help="newtons per unit, instead of a calibration")
-    loadcell.add_argument("--calibration", type=Path, metavar="FILE", help="an earlier one, instead of two weights")
+    option("--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: that of the lines)")
+    option("--scale", type=positive, metavar="X", help="newtons per unit, instead of a calibration")
+    option("--calibration", type=Path, metavar="FILE", help="an earlier one, instead of two weights")
 
 
 def _add_stage_encoder(loadcell: argparse.ArgumentParser) -> None:
-    loadcell.add_argument(
+    option = loadcell.add_argument
+    option(
         "--position",
         nargs="?",
         const="",
         metavar="PATH",
         help="port of an encoder of the stage, which may be pushed by hand then",
     )
-    loadcell.add_argument(
-        "--position-step", type=between(0.01, 10000.0, "um"), metavar="UM", help="travel per count, of either sign"
-    )
-    loadcell.add_argument(
-        "--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)"
-    )
-    loadcell.add_argument("--position-label", default="", metavar="TEXT", help="at the beginning of each of its lines")
+    option("--position-step", type=between(0.01, 10000.0, "um"), metavar="UM", help="travel per count, of either sign")
+    option("--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)")
+    option("--position-label", default="", metavar="TEXT", help="at the beginning of each of its lines")
 
 
 def _add_trackway(names: Commands) -> None:
@@ -215,16 +200,11 @@ def _add_trackway(names: Commands) -> None:
         trackway, "robot and muds are simulated; without it the daemon's robot walks", "for report, pictures and log"
     )
     add_socket(trackway)
-    trackway.add_argument(
-        "--trials", "--seeds", type=SEEDS, metavar="N", help="of each gait (default: 3, as the paper)"
-    )
-    trackway.add_argument(
-        "--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)"
-    )
-    trackway.add_argument(
-        "--compartment", type=between(0.2, 100.0), metavar="M", help="length of each simulated mud (default: 0.61)"
-    )
-    trackway.add_argument(
+    option = trackway.add_argument
+    option("--trials", "--seeds", type=SEEDS, metavar="N", help="of each gait (default: 3, as the paper)")
+    option("--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)")
+    option("--compartment", type=between(0.2, 100.0), metavar="M", help="length of each simulated mud (default: 0.61)")
+    option(
         "--mud",
         type=mud_length,
         action="append",
@@ -236,9 +216,10 @@ def _add_trackway(names: Commands) -> None:
 def _add_sweep(names: Commands) -> None:
     sweep = add(names, "sweep", "experiments.trackway.run_sweep", "Speed against depth in muds of any strength.")
     _add_report(sweep, "robot and muds are simulated", "write JSON and picture there")
-    sweep.add_argument("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="repeatable (default: 12)")
-    sweep.add_argument("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
-    sweep.add_argument("--seeds", type=SEEDS, default=2, metavar="N", help="walks of each point (default: 2)")
+    option = sweep.add_argument
+    option("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="repeatable (default: 12)")
+    option("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
+    option("--seeds", type=SEEDS, default=2, metavar="N", help="walks of each point (default: 2)")
 
 
 def _add_faults(names: Commands) -> None:
@@ -246,6 +227,7 @@ def _add_faults(names: Commands) -> None:
         names, "faults", "experiments.faults.run_faults", "Every fault in every phase, with the bounds of its reaction."
     )
     _add_report(faults, "the faults happen to a simulated robot", "write JSON and picture there")
-    faults.add_argument("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
-    faults.add_argument("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
-    faults.add_argument("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
+    option = faults.add_argument
+    option("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
+    option("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
+    option("--phase", action="append", metavar="NAME", help="repeatable (default: all)")

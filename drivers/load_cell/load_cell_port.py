@@ -6,8 +6,7 @@ display, and an unplugged adapter is opened again as soon as it is back (serial_
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import NEWTONS, LineFormat, Reading, printable
@@ -24,19 +23,12 @@ class Sample(NamedTuple):
 class LoadCellPort:
     """Reads samples of force. Owns its serial line and the counters, which only grow."""
 
-    def __init__(
-        self,
-        path: str,
-        baud: int,
-        line_format: LineFormat,
-        calibration: LoadCellCalibration,
-        open_device: Callable[[str, int], Any] | None = None,
-    ) -> None:
+    def __init__(self, path: str, baud: int, line_format: LineFormat, calibration: LoadCellCalibration) -> None:
         """Opens the line; raises SerialLineError where it does not open."""
         self.line_format, self.calibration = line_format, calibration
         self.lines = self.malformed_lines = self.overloads = 0
         self.last_malformed = ""
-        self.line = SampledLine(path, baud, open_device)
+        self.line = SampledLine(path, baud)
 
     @property
     def arrivals(self) -> Arrivals:

@@ -12,8 +12,6 @@ period is measured again.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import Any
 
 from drivers.serial.serial_line import SerialLine
 
@@ -91,10 +89,10 @@ class LineClock:
 class SampledLine(SerialLine):
     """A serial line whose device measures at a steady rate. Owns its clock."""
 
-    def __init__(self, path: str, baud: int, open_device: Callable[[str, int], Any] | None = None) -> None:
+    def __init__(self, path: str, baud: int) -> None:
         """Opens the line; raises SerialLineError where it does not open."""
         self.clock = LineClock(baud)
-        super().__init__(path, baud, open_device=open_device)
+        super().__init__(path, baud)
 
     def reset(self) -> None:
         super().reset()

@@ -7,9 +7,8 @@ is opened again as soon as it is back.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from drivers.load_cell.sample_clock import SampledLine
@@ -33,10 +32,10 @@ class StagePosition(NamedTuple):
 class StageEncoder:
     """Reads the positions. Owns its serial line and its counts."""
 
-    def __init__(self, settings: StageEncoderSettings, open_device: Callable[[str, int], Any] | None = None) -> None:
+    def __init__(self, settings: StageEncoderSettings) -> None:
         """Opens the line; raises SerialLineError where it does not open."""
         self.settings = settings
-        self.line = SampledLine(settings.path, settings.baud, open_device)
+        self.line = SampledLine(settings.path, settings.baud)
         self.counts = EncoderCounts(settings.metres_per_count, settings.label)
         self._heard_s: float | None = None
 

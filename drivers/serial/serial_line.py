@@ -24,7 +24,6 @@ RETRY_S = 0.5  # between tries to open a device that is gone
 LONGEST_LINE_BYTES = 200
 MOST_BYTES_PER_READ = 4096  # the buffer of a tty
 RECENT_LINES = 40  # by which the format and the baud rate are checked
-COMMON_BAUDS = (9600, 115200, 57600, 38400, 19200, 4800, 2400, 230400)
 GONE = select.POLLHUP | select.POLLERR | select.POLLNVAL
 LINE_ENDS = re.compile(rb"[\r\n]+")
 
@@ -60,9 +59,9 @@ class SerialLine:
         self.path, self.baud = path, baud
         self.unpluggings = 0
         self.problem: SerialLineError | None = None  # the newest one
-        self.open_device = open_device or open_serial
+        self._open_device = open_device or open_serial
         self._longest_bytes, self._retry_s, self._retry_at_s = longest_bytes, retry_s, NEVER_S
-        self._use(self.open_device(path, baud))
+        self._use(self._open_device(path, baud))
 
     def _use(self, device: Any) -> None:
         self._device: Any = device
@@ -133,7 +132,7 @@ class SerialLine:
             return False
         self._retry_at_s = now_s + self._retry_s
         try:
-            self._use(self.open_device(self.path, self.baud))
+            self._use(self._open_device(self.path, self.baud))
         except SerialLineError as problem:
             self.problem = problem
             return False

@@ -1,4 +1,4 @@
-"""Figures of the actuator calibration: sensed against external torque, errors by weight, friction by speed.
+"""Figures of the actuator calibration: sensed against external torque, friction by speed.
 
 In black and white, joints differ by their markers, and configured from fitted; what is the paper's is grey.
 """
@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -44,37 +43,6 @@ def plot_torques(fits: Sequence[JointFit], path: Path) -> None:
             label = f"fitted: {value_text(fit.constant_nm_a, fit.constant_error_nm_a)} N·m/A"
             axis.plot(external_nm, [fit.fitted_nm(load) for load in fit.loads], label=label, zorder=3, **_style(fit))
             axis.set_xlabel(f"external torque {EXTERNAL} (N·m)")
-
-
-def plot_errors(fits: Sequence[JointFit], path: Path) -> None:
-    highest_mnm = 1e3 * max(max(paper_rmse_nm(fit.joint), *map(abs, _errors_nm(fit))) for fit in fits)
-    with _panels(fits, path) as axes:
-        axes[0].set_ylim(-1.15 * highest_mnm, 1.75 * highest_mnm)  # of all; room for the legend
-        axes[0].set_ylabel(f"{SENSED} $-$ {EXTERNAL} (mN·m)")
-        for axis, fit in zip(axes, fits, strict=True):
-            bound_mnm = 1e3 * paper_rmse_nm(fit.joint)
-            weights_g = sorted({load.weight_g for load in fit.loads})
-            label = f"paper's RMSE, ±{bound_mnm:g} mN·m"
-            axis.axhspan(-bound_mnm, bound_mnm, color=LIGHT_GREY, linewidth=0.0, zorder=0, label=label)
-            axis.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
-            for column, weight_g in enumerate(weights_g):
-                _plot_weight(axis, fit, column, weight_g, last=column == len(weights_g) - 1)
-            axis.set_xticks(range(len(weights_g)), [f"{weight_g:g}" for weight_g in weights_g])
-            axis.set_title(f"{axis.get_title()}\nRMSE fitted {1e3 * fit.rmse_fitted_nm:.1f} mN·m")
-            axis.set_xlabel("weight (g)")
-
-
-def _plot_weight(axis: Axes, fit: JointFit, column: int, weight_g: float, last: bool) -> None:
-    errors = zip(fit.loads, _errors_nm(fit), strict=True)
-    errors_mnm = [1e3 * error_nm for load, error_nm in errors if load.weight_g == weight_g]
-    label = "their mean" if last else None
-    axis.plot([column - 0.28, column + 0.28], [fmean(errors_mnm)] * 2, color="black", linewidth=1.8, label=label)
-    label = None if column else "a trial, fitted constant"
-    axis.plot([column] * len(errors_mnm), errors_mnm, zorder=2, label=label, **_style(fit))
-
-
-def _errors_nm(fit: JointFit) -> list[float]:
-    return [fit.fitted_nm(load) - load.torque_nm for load in fit.loads]
 
 
 def plot_friction(fits: Sequence[JointFit], path: Path) -> None:

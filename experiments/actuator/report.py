@@ -19,7 +19,7 @@ from experiments.actuator.fit import (
     repeatability,
 )
 from experiments.actuator.plan import Plan, steps_of
-from experiments.actuator.plots import plot_errors, plot_friction, plot_torques
+from experiments.actuator.plots import plot_friction, plot_torques
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import Rows, TitledRows
 from experiments.reports.value_text import fraction_text, value_text
@@ -136,7 +136,9 @@ def list_left_out(plan: Plan, readings: Readings) -> list[LeftOut]:
 def make_sections(plan: Plan, readings: Readings, fits: Sequence[JointFit]) -> list[Section]:
     sections = []
     if fits:
-        sections.append(Section("Torque constants", DEFINITIONS, rows=constant_rows(fits), figures=_figures(fits)))
+        sections.append(
+            Section("Torque constants", DEFINITIONS, rows=constant_rows(fits), figures=[_torque_figure(fits)])
+        )
         figures = _friction_figures(fits)
         sections.append(Section("Friction and offset", rows=friction_rows(fits), figures=figures))
     sections += [Section(f"Weights on {fit.joint}", rows=_weight_rows(fit)) for fit in fits]
@@ -197,19 +199,12 @@ def _weight_rows(fit: JointFit) -> Rows:
     return rows
 
 
-def _figures(fits: Sequence[JointFit]) -> list[Figure]:
-    torques = (
+def _torque_figure(fits: Sequence[JointFit]) -> Figure:
+    caption = (
         "Torque by the motor's current against the weights' own, as in the paper's figure 3: with the configured and "
         "with the fitted constant. Grey: where both are equal, give or take the paper's RMSE."
     )
-    errors = (
-        "Errors of the torque by the fitted constant, each trial by the constant of the others; the bar is the mean of "
-        "the trials. Grey band: the paper's RMSE, which is that of its configured constant."
-    )
-    return [
-        Figure("torques", torques, partial(plot_torques, fits)),
-        Figure("errors", errors, partial(plot_errors, fits)),
-    ]
+    return Figure("torques", caption, partial(plot_torques, fits))
 
 
 def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:

@@ -18,9 +18,9 @@ from __future__ import annotations
 from math import nan
 
 from control.rate import PERIOD_S
-from control.records import NO_TORQUE, DriveStates, Torques
+from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
 from experiments.bench.reading import Reading
-from experiments.bench.test_rig import TestRig, joint_index, torque_on
+from experiments.bench.test_rig import TestRig, torque_on
 from experiments.robot.bench_robot import BenchError
 
 FIRST_NM, GROWTH = 0.02, 1.5
@@ -73,7 +73,7 @@ class Shake:
 
 def shake_joint(test_rig: TestRig, joint: str) -> Shake:
     """Shake a joint of an armed robot. Raises BenchError where a fault or a late computer ends it."""
-    index, kind = joint_index(joint), joint.split("_")[1]
+    index, kind = JOINTS.index(joint), joint.split("_")[1]
     test_rig.controller.hold_law = idle
     for _ in range(TRIES):
         at_rest = [sample.states[index].angle_rad for sample in test_rig.run_for(REST_TICKS * PERIOD_S)]

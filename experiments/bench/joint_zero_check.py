@@ -8,7 +8,7 @@ from control.controller import measured_angles
 from control.records import JOINTS, JointAngles, Joints
 from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.stroke_tracking import WALK_DEPTH_M
-from experiments.bench.test_rig import POLL_S, Sample, TestRig, joint_index
+from experiments.bench.test_rig import POLL_S, Sample, TestRig
 
 LEVEL_DEG = 5.0  # error of a hand with a spirit level: 1 cm at the end of an arm
 LEAST_TURN_DEG = 30.0  # a joint turned on purpose moves more
@@ -56,7 +56,7 @@ def check_turning(test_rig: TestRig, joint: str) -> Readings:
         return
     test_rig.operator.release_flippers()
     turns_deg = [degrees(max(angles) - min(angles)) for angles in zip(*seen, strict=True)]
-    index = joint_index(joint)
+    index = JOINTS.index(joint)
     turn_deg = turns_deg.pop(index)
     other_deg, other = max(zip(turns_deg, [other for other in JOINTS if other != joint], strict=True))
     mixed = f"{other} turned instead: exchange the node ids (or the bus) of the two"

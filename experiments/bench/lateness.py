@@ -7,6 +7,8 @@ distinguished from an overloaded computer that emulates drives.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from control.rate import PERIOD_S
 from control.records import DriveStates
 from firmware_host.ticker import Tick
@@ -16,16 +18,13 @@ BUSY = "end what else runs on this computer, and give this program real-time pri
 WIRES = "see stage 1, and where the drives are emulated, end what else runs on this computer"
 
 
+@dataclass
 class Lateness:
-    """Owns what was late since the last reset."""
+    """Owns what was late."""
 
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        self.ticks = 0  # including the missed ones
-        self.missed = 0
-        self.oldest_s = 0.0
+    ticks: int = 0  # including the missed ones
+    missed: int = 0
+    oldest_s: float = 0.0
 
     def update(self, tick: Tick, states: DriveStates) -> None:
         self.ticks += 1 + tick.missed

@@ -13,13 +13,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from control.rate import PERIOD_S
 from control.records import JOINTS
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus, MockPort
+from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import NoPose
 from experiments.robot.bench_robot import BenchError
@@ -43,21 +43,6 @@ class Overheard(NamedTuple):
     frames: Mapping[str, Sequence[Frame]]  # by bus
 
 
-class Rig(Protocol):
-    configuration: Configuration
-    loop: Loop
-    overheard: Overheard
-    warnings: Sequence[str]  # about the operating system, for the operator
-
-    @property
-    def now_s(self) -> float: ...
-
-    def wait(self) -> Tick:
-        """Wait for the next tick."""
-
-    def close(self) -> None: ...
-
-
 class HardwareRig:
     """Real buses and real time. Raises BenchError where a daemon runs or a bus does not open.
 
@@ -71,22 +56,20 @@ class HardwareRig:
             ports = open_ports(configuration.bus)
         except BusError as problem:
             raise BenchError(f"{problem}.") from problem
-        self.overheard = listen(ports)
+        self.overheard = listen(ports, time.monotonic(), _wait_briefly)
         drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         self.loop = Loop(configuration, drives, NoPose(), NullRecorder())
         self._processors = os.sched_getaffinity(0)
         options = configuration.loop
+        # about the operating system, for the operator
         self.warnings: Sequence[str] = prepare_loop(options.priority, options.cpu, lock_memory=False)
         self._ticker = Ticker()
-        self._now_s = time.monotonic()
-
-    @property
-    def now_s(self) -> float:
-        return self._now_s
+        self.now_s = time.monotonic()
 
     def wait(self) -> Tick:
+        """Wait for the next tick."""
         tick = self._ticker.wait()
-        self._now_s = tick.now_s
+        self.now_s = tick.now_s
         return tick
 
     def close(self) -> None:
@@ -110,17 +93,22 @@ def refuse_beside_daemon(socket: Path) -> None:
     raise BenchError(why)
 
 
-def listen(ports: Mapping[str, CanPort]) -> Overheard:
+def listen(ports: Mapping[str, CanPort], now_s: float, wait: Callable[[], float]) -> Overheard:
+    """Record all frames for LISTENING_S. `wait` lets a moment pass and returns the time."""
     frames: dict[str, list[Frame]] = {name: [] for name in ports}
-    begun_s = now_s = time.monotonic()
+    begun_s = now_s
     for port in ports.values():
         port.receive()  # discard older frames
     while now_s - begun_s < LISTENING_S:
+        now_s = wait()
         for name, port in ports.items():
             frames[name] += port.receive()
-        time.sleep(READ_INTERVAL_S)
-        now_s = time.monotonic()
     return Overheard(now_s - begun_s, frames)
+
+
+def _wait_briefly() -> float:
+    time.sleep(READ_INTERVAL_S)
+    return time.monotonic()
 
 
 class SimulatedRig:
@@ -152,29 +140,18 @@ class SimulatedRig:
         )
         self.others = list(others)
         self._tick_number = 0
-        self.overheard = self._listen()
+        ears = {name: bus.open() for name, bus in self.buses.items()}
+        self.overheard = listen(ears, 0.0, lambda: self.wait().now_s)
+        for ear in ears.values():
+            ear.close()
         wires = {name: bus.open() for name, bus in self.buses.items()}
         robot_drives = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
-        self.loop = Loop(configuration, robot_drives, NoPose(), NullRecorder(), self._clock, self._clock)
+        self.loop = Loop(configuration, robot_drives, NoPose(), NullRecorder(), lambda: self.now_s, lambda: self.now_s)
         self.warnings: Sequence[str] = ()
 
     @property
     def now_s(self) -> float:
         return self._tick_number * PERIOD_S
-
-    def _clock(self) -> float:
-        return self.now_s
-
-    def _listen(self) -> Overheard:
-        ears: dict[str, MockPort] = {name: bus.open() for name, bus in self.buses.items()}
-        frames: dict[str, list[Frame]] = {name: [] for name in ears}
-        while self.now_s < LISTENING_S:
-            self.wait()
-            for name, ear in ears.items():
-                frames[name] += ear.receive()
-        for ear in ears.values():
-            ear.close()
-        return Overheard(self.now_s, frames)
 
     def wait(self) -> Tick:
         self._tick_number += 1
@@ -185,3 +162,6 @@ class SimulatedRig:
 
     def close(self) -> None:
         self.loop.drives.close()
+
+
+Rig = HardwareRig | SimulatedRig

@@ -16,7 +16,7 @@ from control.records import JOINTS, NO_TORQUE, DriveStates, JointAngles, Joints,
 from experiments.bench.joint_shake import answer_reading, idle, shake_joint
 from experiments.bench.operator import MOTIONS, Observation
 from experiments.bench.reading import Reading, Readings, left_out
-from experiments.bench.test_rig import Sample, TestRig, joint_index, torque_on
+from experiments.bench.test_rig import Sample, TestRig, torque_on
 
 STEP_NM = 0.01  # a fifth of the torque that holds an arm of the default mass level
 STEP_S = 0.03  # for the joint to start moving before the next step
@@ -51,7 +51,7 @@ class Nudge:
 
 def check_nudge(test_rig: TestRig, joint: str) -> Readings:
     """Check the motion of one joint. Raises BenchError where a fault ends it."""
-    index = joint_index(joint)
+    index = JOINTS.index(joint)
     test_rig.arm(idle)
     shaken = shake_joint(test_rig, joint)
     yield answer_reading(joint, shaken)
@@ -101,7 +101,7 @@ def hold_gently(held: Torques, states: DriveStates) -> Torques:
 
 def check_shown_motion(test_rig: TestRig, joint: str) -> Readings:
     """Check that the operator sees the motion that the encoders report."""
-    index, bench_operator = joint_index(joint), test_rig.operator
+    index, bench_operator = JOINTS.index(joint), test_rig.operator
     test_rig.arm(hold_gently)
     here = measured_angles(test_rig.run_for(test_rig.configuration.motion.fade_in_s)[-1].states)
     bench_operator.start_observing()

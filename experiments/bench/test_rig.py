@@ -212,10 +212,6 @@ def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:
     return next((first for first in range(len(flags) - ticks + 1) if all(flags[first : first + ticks])), None)
 
 
-def joint_index(joint: str) -> int:
-    return JOINTS.index(joint)
-
-
 def torque_on(index: int, torque_nm: float) -> Torques:
     """Return a torque for one joint, and none for the others."""
     a, b, c, d = (torque_nm if other == index else 0.0 for other in range(len(JOINTS)))

@@ -1,4 +1,4 @@
-"""Pictures of the load cell's trials: force and depth with the fits, coefficients, and a flipper's for comparison."""
+"""Pictures of the load cell's trials: force and depth with the fits, and coefficients."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from experiments.loadcell.analysis.coefficients import (
     volume_m3,
 )
 from experiments.loadcell.analysis.force_motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings
-from experiments.loadcell.comparison import Compared
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import DOTS_PER_INCH, INK, LABELS, looks_of, mark_of
 from experiments.reports.value_text import N_CM3
@@ -138,24 +137,4 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]], path: Pa
             panel.errorbar(column, value, two_errors, ecolor=INK, capsize=3, linestyle="", **mark_of(looks[mud]))
         panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
         panel.set(xlim=(-0.6, len(names) - 0.4), ylim=(0.0, None), xlabel="mud", ylabel=f"{LABELS[name]} (N/cm³)")
-    figure.savefig(path, dpi=DOTS_PER_INCH)
-
-
-def plot_comparison(rows: Sequence[Compared], path: Path) -> None:
-    """Plot the flipper's coefficients against the load cell's, as the paper's figure 5 G to I."""
-    figure = Figure(figsize=(11.0, 3.9), layout="constrained")
-    looks, panels = looks_of(list(dict.fromkeys(row.mud for row in rows))), figure.subplots(1, 3)
-    for panel, name in zip(panels, COEFFICIENTS, strict=True):
-        reach = 0.0
-        for row in (row for row in rows if row.coefficient == name):
-            x, y = row.truth / N_CM3, row.sensed / N_CM3
-            x_errors, y_errors = 2.0 * row.truth_std_error / N_CM3, 2.0 * row.sensed_std_error / N_CM3
-            look = {"linestyle": "", "ecolor": INK, "capsize": 3, "label": mud_text(row.mud)} | mark_of(looks[row.mud])
-            panel.errorbar(x, y, y_errors, x_errors, lolims=row.at_least, **look)
-            reach = max(reach, 1.05 * (x + x_errors), 1.05 * (y + y_errors))
-        reach = reach or 1.05
-        panel.plot([0.0, reach], [0.0, reach], color="grey", linewidth=1.2, zorder=0)
-        panel.set(xlim=(0.0, reach), ylim=(0.0, reach), aspect="equal", ylabel="by the flipper (N/cm³)")
-        panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")
-    panels[0].legend(fontsize="small", title="mud", loc="upper left")
     figure.savefig(path, dpi=DOTS_PER_INCH)

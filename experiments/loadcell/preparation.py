@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,9 +19,9 @@ from drivers.load_cell.calibration import (
 )
 from drivers.load_cell.line_formats import AUTO, COUNTS, LineFormat, find_format
 from drivers.load_cell.load_cell_port import LoadCellPort
-from drivers.serial.serial_line import COMMON_BAUDS, SerialLine, SerialLineError, text_fraction
+from drivers.serial.serial_line import SerialLine, text_fraction
 from experiments.loadcell.analysis.force_motion import StageSettings
-from experiments.loadcell.recording import POLL_S, BenchClock, CellRecorder
+from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.trials import TrialBench
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON, Operator
@@ -31,9 +31,12 @@ WEIGHING_S = 2.0
 LEAST_SAMPLES, LEAST_POSITIONS = 12, 12  # of an insertion
 STOP = "q"
 LISTENING_S, STARTING_S = 2.0, 4.0  # a board that restarts when its port is opened needs the longer time
-PROBE_S = 0.8
 TEXT_FRACTION = 0.8  # less readable text means another baud rate
 READABLE_FRACTION = 0.6  # fewer decoded lines mean another format
+CHOOSE = (
+    "Choose the column of the load with --format column1 to column9, or give a regular expression with (?P<value>...) "
+    "that fits a whole line of the amplifier"
+)
 OR_WITHOUT = "or continue without --position"
 
 
@@ -65,19 +68,14 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
     port = recorder.port
     recorder.listen(LISTENING_S)
     _require_text(recorder, port.line, "amplifier", "--baud")
-    arrivals, lines = port.arrivals, list(port.line.recent)
+    lines, readable = list(port.line.recent), port.arrivals.readable
     found = find_format(lines)
-    if name == AUTO:
-        if found is None:
-            raise BenchError(f"no named format reads these lines: {_quote(lines)}. {_advise_column(lines)}")
+    if name != AUTO and readable >= READABLE_FRACTION:
+        return name
+    if name == AUTO and found is not None:
         return found.name
-    if arrivals.readable < READABLE_FRACTION:
-        advice = f"--format {found.name} does" if found else _advise_column(lines)
-        raise BenchError(
-            f"the format {name!r} reads {100.0 * arrivals.readable:.0f} % of the lines, such as {_quote(lines)}; "
-            + advice
-        )
-    return name
+    read = "no named format reads these lines" if name == AUTO else f"{name!r} reads {100.0 * readable:.0f} % of lines"
+    raise BenchError(f"{read} such as {_quote(lines)}. {f'--format {found.name} does' if found else CHOOSE}")
 
 
 def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
@@ -106,21 +104,6 @@ def _quote(lines: Iterable[bytes]) -> str:
     return " and ".join(repr(line.decode("ascii", "replace").strip()[:60]) for line in [*lines][-2:])
 
 
-def _advise_column(lines: Sequence[bytes]) -> str:
-    readable = [column for column in range(1, 10) if _can_read(f"column{column}", lines)]
-    if readable:
-        names = " or ".join(f"--format column{column}" for column in readable)
-        return f"Choose the column of the load with {names}"
-    return (
-        "Is it a load cell's amplifier? Give --format a regular expression with (?P<value>...) that fits a whole line"
-    )
-
-
-def _can_read(name: str, lines: Sequence[bytes]) -> bool:
-    line_format = LineFormat(name)
-    return sum(line_format.decode(line) is not None for line in lines) > 0.8 * len(lines)
-
-
 def _require_text(recorder: CellRecorder, line: SerialLine, device: str, option: str, otherwise: str = "") -> None:
     """Raises BenchError where nothing arrives, or bytes of another baud rate."""
     if not line.recent:
@@ -131,30 +114,10 @@ def _require_text(recorder: CellRecorder, line: SerialLine, device: str, option:
             f"without being asked, and that this is its port{otherwise}"
         )
     if text_fraction(line.recent) < TEXT_FRACTION:
-        raise BenchError(_wrong_baud(recorder, line, device, option) + otherwise)
-
-
-def _wrong_baud(recorder: CellRecorder, line: SerialLine, device: str, option: str) -> str:
-    """Try all common baud rates; return a message with the one at which text arrives."""
-    recorder.report(f"no text arrives on {line.path} at {line.baud} baud: other rates are tried")
-    line.close()
-    for baud in COMMON_BAUDS:
-        if baud != line.baud and _is_text(line, baud, recorder.clock):
-            return f"{line.baud} is not the baud rate of {line.path}: at {baud} it sends text. Use {option} {baud}"
-    return f"no text arrives on {line.path}, at any common rate: is it an {device} that sends lines of text?"
-
-
-def _is_text(line: SerialLine, baud: int, clock: BenchClock) -> bool:
-    try:
-        tried = SerialLine(line.path, baud, open_device=line.open_device)
-    except SerialLineError:
-        return False
-    end_s = clock.now_s() + PROBE_S
-    while clock.now_s() < end_s:
-        clock.pass_time(POLL_S)
-        tried.read(clock.now_s())
-    tried.close()
-    return text_fraction(tried.recent) > TEXT_FRACTION
+        raise BenchError(
+            f"no text arrives on {line.path} at {line.baud} baud: give the {device}'s own rate with {option}, often "
+            f"9600, 57600 or 115200{otherwise}"
+        )
 
 
 # calibration

@@ -15,7 +15,7 @@ from experiments.loadcell.analysis.force_motion import RATE_EXPONENT, Insertion,
 from experiments.loadcell.analysis.stage_track import common_alignment
 from experiments.loadcell.comparison import OTHER_PLATE, Compared
 from experiments.loadcell.evaluation import Results
-from experiments.loadcell.plots import plot_coefficients, plot_comparison, plot_mud
+from experiments.loadcell.plots import plot_coefficients, plot_mud
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.mud_names import mud_text
 from experiments.reports.report_page import Figure, Section
@@ -54,7 +54,7 @@ def errors_text(muds: Mapping[str, Mapping[str, MudCoefficient]], plan: TrialPla
 
 
 def comparison_text(flipper: Mapping[str, Any], settings: StageSettings) -> str:
-    text = f"On the grey line the flipper measures the same as the load cell. {OTHER_PLATE}"
+    text = OTHER_PLATE
     depth_m = (flipper.get("settings") or {}).get("depth_m")
     if isinstance(depth_m, int | float) and abs(depth_m - settings.depth_m) > 1e-6:
         text += (
@@ -71,11 +71,8 @@ def make_sections(results: Results, plan: TrialPlan, flipper: Mapping[str, Any])
     text = "\n\n".join([METHOD, *position_texts(results.trials), errors_text(results.muds, plan)])
     sections = [Section("Coefficients", text, rows=rows, figures=figures)]
     if results.compared:
-        rows, draw = compared_rows(results.compared), partial(plot_comparison, results.compared)
-        caption = "Flipper against load cell, two standard errors; grey: both are equal."
-        figures = [Figure("comparison", caption, draw)]
-        text = comparison_text(flipper, plan.settings)
-        sections.append(Section("Compared with the flipper", text, rows=rows, figures=figures))
+        rows, text = compared_rows(results.compared), comparison_text(flipper, plan.settings)
+        sections.append(Section("Compared with the flipper", text, rows=rows))
     if results.remarks:
         sections.append(Section("Remarks", "\n\n".join(results.remarks)))
     for mud, coefficients in results.muds.items():

@@ -8,6 +8,7 @@ move. The plate is any object that returns the force on it after a step of motio
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from random import Random
 from typing import NamedTuple, Protocol
 
@@ -30,13 +31,17 @@ class CarriedPlate(Protocol):
         """Returns the force (forward, upward) of the mud on the plate."""
 
 
-class StageMove(NamedTuple):
-    """One straight motion of the stage, `path_m` forward or upward, and the pause after it."""
+class Move(NamedTuple):
+    """One straight motion of the stage, `path_m` forward or upward."""
 
+    start_s: float
     path_m: float
-    speed_m_s: float
-    pause_s: float = 0.0
-    sideways: bool = False
+    motion: Motion
+    sideways: bool
+
+    def position_m(self, at_s: float) -> float:
+        path_m = self.motion.path_m(at_s - self.start_s)
+        return path_m if self.path_m > 0.0 else -path_m
 
 
 class StageParameters(NamedTuple):
@@ -55,7 +60,7 @@ class PlateStage:
         self.hung_weight_n = 0.0  # a calibration weight on the cell
         self._random = Random(self.parameters.seed)
         self._travelled_m = 0.0  # by moves that have ended
-        self._moves: list[tuple[float, StageMove, Motion]] = []
+        self._moves: list[Move] = []
         self.reset()
 
     def reset(self) -> None:
@@ -66,7 +71,7 @@ class PlateStage:
         self.measures_sideways = False  # the direction in which the cell is mounted
         self._time_s = NEVER_S
         self._clear_moves()
-        self._ends_s = NEVER_S
+        self.ends_s = NEVER_S  # the end of the last requested move
 
     def move_over(self, plate: CarriedPlate, sideways: bool) -> None:
         """Moves over another mud, or the same one re-mixed, and turns the cell along the coming move."""
@@ -77,46 +82,43 @@ class PlateStage:
     def insert(self, start_s: float, depth_m: float, speed_m_s: float, hold_s: float) -> None:
         """Inserts the plate from above the mud, holds it, and lifts it again."""
         path_m = LIFTED_M + depth_m
-        self._start(
-            start_s, [StageMove(-path_m, speed_m_s, hold_s), StageMove(path_m, speed_m_s)], self.parameters.manual
-        )
+        self._start(start_s, (-path_m, path_m), speed_m_s, hold_s, manual=self.parameters.manual)
 
     def lower(self, start_s: float, depth_m: float) -> None:
-        self._start(start_s, [StageMove(self.plate.depth_m - depth_m, GUIDE_SPEED_M_S)])
+        self._start(start_s, (self.plate.depth_m - depth_m,), GUIDE_SPEED_M_S)
 
     def lift(self, start_s: float) -> None:
-        self._start(start_s, [StageMove(LIFTED_M + self.plate.depth_m, GUIDE_SPEED_M_S)])
+        self._start(start_s, (LIFTED_M + self.plate.depth_m,), GUIDE_SPEED_M_S)
 
     def drag(self, start_s: float, path_m: float, speed_m_s: float) -> None:
-        self._start(start_s, [StageMove(-path_m, speed_m_s, sideways=True)], self.parameters.manual)
+        self._start(start_s, (-path_m,), speed_m_s, sideways=True, manual=self.parameters.manual)
 
-    def _start(self, start_s: float, moves: Sequence[StageMove], manual: ManualMotionParameters | None = None) -> None:
+    def _start(
+        self,
+        start_s: float,
+        paths_m: Sequence[float],
+        speed_m_s: float,
+        hold_s: float = 0.0,
+        sideways: bool = False,
+        manual: ManualMotionParameters | None = None,
+    ) -> None:
+        """Plans moves with a hold between them."""
         self._clear_moves()
-        for move in moves:
-            motion = self._motion_of(move, manual)
-            self._moves.append((start_s, move, motion))
-            start_s += motion.duration_s + move.pause_s
-        self._ends_s = start_s
-
-    def _motion_of(self, move: StageMove, manual: ManualMotionParameters | None) -> Motion:
-        if manual is not None:
-            return ManualMotion(abs(move.path_m), manual, self._random)
-        return RampedMotion(abs(move.path_m), move.speed_m_s, self.parameters.acceleration_m_s2)
+        for path_m in paths_m:
+            motion: Motion = RampedMotion(abs(path_m), speed_m_s, self.parameters.acceleration_m_s2)
+            if manual is not None:
+                motion = ManualMotion(abs(path_m), manual, self._random)
+            self._moves.append(Move(start_s, path_m, motion, sideways))
+            self.ends_s = start_s + motion.duration_s
+            start_s += motion.duration_s + hold_s
 
     def _clear_moves(self) -> None:
-        self._travelled_m += sum(move.path_m for _, move, _ in self._moves)
+        self._travelled_m += sum(move.path_m for move in self._moves)
         self._moves = []
 
     def travelled_m(self, at_s: float) -> float:
         """Returns the stage's travel, forward and upward, that an encoder on it counts. `at_s` may lie in the past."""
-        return self._travelled_m + sum(
-            _position_m(start_s, move, motion, at_s) for start_s, move, motion in self._moves
-        )
-
-    @property
-    def ends_s(self) -> float:
-        """The time at which the last requested move ends."""
-        return self._ends_s
+        return self._travelled_m + sum(move.position_m(at_s) for move in self._moves)
 
     def mean_force_n(self, until_s: float) -> float:
         """Returns the mean force since the last call, as an integrating converter measures it."""
@@ -130,29 +132,15 @@ class PlateStage:
     def _step(self, until_s: float) -> float:
         """Advances to the next change of motion and returns force times time."""
         before_s = self._time_s
-        move = self._move_at(before_s)
+        under_way = (move for move in self._moves if move.start_s <= before_s < move.start_s + move.motion.duration_s)
+        move = next(under_way, None)
+        next_start_s = min((move.start_s for move in self._moves if move.start_s > before_s), default=inf)
         step_s = RESTING_STEP_S if move is None else MOVING_STEP_S
-        self._time_s = min(before_s + step_s, until_s, self._next_start_s(before_s))
-        dt_s = self._time_s - before_s
-        forward_m = upward_m = 0.0
+        self._time_s = min(before_s + step_s, until_s, next_start_s)
+        dt_s, forward_m, upward_m = self._time_s - before_s, 0.0, 0.0
         if move is not None:
-            wanted = move[1]
-            moved_m = _position_m(*move, self._time_s) - _position_m(*move, before_s)
-            forward_m, upward_m = (moved_m, 0.0) if wanted.sideways else (0.0, moved_m)
+            moved_m = move.position_m(self._time_s) - move.position_m(before_s)
+            forward_m, upward_m = (moved_m, 0.0) if move.sideways else (0.0, moved_m)
         forward_n, upward_n = self.plate.step(dt_s, forward_m / dt_s, upward_m / dt_s)
         self.force_n = self.hung_weight_n + (forward_n if self.measures_sideways else upward_n)
         return self.force_n * dt_s
-
-    def _move_at(self, now_s: float) -> tuple[float, StageMove, Motion] | None:
-        for start_s, move, motion in self._moves:
-            if start_s <= now_s < start_s + motion.duration_s:
-                return start_s, move, motion
-        return None
-
-    def _next_start_s(self, now_s: float) -> float:
-        return min((start_s for start_s, _, _ in self._moves if start_s > now_s), default=float("inf"))
-
-
-def _position_m(start_s: float, move: StageMove, motion: Motion, now_s: float) -> float:
-    path_m = motion.path_m(now_s - start_s)
-    return path_m if move.path_m > 0.0 else -path_m

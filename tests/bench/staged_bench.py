@@ -11,6 +11,7 @@ from typing import Any, Concatenate, ParamSpec
 import pytest
 
 from command_line.experiments.terminal_prompt import TerminalPrompt
+from experiments.bench.lateness import Lateness
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import EndedError
@@ -172,7 +173,7 @@ class StagedBench:
             pytest.fail("\n".join([*wrong, late]).rstrip(), pytrace=False)
 
     def _readings(self, measured: Readings) -> list[Reading]:
-        self.test_rig.lateness.reset()
+        self.test_rig.lateness = Lateness()
         reported: list[Reading] = []
         try:
             for reading in measured:

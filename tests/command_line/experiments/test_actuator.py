@@ -55,7 +55,7 @@ def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
     assert written.drive["right_sweep"].torque_constant_nm_a == round(joint["torque_constant_nm_a"], 5)
     assert written.friction["right_sweep"].coulomb_nm > 0.0
     assert "+torque_constant_nm_a" in said.err
-    assert {path.name for path in tmp_path.iterdir()} >= {"report.html", "summary.json", "torques.png", "errors.png"}
+    assert {path.name for path in tmp_path.iterdir()} >= {"report.html", "summary.json", "torques.png", "friction.png"}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Actuator calibration (simulated)" in page and "true k_t (N·m/A)</th>" in page
     assert "What to set where" in page and "data:image/png;base64" in page

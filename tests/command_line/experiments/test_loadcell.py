@@ -63,11 +63,11 @@ def test_the_measured_coefficients_of_a_simulated_mud_are_the_true_ones(report: 
 def test_a_simulated_experiment_needs_no_questions_and_leaves_a_report(report: dict[str, Any], folder: Path) -> None:
     assert report["experiment"] == "loadcell"
     names = {path.name for path in (folder / "out").iterdir()}
-    pictures = {"coefficients.png", "comparison.png", "mud_48.6.png"}
+    pictures = {"coefficients.png", "mud_48.6.png"}
     assert {"report.html", "summary.json", "notebook.jsonl", "calibration.json", "raw", *pictures} <= names
     assert all((folder / "out" / trial["file"]).exists() for trial in report["trials"])
     page = (folder / "out" / "report.html").read_text()
-    assert page.count("data:image/png") == 3 and "Compared with the flipper" in page
+    assert page.count("data:image/png") == 2 and "Compared with the flipper" in page
 
 
 def test_the_flipper_is_compared_where_it_has_a_value(report: dict[str, Any]) -> None:
