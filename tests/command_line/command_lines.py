@@ -1,4 +1,4 @@
-"""Runs command lines: in a process of their own, or in this one where they are refused."""
+"""Runs command lines: in this process, or in one of their own."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 
 import pytest
 
@@ -15,7 +17,16 @@ from tests.waiting import LONGEST_S
 
 
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs a command in its own process with additional environment variables."""
+    """Runs a command with additional environment variables, in this process: it has imported all libraries already."""
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        status = _status(arguments)
+    return subprocess.CompletedProcess(arguments, status, out.getvalue(), err.getvalue())
+
+
+def run_process(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs a command in a process of its own."""
     command = [sys.executable, "-m", "command_line.main", *arguments]
     return subprocess.run(
         command, capture_output=True, text=True, timeout=LONGEST_S, env=os.environ | environment, check=False
@@ -33,11 +44,15 @@ def failure(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 
 def _complaint(capsys: pytest.CaptureFixture[str], status: int, arguments: Sequence[str]) -> str:
-    try:
-        ended: object = main(arguments)
-    except SystemExit as problem:  # as argparse does it
-        ended = problem.code
+    ended = _status(arguments)
     printed = capsys.readouterr()
     assert (ended, printed.out) == (status, "")
     assert "Traceback" not in printed.err
     return printed.err.splitlines()[-1]
+
+
+def _status(arguments: Sequence[str]) -> int:
+    try:
+        return main(arguments)
+    except SystemExit as ended:  # as argparse does it
+        return int(ended.code or 0)

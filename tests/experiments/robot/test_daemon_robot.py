@@ -19,6 +19,7 @@ from experiments.robot.bench_robot import BenchError, arm, disarm, move, walk
 from experiments.robot.daemon_robot import DaemonRobot
 from firmware_host.log_reading.log_reader import read_log
 from firmware_host.operator.status_client import CallRefusedError
+from tests.command_line.command_lines import run_process
 from tests.command_line.conftest import Bench
 from tests.command_line.conftest import own_bench as bench  # noqa: F401 - each test ends processes of its own
 from tests.waiting import LONGEST_S
@@ -27,7 +28,7 @@ from tests.waiting import LONGEST_S
 def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.CompletedProcess[str]:  # noqa: F811
     """A command in another terminal, while the experiment waits and renews its lease."""
     with ThreadPoolExecutor(1) as terminals:
-        command = terminals.submit(bench.run, *arguments)
+        command = terminals.submit(run_process, *arguments, MUDSKIPPER_SOCKET=str(bench.socket))
         with suppress(RobotInUseError):
             while not command.done():
                 robot.wait(0.05)
