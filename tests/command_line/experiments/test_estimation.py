@@ -10,7 +10,7 @@ import sys
 import time
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ import command_line.experiments.estimation
 from command_line import exit_codes
 from command_line.main import main
 from experiments.estimation.boundaries import BoundaryRow
-from experiments.estimation.evaluation import Outcome, Plan, report_of
+from experiments.estimation.evaluation import Outcome, Plan, evaluate, report_of
 from experiments.estimation.text import estimation_text
 from experiments.reports.error_table import ErrorRow, PlateRow
 from simulation.mud.clay import MUDS, Clay
@@ -32,9 +32,15 @@ SHORT = (*COMMAND, "--seeds", "1", "--setup", "single", "--mud", "49.5", "--laye
 DOCUMENTED = {"setup", "mud", "coefficient", "method", "median", "p95", "coverage", "strides"}
 
 
+@cache
+def evaluated(plan: Plan) -> Outcome:
+    return evaluate(plan, lambda done, total: None)
+
+
 @pytest.fixture(autouse=True)
 def one_stride(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each trial, instead of two and eight."""
+    """Of each trial, instead of two and eight; the trials of a plan are run once."""
+    monkeypatch.setattr(command_line.experiments.estimation, "evaluate", lambda plan, show: evaluated(plan))
     monkeypatch.setattr(command_line.experiments.estimation, "Plan", partial(Plan, single_strides=1, walking_strides=1))
 
 

@@ -163,6 +163,7 @@ WRONG = (
         lambda c: with_drive(c, "left_adduction", encoder_offset_rad=0.15),
         "zeros",
         "set drive.left_adduction.zero_turn",
+        "zeros",
     ),
     Wrong(
         "limits",
@@ -176,6 +177,7 @@ WRONG = (
         lambda c: SimulatedRig(c, built(c, right_sweep={"torque_constant_nm_a": 1.2 * 0.083})),
         "currents",
         "drive.right_sweep.torque_constant_nm_a",
+        "currents",
     ),
     Wrong(
         "slow drive",

@@ -12,10 +12,12 @@ from typing import Any
 
 import pytest
 
+import experiments.faults.cell
 from control.faults import FaultKind
 from control.modes import Mode, Request
+from control.rate import PERIOD_S
 from experiments.faults.bench import FaultBench
-from experiments.faults.cell import run_cell
+from experiments.faults.cell import FORBIDDEN_TICKS, run_cell
 from experiments.faults.evaluation import Cell, problems
 from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
 from experiments.faults.loop_injectors import bug_in, nothing
@@ -34,7 +36,10 @@ def one_cell_of_each_fault() -> list[CellKey]:
 
 @pytest.fixture(scope="module")
 def cells() -> Sequence[Cell]:
-    return run_parallel([partial(run_cell, *key) for key in one_cell_of_each_fault()], lambda done, of: None)
+    """Each is watched for twice the time in which the loop must notice that a drive takes torque again."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(experiments.faults.cell, "AFTER_S", 2.0 * FORBIDDEN_TICKS * PERIOD_S)
+        return run_parallel([partial(run_cell, *key) for key in one_cell_of_each_fault()], lambda done, of: None)
 
 
 def test_every_kind_of_fault_has_a_failure_mode() -> None:

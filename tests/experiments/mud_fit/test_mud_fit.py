@@ -135,10 +135,15 @@ def test_more_damping_is_slower() -> None:
     assert 0.0 < tight < 0.95 * loose
 
 
-def test_speeds_are_means_over_seeds_by_ground_and_depth() -> None:
-    ground = Ground(6.0, 2800.0)
-    reported = walk_on([ground, ground], Plan(seeds=2, strides=2), lambda done, total: None)
-    assert list(reported) == [ground]
-    alone = [fixed_speed_cm_s(ground, 0.05, seed, strides=2) for seed in (1, 2)]
-    assert reported[ground][0.05] == pytest.approx(sum(alone) / 2.0)
-    assert set(reported[ground]) == {0.03, 0.05}
+def synthetic_speed_cm_s(ground: Ground, depth_m: float, seed: int, strides: int) -> float:
+    return ground.damping_n_s_m + 100.0 * depth_m + 0.1 * seed + strides
+
+
+def test_speeds_are_means_over_seeds_by_ground_and_depth(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(experiments.mud_fit.mud_fit, "fixed_speed_cm_s", synthetic_speed_cm_s)
+    loose, tight = Ground(6.0, 2800.0), Ground(7.0, 2800.0)
+    reported = walk_on([loose, tight, loose], Plan(seeds=2, strides=2), lambda done, total: None)
+    assert reported == {
+        loose: {0.03: pytest.approx(11.15), 0.05: pytest.approx(13.15)},
+        tight: {0.03: pytest.approx(12.15), 0.05: pytest.approx(14.15)},
+    }

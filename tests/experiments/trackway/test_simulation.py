@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from experiments.reports.report_page import to_json
-from experiments.trackway.one_mud import BestDepth
+from experiments.trackway.one_mud import STARTING, BestDepth, MudWalk
 from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE, Speed
 from experiments.trackway.plots import plot_trackway
 from experiments.trackway.report import MeanOverMuds
@@ -176,7 +176,14 @@ def test_every_walk_has_a_key_of_its_own() -> None:
 # in simulation
 
 
-SHORT = Plan(compartment_m=0.2, seeds=1, constant_depths_m=(0.03,), constant_seeds=1)
+class Short(Plan):
+    """Each constant depth is walked for a stride that counts, and the one before it."""
+
+    def constant_walks(self) -> list[MudWalk]:
+        return [order._replace(strides=STARTING + 1) for order in super().constant_walks()]
+
+
+SHORT = Short(compartment_m=0.2, seeds=1, constant_depths_m=(0.03,), constant_seeds=1)
 
 
 @cache
