@@ -14,6 +14,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from tests.folders import ROOT
 from tests.recorded_walks import record_walks
+from tests.running_bench import Bench, running_bench
 
 # A busy machine is not wrong, and a commit gets the same verdict every time; `--hypothesis-profile search` looks on.
 settings.register_profile("search", deadline=None)
@@ -64,3 +65,23 @@ def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configura
     path = tmp_path_factory.mktemp("logs") / "two.mcap"
     record_walks(path, configuration, 2, 1)
     return path
+
+
+@pytest.fixture(scope="session")
+def session_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with running_bench(tmp_path_factory.mktemp("bench") / "logs") as made:
+        yield made
+
+
+@pytest.fixture
+def bench(session_bench: Bench) -> Bench:
+    """A robot at rest that many tests share: they leave both processes running."""
+    session_bench.reset()
+    return session_bench
+
+
+@pytest.fixture
+def own_bench(tmp_path: Path) -> Iterator[Bench]:
+    """A robot whose processes the test may end."""
+    with running_bench(tmp_path / "logs") as made:
+        yield made

@@ -52,7 +52,7 @@ def test_tick_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
     monkeypatch.setattr(timed_walk, "WARM_UP_S", 1.0)
     monkeypatch.setattr(timed_walk, "BLOCK_TICKS", 50)
     monkeypatch.setattr(timed_walk, "freeze_garbage", lambda: None)  # it switches garbage collection off
-    assert tick_time.main(["--json", "--seconds", "1"]) == 0
+    assert run_benchmark(tick_time.measure, ["--seconds", "1"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["bar_us"] == 200.0
     assert set(report["variants"]) == set(VARIANTS)

@@ -19,7 +19,7 @@ from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.operator.rights import load_rights
 from firmware_host.operator.status_client import NotPermittedError, StatusClient
 from firmware_host.operator.status_socket import Methods, StatusSocket
-from tests.command_line.conftest import Bench
+from tests.running_bench import Bench
 
 NOBODY = 65534
 REFUSAL = "status is for members of the group mudskipper. Have root run 'adduser YOU mudskipper', then log in again"

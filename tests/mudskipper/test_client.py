@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import mudskipper
-from tests.command_line.conftest import Bench
 from tests.mudskipper.test_examples import run_example
-
-
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    made = Bench(tmp_path_factory.mktemp("b"), tmp_path_factory.mktemp("logs"))
-    try:
-        made.wait_until_ready()
-        yield made
-    finally:
-        made.end()
+from tests.running_bench import Bench
 
 
 def test_the_example_walks_three_strides(bench: Bench) -> None:
@@ -28,7 +17,6 @@ def test_the_example_walks_three_strides(bench: Bench) -> None:
 
 
 def test_joints_move_under_a_lease(bench: Bench) -> None:
-    bench.wait_until_ready()
     with mudskipper.Client(bench.socket, lease_s=1.0) as robot:
         robot.arm()
         assert robot.wait_for("hold")["lease"]

@@ -17,7 +17,7 @@ from control.records import JOINTS
 from firmware_host.computer.findings import Level
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
-from tests.command_line.conftest import Bench
+from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
 LINES = {"configuration", "kernel", "governor", "processors", "interrupts", "disk", "log", "clock", "daemon"}

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import signal
 
 from command_line import exit_codes
 from drivers.fault_injection.failures import Failures
 from firmware_host.log_reading.log_reader import read_log
-from tests.command_line.conftest import Bench
-from tests.waiting import LONGEST_S
+from tests.running_bench import Bench
 
 
 def test_a_failing_drive_stops_the_robot_and_is_shown_and_logged(own_bench: Bench) -> None:
@@ -48,15 +46,3 @@ def test_an_impossible_failure_is_refused_and_an_incomplete_one_is_wrong_usage(b
         *(("left_sweep", "off", "--for", text) for text in ("nan", "inf", "x")),
     ):
         assert bench.run("fail", *wrong).returncode == exit_codes.USAGE, wrong
-
-
-def test_a_robot_whose_configuration_forbids_failures_refuses_them(own_bench: Bench) -> None:
-    text = own_bench.configuration.read_text(encoding="utf-8")
-    own_bench.configuration.write_text(text.replace("allowed = true", "allowed = false"), encoding="utf-8")
-    own_bench.daemon.send_signal(signal.SIGTERM)
-    own_bench.daemon.wait(LONGEST_S)
-    own_bench.restart_daemon()
-    own_bench.wait_until_ready()
-    refused = own_bench.run("fail", "pose", "off")
-    assert refused.returncode == exit_codes.REFUSED and "failures.allowed = true" in refused.stderr
-    assert json.loads(own_bench.run("fail", "--list", "--json").stdout)["allowed"] is False

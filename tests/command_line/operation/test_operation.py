@@ -19,7 +19,7 @@ from firmware_host.log_reading.log_reader import read_log
 from firmware_host.log_reading.replay import replay_files
 from simulation.harness.peer import WATCHDOG_S
 from tests.command_line.command_lines import refusal, run
-from tests.command_line.conftest import Bench
+from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
 

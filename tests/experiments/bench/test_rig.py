@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import socket
 import subprocess
@@ -56,19 +55,6 @@ def test_a_bus_that_does_not_open_is_reported(configuration: Configuration, shor
         HardwareRig(changed)
 
 
-def test_a_refused_bench_says_why_once_and_reports_it(answering: Path, tmp_path: Path) -> None:
-    path = write_local_setup(answering.parent, tmp_path)
-    report = tmp_path / "report.json"
-    # -rN: the short summary would say it again, whole where the environment has CI=, cut to the terminal elsewhere.
-    arguments = ["tests/bench", "-q", "-rN", "--config", str(path), "--yes", "--bench-report", str(report)]
-    command = [sys.executable, "-m", "pytest", *arguments]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
-    assert ended.returncode == 1
-    assert ended.stdout.count("systemctl stop mudskipper") == 1
-    reported = json.loads(report.read_text(encoding="utf-8"))
-    assert reported["stages"] == {"wiring": "failed"} | dict.fromkeys(list(reported["stages"])[1:], "skipped")
-
-
 @pytest.mark.parametrize("text", ["[robot", "[gait]\nsweep_angle_deg = 500\nodd = 1\n"])
 def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
@@ -78,21 +64,6 @@ def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path
     reported = reported_of_file(path, caught.value.problems).splitlines()
     assert len(reported) == len(caught.value.problems)
     assert all(line.startswith(f"{path}: ") and line.count("bad.toml") == 1 for line in reported)
-
-
-def test_a_joint_whose_encoder_counts_backwards_never_gets_stiffness(tmp_path: Path) -> None:
-    """With stiffness it would run away. All joints are still nudged, and nothing moves after that."""
-    report = tmp_path / "report.json"
-    flipped = ["-p", "tests.experiments.bench.flipped_encoder"]
-    command = [sys.executable, "-m", "pytest", "tests/bench", *flipped, "--simulated", "--bench-report", str(report)]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
-    reported = json.loads(report.read_text(encoding="utf-8"))
-    assert [test["outcome"] for test in reported["tests"] if test["name"] == "signs"] == [
-        *("passed", "passed", "failed", "passed"),
-        *4 * ["skipped"],
-    ]
-    assert set(list(reported["stages"].values())[2:]) == {"skipped"}
-    assert float(ended.stdout.partition("fastest: ")[2].split()[0]) < 2.0
 
 
 @pytest.fixture

@@ -20,12 +20,11 @@ from experiments.robot.daemon_robot import DaemonRobot
 from firmware_host.log_reading.log_reader import read_log
 from firmware_host.operator.status_client import CallRefusedError
 from tests.command_line.command_lines import run_process
-from tests.command_line.conftest import Bench
-from tests.command_line.conftest import own_bench as bench  # noqa: F401 - each test ends processes of its own
+from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
 
-def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.CompletedProcess[str]:  # noqa: F811
+def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.CompletedProcess[str]:
     """A command in another terminal, while the experiment waits and renews its lease."""
     with ThreadPoolExecutor(1) as terminals:
         command = terminals.submit(run_process, *arguments, MUDSKIPPER_SOCKET=str(bench.socket))
@@ -35,7 +34,7 @@ def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.
         return command.result()
 
 
-def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
+def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_path: Path) -> None:
     robot = DaemonRobot(bench.socket)
     try:
         assert robot.configuration.robot.name == "simulated"
@@ -54,7 +53,7 @@ def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_p
         robot.close()
 
 
-def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:  # noqa: F811
+def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:
     """Right behind its arm as well: the lease is older than the torque."""
     robot = DaemonRobot(bench.socket)
     arm(robot)
@@ -64,7 +63,7 @@ def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:  # noq
 
 
 def test_an_experiment_that_is_killed_with_its_flippers_in_the_mud_leaves_them_raised_and_without_torque(
-    bench: Bench,  # noqa: F811
+    bench: Bench,
 ) -> None:
     program = (
         "import sys, time\nfrom pathlib import Path\nfrom experiments.robot.bench_robot import arm\n"
@@ -90,11 +89,11 @@ def test_a_missing_daemon_is_reported_with_how_to_start_it(tmp_path: Path) -> No
         DaemonRobot(tmp_path / "none.sock")
 
 
-def test_the_end_of_a_daemon_is_reported_and_its_log_remains(bench: Bench, tmp_path: Path) -> None:  # noqa: F811
-    robot = DaemonRobot(bench.socket)
+def test_the_end_of_a_daemon_is_reported_and_its_log_remains(own_bench: Bench, tmp_path: Path) -> None:
+    robot = DaemonRobot(own_bench.socket)
     arm(robot)
-    bench.daemon.terminate()
-    bench.daemon.wait(LONGEST_S)
+    own_bench.daemon.terminate()
+    own_bench.daemon.wait(LONGEST_S)
     with pytest.raises(BenchError, match="the daemon on"):
         robot.call("status")
     (copy,) = robot.copy_logs(tmp_path)
@@ -103,7 +102,7 @@ def test_the_end_of_a_daemon_is_reported_and_its_log_remains(bench: Bench, tmp_p
 
 
 def test_no_log_is_copied_before_the_robot_obeys_and_a_failed_copy_is_reported(
-    bench: Bench,  # noqa: F811
+    bench: Bench,
     tmp_path: Path,
 ) -> None:
     robot = DaemonRobot(bench.socket)
@@ -118,7 +117,7 @@ def test_no_log_is_copied_before_the_robot_obeys_and_a_failed_copy_is_reported(
         robot.close()
 
 
-def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> None:  # noqa: F811
+def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> None:
     first = DaemonRobot(bench.socket)
     try:
         with pytest.raises(BenchError, match="operates the robot: wait for its end"):
@@ -137,7 +136,7 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
     assert bench.run("arm").returncode == exit_codes.OK
 
 
-def test_a_robot_that_another_program_took_over_is_left_alone(bench: Bench) -> None:  # noqa: F811
+def test_a_robot_that_another_program_took_over_is_left_alone(bench: Bench) -> None:
     robot = DaemonRobot(bench.socket)
     arm(robot)
     assert run_beside(robot, bench, "move", "--take-over", "left_sweep=3").returncode == exit_codes.OK

@@ -1,4 +1,4 @@
-"""Runs a simulated robot and a real daemon as processes, operated through the command line."""
+"""A simulated robot and a real daemon as processes in real time, operated through the command line."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
@@ -103,23 +101,3 @@ def running_bench(logs: Path) -> Iterator[Bench]:
             yield made
         finally:
             made.end()
-
-
-@pytest.fixture(scope="module")
-def module_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with running_bench(tmp_path_factory.mktemp("bench") / "logs") as made:
-        yield made
-
-
-@pytest.fixture
-def bench(module_bench: Bench) -> Bench:
-    """A robot at rest that the tests of a module share: they leave both processes running."""
-    module_bench.reset()
-    return module_bench
-
-
-@pytest.fixture
-def own_bench(tmp_path: Path) -> Iterator[Bench]:
-    """A robot whose processes the test may end."""
-    with running_bench(tmp_path / "logs") as made:
-        yield made

@@ -1,0 +1,48 @@
+"""The whole bench as an operator starts it: a refused one, a sound robot, and one whose encoder counts backwards."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from simulation.harness.local_setup import write_local_setup
+from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, STAGES
+from tests.folders import ROOT
+
+
+def run_bench(report: Path, *options: str) -> tuple[int, str, dict[str, Any]]:
+    """Return the exit status, the output and the report."""
+    command = [sys.executable, "-m", "pytest", "tests/bench", "-q", "--bench-report", str(report), *options]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    return ended.returncode, ended.stdout, json.loads(report.read_text(encoding="utf-8"))
+
+
+def test_a_sound_robot_passes_every_stage(tmp_path: Path) -> None:
+    status, _, reported = run_bench(tmp_path / "report.json", "--simulated")
+    assert reported["stages"] == dict.fromkeys(STAGES, PASSED)
+    assert status == 0
+
+
+def test_a_refused_bench_says_why_once_and_reports_it(short_folder: Path, tmp_path: Path) -> None:
+    """A daemon runs. The option -rN prevents a summary that would say it again."""
+    path = write_local_setup(short_folder, tmp_path)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as daemon:
+        daemon.bind(str(short_folder / "mudskipper.sock"))
+        daemon.listen()
+        status, printed, reported = run_bench(tmp_path / "report.json", "-rN", "--config", str(path), "--yes")
+    assert (status, printed.count("systemctl stop mudskipper")) == (1, 1)
+    assert reported["stages"] == dict.fromkeys(STAGES, SKIPPED) | {"wiring": FAILED}
+
+
+def test_a_joint_whose_encoder_counts_backwards_never_gets_stiffness(tmp_path: Path) -> None:
+    """With stiffness it would run away. All joints are still nudged, and nothing moves after that."""
+    flipped = ("-p", "tests.experiments.bench.flipped_encoder", "--simulated")
+    _, printed, reported = run_bench(tmp_path / "report.json", *flipped)
+    outcomes = [test["outcome"] for test in reported["tests"] if test["name"] == "signs"]
+    assert outcomes == [PASSED, PASSED, FAILED, PASSED, *4 * [SKIPPED]]
+    assert set(list(reported["stages"].values())[2:]) == {SKIPPED}
+    assert float(printed.partition("fastest: ")[2].split()[0]) < 2.0
