@@ -5,11 +5,11 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --nitpicky --quiet
 
-# These tests run a robot in real time or depend on their order: they run one after the other, with nothing next to them.
-SERIAL := bench $(addprefix command_line/,experiments/test_actuator.py operation/test_attended_walk.py demo/test_demo.py doctor/test_doctor.py operation/test_failing.py operation/test_operation.py test_permission.py) $(addprefix experiments/,bench/test_rig.py robot/test_daemon_robot.py) mudskipper/test_client.py
+# These tests run a robot in real time, which takes a part of a processor: nothing else runs next to two of them.
+REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command_line/doctor/test_doctor.py command_line/test_permission.py experiments/robot/test_daemon_robot.py mudskipper/test_client.py)
 
 # Ends a test that hangs, and prints where it hangs.
-PYTEST := $(BIN)/python -m pytest -q --durations=10 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
+PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --durations=10 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
 .PHONY: help setup demo test test-vm mutants lint docs docs-links man clean
 
@@ -21,11 +21,11 @@ setup: .venv/setup  ## install what running and plotting need into .venv
 demo: .venv/setup  ## walk a simulated robot over three muds, in real time
 	@$(BIN)/mudskipper demo $(ARGS)
 
-test: .venv/test  ## run all tests without network: first in parallel, then those in real time
-	@$(PYTEST) --numprocesses 2 --dist loadfile $(addprefix --ignore=tests/,$(SERIAL)) $(ARGS); parallel=$$?; \
-	$(PYTEST) --simulated $(addprefix tests/,$(SERIAL)) $(ARGS); serial=$$?; \
-	echo "exit status: parallel tests $$parallel, real-time tests $$serial"; \
-	test $$parallel -eq 0 -a $$serial -eq 0
+test: .venv/test  ## run all tests without network: first those that compute, then those in real time
+	@$(PYTEST) --ignore=tests/bench $(addprefix --ignore=,$(REAL_TIME)) $(ARGS); computing=$$?; \
+	$(PYTEST) $(REAL_TIME) $(ARGS); real_time=$$?; \
+	echo "exit status: computing tests $$computing, real-time tests $$real_time"; \
+	test $$computing -eq 0 -a $$real_time -eq 0
 
 test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot

@@ -14,7 +14,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from tests.folders import ROOT
 from tests.recorded_walks import record_walks
-from tests.running_bench import Bench, running_bench
+from tests.running_bench import Bench, SharedBench, running_bench
 
 # A busy machine is not wrong, and a commit gets the same verdict every time; `--hypothesis-profile search` looks on.
 settings.register_profile("search", deadline=None)
@@ -68,20 +68,23 @@ def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configura
 
 
 @pytest.fixture(scope="session")
-def session_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with running_bench(tmp_path_factory.mktemp("bench") / "logs") as made:
-        yield made
+def shared_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SharedBench]:
+    shared = SharedBench(tmp_path_factory)
+    yield shared
+    shared.end()
 
 
 @pytest.fixture
-def bench(session_bench: Bench) -> Bench:
+def bench(shared_bench: SharedBench) -> Bench:
     """A robot at rest that many tests share: they leave both processes running."""
-    session_bench.reset()
-    return session_bench
+    made = shared_bench.start()
+    made.reset()
+    return made
 
 
 @pytest.fixture
-def own_bench(tmp_path: Path) -> Iterator[Bench]:
+def own_bench(shared_bench: SharedBench, tmp_path: Path) -> Iterator[Bench]:
     """A robot whose processes the test may end."""
+    shared_bench.end()
     with running_bench(tmp_path / "logs") as made:
         yield made

@@ -8,9 +8,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
@@ -101,3 +103,21 @@ def running_bench(logs: Path) -> Iterator[Bench]:
             yield made
         finally:
             made.end()
+
+
+class SharedBench:
+    """Owns at most one running robot: each takes a part of a processor."""
+
+    def __init__(self, folders: pytest.TempPathFactory) -> None:
+        self._folders = folders
+        self._running = ExitStack()
+        self._bench: Bench | None = None
+
+    def start(self) -> Bench:
+        if self._bench is None:
+            self._bench = self._running.enter_context(running_bench(self._folders.mktemp("bench") / "logs"))
+        return self._bench
+
+    def end(self) -> None:
+        self._running.close()
+        self._bench = None
