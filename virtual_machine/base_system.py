@@ -28,18 +28,8 @@ HOST_PACKAGES = {  # Debian package: the program that it brings
 SUITE = "bookworm"
 GUEST_PYTHON = "3.11"
 PACKAGES = (
-    *(
-        "linux-image-amd64",
-        "initramfs-tools",
-        "lz4",
-        "kmod",
-        "udev",
-        "systemd",
-        "systemd-sysv",
-        "libpam-systemd",
-        "dbus",
-    ),
-    *("iproute2", "procps", "adduser", "python3", "python3-venv", "can-utils"),
+    "linux-image-amd64,initramfs-tools,lz4,kmod,udev,systemd,systemd-sysv,libpam-systemd,dbus,"
+    "iproute2,procps,adduser,python3,python3-venv,can-utils"
 )
 EXCLUDED_PATHS = ("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*") + tuple(
     f"/lib/modules/*/kernel/{folder}/*"  # two thirds of the kernel's package, for hardware that is not emulated
@@ -134,7 +124,7 @@ def _write_initramfs_settings() -> None:
 
 
 def _debian_command() -> list[str]:
-    command = ["mmdebstrap", "--variant=minbase", "--format=tar", f"--include={','.join(PACKAGES)}"]
+    command = ["mmdebstrap", "--variant=minbase", "--format=tar", f"--include={PACKAGES}"]
     command += [f"--dpkgopt=path-exclude={pattern}" for pattern in EXCLUDED_PATHS]
     command += [f"--essential-hook=copy-in {STORE / 'settings' / 'etc'} /"]  # before the kernel makes its initramfs
     command += [f"--customize-hook=copy-in {STORE / 'wheels'} /opt"]

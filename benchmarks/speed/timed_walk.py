@@ -25,7 +25,7 @@ from simulation.harness.robot import SimulatedRobot
 from simulation.mud.track import paper_track
 
 BLOCK_TICKS = round(RATE_HZ)
-WARM_UP_S = 4.0  # part of it moves the flippers to the start of the first stride
+WARM_UP_S = 2.0  # to the end of the first stride
 STAGES = {  # in their order, by the loop's method that begins each
     "read": "drives.read",  # drain the buses, decode
     "pose": "pose.read",  # simulated here
