@@ -35,8 +35,7 @@ from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.log.recorder import Recording
-from firmware_host.log.row_packing import stride_row, tick_row
-from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
+from firmware_host.log.rows import STRIDE_KIND, TICK_KIND, stride_row, tick_row
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning

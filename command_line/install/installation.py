@@ -5,22 +5,81 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from command_line import exit_codes
-from command_line.install.service_plan import CONFIGURATION, Plan, System, plan_installation, plan_removal
-from command_line.install.service_steps import Command, Run, StepError, WriteFile, perform, run_command
+from command_line.install.service_plan import (
+    CONFIGURATION,
+    Command,
+    MakeLink,
+    Outcome,
+    Plan,
+    Remove,
+    Run,
+    Step,
+    System,
+    WriteFile,
+    plan_installation,
+    plan_removal,
+)
 from command_line.screen import complain
 
 HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # ProtectHome= and PrivateTmp= of the unit hide them
+COMMAND_TIMEOUT_S = 120.0  # stopping the service may take 20 s
 Find = Callable[[str], str | None]  # returns the path of a program
 NEXT = """\
 Next: edit {root}etc/mudskipper/mudskipper.toml (your geometry, your drives), then
   adduser YOU mudskipper             an operator; takes effect at the next login
   systemctl start mudskipper
   mudskipper doctor; mudskipper check"""
+
+
+class StepError(Exception):
+    """A step failed; the text gives the reason."""
+
+
+def perform(step: Step, run: Run) -> None:
+    """Raises StepError, and OSError."""
+    match step:
+        case WriteFile(path, text):
+            temporary = _temporary_path(path)
+            temporary.write_text(text, encoding="utf-8")
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        case MakeLink(path, target):
+            temporary = _temporary_path(path)
+            temporary.symlink_to(target)
+            temporary.replace(path)
+        case Remove(path) if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        case Remove(path):
+            path.unlink(missing_ok=True)
+        case Command(words):
+            outcome = run(words)
+            if outcome.status != 0:
+                last_line = outcome.text.strip().rpartition("\n")[2]
+                raise StepError(last_line or f"exit status {outcome.status}")
+
+
+def _temporary_path(path: Path) -> Path:
+    """Returns an unused path in the same folder, which it makes; removes the rest of an interrupted installation."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary.unlink(missing_ok=True)
+    return temporary
+
+
+def run_command(words: Sequence[str]) -> Outcome:
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, timeout=COMMAND_TIMEOUT_S, check=False)
+    except subprocess.TimeoutExpired:
+        return Outcome(124, f"took longer than {COMMAND_TIMEOUT_S:g} s")
+    except FileNotFoundError:
+        return Outcome(127, f"{words[0]} is not installed")
+    return Outcome(done.returncode, done.stdout + done.stderr)
 
 
 def install(options: argparse.Namespace, run: Run = run_command, find: Find = shutil.which) -> int:

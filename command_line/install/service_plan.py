@@ -1,5 +1,7 @@
 """Plans the installation or removal of the robot's service: lists the steps without doing them.
 
+A step writes a file, makes a link, removes a file or runs a command; its text is printed before it is done.
+
 A file that its owner has edited is never overwritten: the new version is written next to it as NAME.new, once. A file
 counts as edited where its digest differs from the one in the manifest of the last installation. The manifest is
 written last, so an interrupted installation is repeated. The configuration always counts as edited.
@@ -8,14 +10,13 @@ written last, so an interrupted installation is repeated. The configuration alwa
 from __future__ import annotations
 
 import json
+import shlex
 import sysconfig
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
-
-from command_line.install.service_steps import Command, MakeLink, Remove, Run, Step, WriteFile
 
 DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
 MANIFEST = "etc/mudskipper/.installed.json"
@@ -32,6 +33,47 @@ SOURCES = {  # name in systemd/ by installed path
     **{path: path.rpartition("/")[2] for path in (LINK_FILE, NETWORK, UNIT, CONFIGURATION)},
 }
 OWNED = ("etc/mudskipper", "var/lib/mudskipper")  # folders that a purge removes
+
+
+class Outcome(NamedTuple):
+    status: int
+    text: str
+
+
+Run = Callable[[Sequence[str]], Outcome]
+
+
+class WriteFile(NamedTuple):
+    path: Path
+    text: str
+
+    def __str__(self) -> str:
+        return f"write {self.path}"
+
+
+class MakeLink(NamedTuple):
+    path: Path
+    target: Path
+
+    def __str__(self) -> str:
+        return f"link {self.path} to {self.target}"
+
+
+class Remove(NamedTuple):
+    path: Path
+
+    def __str__(self) -> str:
+        return f"remove {self.path}{'/' if self.path.is_dir() else ''}"
+
+
+class Command(NamedTuple):
+    words: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"run {shlex.join(self.words)}"
+
+
+Step = WriteFile | MakeLink | Remove | Command
 
 
 class Plan(NamedTuple):

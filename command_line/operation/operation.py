@@ -177,9 +177,7 @@ def check(options: Options) -> int:
     try:
         StatusClient(options.socket).close()
     except NoDaemonError as problem:
-        from command_line.doctor.checks_before_arming import (
-            check_without_daemon,  # python-can, pydantic: too slow for `status`
-        )
+        from command_line.doctor.doctor import check_without_daemon  # imports too much for `status`
 
         return _show_items(options, check_without_daemon(options.config, str(problem)))
     except NotPermittedError:

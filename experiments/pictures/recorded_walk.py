@@ -21,8 +21,7 @@ from control.records import FLIPPERS, BodyPose, FlipperLoad, StrideEstimate
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.recorded_states import recorded_states
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.row_packing import stride_row
-from firmware_host.log.rows import STRIDE
+from firmware_host.log.rows import STRIDE, stride_row
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.log_reader import (
     Log,

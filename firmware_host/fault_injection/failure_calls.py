@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from drivers.fault_injection.failures import EFFECTS, Failure, Failures, begin_text, end_text
+from drivers.fault_injection.failures import EFFECTS, Failures, begin_text, end_text
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import validated
@@ -34,12 +34,22 @@ def with_failures(methods: Methods, failures: Failures | None, report: Report, c
         nothing = {"allowed": False, "failing": [], "table": []}
         return {**methods, "fail": _refuse, "failures": lambda params, caller: nothing}
     calls = FailureCalls(failures, report, clock)
+
+    def status(params: dict[str, Any], caller: Caller) -> Any:
+        """Add the active failures to the status, also as warnings."""
+        reported, failing = methods["status"](params, caller), calls.failing()
+        warnings = [
+            f"failing on purpose: {each['component']} {each['kind']}, {each['remaining_s']:.1f} s more"
+            for each in failing
+        ]
+        return reported | {"failing": failing, "warnings": reported["warnings"] + warnings}
+
+    def disarm(params: dict[str, Any], caller: Caller) -> Any:
+        calls.end(ALL)
+        return methods["disarm"](params, caller)
+
     added: Methods = {"fail": validated("fail", calls.fail), "failures": validated("failures", calls.failures)}
-    changed: Methods = {
-        "status": lambda params, caller: calls.in_status(methods["status"](params, caller)),
-        "disarm": calls.ending_all_before(methods["disarm"]),
-    }
-    return {**methods, **added, **changed}
+    return {**methods, **added, "status": status, "disarm": disarm}
 
 
 def _refuse(params: dict[str, Any], caller: Caller) -> Any:
@@ -56,10 +66,10 @@ class FailureCalls:
         """Make `component` fail as `kind` says for `for_s`; kind "ok" ends it. Returns the active failures."""
         component, kind = params["component"], params["kind"]
         if kind == OK:
-            self._end(component)
+            self.end(component)
         else:
             self._begin(component, kind, float(params["for_s"]), str(caller))
-        return self._failing()
+        return self.failing()
 
     def _begin(self, component: str, kind: str, for_s: float, who: str) -> None:
         refused = self._failures.refusal(component, kind, for_s)
@@ -69,7 +79,7 @@ class FailureCalls:
         self._report(now_s, begin_text(component, kind, for_s, who))  # first: it may be the log that fails
         self._failures.begin(component, kind, now_s, for_s)
 
-    def _end(self, component: str) -> None:
+    def end(self, component: str) -> None:
         if component != ALL and component not in self._failures.families:
             raise RefusedError(self._failures.refusal(component, OK))
         failure = self._failures.end(component)
@@ -83,32 +93,16 @@ class FailureCalls:
             {"component": name, "family": families[name], "kind": kind, "does": does}
             for name, kind, does in self._failures.table()
         ]
-        return {"allowed": True, "failing": self._failing(), "table": table}
+        return {"allowed": True, "failing": self.failing(), "table": table}
 
-    def _failing(self) -> list[dict[str, Any]]:
-        return [self._described(failure) for failure in self._failures.active]
-
-    def _described(self, failure: Failure) -> dict[str, Any]:
-        return {
-            "component": failure.component,
-            "kind": str(failure.kind),
-            "remaining_s": max(0.0, failure.until_s - self._clock()),
-            "does": EFFECTS[self._failures.families[failure.component]][failure.kind],
-        }
-
-    def in_status(self, report: dict[str, Any]) -> dict[str, Any]:
-        """Add the active failures to the status, also as warnings."""
-        failing = self._failing()
-        warnings = [failing_text(each) for each in failing]
-        return report | {"failing": failing, "warnings": report["warnings"] + warnings}
-
-    def ending_all_before(self, method: Method) -> Method:
-        def ended_first(params: dict[str, Any], caller: Caller) -> Any:
-            self._end(ALL)
-            return method(params, caller)
-
-        return ended_first
-
-
-def failing_text(failing: dict[str, Any]) -> str:
-    return f"failing on purpose: {failing['component']} {failing['kind']}, {failing['remaining_s']:.1f} s more"
+    def failing(self) -> list[dict[str, Any]]:
+        """The active failures."""
+        return [
+            {
+                "component": component,
+                "kind": str(failure.kind),
+                "remaining_s": max(0.0, failure.until_s - self._clock()),
+                "does": EFFECTS[self._failures.families[component]][failure.kind],
+            }
+            for component, failure in self._failures.failing.items()
+        ]

@@ -1,15 +1,17 @@
 """The three kinds of row in a log. A new field is one line here: name with unit, type, source and meaning.
 
-The source of a field is the Python expression that gives its value; it uses the names that row_packing.py defines.
+The source of a field is the Python expression that gives its value; it uses the names that `tick_row` and `stride_row`
+define.
 Wide types come first, so that a row needs no padding between its fields.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 
 from control.modes import Mode
-from control.records import FLIPPERS, JOINTS, Phase
+from control.records import FLIPPERS, JOINTS, Phase, StrideEstimate
 from firmware_host.log.schema import TEXT, Field, RowKind
 
 MESSAGES = "mudskipper_msgs/msg"
@@ -103,3 +105,16 @@ EVENT = RowKind(
 
 ROW_KINDS = (TICK, STRIDE, EVENT)
 TICK_KIND, STRIDE_KIND, EVENT_KIND = range(len(ROW_KINDS))  # a row's kind on its way into a file
+
+tick_row: Callable[..., bytes] = TICK.compile(  # of a tick, its duration in s, and the loop after it
+    "tick, tick_s, loop",
+    "now_s, target, body, sent = tick.now_s, loop.target, loop.body, loop.sent",
+    f"{', '.join(JOINTS)} = loop.states",
+    f"{', '.join(f'{joint}_nm' for joint in JOINTS)} = sent.torques_nm",
+    f"{', '.join(FLIPPERS)}, _ = loop.learning.reading",
+)
+
+stride_row: Callable[[float, StrideEstimate, float], bytes] = STRIDE.compile(
+    "now_s, stride, chosen_depth_m",
+    *(f"{name} = stride.{name}" for name in COEFFICIENTS),
+)

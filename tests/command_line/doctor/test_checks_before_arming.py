@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from command_line.doctor.checks_before_arming import _pose_items
+from command_line.doctor.doctor import _pose_items
 from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters

@@ -14,7 +14,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.install import installation, service_plan
-from command_line.install.installation import install, location_problem, uninstall
+from command_line.install.installation import StepError, install, location_problem, perform, run_command, uninstall
 from command_line.install.service_plan import (
     CONFIGURATION,
     LINK,
@@ -22,13 +22,16 @@ from command_line.install.service_plan import (
     NETWORK,
     SOURCES,
     UNIT,
+    Command,
+    Outcome,
     Plan,
+    Remove,
     System,
+    WriteFile,
     load_sources,
     plan_installation,
     plan_removal,
 )
-from command_line.install.service_steps import Command, Outcome, Remove, StepError, WriteFile, perform, run_command
 from command_line.main import build_parser
 from tests.folders import ROOT
 

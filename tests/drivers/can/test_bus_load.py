@@ -49,10 +49,6 @@ def test_real_frames_lie_between_the_bounds() -> None:
         assert least <= bits_on_the_wire(chance.randrange(2048), data) <= most
 
 
-def test_eight_bytes_take_111_to_135_bits() -> None:
-    assert frame_bits(8) == (111, 135)
-
-
 def test_two_drives_on_a_megabit_leave_room_and_four_are_close() -> None:
     assert bus_load(2, 1e6).most == pytest.approx(0.353, abs=0.002)
     assert 0.6 < bus_load(4, 1e6).most < 0.8
@@ -60,13 +56,6 @@ def test_two_drives_on_a_megabit_leave_room_and_four_are_close() -> None:
 
 def test_what_odrives_are_delivered_with_cannot_carry_two_drives() -> None:
     assert bus_load(2, 250e3).least > 1.0
-
-
-def test_load_goes_with_drives_and_against_bit_rate() -> None:
-    one = bus_load(1, 1e6)
-    assert bus_load(3, 1e6) == pytest.approx((3 * one.least, 3 * one.most))
-    assert bus_load(1, 5e5) == pytest.approx((2 * one.least, 2 * one.most))
-    assert str(bus_load(2, 1e6)) == "29 to 35 %"
 
 
 def test_every_message_that_the_readme_sets_is_counted() -> None:
