@@ -18,9 +18,8 @@ from control.records import JOINTS, NEVER_S, BodyPose, DriveStates, Joints
 from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth, Drives
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.log_monitor import LogMonitor
 from firmware_host.log.recorder import LogReport
-from firmware_host.loop_monitor import LoopMonitor
+from firmware_host.loop_monitor import LogMonitor, LoopMonitor
 from firmware_host.ticker import Tick
 
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop

@@ -1,4 +1,7 @@
-"""Detects faults of the loop's own timing: missed ticks, a low rate, a stall, and a wall clock that was set."""
+"""Detects faults of the loop's own process: of its timing, of the wall clock, and of the log.
+
+Trouble of the log does not stop a robot that moves; a log that cannot be written blocks arming.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections import deque
 from control.faults import Fault, FaultKind
 from control.monitors.joint_monitor import FaultBounds
 from control.rate import PERIOD_S
+from firmware_host.log.recorder import LogReport
 from firmware_host.ticker import Tick
 
 MEAN_TICKS = 100  # ticks over which the mean rate is measured
@@ -50,4 +54,28 @@ class LoopMonitor:
             if fraction > self._bounds.lag_fraction:
                 extent = f"its ticks take {100.0 * fraction:.0f} % too long"
                 found.append(FaultKind.LOOP_LAGGING.fault(extent=extent))
+        return found
+
+
+class LogMonitor:
+    """Turns the reports of the log's writer into faults. Owns the number of rows lost so far."""
+
+    def __init__(self, bounds: FaultBounds) -> None:
+        self._bounds = bounds
+        self._dropped = 0
+
+    def update(self, report: LogReport) -> list[Fault]:
+        found: list[Fault] = []
+        if not report.alive:
+            found.append(FaultKind.RECORDER_DEAD.fault())
+        elif report.problem:
+            found.append(FaultKind.LOG_UNWRITABLE.fault(reason=report.problem))
+        if report.free_fraction < self._bounds.disk_free_fraction:
+            percent, free_mb = 100.0 * report.free_fraction, report.free_bytes / 1e6
+            found.append(FaultKind.DISK_LOW.fault(free_percent=percent, free_mb=free_mb))
+        if report.slowest_write_s > self._bounds.disk_slow_s:
+            found.append(FaultKind.DISK_SLOW.fault(write_s=report.slowest_write_s))
+        if report.alive and report.dropped > self._dropped:
+            found.append(FaultKind.ROWS_LOST.fault(rows=report.dropped))
+        self._dropped = report.dropped
         return found

@@ -13,7 +13,7 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from control.bounds import Bounds
 
@@ -103,9 +103,8 @@ class RecordReader:
     `hints` replace the annotations of fields whose type depends on the file.
     """
 
-    def __init__(self, record: type, without: Collection[str] = (), hints: Mapping[str, Any] | None = None) -> None:
-        self._hints = _hints(record, without) | dict(hints or {})
-        self._model = _model_of(record, self._hints)
+    def __init__(self, record: type, without: Collection[str] = (), hints: dict[str, Any] | None = None) -> None:
+        self._model = _model_of(record, without, hints)
 
     def problems(self, document: Mapping[str, Any]) -> list[str]:
         try:
@@ -117,23 +116,17 @@ class RecordReader:
     def read(self, document: Mapping[str, Any]) -> dict[str, Any]:
         """The record's fields. Raises ConfigurationError."""
         try:
-            checked = self._model.model_validate(document)
+            return dict(self._model.model_validate(document))
         except ValidationError as problem:
             raise ConfigurationError([_message(error) for error in problem.errors()]) from problem
-        return _values(self._hints, checked)
 
 
-def _hints(record: type, without: Collection[str] = ()) -> dict[str, Any]:
-    """Returns the annotations of the fields that a file may give."""
-    return {name: hint for name, hint in get_type_hints(record, include_extras=True).items() if name not in without}
-
-
-def _model_of(record: type, hints: Mapping[str, Any] | None = None) -> type[BaseModel]:
-    """Makes a pydantic model with a record's fields, defaults and bounds, which refuses anything else."""
-    hints = _hints(record) if hints is None else hints
+def _model_of(record: type, without: Collection[str] = (), others: dict[str, Any] | None = None) -> type[BaseModel]:
+    """Makes a pydantic model with a record's fields, defaults and bounds; `others` replace some of its annotations."""
+    hints = get_type_hints(record, include_extras=True) | (others or {})
     definitions: dict[str, Any] = {}
     for item in fields(record):
-        if item.name not in hints:
+        if item.name in without:
             continue
         default = item.default if item.default is not MISSING else ...
         if item.default_factory is not MISSING:
@@ -144,47 +137,26 @@ def _model_of(record: type, hints: Mapping[str, Any] | None = None) -> type[Base
 
 
 def _checked_hint(hint: Any) -> Any:
-    if changes := _changes(hint):
-        return _model_of(changes.record, _hints(changes.record, changes.without))
+    """Returns the type that pydantic checks for a field; a checked table becomes a record again."""
     if get_origin(hint) is Annotated:
         kind, *extras = get_args(hint)
+        changes = next((extra for extra in extras if isinstance(extra, ChangesOf)), None)
+        if changes:
+            return Annotated[_model_of(changes.record, changes.without), AfterValidator(_given_fields)]
         bounds = next((extra for extra in extras if isinstance(extra, Bounds)), None)
         return Annotated[kind, Field(ge=bounds.minimum, le=bounds.maximum)] if bounds else kind
-    record = _record_in(hint)
-    if get_origin(hint) is dict and record:
-        return dict[str, _model_of(record)]  # type: ignore[misc]
-    if get_origin(hint) is list and record:
-        return list[_model_of(record)]  # type: ignore[misc]
-    return _model_of(hint) if is_dataclass(hint) and isinstance(hint, type) else hint
+    if get_origin(hint) is dict:
+        return dict[str, _checked_hint(get_args(hint)[1])]  # type: ignore[misc]
+    if get_origin(hint) is list:
+        return list[_checked_hint(get_args(hint)[0])]  # type: ignore[misc]
+    if not (is_dataclass(hint) and isinstance(hint, type)):
+        return hint
+    return Annotated[_model_of(hint), AfterValidator(lambda checked: hint(**dict(checked)))]
 
 
-def _changes(hint: Any) -> ChangesOf | None:
-    extras = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
-    return next((extra for extra in extras if isinstance(extra, ChangesOf)), None)
-
-
-def _record_in(hint: Any) -> type | None:
-    """Returns the record that a dict or a list consists of, or None."""
-    last = get_args(hint)[-1] if get_args(hint) else None
-    return last if is_dataclass(last) and isinstance(last, type) else None
-
-
-def _values(hints: Mapping[str, Any], model: BaseModel) -> dict[str, Any]:
-    return {name: _as_records(hint, getattr(model, name)) for name, hint in hints.items()}
-
-
-def _as_records(hint: Any, value: Any) -> Any:
-    """Turns models back into the records that they were made from."""
-    if changes := _changes(hint):  # only the fields that the file sets; the part that makes the record has the others
-        given = value.model_fields_set if isinstance(value, BaseModel) else ()
-        hints = _hints(changes.record, changes.without)
-        return {name: _as_records(hints[name], getattr(value, name)) for name in hints if name in given}
-    record = _record_in(hint)
-    if get_origin(hint) is dict and record:
-        return {name: record(**_values(_hints(record), model)) for name, model in value.items()}
-    if get_origin(hint) is list and record:
-        return [record(**_values(_hints(record), model)) for model in value]
-    return hint(**_values(_hints(hint), value)) if isinstance(value, BaseModel) else value
+def _given_fields(checked: BaseModel) -> dict[str, Any]:
+    """Returns only the fields that the file sets; the part that makes the record has the others."""
+    return {name: value for name, value in checked if name in checked.model_fields_set}
 
 
 def _key(location: tuple[str | int, ...]) -> str:

@@ -90,13 +90,6 @@ def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_be
     }
 
 
-def test_a_second_daemon_on_the_same_socket_is_refused(bench: Bench) -> None:
-    second = bench.start("firmware_host.daemon")
-    _, complaint = second.communicate(timeout=LONGEST_S)
-    assert second.returncode == 1
-    assert "already running" in complaint and "Traceback" not in complaint
-
-
 def test_ctrl_c_ends_a_watch_without_a_message(bench: Bench) -> None:
     command = [sys.executable, "-m", "command_line.main", "watch", "--socket", str(bench.socket)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as watch:

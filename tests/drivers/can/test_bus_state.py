@@ -10,7 +10,6 @@ import errno
 import logging
 import socket
 from collections.abc import Iterator
-from typing import Any
 
 import can
 import pytest
@@ -196,18 +195,3 @@ def test_a_mock_port_fails_as_the_test_sets_it() -> None:
     third = port.open_peer()
     third.send(ENCODER)
     assert other.receive() == port.receive() == [ENCODER]
-
-
-def test_no_broadcast_manager_is_asked_for(kernel: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    """python-can opens CAN_BCM for periodic messages only: opening, sending and reading never do."""
-
-    def refuse(*arguments: Any, **options: Any) -> None:
-        raise AssertionError("a BCM socket")
-
-    monkeypatch.setattr(socketcan, "create_bcm_socket", refuse)
-    monkeypatch.setattr(socketcan.SocketcanBus, "_send_periodic_internal", refuse)
-    opened = open_port("socketcan", "can0", {})
-    opened.send(ENCODER)
-    report(kernel, ENCODER)
-    assert ids(opened) == [0x009]
-    opened.close()
