@@ -123,13 +123,17 @@ class Draft:
 
     def near(self) -> str:
         """Changes a few values to nearby ones, so each is valid by itself."""
-        changed = self._chance.sample(self._parameters, self._chance.randint(1, 8))
-        return [self._set(parameter.path, self._near_value(parameter)) for parameter in changed][-1]
+        return self._change_some(8, self._near_value)
 
     def within(self) -> str:
         """Changes a few values to any within their bounds, so each is valid by itself."""
-        changed = self._chance.sample(self._parameters, self._chance.randint(1, 3))
-        return [self._set(parameter.path, self._value_within(parameter)) for parameter in changed][-1]
+        return self._change_some(3, self._value_within)
+
+    def _change_some(self, most: int, value_of: Callable[[Parameter], Any]) -> str:
+        text = ""
+        for parameter in self._chance.sample(self._parameters, self._chance.randint(1, most)):
+            text = self._set(parameter.path, value_of(parameter))
+        return text
 
     def _near_value(self, parameter: Parameter) -> Any:
         if parameter.bounds is None or parameter.value is None:
