@@ -4,7 +4,9 @@ Muds here are made of numbers, not of the estimator: every stride's k is the tru
 (the authors' repeatability) and the doubt that the stride itself tells.
 """
 
+import pickle
 from collections.abc import Sequence
+from functools import cache
 from math import exp, inf, isfinite, log, nan, sqrt
 from typing import NamedTuple
 
@@ -206,6 +208,14 @@ class Mud:
         )
 
 
+@cache
+def pickled_after(seed: int, strides: int) -> bytes:
+    mud = Mud(seed)
+    for _ in range(strides):
+        mud.walk()
+    return pickle.dumps(mud)
+
+
 class Following(NamedTuple):
     reported: float  # share of the walks in which a boundary was told within two strides of it
     nearer: float  # share of the flippers that believed the new mud rather than the old after two strides
@@ -216,9 +226,7 @@ def following(step_s: float, step_p: float, walks: int = 400, strides_before: in
     """Of k_s behind a boundary."""
     boundaries, errors, uncertainties = 0, [], []
     for seed in range(walks):
-        mud = Mud(seed)
-        for _ in range(strides_before):
-            mud.walk()
+        mud = pickle.loads(pickled_after(seed, strides_before))
         mud.scale_s, mud.scale_p = step_s, step_p
         boundaries += any([mud.walk().boundary for _ in range(2)])
         for flipper in (mud.knowledge.mud_estimate.left, mud.knowledge.mud_estimate.right):

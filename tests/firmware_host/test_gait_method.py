@@ -83,7 +83,7 @@ def test_other_methods_ignore_the_keys_of_the_gait_method(example_text: str) -> 
     assert parse_configuration(text).adaptation.method == "default"
 
 
-def walked(configuration: Configuration, strength_pa: float, method: Method, strides: int = 6) -> Lockstep:
+def walked(configuration: Configuration, strength_pa: float, method: Method, strides: int = 4) -> Lockstep:
     adaptation = replace(AdaptationParameters(), method=method)
     lockstep = Lockstep(
         replace(configuration, adaptation=adaptation), Track([(100.0, Clay("made", strength_pa))]), disturbances=LAB
@@ -122,7 +122,7 @@ def test_a_walk_of_fixed_depth_does_not_depend_on_the_method(configuration: Conf
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03, adaptive=False))
         seen = []
-        for _ in range(1500):
+        for _ in range(900):
             lockstep.step()
             seen.append(lockstep.loop.controller.target)
         return seen

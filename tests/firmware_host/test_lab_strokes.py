@@ -6,6 +6,9 @@ N/m³ at twice the depth cannot be above the values of the others, so the compar
 in force at equal depth.
 """
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -17,10 +20,15 @@ FOLDER = SHARED_DATA / "flipper_in_mud"
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the shared measurements are not beside the repository")
 
 
+@cache
+def strokes_of(path: Path) -> tuple[StrideEstimate, ...]:
+    return tuple(replay_files([path]).strides)
+
+
 def first_strokes(label: str) -> list[StrideEstimate]:
     logs = sorted(FOLDER.glob(f"single_{label}_*"))
     assert logs
-    return [replay_files([path]).strides[0] for path in logs]
+    return [strokes_of(path)[0] for path in logs]
 
 
 def variation(values: list[float]) -> float:
@@ -67,5 +75,5 @@ def test_the_stiffest_mud_supports_the_largest_forces() -> None:
 
 def test_repeats_in_the_same_hole_read_weaker_mud() -> None:
     for path in sorted(FOLDER.glob("single_12.5N_*")):
-        strides = replay_files([path]).strides
+        strides = strokes_of(path)
         assert strides[-1].stance_force_n < 0.9 * strides[0].stance_force_n

@@ -149,10 +149,14 @@ def free_itself(configuration: Configuration, kilopascal: float, log: Recorder |
     return robot
 
 
-def test_in_the_stiffest_mud_it_frees_itself_with_its_last_attempt_and_walks_on(configuration: Configuration) -> None:
+def test_in_the_stiffest_mud_it_frees_itself_with_its_last_attempt_without_a_fault(
+    configuration: Configuration,
+) -> None:
     robot = free_itself(configuration, 9.0)
     assert isinstance(robot.loop.recorder, EventRecorder)
     assert len(robot.loop.recorder.about("stuck, attempt")) == PARAMETERS.attempts
+    texts = robot.loop.recorder.texts
+    assert not [text for text in texts[texts.index("request arm") :] if text.startswith("fault ")]
 
 
 def test_in_stiff_mud_it_frees_itself_and_a_replay_gives_the_same_strides_to_the_last_digit(

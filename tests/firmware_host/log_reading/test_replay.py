@@ -33,32 +33,32 @@ def same(live: StrideEstimate, replayed: StrideEstimate) -> bool:
 
 def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path, configuration: Configuration) -> None:
     path = tmp_path / "walk.mcap"
-    robot = record_walks(path, configuration, 4, 2)  # the second walk in one log begins afresh
+    robot = record_walks(path, configuration, 2, 1)  # the second walk in one log begins afresh
     live = [stride.estimate for stride in robot.loop.learning.strides]
     replayed = replay_files([path]).strides
-    assert len(live) == len(replayed) == 12
+    assert len(live) == len(replayed) == 6
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
 
 
 def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
     tmp_path: Path, configuration: Configuration
 ) -> None:
-    """A long rest first, of which few ticks are written, and a border every three seconds of the walk."""
-    parameters = LogParameters(directory=str(tmp_path), segment_s=3.0)
+    """A long rest first, of which few ticks are written, and a border every second and a half of the walk."""
+    parameters = LogParameters(directory=str(tmp_path), segment_s=1.5)
     first = first_path(tmp_path, "run")
     recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)
     robot = Lockstep(configuration, paper_track(), recorder=recorder)
-    robot.run_for(20.0)
+    robot.run_for(14.0)
     robot.arm()
-    robot.walk(WalkOrder(0.03, True, 5))
+    robot.walk(WalkOrder(0.03, True, 2))
     robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 20.0)
     assert recorder.close(20.0) and recorder.dropped == 0
     paths = log_files(tmp_path, DONE)
     assert len(paths) > 3
-    assert len(read_logs(paths).ticks) < robot.tick_number - 3000
+    assert len(read_logs(paths).ticks) < robot.tick_number - 1000
     live = [stride.estimate for stride in robot.loop.learning.strides]
     replayed = replay_files(paths).strides
-    assert len(live) == len(replayed) == 10
+    assert len(live) == len(replayed) == 4
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
 
 

@@ -305,10 +305,10 @@ def test_mud_never_returns_more_work_than_it_received(
 @pytest.mark.parametrize("slow_m_s", [0.001, 0.01])
 def test_slow_loading_returns_no_extra_work_when_released_fast(slow_m_s: float) -> None:
     plate, given_j = PlateContact(SIZE), 0.0
-    for speed_m_s in (slow_m_s, -1.0):
+    for speed_m_s, dt_s in ((slow_m_s, 0.001), (-1.0, 0.0001)):
         twist = Twist(normal_m_s=speed_m_s)
-        steps = round(0.008 / abs(speed_m_s) / 0.0001)
-        given_j += sum(0.0001 * power_w(plate.step(0.0001, CLAY, UPRIGHT, twist), twist) for _ in range(steps))
+        steps = round(0.008 / abs(speed_m_s) / dt_s)
+        given_j += sum(dt_s * power_w(plate.step(dt_s, CLAY, UPRIGHT, twist), twist) for _ in range(steps))
     assert -1e-2 < given_j < 0.0
 
 
@@ -346,7 +346,7 @@ def test_a_loaded_plate_at_rest_does_not_creep() -> None:
     move(plate, Twist(0.1, 0.05, -0.1, 1.0, 1.0, 1.0, 1.0), 0.5)
     at_rest = move(plate, STOP, DT_S)
     assert at_rest.normal_n < -1.0
-    assert move(plate, STOP, 30.0) == pytest.approx(at_rest, rel=1e-9)
+    assert move(plate, STOP, 5.0) == pytest.approx(at_rest, rel=1e-9)
 
 
 def test_a_load_relaxes_at_rest_by_the_stated_fraction_within_half_a_second() -> None:
