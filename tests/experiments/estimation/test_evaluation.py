@@ -35,9 +35,14 @@ SHORT = Plan(single=(STRONG,), walking=(STRONG,), seeds=1, single_strides=1, wal
 
 
 @cache
+def evaluated() -> tuple[Outcome, Sequence[tuple[int, int]]]:
+    """Two trials: a single flipper of one stride, a walk of two. Also what was shown of the progress."""
+    shown: list[tuple[int, int]] = []
+    return evaluate(SHORT, lambda done, total: shown.append((done, total)), processes=1), shown
+
+
 def outcome() -> Outcome:
-    """Two trials: a single flipper of one stride, a walk of two."""
-    return evaluate(SHORT, lambda done, total: None, processes=1)
+    return evaluated()[0]
 
 
 # the plan
@@ -161,9 +166,7 @@ def test_each_stride_of_each_method_is_evaluated_once() -> None:
 
 
 def test_progress_counts_all_trials() -> None:
-    shown: list[tuple[int, int]] = []
-    evaluate(replace(SHORT, single=(), walking_strides=1), lambda done, total: shown.append((done, total)), 1)
-    assert shown == [(1, 1)]
+    assert evaluated()[1] == [(1, 2), (2, 2)]
 
 
 def test_a_trial_in_another_process_is_the_same_trial() -> None:

@@ -89,11 +89,11 @@ def test_what_is_copied_is_replayed_and_reported_without_the_segments_before_it(
     tmp_path: Path, configuration: Configuration, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Another walk and a long rest come before the experiment's own."""
-    parameters = LogParameters(directory=str(tmp_path / "logs"), segment_s=3.0)
+    parameters = LogParameters(directory=str(tmp_path / "logs"), segment_s=1.0)
     first = first_path(tmp_path / "logs", "run")
     recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)
     robot = Lockstep(configuration, paper_track(), recorder=recorder)
-    _, (begun_s, _) = walk_and_hold(robot, 1, 2, rest_s=4.0)
+    _, (begun_s, _) = walk_and_hold(robot, 1, 2, rest_s=1.5)
     assert recorder.close(20.0)
     copies = copy_since(run_files(first), begun_s, tmp_path)
     assert 0 < len(copies) < len(run_files(first)) and copies[0].name != first.name
