@@ -19,9 +19,8 @@ from typing import Any
 
 import msgpack
 
-from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.operator.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
-from firmware_host.operator.rights import Peer, Rights, load_rights, read_peer
+from firmware_host.operator.rights import Peer, Rights, read_peer
 from firmware_host.operator.rpc import RESPONSE, MalformedError, RefusedError, read_params, read_shape
 from firmware_host.operator.socket_file import SocketFile
 
@@ -37,7 +36,7 @@ class StatusSocket:
         self,
         path: Path,
         methods: Methods,
-        rights: Rights | None = None,
+        rights: Rights,
         peer_of: Callable[[socket.socket], Peer] = read_peer,
     ) -> None:
         """Raises AlreadyServedError, or OSError if the path cannot be bound."""
@@ -46,7 +45,7 @@ class StatusSocket:
         self.report_bug: Callable[[str], None] = lambda message: None
         self.on_hang_up: Callable[[Caller], None] = lambda caller: None  # may be called twice for one client
         self.is_protected: Callable[[Caller], bool] = lambda caller: False  # its disconnection would stop the robot
-        self._rights = rights or load_rights(StatusParameters())
+        self._rights = rights
         self._peer_of = peer_of
         self._file = SocketFile(path, MOST_CLIENTS)
         self._listener = self._file.listener
