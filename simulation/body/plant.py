@@ -122,7 +122,9 @@ class Arm:
         self._meet_mud(edge_m, attitude)
         rates = self.sweep_velocity_rad_s, self.adduction_velocity_rad_s
         motion = ArmMotion(sweep_rad, adduction_rad, *rates, body_m_s)
-        self.force = self.contact.step(dt_s, self.clay, motion, attitude.below(self.surface_m), carriage)
+        surface_m = self.surface_m
+        below = attitude.below(surface_m) if surface_m else attitude
+        self.force = self.contact.step(dt_s, self.clay, motion, below, carriage)
         if self.stones:
             self._meet_stones(self.stones, dt_s, edge_m, attitude)
         load_sweep_nm, load_lift_nm = self._load_nm()

@@ -100,6 +100,8 @@ class RailBody:
         self.pad = pad
         self.track = track
         self._drag = DryDrag()
+        self._pad_clay: Clay | None = None  # for which `_pad_n` was computed
+        self._pad_n = 0.0
         self.reset()
 
     def reset(self) -> None:
@@ -112,8 +114,10 @@ class RailBody:
 
     def step(self, dt_s: float, left: Pusher, right: Pusher) -> None:
         thrust_n = left.force.thrust_n + right.force.thrust_n
-        pad_n = self.pad.yield_n(self.track.clay_at(self.forward_m))
-        largest_n = self.rail_drag_n + rate_factor(abs(self.forward_m_s)) * pad_n
+        clay = self.track.clay_at(self.forward_m)
+        if clay is not self._pad_clay:
+            self._pad_clay, self._pad_n = clay, self.pad.yield_n(clay)
+        largest_n = self.rail_drag_n + rate_factor(abs(self.forward_m_s)) * self._pad_n
         drag_n = self._drag.step(dt_s, self.forward_m_s, largest_n) - self.rail_damping_n_s_m * self.forward_m_s
         self.forward_m_s += dt_s * (thrust_n + drag_n) / self.mass_kg
         self.forward_m += dt_s * self.forward_m_s

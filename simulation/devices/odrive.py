@@ -204,8 +204,11 @@ class SimulatedOdrive:
         """Returns the torque by the drive's own torque constant, after its clamps and the lag of the current."""
         parameters, largest_nm = self.parameters, self._largest_nm
         gain, limit, turns_s = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s, self._turns_s
-        torque_nm = min(max(self._setpoint_nm, (-limit - turns_s) * gain), (limit - turns_s) * gain)
-        torque_nm = min(max(torque_nm, -largest_nm), largest_nm)
+        torque_nm, lowest_nm, highest_nm = self._setpoint_nm, (-limit - turns_s) * gain, (limit - turns_s) * gain
+        torque_nm = lowest_nm if lowest_nm > torque_nm else torque_nm  # min and max cost ten times as much
+        torque_nm = highest_nm if highest_nm < torque_nm else torque_nm
+        torque_nm = -largest_nm if -largest_nm > torque_nm else torque_nm
+        torque_nm = largest_nm if largest_nm < torque_nm else torque_nm
         if parameters.current_lag_s:
             before_nm = self._current_a * parameters.torque_constant_nm_a
             torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)

@@ -52,12 +52,13 @@ class SimulatedRobot:
             for arm in self.plant.arms:
                 arm.put_back()
         a, b, c, d = self.drives
+        wires = tuple(zip(self.drives, self._port_of_drive, strict=True))
         while self.now_s + STEP_S <= until_s:
             self.now_s = now_s = self.now_s + STEP_S
             torques: Torques = Joints(a.torque_nm(now_s), b.torque_nm(now_s), c.torque_nm(now_s), d.torque_nm(now_s))
             self.plant.step(STEP_S, torques)
             self._measure()
-            for drive, port in zip(self.drives, self._port_of_drive, strict=True):
+            for drive, port in wires:
                 for frame in drive.cyclic_frames(now_s):
                     port.send(frame)
 

@@ -114,4 +114,4 @@ class FlipperContact:
             return NO_CONTACT
         geometry = self.geometry
         twist = twist_of(geometry, motion) if carriage is None else carried_twist(geometry, carriage, *motion[:4])
-        return contact_force(geometry, motion.sweep_rad, self.plate.step(dt_s, clay, attitude, twist))
+        return contact_force(geometry, motion.sweep_rad, self.plate.press(dt_s, clay, attitude, twist))

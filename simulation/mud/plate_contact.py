@@ -76,8 +76,10 @@ class PlateContact:
         return True
 
     def step(self, dt_s: float, clay: Clay, attitude: Attitude, twist: Twist) -> Wrench:
-        if self.leaves(attitude):
-            return NO_WRENCH
+        return NO_WRENCH if self.leaves(attitude) else self.press(dt_s, clay, attitude, twist)
+
+    def press(self, dt_s: float, clay: Clay, attitude: Attitude, twist: Twist) -> Wrench:
+        """Steps a plate that does not leave the mud."""
         self._touched = True
         speed_m_s = sqrt(twist.normal_m_s**2 + twist.outward_m_s**2 + twist.upward_m_s**2)
         if self.relaxation:

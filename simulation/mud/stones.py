@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from math import copysign, cos, sin
+from math import copysign, cos, inf, sin
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
@@ -87,6 +87,7 @@ class StoneContact:
 
     def __init__(self, stones: Sequence[Stone]) -> None:
         self.stones = tuple(stones)
+        self._highest_m = min((stone.top_m for stone in self.stones), default=inf)
         self.reset()
 
     def reset(self) -> None:
@@ -110,6 +111,8 @@ class StoneContact:
     def _find_stone(self, position_m: float, depth_m: float) -> None:
         """Finds the stone that contains the edge, and the face through which it came."""
         self.reset()
+        if depth_m <= self._highest_m:  # above all stones, as in swing
+            return
         for stone in self.stones:
             if stone.contains(position_m, depth_m):
                 self._touched = (stone, stone.nearest_face(position_m, depth_m))
