@@ -28,16 +28,13 @@ from typing import NamedTuple
 
 from experiments.reports.mud_names import mud_label
 from experiments.reports.text_tables import table
-from experiments.trackway.depth_rule import configuration_for, constant_depth
+from experiments.trackway.depth_rule import constant_depth, walk_by
 from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has_strides, speed_cm_s
 from experiments.trackway.paper_table import FIXED_DEPTHS_M, PAPER_TABLE, Speed
-from experiments.trackway.walk import walk_in
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Finding, Show, screen_finding
 from simulation.body.plant import PlantParameters
-from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.clay import MUDS, Clay
-from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 
 Targets = Mapping[str, Mapping[float, Speed]]  # by mud and depth in metres
@@ -155,11 +152,8 @@ def walk_on(
 def fixed_speed_cm_s(ground: Ground, depth_m: float, seed: int, strides: int) -> float:
     """Walk in one endless mud."""
     rule, track = constant_depth(depth_m), Track([(ENDLESS_M, Clay("mud", ground.strength_pa))])
-    configuration = configuration_for(rule)
-    plant = plant_of(configuration, LAB, rail_damping_n_s_m=ground.damping_n_s_m)
-    lockstep = Lockstep(configuration, track, seed, disturbances=LAB, plant=plant)
-    lockstep.arm()
-    return speed_cm_s(walk_in(lockstep, track, rule.order, partial(has_strides, strides)))
+    done = partial(has_strides, strides)
+    return speed_cm_s(walk_by(rule, track, seed, done, rail_damping_n_s_m=ground.damping_n_s_m))
 
 
 def chi2_of(speeds: Mapping[float, float], targets: Mapping[float, Speed]) -> float:

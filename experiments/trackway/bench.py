@@ -4,7 +4,7 @@ After section III-D of the paper. Each trial begins with the sweep axes over the
 position there is the zero of the track. The trials of the gaits alternate, so that a mud that dries or softens with
 time affects all gaits alike. A walk is stopped when the plates go down past the last mud, after 90 s in one mud, or by
 a fault. The operator decides on each walk; one that the operator or a fault stopped is repeated unless a key keeps it.
-The strides are read from the log (log_strides.py), and the table is the same as for the simulated trackway.
+The strides are read from the log, and the table is the same as for the simulated trackway.
 """
 
 from __future__ import annotations
@@ -29,11 +29,10 @@ from experiments.robot.bench_robot import (
     wait_until,
 )
 from experiments.trackway.depth_rule import DepthRule, constant_depth
-from experiments.trackway.log_strides import walked_strides
 from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
 from experiments.trackway.report import Settings, TrackwayReport, table_report
 from experiments.trackway.simulation import STUCK_S
-from experiments.trackway.walk import Walk, WalkedStride, speed_m_s, walk_of
+from experiments.trackway.walk import Walk, WalkedStride, logged_strides, speed_m_s, walk_of
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
@@ -134,7 +133,7 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
         end = End(mode_reason(after), stopped=True)
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
-    strides = walked_strides(log, robot.configuration, lambda position_m: plan.mud_at(position_m - start_m))
+    strides = logged_strides(log, robot.configuration, lambda position_m: plan.mud_at(position_m - start_m))
     walk = Walk([stride._replace(position_m=stride.position_m - start_m) for stride in strides], end.why)
     logged = LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"])
     if end.stopped:

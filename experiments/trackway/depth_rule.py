@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, cast, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 from control.controller import WalkOrder
 from control.depth.depth_choice import Method
 from control.gait.recovery import RecoveryParameters
-from experiments.trackway.walk import Walk, WalkedStride, walk
+from experiments.trackway.walk import Walk, WalkedStride, walk_in
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.configuration import Configuration
+from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 
@@ -62,6 +63,10 @@ def _papers_robot(configuration: Configuration) -> Configuration:
     )
 
 
-def walk_by(rule: DepthRule, track: Track, seed: int, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
-    """Walk until `done`, with the disturbances of mud and drives in the authors' logs."""
-    return walk(configuration_for(rule), track, rule.order, seed, done, LAB)
+def walk_by(
+    rule: DepthRule, track: Track, seed: int, done: Callable[[Sequence[WalkedStride]], bool], **plant: Any
+) -> Walk:
+    """Walk until `done`, with the disturbances of mud and drives in the authors' logs. `plant` changes parameters."""
+    configuration = configuration_for(rule)
+    changed = plant_of(configuration, LAB, **plant)
+    return walk_in(Lockstep(configuration, track, seed, disturbances=LAB, plant=changed), track, rule.order, done)

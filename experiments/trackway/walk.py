@@ -1,30 +1,36 @@
-"""One simulated walk, stride by stride: step, duration, mud and failure of each.
+"""Walks, stride by stride: step, duration, mud and failure of each.
 
-The truth comes from the plant, not from the robot's own estimates: the distance of the body from the start of one
-insertion to the next, and the mud in which the plates went down. Two failures have names, after the paper's section
-III-D. SLIPPAGE: the stride advances by less than half an arm (the bound in the authors' optimiser). EXTRACTION: the
-body is pushed back after the extraction, because the plates are still in the mud when they swing forward.
+A step is the distance of the body from the start of one insertion to the next; its mud is that in which the plates went
+down. For a simulated robot both come from the plant, not from the robot's own estimates; for a real one from the pose
+and the joint angles in its log. Two failures have names, after the paper's section III-D. SLIPPAGE: the stride advances
+by less than half an arm (the bound in the authors' optimiser). EXTRACTION: the body is pushed back after the
+extraction, because the plates are still in the mud when they swing forward.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, sin
+from math import inf, isfinite, sin
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from control.controller import WalkOrder
 from control.modes import Mode
-from control.records import Phase
+from control.records import UNKNOWN, Phase
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.log_reader import Log
 from firmware_host.operator.fault_texts import fault_message
 from simulation.harness.lockstep import Lockstep
-from simulation.mud.disturbances import NONE, Disturbances
 from simulation.mud.track import Track
 
 SLIPPAGE, EXTRACTION, RECOVERED = "slippage", "extraction", "recovered"
 PUSHED_BACK_M = 0.01  # a flipper that comes out of the mud moves the body by less
 AFTER_STANCE = frozenset({Phase.EXTRACTION, Phase.SWING})
+SEEN_FRACTION = 0.9  # of the ticks after a stance: with fewer poses, a push back may have been missed
+NO_MUD = ""  # of a stride whose position is not known
+LEFT_SWEEP, RIGHT_SWEEP = 0, 2  # in the order of JOINTS
 
 
 class WalkedStride(NamedTuple):
@@ -70,76 +76,106 @@ def speed_m_s(strides: Sequence[WalkedStride]) -> float:
     return sum(stride.step_m for stride in strides) / sum(stride.duration_s for stride in strides)
 
 
+class WalkTick(NamedTuple):
+    now_s: float
+    stride: int  # commanded, -1 for none
+    phase: int  # commanded
+    depth_m: float  # commanded; an insertion may end early
+    body_m: float  # along the track; NaN without a pose
+    plates_m: float
+
+
 class StrideRecord:
-    """Owns the strides of a walk so far, and the measurements of the stride under way."""
+    """Owns the strides of a walk so far, and the measurements of the stride under way.
 
-    def __init__(self, lockstep: Lockstep, track: Track) -> None:
-        self._lockstep = lockstep
-        self._track = track
-        self.reset()
+    A stride counts once the next one has begun: the stride in which a walk ends has no length.
+    """
 
-    def reset(self) -> None:
+    def __init__(self, mud_at: Callable[[float], str]) -> None:
+        """`mud_at` names the mud at a position of the plates in metres."""
         self.strides: list[WalkedStride] = []
-        self._number = -1
-        self._start_stride()
+        self._mud_at = mud_at
+        self._start_stride(WalkTick(0.0, -1, Phase.REST, 0.0, 0.0, 0.0))
 
-    def _start_stride(self) -> None:
-        plant, loop = self._lockstep.robot.plant, self._lockstep.loop
-        self._start_m, self._start_s = plant.body_m, self._lockstep.now_s
+    def _start_stride(self, tick: WalkTick) -> None:
+        self._first = self._last = tick
         self._furthest_m, self._pushed_back_m, self._recovered = -inf, 0.0, False
-        self._depth_m = loop.stride_depth_m
-        self._position_m = plant.body_m + loop.configuration.geometry.flipper_length_m * sin(plant.arms[0].sweep_rad)
+        self._ticks_after = self._seen_after = 0
 
-    def update(self) -> None:
-        """Call once a tick while the robot walks."""
-        target, body_m = self._lockstep.loop.controller.target, self._lockstep.robot.plant.body_m
-        if target.stride != self._number:
-            self._finish_stride(body_m)
-            self._number = target.stride
-        self._depth_m = self._lockstep.loop.stride_depth_m  # an insertion may end early
-        self._recovered = self._recovered or target.phase is Phase.RECOVERY
-        if target.phase in AFTER_STANCE:
+    def update(self, tick: WalkTick) -> None:
+        if tick.stride != self._first.stride:
+            if 0 <= self._first.stride == tick.stride - 1:
+                self._finish_stride(tick)
+            self._start_stride(tick)
+        self._last = tick
+        self._recovered = self._recovered or tick.phase == Phase.RECOVERY
+        if tick.phase in AFTER_STANCE:
+            self._ticks_after += 1
+            self._measure_push_back(tick.body_m)
+
+    def _measure_push_back(self, body_m: float) -> None:
+        if isfinite(body_m):
+            self._seen_after += 1
             self._furthest_m = max(self._furthest_m, body_m)
             self._pushed_back_m = max(self._pushed_back_m, self._furthest_m - body_m)
 
-    def _finish_stride(self, body_m: float) -> None:
-        if self._number >= 0:
-            mud, duration_s = self._track.clay_at(self._position_m).name, self._lockstep.now_s - self._start_s
-            step_m = body_m - self._start_m
-            self.strides.append(
-                WalkedStride(
-                    mud=mud,
-                    position_m=self._position_m,
-                    depth_m=self._depth_m,
-                    step_m=step_m,
-                    duration_s=duration_s,
-                    pushed_back_m=self._pushed_back_m,
-                    recovered=self._recovered,
-                )
+    def _finish_stride(self, tick: WalkTick) -> None:
+        first, seen = self._first, self._seen_after >= SEEN_FRACTION * self._ticks_after
+        self.strides.append(
+            WalkedStride(
+                mud=self._mud_at(first.plates_m) if isfinite(first.plates_m) else NO_MUD,
+                position_m=first.plates_m,
+                depth_m=self._last.depth_m,
+                step_m=tick.body_m - first.body_m,
+                duration_s=tick.now_s - first.now_s,
+                pushed_back_m=self._pushed_back_m if seen else UNKNOWN,
+                recovered=self._recovered,
             )
-        self._start_stride()
-
-
-def walk(
-    configuration: Configuration,
-    track: Track,
-    order: WalkOrder,
-    seed: int,
-    done: Callable[[Sequence[WalkedStride]], bool],
-    disturbances: Disturbances = NONE,
-) -> Walk:
-    """Walk until `done` accepts the strides so far, or a fault. Raises RuntimeError where the robot does not start."""
-    lockstep = Lockstep(configuration, track, seed, disturbances=disturbances)
-    lockstep.arm()
-    return walk_in(lockstep, track, order, done)
+        )
 
 
 def walk_in(lockstep: Lockstep, track: Track, order: WalkOrder, done: Callable[[Sequence[WalkedStride]], bool]) -> Walk:
-    """Walk like `walk`, with a robot that is armed already."""
+    """Walk until `done` accepts the strides so far, or a fault. Raises RuntimeError where the robot does not start."""
+    lockstep.arm()
     lockstep.walk(order)
-    record = StrideRecord(lockstep, track)
+    record = StrideRecord(lambda position_m: track.clay_at(position_m).name)
     while lockstep.loop.mode is Mode.WALKING and not done(record.strides):
         lockstep.step()
-        record.update()
+        record.update(tick_of(lockstep))
     fault = lockstep.loop.fault
     return Walk(record.strides, fault_message(fault) if fault else "")
+
+
+def tick_of(lockstep: Lockstep) -> WalkTick:
+    """Return the truth of the plant."""
+    plant, loop = lockstep.robot.plant, lockstep.loop
+    target, arm_m = loop.controller.target, loop.configuration.geometry.flipper_length_m
+    return WalkTick(
+        now_s=lockstep.now_s,
+        stride=target.stride,
+        phase=target.phase,
+        depth_m=loop.stride_depth_m,
+        body_m=plant.body_m,
+        plates_m=plant.body_m + arm_m * sin(plant.arms[0].sweep_rad),
+    )
+
+
+def logged_strides(log: Log, configuration: Configuration, mud_at: Callable[[float], str]) -> list[WalkedStride]:
+    """Return the strides of all walks in the log.
+
+    The row of a tick holds what was commanded before it, so the command of a tick is in the next row.
+    """
+    now, commanded = log.ticks[:-1], log.ticks[1:]
+    sweep_sines = np.sin(now["angle_rad"][:, [LEFT_SWEEP, RIGHT_SWEEP]]).mean(axis=1)
+    columns = (
+        now["stamp_s"],
+        np.where(now["mode"] == Mode.WALKING, commanded["stride"], -1),
+        commanded["phase"],
+        now["stride_depth_m"],
+        now["body_x_m"],
+        now["body_x_m"] + configuration.geometry.flipper_length_m * sweep_sines,
+    )
+    record = StrideRecord(mud_at)
+    for row in zip(*(column.tolist() for column in columns), strict=True):
+        record.update(WalkTick(*row))
+    return record.strides

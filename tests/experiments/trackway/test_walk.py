@@ -1,22 +1,40 @@
-"""Strides of a walk: where they begin and end, the names of their failures, and their sum against the plant."""
+"""Strides of a walk: where they begin and end, the names of their failures, and those of a log against the plant."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
-from math import radians, sin
-from types import SimpleNamespace
-from typing import Any
+from math import isnan, nan
+from typing import NamedTuple
 
 import pytest
 
+from control.controller import WalkOrder
+from control.modes import Mode
 from control.records import Phase
-from experiments.trackway.depth_rule import configuration_for, constant_depth
-from experiments.trackway.walk import EXTRACTION, RECOVERED, SLIPPAGE, StrideRecord, Walk, WalkedStride, speed_m_s, walk
+from experiments.trackway.depth_rule import constant_depth, walk_by
+from experiments.trackway.walk import (
+    EXTRACTION,
+    RECOVERED,
+    SLIPPAGE,
+    StrideRecord,
+    Walk,
+    WalkedStride,
+    WalkTick,
+    logged_strides,
+    speed_m_s,
+    tick_of,
+)
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import Recorder
+from firmware_host.log_reading.log_reader import Log, read_log
+from simulation.devices.motion_capture import MotionCaptureParameters
+from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track
 
 ARM_M = 0.12
-FIRM, SOFT = Clay("firm", 3000.0), Clay("soft", 700.0)
 GOOD = WalkedStride("firm", 0.0, 0.03, 0.12, 1.6, 0.0)
 
 
@@ -57,77 +75,123 @@ def test_a_stride_belongs_to_the_mud_in_which_its_plates_went_down() -> None:
     assert Walk([GOOD], "").in_mud("soft") == []
 
 
-# the record, with a synthetic robot
+# the record
+
+PHASES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING, Phase.INSERTION, Phase.STANCE)
+STRIDES = (0, 0, 0, 0, 1, 1)
+POSITIONS_M = (0.00, 0.09, 0.06, 0.08, 0.10, 0.15)  # with 3 cm lost in the stance's end, which do not count
 
 
-class SyntheticWalk:
-    """A robot whose body and phases the test sets, 0.1 s apart."""
-
-    def __init__(self) -> None:
-        target = SimpleNamespace(stride=-1, phase=Phase.REST)
-        plant = SimpleNamespace(body_m=0.0, arms=[SimpleNamespace(sweep_rad=radians(30.0))])
-        geometry = SimpleNamespace(flipper_length_m=ARM_M)
-        self.target, self.plant = target, plant
-        lockstep: Any = SimpleNamespace(
-            now_s=0.0,
-            robot=SimpleNamespace(plant=plant),
-            loop=SimpleNamespace(
-                controller=SimpleNamespace(target=target),
-                configuration=SimpleNamespace(geometry=geometry),
-                stride_depth_m=0.03,
-            ),
-        )
-        self.lockstep = lockstep
-        self.record = StrideRecord(lockstep, Track([(0.1, FIRM), (1.0, SOFT)]))
-
-    def live(self, stride: int, phase: Phase, body_m: float) -> None:
-        self.lockstep.now_s += 0.1
-        self.target.stride, self.target.phase, self.plant.body_m = stride, phase, body_m
-        self.record.update()
+def one_stride(
+    body_m: Sequence[float], phases: Sequence[Phase] = PHASES, strides: Sequence[int] = STRIDES
+) -> WalkedStride:
+    """Record ticks 0.1 s apart, in which the ordered depth grows by 1 mm each; the plates are 6 cm in front."""
+    record = StrideRecord(lambda position_m: "soft" if position_m > 0.05 else "firm")
+    for i, (stride, phase, x_m) in enumerate(zip(strides, phases, body_m, strict=True)):
+        record.update(WalkTick(0.1 * i, stride, phase, 0.03 + 0.001 * i, x_m, x_m + 0.06))
+    (made,) = record.strides
+    return made
 
 
 def test_a_stride_lasts_from_one_insertion_to_the_next() -> None:
-    synthetic = SyntheticWalk()
-    synthetic.live(-1, Phase.REST, 0.01)
-    synthetic.live(0, Phase.INSERTION, 0.02)
-    synthetic.live(0, Phase.STANCE, 0.08)
-    synthetic.live(0, Phase.SWING, 0.09)
-    assert synthetic.record.strides == []
-    synthetic.lockstep.loop.stride_depth_m = 0.04
-    synthetic.live(1, Phase.INSERTION, 0.10)
-    (first,) = synthetic.record.strides
-    assert first.step_m == pytest.approx(0.08)
-    assert first.duration_s == pytest.approx(0.3)
-    assert first.position_m == pytest.approx(0.02 + ARM_M * sin(radians(30.0)))
-    assert (first.mud, first.depth_m) == ("firm", 0.03)
-    synthetic.live(2, Phase.INSERTION, 0.20)
-    assert (synthetic.record.strides[1].mud, synthetic.record.strides[1].depth_m) == ("soft", 0.04)
+    made = one_stride(POSITIONS_M)
+    assert (made.mud, made.recovered) == ("soft", False)
+    assert made[1:6] == pytest.approx((0.06, 0.033, 0.10, 0.4, 0.0))
 
 
 def test_only_a_loss_after_the_stance_counts_as_pushed_back() -> None:
-    synthetic = SyntheticWalk()
-    for phase, body_m in (
-        (Phase.INSERTION, 0.00),
-        (Phase.STANCE, 0.05),
-        (Phase.STANCE, 0.02),  # a slip within the stance does not count
-        (Phase.EXTRACTION, 0.06),
-        (Phase.SWING, 0.09),
-        (Phase.SWING, 0.04),
-        (Phase.SWING, 0.07),
-    ):
-        synthetic.live(0, phase, body_m)
-    synthetic.live(1, Phase.INSERTION, 0.07)
-    synthetic.live(2, Phase.INSERTION, 0.08)
-    assert [stride.pushed_back_m for stride in synthetic.record.strides] == [pytest.approx(0.05), 0.0]
+    assert one_stride((0.0, 0.05, 0.02, 0.09, 0.08, 0.15), (*PHASES[:2], *PHASES[1:4], PHASES[4]),
+                      (0, 0, 0, 0, 0, 1)).pushed_back_m == pytest.approx(0.01)  # fmt: skip
 
 
-def test_a_record_that_was_reset_has_no_strides() -> None:
-    synthetic = SyntheticWalk()
-    synthetic.live(0, Phase.INSERTION, 0.0)
-    synthetic.live(1, Phase.INSERTION, 0.1)
-    synthetic.record.reset()
-    synthetic.live(5, Phase.STANCE, 0.2)  # the stride under way has no beginning
-    assert synthetic.record.strides == []
+def test_a_stride_without_a_pose_at_its_ends_has_no_length_and_no_mud() -> None:
+    unseen = one_stride((nan, *POSITIONS_M[1:]))
+    assert isnan(unseen.step_m) and isnan(unseen.position_m) and unseen.mud == ""
+    unseen = one_stride((*POSITIONS_M[:4], nan, POSITIONS_M[5]))
+    assert isnan(unseen.step_m) and unseen.mud == "soft"
+
+
+def test_a_push_back_during_lost_poses_is_unknown() -> None:
+    unseen = one_stride((*POSITIONS_M[:2], nan, *POSITIONS_M[3:]))
+    assert isnan(unseen.pushed_back_m) and unseen.step_m == pytest.approx(0.10)
+
+
+def test_a_recovery_is_reported() -> None:
+    assert one_stride(POSITIONS_M, (*PHASES[:3], Phase.RECOVERY, *PHASES[4:])).recovered
+
+
+@pytest.mark.parametrize("strides", [(-1,) * 6, (0, 0, 0, 0, 2, 2), (0, 0, 0, 0, -1, -1)])
+def test_a_stride_whose_end_is_unknown_is_left_out(strides: Sequence[int]) -> None:
+    with pytest.raises(ValueError, match="not enough values"):
+        one_stride(POSITIONS_M, strides=strides)
+
+
+# a log against the plant
+
+TRACK = Track([(0.3, Clay("soft", 1000.0)), (1.0, Clay("firm", 5000.0))])
+DEPTHS_M = (0.03, 0.05)  # of two walks
+COUNT = 3  # of each
+
+
+class LoggedWalks(NamedTuple):
+    log: Log
+    truth: Sequence[WalkedStride]
+    configuration: Configuration
+
+
+def mud_at(position_m: float) -> str:
+    return TRACK.clay_at(position_m).name
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> LoggedWalks:
+    """Two walks one after the other, in one log; in the second one flippers get stuck, and no swing waits for them."""
+    path = tmp_path_factory.mktemp("log") / "walks.mcap"
+    held = replace(configuration, recovery=replace(configuration.recovery, attempts=0))
+    recorder = Recorder(path, held.text, {"robot": "test"})
+    lockstep = Lockstep(held, TRACK, recorder=recorder, motion_capture=MotionCaptureParameters(noise_m=0.0))
+    lockstep.arm()
+    truth: list[WalkedStride] = []
+    for depth_m in DEPTHS_M:
+        lockstep.walk(WalkOrder(depth_m, adaptive=False, strides=COUNT))
+        record = StrideRecord(mud_at)
+        while lockstep.loop.mode is Mode.WALKING:
+            lockstep.step()
+            record.update(tick_of(lockstep))
+        truth += record.strides[:COUNT]  # the next is the tick in which the walk ended
+        lockstep.run_until(lambda: lockstep.loop.mode is Mode.HOLD, 5.0)
+    assert recorder.close(20.0) and recorder.dropped == 0
+    return LoggedWalks(read_log(path), truth, held)
+
+
+def test_the_log_gives_the_strides_that_the_plant_made(walks: LoggedWalks) -> None:
+    reported = logged_strides(walks.log, walks.configuration, mud_at)
+    assert len(reported) == len(walks.truth) == 2 * COUNT
+    for stride, true in zip(reported, walks.truth, strict=True):
+        assert (stride.mud, stride.depth_m, stride.recovered) == (true.mud, true.depth_m, true.recovered)
+        assert stride.step_m == pytest.approx(true.step_m, abs=1e-9)
+        assert stride.duration_s == pytest.approx(true.duration_s, abs=1e-9)
+        assert stride.position_m == pytest.approx(true.position_m, abs=1e-3)  # a joint angle is 1 ms old
+        assert stride.pushed_back_m == pytest.approx(true.pushed_back_m, abs=1e-9)
+        assert stride.failure(ARM_M) == true.failure(ARM_M)
+
+
+def test_the_walks_have_both_muds_and_both_depths_and_a_failure(walks: LoggedWalks) -> None:
+    """Or the comparison says nothing."""
+    assert {stride.mud for stride in walks.truth} == {"soft", "firm"}
+    assert EXTRACTION in {stride.failure(ARM_M) for stride in walks.truth}
+    assert {stride.depth_m for stride in walks.truth} == set(DEPTHS_M)
+
+
+def test_drop_outs_of_motion_capture_lose_strides_but_never_invent_one(walks: LoggedWalks) -> None:
+    """Poses are missing for 0.5 s in every 2.3 s."""
+    ticks = walks.log.ticks.copy()
+    ticks["body_x_m"][ticks["stamp_s"] % 2.3 < 0.5] = nan
+    strides = logged_strides(walks.log._replace(ticks=ticks), walks.configuration, mud_at)
+    assert len(strides) == 2 * COUNT
+    known = [(each, true) for each, true in zip(strides, walks.truth, strict=True) if not isnan(each.step_m)]
+    assert 0 < len(known) < 2 * COUNT
+    assert all(each.step_m == pytest.approx(true.step_m, abs=1e-9) for each, true in known)
 
 
 # in simulation
@@ -136,8 +200,7 @@ def test_a_record_that_was_reset_has_no_strides() -> None:
 @cache
 def walked(depth_m: float, strength_pa: float, strides: int = 3) -> Walk:
     track = Track([(100.0, Clay("mud", strength_pa))])
-    rule = constant_depth(depth_m)
-    return walk(configuration_for(rule), track, rule.order, 1, lambda made: len(made) >= strides)
+    return walk_by(constant_depth(depth_m), track, 1, lambda made: len(made) >= strides)
 
 
 def test_a_walk_has_the_ordered_length_and_is_deterministic() -> None:
