@@ -15,9 +15,10 @@ from math import isfinite
 from typing import NamedTuple
 
 from control.records import StrideEstimate
-from estimation.mud import EstimationParameters, PaperEstimationParameters
+from estimation.mud import EstimationParameters
 from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, PlateRow, error_rows, plate_rows
+from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Show
@@ -98,15 +99,11 @@ def with_layers(plan: Plan, layers: Sequence[str]) -> Plan:
 
 def methods_of(setup: Setup) -> tuple[Method, ...]:
     """Return the methods to evaluate. All know how uneven the mud is, as an operator would see."""
-    default = EstimationParameters(fixed_base=setup.fixed_base, surface_error_m=LAB.surface_sd_m)
-    paper = replace(default, method="paper")
-    both = (Method("default", setup.name, True, default), Method("paper", setup.name, True, paper))
-    if setup.fixed_base:
-        return both
-    compensated = Method(
-        "paper compensated", setup.name, True, replace(paper, paper=PaperEstimationParameters(compensation=True))
-    )
-    return *both, compensated, Method("default", f"{setup.name} without pose", False, default)
+    known = EstimationParameters(fixed_base=setup.fixed_base, surface_error_m=LAB.surface_sd_m)
+    names = (DEFAULT, PAPER) if setup.fixed_base else (DEFAULT, PAPER, COMPENSATED)
+    methods = [Method(name, setup.name, True, with_method(known, name)) for name in names]
+    without_pose = Method(DEFAULT, f"{setup.name} without pose", False, known)
+    return tuple(methods) if setup.fixed_base else (*methods, without_pose)
 
 
 def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Outcome:

@@ -10,8 +10,9 @@ from experiments.trials.mud_trials import PlannedTrial
 from experiments.trials.simulated_bed import CarriedBed, simulated_bench
 from experiments.trials.trial import BENCH_CURRENT_A, BENCH_TORQUE_NM
 from firmware_host.configuration.configuration import Configuration
+from simulation.devices.motion_capture import AT_EVERY_TICK
 from simulation.mud.clay import clay_of_water
-from simulation.mud.disturbances import LAB, Disturbances
+from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 
 TRIAL_M = 0.2  # between the trials in one mud: every stroke is in fresh mud
@@ -38,14 +39,11 @@ def bench_configuration() -> Configuration:
     return simulated_configuration(SECTIONS, DRIVE)
 
 
-def flipper_bench(
-    folder: Path, muds: Sequence[str], seed: int, disturbances: Disturbances = LAB
-) -> tuple[LockstepRobot, CarriedBed]:
+def flipper_bench(folder: Path, muds: Sequence[str], seed: int) -> tuple[LockstepRobot, CarriedBed]:
     """Make a robot over strips of muds, named after their water content. Raises ValueError for an unknown mud."""
     track = Track([(STRIP_M, clay_of_water(float(mud))) for mud in muds])
-    robot, lockstep = simulated_bench(folder, bench_configuration(), track, seed, True, disturbances)
 
     def position_m(trial: PlannedTrial, prepared: int) -> float:
         return STRIP_M * list(muds).index(trial.group) + TRIAL_M * (prepared + 1)
 
-    return robot, CarriedBed(robot, lockstep, position_m)
+    return simulated_bench(folder, bench_configuration(), track, seed, position_m, AT_EVERY_TICK)

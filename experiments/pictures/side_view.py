@@ -2,14 +2,14 @@
 
 In the frame that tilts with adduction, the point u outward, s up and w along the plate's normal from the middle of its
 lower edge is at ((l + u) sin α + w cos α, (l + u) cos α - w sin α, s - h). R_x(β) turns it to (x, y, z) about the
-intersection of the axes (control/geometry.py), which is at height H above the mud. The outline of the plate is the
-convex hull of its eight corners.
+intersection of the axes (control/geometry.py), which is at height H above the mud.
 """
 
 from __future__ import annotations
 
+from cmath import phase
 from collections.abc import Iterable
-from itertools import product
+from itertools import accumulate
 from math import cos, sin
 from typing import NamedTuple
 
@@ -35,29 +35,16 @@ def view_from_side(
         outward_m = (l + u_m) * ca - w_m * sa
         return body_x_m + (l + u_m) * sa + w_m * ca, axis_m + outward_m * sb + (s_m - h) * cb
 
-    half_width_m, half_thickness_m = geometry.plate_width_m / 2.0, geometry.plate_thickness_m / 2.0
-    corners = product(
-        (-half_width_m, half_width_m), (0.0, geometry.plate_height_m), (-half_thickness_m, half_thickness_m)
-    )
-    outline = convex_hull(project(*corner) for corner in corners)
-    return SideView((body_x_m, axis_m), project(0.0, h), project(0.0, 0.0), outline)
+    edge, height_m = project(0.0, 0.0), geometry.plate_height_m
+    sizes = ((geometry.plate_width_m, 0.0, 0.0), (0.0, height_m, 0.0), (0.0, 0.0, geometry.plate_thickness_m))
+    sides = [complex(*project(*size)) - complex(*edge) for size in sizes]
+    outline = _outline_of_box(complex(*project(0.0, height_m / 2.0)), sides)
+    return SideView((body_x_m, axis_m), project(0.0, h), edge, outline)
 
 
-def convex_hull(points: Iterable[Point]) -> list[Point]:
-    """Return the hull counter-clockwise from the leftmost point: a lower and an upper half that only turn left."""
-    ordered = sorted(set(points))
-    return _left_turns(ordered)[:-1] + _left_turns(ordered[::-1])[:-1]
-
-
-def _left_turns(points: list[Point]) -> list[Point]:
-    hull: list[Point] = []
-    for point in points:
-        while len(hull) > 1 and _turn(hull[-2], hull[-1], point) <= 0.0:
-            hull.pop()
-        hull.append(point)
-    return hull
-
-
-def _turn(a: Point, b: Point, c: Point) -> float:
-    """Return a positive value where the path from a over b to c turns left."""
-    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+def _outline_of_box(middle: complex, sides: Iterable[complex]) -> list[Point]:
+    """Return the outline from its leftmost corner: the sides in the order of their directions, there and back."""
+    rightward = sorted((max(side, -side, key=lambda each: (each.real, each.imag)) for side in sides), key=phase)
+    steps = [*rightward, *(-side for side in rightward[:-1])]
+    corners = accumulate(steps, initial=middle - sum(rightward) / 2.0)
+    return [(corner.real, corner.imag) for corner in corners]

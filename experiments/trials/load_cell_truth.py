@@ -19,7 +19,7 @@ from control.geometry import FlipperGeometry
 from control.plate import SubmergedPlate, submerged_part
 from control.records import UNKNOWN
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
-from simulation.test_rig.joint_cell import ArcCurve, ArcStroke, measure_arc
+from simulation.test_rig.joint_cell import ArcCurve, measure_arc
 from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
 
 PAPER_SPEED_M_S = 0.1  # of its load cell; for a plate that did not slip
@@ -50,41 +50,31 @@ def true_coefficients(
 ) -> TrueCoefficients:
     """Return the coefficients of one of the two plates."""
     return TrueCoefficients(
-        _insertion(stride, geometry, relaxation, upright),
-        _shear(stride, geometry, upright),
-        _extraction(stride, geometry, relaxation, hold_s, upright),
+        k_p=_stiffness(stride, stride.insertion, 1.0, geometry, relaxation, 0.0, upright),
+        k_s=_shear(stride, geometry, upright),
+        k_e=_stiffness(stride, stride.extraction, -1.0, geometry, relaxation, hold_s, upright),
     )
 
 
-def _insertion(stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, upright: bool) -> float:
-    stroke = stride.insertion
-    if not (isfinite(stroke.speed_m_s) and stroke.deepest_m > 0.0):
-        return UNKNOWN
-    if upright:
-        straight = measure_insertion(stride.clay, geometry, 0.0, 0.0, stroke.deepest_m, stroke.speed_m_s, relaxation)
-        return _straight_stiffness(straight.down, 1.0, geometry, stroke.deepest_m)
-    return _arc_stiffness(_arc(stride, stroke, geometry, relaxation, 0.0).down, 1.0, stroke.deepest_m)
-
-
-def _extraction(
-    stride: StrideTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float, upright: bool
+def _stiffness(
+    stride: StrideTruth,
+    stroke: StrokeTruth,
+    sign: float,
+    geometry: FlipperGeometry,
+    relaxation: float,
+    hold_s: float,
+    upright: bool,
 ) -> float:
-    stroke = stride.extraction
+    """Return the coefficient of a stroke down (sign 1) or up (sign -1), by least squares."""
     if not (isfinite(stroke.speed_m_s) and stroke.deepest_m > 0.0):
         return UNKNOWN
-    deepest_m, speed_m_s = stroke.deepest_m, stroke.speed_m_s
-    fitted_m = (1.0 - REVERSAL_FRACTION) * deepest_m
+    deepest_m, motion = stroke.deepest_m, (stroke.deepest_m, stroke.speed_m_s, relaxation, hold_s)
+    fitted_m = deepest_m if sign > 0.0 else (1.0 - REVERSAL_FRACTION) * deepest_m
     if upright:
-        straight = measure_insertion(stride.clay, geometry, 0.0, 0.0, deepest_m, speed_m_s, relaxation, hold_s)
-        return _straight_stiffness(straight.up, -1.0, geometry, fitted_m)
-    return _arc_stiffness(_arc(stride, stroke, geometry, relaxation, hold_s).up, -1.0, fitted_m)
-
-
-def _arc(
-    stride: StrideTruth, stroke: StrokeTruth, geometry: FlipperGeometry, relaxation: float, hold_s: float
-) -> ArcStroke:
-    motion = (stroke.sweep_rad, stride.surface_m, stroke.deepest_m, stroke.speed_m_s)
-    return measure_arc(stride.clay, geometry, *motion, relaxation, hold_s)
+        straight = measure_insertion(stride.clay, geometry, 0.0, 0.0, *motion)
+        return _straight_stiffness(straight.down if sign > 0.0 else straight.up, sign, geometry, fitted_m)
+    arc = measure_arc(stride.clay, geometry, stroke.sweep_rad, stride.surface_m, *motion)
+    return _arc_stiffness(arc.down if sign > 0.0 else arc.up, sign, fitted_m)
 
 
 def _shear(stride: StrideTruth, geometry: FlipperGeometry, upright: bool) -> float:

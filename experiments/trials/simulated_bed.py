@@ -25,9 +25,9 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
+from simulation.devices.motion_capture import OF_THE_PAPER, MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep, drives_of
-from simulation.mud.disturbances import LAB, Disturbances, drive_changes
+from simulation.mud.disturbances import LAB, drive_changes
 from simulation.mud.track import Track
 
 
@@ -55,24 +55,26 @@ def simulated_bench(
     configuration: Configuration,
     track: Track,
     seed: int,
-    fixed_base: bool,
-    disturbances: Disturbances,
-    motion_capture: MotionCaptureParameters = AT_EVERY_TICK,
-) -> tuple[LockstepRobot, ReferenceLockstep]:
-    """Make a robot with its log in `folder`, next to those of earlier ones."""
+    position_m: Callable[[PlannedTrial, int], float],
+    motion_capture: MotionCaptureParameters = OF_THE_PAPER,
+) -> tuple[LockstepRobot, CarriedBed]:
+    """Make a robot in a laboratory, with its log in `folder` next to those of earlier ones, and its bed of mud.
+
+    `position_m` takes a trial and the number of earlier preparations, and returns the trial's place along the track.
+    """
     recorder = FileRecorder(_new_log(folder), configuration)
-    drives = drives_with_errors(configuration, disturbances, seed)
     lockstep = ReferenceLockstep(
         configuration,
         track,
         seed,
         recorder=recorder,
-        disturbances=disturbances,
-        fixed_base=fixed_base,
-        drives=drives,
+        disturbances=LAB,
+        fixed_base=configuration.estimation.fixed_base,
+        drives=_drives_with_errors(configuration, seed),
         motion_capture=motion_capture,
     )
-    return LockstepRobot(lockstep, recorder), lockstep
+    robot = LockstepRobot(lockstep, recorder)
+    return robot, CarriedBed(robot, lockstep, position_m)
 
 
 def _new_log(folder: Path) -> Path:
@@ -80,16 +82,12 @@ def _new_log(folder: Path) -> Path:
     return next(path for path in paths if not path.exists())
 
 
-def drives_with_errors(
-    configuration: Configuration, disturbances: Disturbances, seed: int
-) -> dict[str, SimulatedDriveParameters]:
+def _drives_with_errors(configuration: Configuration, seed: int) -> dict[str, SimulatedDriveParameters]:
     """Return motors whose constants differ from the configured ones by the paper's repeatability."""
     random = Random(f"drives {seed}")
-    drives = drives_of(configuration, **drive_changes(disturbances))
-    fraction = TORQUE_ERROR if disturbances == LAB else 0.0
+    drives = drives_of(configuration, **drive_changes(LAB))
     return {
-        joint: replace(drive, torque_constant_error=random.gauss(0.0, fraction)) if fraction else drive
-        for joint, drive in drives.items()
+        joint: replace(drive, torque_constant_error=random.gauss(0.0, TORQUE_ERROR)) for joint, drive in drives.items()
     }
 
 
@@ -99,7 +97,6 @@ class CarriedBed:
     def __init__(
         self, robot: LockstepRobot, lockstep: ReferenceLockstep, position_m: Callable[[PlannedTrial, int], float]
     ) -> None:
-        """`position_m` takes a trial and the number of earlier preparations."""
         self._robot = robot
         self._lockstep = lockstep
         self._position_m = position_m

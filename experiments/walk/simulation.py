@@ -8,9 +8,8 @@ from experiments.robot.lockstep_robot import LockstepRobot, simulated_configurat
 from experiments.trials.mud_trials import MOST_ATTEMPTS, PlannedTrial
 from experiments.trials.simulated_bed import CarriedBed, simulated_bench
 from experiments.walk.measurement import Plan
-from simulation.devices.motion_capture import OF_THE_PAPER
 from simulation.mud.clay import clay_of_water
-from simulation.mud.disturbances import LAB, Disturbances
+from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
 
 TAIL_M = 0.5  # the last mud is longer, so that no stride meets the next copy
@@ -18,24 +17,13 @@ SOFT_WALK_M, STRIP_M = 2.0, 1000.0  # length for a walk in soft mud, length of e
 SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_sd_m}  # as an operator would see it\n"
 
 
-def walking_bench(
-    folder: Path, plan: Plan, seed: int, disturbances: Disturbances = LAB
-) -> tuple[LockstepRobot, CarriedBed]:
+def walking_bench(folder: Path, plan: Plan, seed: int) -> tuple[LockstepRobot, CarriedBed]:
     """Make a robot over the plan's muds, named after their water content. Raises ValueError for an unknown mud."""
     lengths_m = [mud.length_m for mud in plan.muds]
     lengths_m[-1] += TAIL_M
     trackway = [(length_m, clay_of_water(float(mud.name))) for length_m, mud in zip(lengths_m, plan.muds, strict=True)]
     copies = MOST_ATTEMPTS * plan.trials
     soft = [(STRIP_M, clay_of_water(float(mud))) for mud in plan.soft]
-    robot, lockstep = simulated_bench(
-        folder,
-        simulated_configuration(SECTIONS),
-        Track(trackway * copies + soft),
-        seed,
-        fixed_base=False,
-        disturbances=disturbances,
-        motion_capture=OF_THE_PAPER,
-    )
 
     def position_m(trial: PlannedTrial, prepared: int) -> float:
         if trial.key.startswith("walk/"):
@@ -43,4 +31,4 @@ def walking_bench(
         strip = next(i for i, mud in enumerate(plan.soft) if trial.key.startswith(f"soft {mud} "))
         return copies * sum(lengths_m) + STRIP_M * strip + SOFT_WALK_M * (prepared + 1)
 
-    return robot, CarriedBed(robot, lockstep, position_m)
+    return simulated_bench(folder, simulated_configuration(SECTIONS), Track(trackway * copies + soft), seed, position_m)

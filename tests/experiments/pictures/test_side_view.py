@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, isclose, pi, sin
+from math import cos, sin
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
 from control.plate import submerged_plate
-from experiments.pictures.side_view import Point, convex_hull, view_from_side
+from experiments.pictures.side_view import Point, view_from_side
 from simulation.mud.flipper_contact import attitude_of
 from simulation.mud.rigid_plate import lowest_point_m
 
@@ -101,16 +101,3 @@ def test_a_plate_straight_below_the_shoulder_is_seen_by_its_edge() -> None:
     width_m = max(x_m for x_m, _ in outline) - min(x_m for x_m, _ in outline)
     assert width_m == pytest.approx(GEOMETRY.plate_thickness_m, abs=1e-12)
     assert area_m2(outline) == pytest.approx(GEOMETRY.plate_thickness_m * GEOMETRY.plate_height_m, abs=1e-12)
-
-
-def test_a_hull_leaves_out_what_lies_inside_and_on_its_sides() -> None:
-    square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
-    assert convex_hull([(0.5, 0.5), (0.5, 0.0), *reversed(square), (0.0, 0.5), (0.0, 0.0)]) == square
-
-
-@given(st.integers(3, 12), st.floats(0.0, 1.0))
-def test_a_hull_of_points_on_a_circle_is_all_of_them(number: int, turn: float) -> None:
-    points = [(cos(turn + 2.0 * pi * n / number), sin(turn + 2.0 * pi * n / number)) for n in range(number)]
-    hull = convex_hull(points)
-    assert sorted(hull) == sorted(points)
-    assert isclose(area_m2(hull), number / 2.0 * sin(2.0 * pi / number), rel_tol=1e-9)

@@ -30,10 +30,9 @@ from experiments.trackway.text import trackway_text
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.mud_trials import Bench, InvalidTrialError, counted_entries
 from experiments.trials.notebook import Notebook
-from experiments.trials.simulated_bed import CarriedBed, simulated_bench
+from experiments.trials.simulated_bed import simulated_bench
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.mud.clay import MUDS
-from simulation.mud.disturbances import NONE
 from simulation.mud.track import Track
 from tests.scripted_operator import ScriptedOperator
 
@@ -44,9 +43,10 @@ COPIES, BEYOND_M = 3, 0.5  # fresh trackways in a row, and the length of mud aft
 
 def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = AT_EVERY_TICK) -> Bench:
     segments = [(mud.length_m, MUDS[mud.name]) for mud in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
-    track, configuration = Track(segments * COPIES), simulated_configuration()
-    robot, lockstep = simulated_bench(folder, configuration, track, 1, False, NONE, motion_capture=capture)
-    bed = CarriedBed(robot, lockstep, lambda trial, prepared: prepared * track.length_m / COPIES)
+    track = Track(segments * COPIES)
+    robot, bed = simulated_bench(
+        folder, simulated_configuration(), track, 1, lambda trial, prepared: prepared * track.length_m / COPIES, capture
+    )
     return Bench(robot, bed, ScriptedOperator(*answers), Notebook(folder, {}))
 
 
