@@ -12,7 +12,7 @@ from experiments.reports.mud_names import mud_name
 from experiments.sweep import sweep
 from experiments.sweep.text import sweep_finding
 from experiments.trackway import bench, simulation
-from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE
+from experiments.trackway.report import ADAPTIVE, PAPER_TABLE
 from experiments.trackway.text import run_at_bench, run_simulated
 
 SIMULATED_ONLY = "the muds are those of the simulator: this experiment runs with --simulated only"

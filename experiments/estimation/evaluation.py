@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import chain
 from math import isfinite
 from typing import NamedTuple
 
-from control.records import StrideEstimate
 from estimation.mud import EstimationParameters
 from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, PlateRow, error_rows, plate_rows
@@ -109,10 +109,8 @@ def methods_of(setup: Setup) -> tuple[Method, ...]:
 def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
     """Run all trials of a plan in parallel."""
     outcomes = run_parallel([partial(run_part, part, plan) for part in plan.parts()], show, processes)
-    return Outcome(
-        [each for outcome in outcomes for each in outcome.evaluated],
-        [each for outcome in outcomes for each in outcome.transitions],
-    )
+    evaluated, transitions = zip(*outcomes, strict=True)
+    return Outcome(list(chain(*evaluated)), list(chain(*transitions)))
 
 
 def run_part(part: Part, plan: Plan) -> Outcome:
@@ -131,25 +129,21 @@ def run_part(part: Part, plan: Plan) -> Outcome:
     if len(part.muds) > 1:
         return Outcome([], transitions_of(trial, truths))
     (clay,) = part.muds
-    methods = methods_of(setup)
-    return Outcome([each for method in methods for each in _evaluate_method(method, clay.name, trial, truths)], [])
+    evaluated = [_evaluate_method(method, clay.name, trial, truths) for method in methods_of(setup)]
+    return Outcome(list(chain.from_iterable(evaluated)), [])
 
 
 def _evaluate_method(
-    method: Method, mud: str, trial: Trial, truths: dict[tuple[str, int], LoadCellTruth]
+    method: Method, mud: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]
 ) -> Iterator[Evaluation]:
     for stride in strides_of(trial, method.parameters, method.with_pose):
         truth = truths.get((stride.flipper, stride.index))
-        if truth is not None:
-            yield from _evaluate_stride(method, mud, stride, truth)
-
-
-def _evaluate_stride(method: Method, mud: str, stride: StrideEstimate, truth: LoadCellTruth) -> Iterator[Evaluation]:
-    for name in COEFFICIENTS:
-        estimate, true = getattr(stride, name), getattr(truth.leaning, name)
-        if isfinite(true):
-            upright = getattr(truth.upright, name)
-            yield Evaluation(method.setup, mud, name, method.name, estimate, true, upright)
+        if truth is None:
+            continue
+        for name in COEFFICIENTS:
+            estimate, leaning, upright = (getattr(each, name) for each in (stride, *truth))
+            if isfinite(leaning):
+                yield Evaluation(method.setup, mud, name, method.name, estimate, leaning, upright)
 
 
 @dataclass(frozen=True)

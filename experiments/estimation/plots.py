@@ -9,11 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.estimation.evaluation import EstimationReport
-from experiments.reports.error_table import ErrorRow
+from experiments.reports.error_table import COEFFICIENTS, ErrorRow
 from experiments.reports.mud_names import mud_text
 
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 
 

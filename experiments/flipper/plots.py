@@ -23,7 +23,6 @@ from experiments.reports.mud_styles import (
     LABELS,
     PHASE_NAMES,
     PHASE_SHADES,
-    are_waters,
     line_of,
     looks_of,
     mark_of,
@@ -156,19 +155,20 @@ def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
 def _plot_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw mean and standard deviation over the trials; a lower bound has an arrow up."""
     names = [mud.mud for mud in muds]
-    for water, mud in zip(waters_of(names), muds, strict=True):
+    waters = waters_of(names)
+    for x, mud in zip(waters or range(len(names)), muds, strict=True):
         gathered, look = mud.coefficient(name), looks[mud.mud]
         if gathered.value is None:
             continue
         value, sd = PER_CM3 * gathered.value, PER_CM3 * gathered.value * (gathered.repeatability or 0.0)
         trials = [PER_CM3 * trial for trial in gathered.trials]
-        panel.plot([water] * len(trials), trials, "_", color=GREY, markersize=12)
-        panel.errorbar(water, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=gathered.at_least,
+        panel.plot([x] * len(trials), trials, "_", color=GREY, markersize=12)
+        panel.errorbar(x, value, sd or None, capsize=4, ecolor=INK, linestyle="", lolims=gathered.at_least,
                        **mark_of(look))  # fmt: skip
     panel.set_ylim(bottom=0.0)
     panel.set_ylabel(f"{LABELS[name]} (N/cm³)")
-    panel.set_xlabel("water content $w$ (%)" if are_waters(names) else "mud")
-    if not are_waters(names):
+    panel.set_xlabel("water content $w$ (%)" if waters else "mud")
+    if not waters:
         panel.set_xticks(range(len(names)), names)
 
 

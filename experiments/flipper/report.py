@@ -31,13 +31,6 @@ class FlipperMud(MudSummary):
     remarks: Sequence[str]
 
 
-@dataclass(frozen=True)
-class PlateSize:
-    width: float
-    height: float
-    thickness: float
-
-
 @dataclass(frozen=True, kw_only=True)
 class FlipperReport:
     experiment: str = "flipper"
@@ -49,7 +42,7 @@ class FlipperReport:
     later_strokes: Mapping[str, Sequence[float]]  # by coefficient, as a fraction of the first stroke's
     missing_truth: str
     settings: Mapping[str, Any]
-    plate_m: PlateSize
+    plate_m: Mapping[str, float]
     left_out: Mapping[str, Entry]
 
 
@@ -74,7 +67,7 @@ def report_of(
         later_strokes=_later_strokes(by_mud, method),
         missing_truth=missing_text(truth, by_mud),
         settings=plan.identity | {"method": method, "truth": "file" if truth else "bed"},
-        plate_m=PlateSize(geometry.plate_width_m, geometry.plate_height_m, geometry.plate_thickness_m),
+        plate_m={name: getattr(geometry, f"plate_{name}_m") for name in ("width", "height", "thickness")},
         left_out=left_out or {},
     )
 

@@ -30,7 +30,7 @@ from experiments.reports.mud_names import mud_label
 from experiments.reports.text_tables import table
 from experiments.trackway.depth_rule import constant_depth, walk_by
 from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has_strides, speed_cm_s
-from experiments.trackway.paper_table import FIXED_DEPTHS_M, PAPER_TABLE, Speed
+from experiments.trackway.report import FIXED_DEPTHS_M, PAPER_TABLE, Speed
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Finding, Show, screen_finding
 from simulation.body.plant import PlantParameters

@@ -20,11 +20,11 @@ from control.records import FLIPPERS as FLIPPER_NAMES
 from experiments.pictures.colours import FAINT, FLIPPER_COLOURS, FORWARD, INK, MUD_SHADES, OUTCOME_COLOURS, SURFACE, UP
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome, outcome_of
+from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_label
 from simulation.mud.track import Track
 
 WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120
-COEFFICIENTS = ("k_p", "k_s", "k_e")
 NOTICED_DASHES = (0, (2, 2))
 SHORTEST_S = 0.1  # least length of the time axis
 HEADROOM = 1.6  # top of a panel as a multiple of its largest value; error bars may be cut

@@ -29,10 +29,12 @@ EstimateReport = Mapping[str, Any]  # an estimate as the daemon reports it: valu
 class ComparedStride(NamedTuple):
     """The estimates of one stride by one method, and a load cell's readings in N/m³."""
 
-    mud: str
+    mud: str  # empty where it is not certain
     method: str
     stride: Mapping[str, Any]
     truth: Mapping[str, float | None]
+    trial: int = 0  # of a walk over several muds
+    plates_m: float = UNKNOWN  # in such a walk, from the start of the first mud
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ class MudSummary:
     truth: Mapping[str, float] | None
 
     def coefficient(self, name: str) -> GatheredCoefficient:
-        return {"k_p": self.k_p, "k_s": self.k_s, "k_e": self.k_e}[name]
+        gathered: GatheredCoefficient = getattr(self, name)
+        return gathered
 
 
 def gather_coefficient(estimates: Iterable[EstimateReport]) -> GatheredCoefficient:
@@ -104,23 +107,20 @@ def _errors(values: Sequence[EstimateReport], spread: float | None) -> tuple[flo
     return hypot(trials_error, shared_error), trials_error, shared_error
 
 
-def evaluate_strides(rows: Iterable[ComparedStride], setup: str) -> list[Evaluation]:
+def error_table(rows: Iterable[ComparedStride], setup: str) -> list[ErrorRow]:
     """Evaluate every coefficient that has a true value."""
-    return [
+    evaluations = [
         Evaluation(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
         for row in rows
         for name in COEFFICIENTS
         if (truth := row.truth.get(name)) is not None and row.stride[name] is not None
     ]
+    return error_rows(evaluations)
 
 
 def estimate_of(report: EstimateReport) -> Estimate:
     value, std_error = (UNKNOWN if report[name] is None else float(report[name]) for name in ("value", "std_error"))
     return Estimate(value, std_error, report["samples"], report["valid"], report["reason"], report["at_least"])
-
-
-def error_table(rows: Iterable[ComparedStride], setup: str) -> list[ErrorRow]:
-    return error_rows(evaluate_strides(rows, setup))
 
 
 # tables for people

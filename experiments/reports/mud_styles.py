@@ -36,19 +36,12 @@ def mark_of(look: dict[str, Any]) -> dict[str, Any]:
     return {"color": look["color"], "marker": look["marker"], "markersize": 7.0, "markeredgecolor": INK}
 
 
-def waters_of(muds: Sequence[str]) -> list[float]:
-    """Return positions on an axis: the water contents, or 0, 1, 2, ..."""
+def waters_of(muds: Sequence[str]) -> list[float] | None:
+    """Return the water contents; None where a mud has another name."""
     try:
         return [float(mud) for mud in muds]
     except ValueError:
-        return [float(index) for index in range(len(muds))]
-
-
-def are_waters(muds: Sequence[str]) -> bool:
-    try:
-        return bool([float(mud) for mud in muds])
-    except ValueError:
-        return False
+        return None
 
 
 def file_name(mud: str) -> str:

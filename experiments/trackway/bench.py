@@ -29,8 +29,7 @@ from experiments.robot.bench_robot import (
     wait_until,
 )
 from experiments.trackway.depth_rule import DepthRule, constant_depth
-from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
-from experiments.trackway.report import Settings, TrackwayReport, table_report
+from experiments.trackway.report import ADAPTIVE, FIXED_DEPTHS_M, Settings, TrackwayReport, table_report
 from experiments.trackway.simulation import STUCK_S
 from experiments.trackway.walk import Walk, WalkedStride, logged_strides, speed_m_s, walk_of
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials

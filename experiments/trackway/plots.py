@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from experiments.reports.mud_names import mud_label
-from experiments.trackway.paper_table import ADAPTIVE, Speed
-from experiments.trackway.report import SpeedCell, StrideReport, TrackwayReport
+from experiments.trackway.report import ADAPTIVE, Speed, SpeedCell, StrideReport, TrackwayReport
 from experiments.trackway.simulation import SimulatedReport
 from experiments.trackway.walk import EXTRACTION, SLIPPAGE
 

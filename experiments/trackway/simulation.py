@@ -24,8 +24,7 @@ from experiments.trackway.one_mud import (
     mean_speeds_cm_s,
     run_mud_walk,
 )
-from experiments.trackway.paper_table import ADAPTIVE, FIXED_DEPTHS_M
-from experiments.trackway.report import Settings, TrackwayReport, table_report
+from experiments.trackway.report import ADAPTIVE, FIXED_DEPTHS_M, Settings, TrackwayReport, table_report
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from experiments.trials.notebook import Notebook
 from experiments.trials.parallel_trials import run_parallel

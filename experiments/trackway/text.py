@@ -19,8 +19,7 @@ from experiments.robot.log_copies import cut_log
 from experiments.robot.prompt import Operator
 from experiments.trackway import bench, simulation
 from experiments.trackway.bench import BenchReport, LoggedTime
-from experiments.trackway.paper_table import PAPER_TABLE
-from experiments.trackway.report import SpeedCell, TrackwayReport
+from experiments.trackway.report import PAPER_TABLE, SpeedCell, TrackwayReport
 from experiments.trackway.simulation import SimulatedReport
 from experiments.trials.mud_trials import open_bench, run_trials
 from experiments.trials.notebook import Notebook

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
+from experiments.reports.coefficient_table import PER_CM3, ComparedStride, GatheredCoefficient
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
@@ -21,7 +21,7 @@ from experiments.trials.notebook import Entry
 from experiments.trials.stride_profile import StrideProfile, profile_from_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import Plan
-from experiments.walk.report import LocatedStride, SoftMud
+from experiments.walk.report import SoftMud
 
 THIN: dict[str, Any] = {"linewidth": 0.8}
 METHOD_STYLES: dict[str, dict[str, Any]] = {
@@ -42,7 +42,7 @@ DEPTH_STYLES: dict[float, dict[str, Any]] = {
 }
 
 
-def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[LocatedStride], reach_m: float, path: Path) -> None:
+def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[ComparedStride], reach_m: float, path: Path) -> None:
     """Draw position, forces and coefficients of one walk against time: figure 6."""
     profile = profile_from_row(walk["course"])
     own = [each for each in strides if each.trial == walk["trial"]]
@@ -67,7 +67,7 @@ def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[LocatedStride], re
 
 
 def _borders_s(
-    plan: Plan, walk: Entry, profile: StrideProfile, own: Sequence[LocatedStride], reach_m: float
+    plan: Plan, walk: Entry, profile: StrideProfile, own: Sequence[ComparedStride], reach_m: float
 ) -> list[float]:
     """Return when the plates first went down past each border; by the order of the strides where there is no pose."""
     found = []
@@ -111,7 +111,7 @@ def _plot_force(panel: Axes, profile: StrideProfile, force_n: Any, begun_s: floa
     panel.legend(ncols=3, **LEGEND)
 
 
-def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[LocatedStride], begun_s: float) -> None:
+def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
     """Draw the estimates by all methods; triangles are lower bounds, dashed lines the load cell's values."""
     methods = [method for method in METHOD_STYLES if method != COMPENSATED or name == "k_s"]
     valid = [each for each in own if each.method in methods and each.stride[name]["valid"]]
@@ -136,7 +136,7 @@ def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[LocatedS
     panel.legend(ncols=5, **LEGEND)
 
 
-def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[LocatedStride], begun_s: float) -> None:
+def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
     """Draw the load cell's values over each mud, from its first stride to its last."""
     label = "load cell"
     for mud in plan.muds:
@@ -184,7 +184,8 @@ def _plot_bars(panel: Axes, soft: SoftMud) -> None:
     for method, (label, colour) in BARS.items():
         for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
             own = DEPTH_STYLES.get(each.depth_cm, {"color": INK})["color"]
-            _plot_gathered(panel, len(names), each.k_s.get(method), colour or own)
+            gathered = each.k_s.get(method)
+            _plot_bar(panel, len(names), gathered.value if gathered else None, colour or own, gathered)
             names.append(f"{label}\n{each.depth_cm:g} cm")
     for each in deepest_first:
         _plot_bar(panel, len(names), each.truth, "#d9d9d9")
@@ -196,21 +197,15 @@ def _plot_bars(panel: Axes, soft: SoftMud) -> None:
     panel.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
 
 
-def _plot_gathered(panel: Axes, x: int, gathered: GatheredCoefficient | None, colour: str) -> None:
-    if gathered is None:
-        _plot_bar(panel, x, None, colour)
-    else:
-        _plot_bar(panel, x, gathered.value, colour, gathered.repeatability or 0.0, gathered.at_least)
-
-
 def _plot_bar(
-    panel: Axes, x: int, value_n_m3: float | None, colour: str, repeatability: float = 0.0, bound: bool = False
+    panel: Axes, x: int, value_n_m3: float | None, colour: str, gathered: GatheredCoefficient | None = None
 ) -> None:
+    """Draw a value, with the standard deviation of the trials from which it was gathered."""
     if value_n_m3 is None:
         panel.text(x, 0.0, "-", ha="center", va="bottom")
         return
-    value = PER_CM3 * value_n_m3
-    sd = value * repeatability
+    value, bound = PER_CM3 * value_n_m3, gathered is not None and gathered.at_least
+    sd = value * (gathered.repeatability or 0.0) if gathered else 0.0
     panel.bar(x, value, 0.7, color="white" if bound else colour, edgecolor=colour if bound else INK, linewidth=1.0,
               hatch="//" if bound else "")  # fmt: skip
     if sd:

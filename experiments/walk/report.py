@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from statistics import fmean, median
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -77,17 +77,6 @@ class WalkReport:
     left_out: Mapping[str, Entry]
 
 
-class LocatedStride(NamedTuple):
-    """One stride of one walk, by one method, with its position."""
-
-    trial: int
-    method: str
-    mud: str  # empty where it is not certain
-    plates_m: float  # from the start of the first mud
-    stride: StrideReport
-    truth: Mapping[str, float | None]
-
-
 def walks_of(plan: Plan, entries: Mapping[str, Entry]) -> list[Entry]:
     return [entries[trial.key] for trial in plan.planned if trial.key in entries and trial.key.startswith("walk/")]
 
@@ -99,7 +88,7 @@ def soft_walks_of(plan: Plan, entries: Mapping[str, Entry], mud: str, depth_m: f
 
 def located_strides(
     plan: Plan, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
-) -> list[LocatedStride]:
+) -> list[ComparedStride]:
     """Locate the strides of the walks over all muds. `truth` of another experiment replaces the bed's own."""
     return [
         located
@@ -111,7 +100,7 @@ def located_strides(
 
 def _locate(
     plan: Plan, walk: Entry, method: str, strides: Sequence[StrideReport], reach_m: float, truth: TruthOfMud | None
-) -> Iterator[LocatedStride]:
+) -> Iterator[ComparedStride]:
     for number, stride in enumerate(strides):
         position_m, start_m = stride["place_m"], walk["start_m"]
         if position_m is None or start_m is None:
@@ -119,7 +108,8 @@ def _locate(
         else:
             plates_m = position_m - start_m + reach_m
         mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
-        yield LocatedStride(walk["trial"], method, mud, plates_m, stride, _truth_of(mud, walk, stride, truth))
+        compared = _truth_of(mud, walk, stride, truth)
+        yield ComparedStride(mud, method, stride, compared, trial=walk["trial"], plates_m=plates_m)
 
 
 def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[ComparedStride]:
@@ -150,7 +140,7 @@ def report_of(
 ) -> WalkReport:
     method = configured_method(configuration.estimation)
     located = located_strides(plan, entries, configuration, truth)
-    certain = [ComparedStride(each.mud, each.method, each.stride, each.truth) for each in located if each.mud]
+    certain = [each for each in located if each.mud]
     soft = soft_strides(plan, entries, truth)
     return WalkReport(
         muds=[_mud_report(mud.name, method, certain) for mud in plan.muds],

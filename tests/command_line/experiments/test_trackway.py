@@ -15,7 +15,7 @@ from experiments.mud_fit import mud_fit
 from experiments.sweep import sweep
 from experiments.trackway import simulation
 from experiments.trackway.one_mud import constant_walks
-from experiments.trackway.paper_table import ADAPTIVE
+from experiments.trackway.report import ADAPTIVE
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Show

@@ -23,7 +23,7 @@ from experiments.mud_fit.mud_fit import (
     walk_on,
 )
 from experiments.reports.report_page import to_json
-from experiments.trackway.paper_table import PAPER_TABLE, Speed
+from experiments.trackway.report import PAPER_TABLE, Speed
 from simulation.body.plant import PlantParameters
 from simulation.mud.clay import MUDS
 

@@ -6,8 +6,15 @@ from statistics import fmean
 
 import pytest
 
-from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE, Speed
-from experiments.trackway.report import MeanOverMuds, mean_over_muds, speed_cell, within_one_sd
+from experiments.trackway.report import (
+    ADAPTIVE,
+    PAPER_TABLE,
+    MeanOverMuds,
+    Speed,
+    mean_over_muds,
+    speed_cell,
+    within_one_sd,
+)
 from experiments.trackway.walk import Walk, WalkedStride
 from simulation.mud.clay import MUDS
 

@@ -14,9 +14,8 @@ import pytest
 
 from experiments.reports.report_page import to_json
 from experiments.trackway.one_mud import STARTING, BestDepth, MudWalk
-from experiments.trackway.paper_table import ADAPTIVE, PAPER_TABLE, Speed
 from experiments.trackway.plots import plot_trackway
-from experiments.trackway.report import MeanOverMuds
+from experiments.trackway.report import ADAPTIVE, PAPER_TABLE, MeanOverMuds, Speed
 from experiments.trackway.simulation import FIXED, Plan, SimulatedReport, end_of, is_over, report_of, rules_of, run
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.notebook import Notebook
