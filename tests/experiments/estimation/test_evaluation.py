@@ -1,6 +1,5 @@
 """The plan of the experiment, and a short piece of it done for real."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from math import isfinite
@@ -48,15 +47,8 @@ def outcome() -> Outcome:
 # the plan
 
 
-def test_without_layers_nothing_is_disturbed() -> None:
-    plan = with_layers(Plan(), ())
-    assert (plan.disturbances, plan.repeats, plan.torque) == (NONE, False, False)
-
-
 def test_with_all_layers_it_is_the_laboratory() -> None:
-    plan = with_layers(Plan(), LAYERS)
-    assert plan == Plan()
-    assert (plan.disturbances, plan.repeats, plan.torque) == (LAB, True, True)
+    assert with_layers(Plan(), LAYERS) == Plan()
 
 
 @pytest.mark.parametrize("layer", LAYERS)
@@ -65,7 +57,7 @@ def test_one_layer_is_that_layer_alone(layer: str) -> None:
     field = FIELD_OF_LAYER.get(layer)
     assert plan.disturbances == (replace(NONE, **{field: getattr(LAB, field)}) if field else NONE)
     assert (plan.repeats, plan.torque) == (layer == REPEATS, layer == TORQUE)
-    assert plan != with_layers(Plan(), ())
+    assert replace(plan, disturbances=LAB, repeats=True, torque=True) == Plan()
 
 
 def test_an_unknown_layer_is_named() -> None:
@@ -73,31 +65,17 @@ def test_an_unknown_layer_is_named() -> None:
         with_layers(Plan(), ("noise", "fog"))
 
 
-def test_layers_leave_the_rest_of_the_plan() -> None:
-    plan = with_layers(SHORT, ("noise",))
-    assert replace(plan, disturbances=SHORT.disturbances, repeats=True, torque=True) == SHORT
-
-
 def test_the_plan_is_every_mud_and_seed_and_a_walk_over_borders_for_each_seed() -> None:
     plan = Plan(seeds=3)
     parts = plan.parts()
     transitions, alone = [p for p in parts if len(p.muds) > 1], [p for p in parts if len(p.muds) == 1]
     assert parts[: len(transitions)] == transitions  # the longest first
+    assert parts[0].muds == parts[1].muds[::-1]
     assert [(p.setup, p.seed, p.strides) for p in transitions] == [(WALKING, seed, 24) for seed in (1, 2, 3)]
     for setup, muds, strides in ((SINGLE, plan.single, 2), (WALKING, plan.walking, 8)):
         reported = {(p.muds[0], p.seed) for p in alone if p.setup == setup and p.strides == strides}
         assert reported == {(mud, seed) for mud in muds for seed in (1, 2, 3)}
     assert len(alone) == 3 * (5 + 3)
-
-
-def test_walks_over_borders_go_in_both_directions() -> None:
-    plan = Plan(seeds=2)
-    first, second, *_ = plan.parts()
-    assert first.muds == second.muds[::-1]
-
-
-def test_one_mud_alone_has_no_border() -> None:
-    assert {len(part.muds) for part in SHORT.parts()} == {1}
 
 
 def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> None:
@@ -169,12 +147,6 @@ def test_progress_counts_all_trials() -> None:
     assert evaluated()[1] == [(1, 2), (2, 2)]
 
 
-def test_a_trial_in_another_process_is_the_same_trial() -> None:
-    part = Part(WALKING, (STRONG,), SHORT.walking_strides, 1)
-    here = run_part(part, SHORT).evaluated
-    assert repr(here) == repr([each for each in outcome().evaluated if each.setup.startswith("walking")])
-
-
 def trial_of(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Return the arguments with which a part of the plan is simulated."""
     asked: dict[str, Any] = {}
@@ -215,23 +187,10 @@ def test_a_walk_over_a_border_reports_how_soon_the_estimate_followed(monkeypatch
 # the report
 
 
-def keys(rows: Sequence[dict[str, Any]]) -> set[str]:
-    return set().union(*rows)
-
-
 def test_the_report_is_json_with_errors_plates_boundaries_and_settings() -> None:
     report = to_json(report_of(SHORT, outcome()))
     assert set(report) == {"experiment", "errors", "plates", "boundaries", "settings"}
-    assert report["experiment"] == "estimation"
-    assert keys(report["errors"]) >= {"setup", "mud", "coefficient", "method", "median", "p95", "coverage", "strides"}
     assert report["boundaries"] == []
     settings = report["settings"]
     assert (settings["seeds"], settings["torque_error"], settings["repeats"]) == (1, TORQUE_ERROR, True)
     assert settings["single_strength_pa"] == {"47.6": round(STRONG.strength_pa, 1)}
-
-
-def test_the_settings_are_those_that_were_run() -> None:
-    settings = report_of(with_layers(SHORT, ("noise",)), Outcome([], [])).settings
-    assert (settings.torque_error, settings.repeats) == (0.0, False)
-    assert settings.disturbances["current_noise_a"] == LAB.current_noise_a
-    assert settings.disturbances["clinging_n"] == 0.0

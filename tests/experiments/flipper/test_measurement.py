@@ -17,7 +17,6 @@ from experiments.flipper.measurement import Plan, require_fixed_base, require_mu
 from experiments.flipper.report import FlipperReport, report_of
 from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
 from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, tables_of
-from experiments.reports.report_page import to_json
 from experiments.robot.bench_robot import BenchError, leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.trials.estimation_methods import DEFAULT, PAPER
@@ -176,13 +175,6 @@ def test_the_recorded_profile_is_a_whole_stride_with_three_pauses() -> None:
 def test_the_law_follows_the_force_in_steady_stance() -> None:
     misfit_n, largest_n = report().misfit_n[MUD]["stance"], report().largest_forces_n[MUD]["stance"]
     assert misfit_n and largest_n and misfit_n < 0.1 * largest_n
-
-
-def test_the_summary_is_json_and_has_what_other_experiments_read() -> None:
-    reported = to_json(report())
-    assert reported["experiment"] == "flipper"
-    for name in ("k_p", "k_s", "k_e"):
-        assert {"value", "std_error", "trials", "repeatability"} <= set(reported["muds"][0][name])
 
 
 def entries_of(**values: list[float]) -> dict[str, Entry]:

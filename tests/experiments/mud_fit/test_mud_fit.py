@@ -15,7 +15,6 @@ from experiments.mud_fit.mud_fit import (
     Fit,
     Ground,
     Plan,
-    best_fit,
     chi2_of,
     fixed_speed_cm_s,
     run,
@@ -97,13 +96,6 @@ def test_the_fit_recovers_a_synthetic_truth(synthetic_world: None) -> None:
     for mud, strength_pa in TRUTH.items():
         assert best.strength_pa[mud] == pytest.approx(strength_pa, rel=0.045)
     assert best.chi2 < 1.0
-
-
-def test_the_finer_grid_fits_better(synthetic_world: None) -> None:
-    targets, plan = synthetic_targets(), Plan()
-    coarse = best_fit(synthetic_speeds(plan.grounds()), targets)
-    finer = best_fit(synthetic_speeds([*plan.grounds(), *plan.finer_grounds(coarse)]), targets)
-    assert finer.chi2 < coarse.chi2
 
 
 def test_the_range_of_a_strength_is_where_chi2_rises_by_one() -> None:

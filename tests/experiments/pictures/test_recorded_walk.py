@@ -62,13 +62,6 @@ def test_the_last_walk_is_shown_unless_another_is_named(two_walks: Path) -> None
         read_walk(two_walks, 3)
 
 
-def test_the_geometry_is_that_of_the_log(two_walks: Path, configuration: Configuration) -> None:
-    walk = read_walk(two_walks)
-    assert walk.geometry == configuration.geometry
-    assert walk.geometric_step_m == pytest.approx(configuration.geometry.flipper_length_m)  # 2 l sin 30°
-    assert walk.title.startswith("test  20")
-
-
 def test_nothing_is_missing_from_a_log_with_a_pose(two_walks: Path) -> None:
     assert read_walk(two_walks).missing == []
 
@@ -166,12 +159,6 @@ def test_what_the_authors_form_does_not_hold_is_named(as_csv: Path, tmp_path: Pa
     assert np.isnan(walk.geometric_step_m)
     assert read_walk(as_csv).missing == []
     assert read_walk(as_csv).geometric_step_m == pytest.approx(0.12)
-
-
-def test_a_run_in_the_authors_form_is_one_walk(as_csv: Path) -> None:
-    assert read_walk(as_csv, 1).walks == 1
-    with pytest.raises(LogError, match="no walk 2"):
-        read_walk(as_csv, 2)
 
 
 def test_one_flipper_alone_is_the_one_shown(as_csv: Path, tmp_path: Path) -> None:

@@ -20,7 +20,6 @@ from experiments.reports.coefficient_table import (
     gather_coefficient,
     mud_rows,
 )
-from experiments.reports.mud_names import mud_name
 from experiments.robot.bench_robot import BenchError
 from experiments.trials.truth_file import load_truth, missing_text, truth_in
 from tests.experiments.synthetic_strides import make_estimate, make_stride
@@ -112,10 +111,6 @@ def test_an_invalid_estimate_does_not_count_but_is_reported() -> None:
     nothing = gather_coefficient([make_estimate(None, reason="too short")])
     assert (nothing.value, nothing.std_error, nothing.trials) == (None, None, [])
     assert coefficient_text(nothing) == "-"
-
-
-def test_other_names_stay_as_they_are() -> None:
-    assert mud_name("kaolin 2") == "kaolin 2"
 
 
 # a load cell's file

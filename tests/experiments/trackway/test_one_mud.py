@@ -9,7 +9,6 @@ from experiments.trackway.one_mud import (
     BestDepth,
     MudWalk,
     best_depth,
-    constant_walks,
     depths_m,
     mean_speeds_cm_s,
     run_mud_walk,
@@ -45,13 +44,6 @@ def test_depths_go_from_1_5_to_5_cm(step_m: float, count: int) -> None:
 
 def test_the_best_depth_is_the_fastest() -> None:
     assert best_depth({0.02: 5.0, 0.0275: 7.12345, 0.05: 6.0}) == BestDepth(2.75, 7.123)
-
-
-def test_every_mud_is_walked_at_every_depth_with_every_seed() -> None:
-    orders = constant_walks([FIRM, SOFT], (0.02, 0.03), seeds=3)
-    assert len(set(orders)) == len(orders) == 2 * 2 * 3
-    assert {order.seed for order in orders} == {1, 2, 3}
-    assert not any(order.rule.method for order in orders)
 
 
 def test_means_are_over_the_seeds_of_a_mud_and_depth() -> None:

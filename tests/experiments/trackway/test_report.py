@@ -42,10 +42,6 @@ def test_sd_is_that_between_trials() -> None:
     assert (cell.mean_all, cell.sd_all) == pytest.approx((2.0, 1.0 / 3.0), abs=0.001)  # rounded
 
 
-def test_one_trial_has_no_sd() -> None:
-    assert speed_cell([walked(0.1, 0.1, 0.1)], "a", ARM_M).sd is None
-
-
 def test_a_trial_of_two_strides_counts_with_both_and_is_reported_as_short() -> None:
     cell = speed_cell([walked(0.10, 0.06), walked(0.0, 0.0, 0.12)], "a", ARM_M)
     assert cell.short_trials == 1

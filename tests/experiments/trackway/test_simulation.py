@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -12,10 +11,9 @@ from typing import Any
 
 import pytest
 
-from experiments.reports.report_page import to_json
 from experiments.trackway.one_mud import STARTING, BestDepth, MudWalk
 from experiments.trackway.plots import plot_trackway
-from experiments.trackway.report import ADAPTIVE, PAPER_TABLE, MeanOverMuds, Speed
+from experiments.trackway.report import ADAPTIVE, PAPER_TABLE, Speed
 from experiments.trackway.simulation import FIXED, Plan, SimulatedReport, end_of, is_over, report_of, rules_of, run
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.notebook import Notebook
@@ -51,17 +49,7 @@ def test_the_first_method_is_the_adaptive_row_and_others_have_their_names() -> N
     assert rules_of(["default"])[:2] == FIXED
 
 
-def test_constant_depths_are_walked_in_each_mud_alone_in_steps_of_2_5_mm() -> None:
-    orders = Plan().constant_walks()
-    assert {order.clay for order in orders} == set(MUDS.values())
-    assert len(orders) == 3 * 15
-
-
 # the end of a walk
-
-
-def test_a_walk_that_has_not_begun_is_not_over() -> None:
-    assert not is_over(1.83, [])
 
 
 @pytest.mark.parametrize(("step_m", "over"), [(0.12, False), (0.14, True), (0.13, True)])
@@ -71,7 +59,7 @@ def test_a_walk_is_over_when_the_plates_would_go_down_past_the_end(step_m: float
 
 def test_a_walk_is_over_after_90_s_in_one_mud_and_not_in_all_muds() -> None:
     slow = [stride("a", 0.1, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0)]
-    assert not is_over(1.83, slow)
+    assert not is_over(1.83, []) and not is_over(1.83, slow)
     assert is_over(1.83, [*slow, stride("b", 0.7, 0.0, 2.0)])
 
 
@@ -93,22 +81,11 @@ def synthetic_report(**changes: Any) -> SimulatedReport:
     return report_of(plan, {rule.name: list(walks) for rule in plan.rules}, constant)
 
 
-def test_the_table_has_a_row_for_each_gait_and_a_cell_for_each_mud() -> None:
-    report = synthetic_report()
-    assert list(report.table) == ["3 cm", "5 cm", "adaptive", "adaptive, paper"]
-    for row in report.table.values():
-        assert list(row) == NAMES
-        for cell in row.values():
-            assert (cell.mean, cell.mean_all, cell.sd) == (6.0, 6.0, 0.0)
-    assert report.mean_over_muds["adaptive"] == MeanOverMuds(6.0, 6.0)
-    assert set(json.loads(json.dumps(to_json(report), allow_nan=False))["table"]) == set(report.table)
-
-
 def test_each_gait_has_its_ratio_to_the_best_constant_depth() -> None:
     report = synthetic_report()
     assert report.best_constant_depth == dict.fromkeys(NAMES, BestDepth(2.75, 8.0))
     assert report.best_constant_mean_over_muds == 8.0
-    assert report.over_best["adaptive"] == dict.fromkeys(NAMES, 0.75)
+    assert report.over_best["adaptive, paper"] == dict.fromkeys(NAMES, 0.75)
 
 
 def test_any_walks_make_a_picture(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -21,13 +20,6 @@ def test_what_was_measured_is_there_again(tmp_path: Path) -> None:
     first.forget("20 g")
     again = Notebook(tmp_path / "new", PLAN)
     assert again.entries and again.entries == first.entries == {"10 g": {"torque_nm": 0.11}}
-
-
-def test_every_entry_is_on_the_disk_at_once(tmp_path: Path) -> None:
-    notebook = Notebook(tmp_path, PLAN)
-    notebook.write("10 g", {"torque_nm": 0.1})
-    lines = (tmp_path / NAME).read_text(encoding="utf-8").splitlines()
-    assert json.loads(lines[1]) == {"key": "10 g", "entry": {"torque_nm": 0.1}}
 
 
 def test_another_plan_is_refused_with_what_differs(tmp_path: Path) -> None:

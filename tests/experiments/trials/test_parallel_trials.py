@@ -37,10 +37,6 @@ def test_trials_run_in_other_processes() -> None:
     assert os.getpid() not in run_parallel([os.getpid] * 2, ignore, processes=1)
 
 
-def test_no_trials_have_no_outcomes() -> None:
-    assert run_parallel(list[partial[float]](), ignore, processes=1) == []
-
-
 def test_an_exception_of_a_trial_reaches_the_caller() -> None:
     with pytest.raises(ValueError, match="cannot be"):
         run_parallel([partial(broken), partial(late, 0.0)], ignore, processes=1)

@@ -5,10 +5,8 @@ from functools import cache
 from itertools import groupby
 from math import isfinite
 
-import numpy as np
 import pytest
 
-from control.rate import PERIOD_S
 from control.records import FLIPPERS, Phase
 from estimation.mud import EstimationParameters, MudEstimator
 from experiments.trials.trial import (
@@ -55,11 +53,6 @@ def test_a_trial_can_be_repeated() -> None:
     other = trial(seed=2)
     assert repr(other.samples) != repr(first.samples)
     assert other.truths != first.truths and other.drives != first.drives
-
-
-def test_there_is_a_sample_of_every_tick() -> None:
-    times_s = [sample.now_s for sample in trial().samples]
-    assert np.diff(times_s) == pytest.approx(PERIOD_S)
 
 
 def test_rows_repeat_as_asked() -> None:
@@ -143,11 +136,6 @@ def test_estimators_see_the_pose_only_if_they_may() -> None:
     assert [stride.flipper for stride in with_pose] == list(FLIPPERS)
     assert all(isfinite(stride.step_m) for stride in with_pose)
     assert not any(isfinite(stride.step_m) for stride in without)
-
-
-def test_the_estimators_strides_are_those_of_the_truth() -> None:
-    reported = [(stride.flipper, stride.index) for stride in strides_of(trial(), EstimationParameters())]
-    assert reported == [(truth.flipper, truth.index) for truth in trial().truths]
 
 
 def test_mud_estimates_are_those_after_each_stride() -> None:
