@@ -21,7 +21,7 @@ report are the keys of the summary in JSON.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from statistics import fmean
 from typing import NamedTuple
@@ -48,10 +48,17 @@ class Ground(NamedTuple):
     strength_pa: float
 
 
-class Fit(NamedTuple):
-    damping_n_s_m: float
-    strengths_pa: Mapping[str, float]  # by mud
+@dataclass(frozen=True)
+class Fit:
+    rail_damping_n_s_m: float
+    strength_pa: Mapping[str, float]  # by mud
     chi2: float
+    cells: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # of Table I: cm/s by depth and mud
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestFit(Fit):
+    strength_range_pa: Mapping[str, Sequence[float]]  # where chi² is within 1 of the least
 
 
 Speeds = Mapping[Ground, Mapping[float, float]]  # cm/s by depth in metres
@@ -75,24 +82,9 @@ class Plan:
         return [Ground(damping, round(strength)) for damping in self.dampings_n_s_m for strength in strengths_pa]
 
     def finer_grounds(self, fit: Fit) -> list[Ground]:
-        dampings = [max(0.0, fit.damping_n_s_m + more) for more in self.finer_dampings_n_s_m]
-        strengths_pa = {round(best_pa * ratio) for best_pa in fit.strengths_pa.values() for ratio in self.finer_ratios}
+        dampings = [max(0.0, fit.rail_damping_n_s_m + more) for more in self.finer_dampings_n_s_m]
+        strengths_pa = {round(best_pa * ratio) for best_pa in fit.strength_pa.values() for ratio in self.finer_ratios}
         return [Ground(damping, strength_pa) for damping in dampings for strength_pa in sorted(strengths_pa)]
-
-
-@dataclass(frozen=True)
-class FittedValues:
-    """A fit with its speeds in cm/s by depth and mud, the cells of Table I."""
-
-    rail_damping_n_s_m: float
-    strength_pa: Mapping[str, float]
-    chi2: float
-    cells: Mapping[str, Mapping[str, float]]
-
-
-@dataclass(frozen=True)
-class BestValues(FittedValues):
-    strength_range_pa: Mapping[str, Sequence[float]]  # where chi² is within 1 of the least
 
 
 @dataclass(frozen=True)
@@ -105,8 +97,8 @@ class Settings:
 @dataclass(frozen=True, kw_only=True)
 class MudFitReport:
     experiment: str = "mud-fit"
-    fitted: BestValues
-    present: FittedValues  # the values in the repository
+    fitted: BestFit
+    present: Fit  # the values in the repository
     chi2_of_damping: Mapping[str, float]
     settings: Settings
 
@@ -131,7 +123,7 @@ def run(plan: Plan, show: Show, processes: int | None = None) -> MudFitReport:
 
 
 def _grounds_of(fit: Fit) -> list[Ground]:
-    return [Ground(fit.damping_n_s_m, strength_pa) for strength_pa in fit.strengths_pa.values()]
+    return [Ground(fit.rail_damping_n_s_m, strength_pa) for strength_pa in fit.strength_pa.values()]
 
 
 def walk_on(
@@ -191,20 +183,21 @@ def strength_range_pa(mud: str, damping_n_s_m: float, speeds: Speeds, targets: T
 def report_of(plan: Plan, speeds: Speeds, today: Fit) -> MudFitReport:
     best = best_fit(speeds, TARGETS)
     dampings = sorted({ground.damping_n_s_m for ground in speeds})
-    ranges_pa = {mud: strength_range_pa(mud, best.damping_n_s_m, speeds, TARGETS) for mud in TARGETS}
+    ranges_pa = {mud: strength_range_pa(mud, best.rail_damping_n_s_m, speeds, TARGETS) for mud in TARGETS}
     return MudFitReport(
-        fitted=BestValues(**vars(_values(best, speeds)), strength_range_pa=ranges_pa),
-        present=_values(today, speeds),
+        fitted=BestFit(**vars(_evaluate(best, speeds)), strength_range_pa=ranges_pa),
+        present=_evaluate(today, speeds),
         chi2_of_damping={f"{each:g}": round(fit_with_damping(each, speeds, TARGETS).chi2, 3) for each in dampings},
         settings=Settings(plan.seeds, plan.strides, len(speeds)),
     )
 
 
-def _values(fit: Fit, speeds: Speeds) -> FittedValues:
-    of_mud = {mud: speeds[Ground(fit.damping_n_s_m, strength)] for mud, strength in fit.strengths_pa.items()}
+def _evaluate(fit: Fit, speeds: Speeds) -> Fit:
+    """Return the fit with its chi² and its cells."""
+    of_mud = {mud: speeds[Ground(fit.rail_damping_n_s_m, strength)] for mud, strength in fit.strength_pa.items()}
     cells = {rule: {mud: round(of_mud[mud][depth_m], 3) for mud in TARGETS} for rule, depth_m in FIXED_DEPTHS_M.items()}
     chi2 = round(sum(chi2_of(of_mud[mud], targets) for mud, targets in TARGETS.items()), 3)
-    return FittedValues(fit.damping_n_s_m, dict(fit.strengths_pa), chi2, cells)
+    return replace(fit, chi2=chi2, cells=cells)
 
 
 def fit_finding(report: MudFitReport) -> Finding:

@@ -142,7 +142,7 @@ def run_sweep(plan: sweep.Plan, show: Show) -> sweep.SweepReport:
 
 def run_fit(plan: mud_fit.Plan, show: Show) -> mud_fit.MudFitReport:
     today = mud_fit.present()
-    grounds = [mud_fit.Ground(today.damping_n_s_m, strength_pa) for strength_pa in today.strengths_pa.values()]
+    grounds = [mud_fit.Ground(today.rail_damping_n_s_m, strength_pa) for strength_pa in today.strength_pa.values()]
     return mud_fit.report_of(plan, {ground: {0.03: 7.0, 0.05: 5.0} for ground in grounds}, today)
 
 
