@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from experiments.trackway.one_mud import STARTING, BestDepth, MudWalk
-from experiments.trackway.plots import plot_trackway
 from experiments.trackway.report import ADAPTIVE, PAPER_TABLE, Speed
 from experiments.trackway.simulation import FIXED, Plan, SimulatedReport, end_of, is_over, report_of, rules_of, run
 from experiments.trackway.walk import Walk, WalkedStride
@@ -86,11 +85,6 @@ def test_each_gait_has_its_ratio_to_the_best_constant_depth() -> None:
     assert report.best_constant_depth == dict.fromkeys(NAMES, BestDepth(2.75, 8.0))
     assert report.best_constant_mean_over_muds == 8.0
     assert report.over_best["adaptive, paper"] == dict.fromkeys(NAMES, 0.75)
-
-
-def test_any_walks_make_a_picture(tmp_path: Path) -> None:
-    plot_trackway(synthetic_report(), tmp_path / "trackway.png")
-    assert (tmp_path / "trackway.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_only_fixed_depths_are_compared_with_the_papers_sd() -> None:

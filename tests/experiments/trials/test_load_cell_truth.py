@@ -105,14 +105,6 @@ def test_shear_of_an_upright_plate_is_the_pressure_on_its_face(depth_m: float, c
     assert reported.upright.k_s == pytest.approx(force_n / (GEOMETRY.plate_width_m * mean_m**2 / 2.0), rel=1e-6)
 
 
-def test_firmer_mud_is_so_in_proportion_along_the_plate() -> None:
-    """Sideways the weight of the mud bears too, whatever its strength."""
-    soft, firm = (truth(stride(Clay("", strength_pa))).upright for strength_pa in (1000.0, 2000.0))
-    assert firm.k_p == pytest.approx(2.0 * soft.k_p)
-    assert firm.k_e == pytest.approx(2.0 * soft.k_e)
-    assert 1.5 * soft.k_s < firm.k_s < 2.0 * soft.k_s
-
-
 @pytest.mark.parametrize("name", ["insertion", "stance", "extraction"])
 def test_each_coefficient_is_of_its_own_strokes_speed(name: str) -> None:
     slow, quick = (truth(with_stroke(name, stroke(speed_m_s=speed_m_s))).upright for speed_m_s in (0.05, 0.8))
