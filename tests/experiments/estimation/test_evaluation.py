@@ -1,5 +1,6 @@
 """The plan of the experiment, and a short piece of it done for real."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from math import isfinite
