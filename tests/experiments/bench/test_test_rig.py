@@ -145,9 +145,12 @@ def test_left_out_checks_are_not_reported_as_passed() -> None:
     assert report.as_json["tests"][0]["readings"][0]["left_out"] is True
 
 
-@pytest.mark.parametrize("index", range(4))
+@pytest.mark.parametrize("index", [0, 1])
 def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: SimulatedRig, index: int) -> None:
-    """Feedback would be positive there: each joint's nudge ends by itself, and nothing may hold a pose after it."""
+    """Feedback would be positive there: each joint's nudge ends by itself, and nothing may hold a pose after it.
+
+    The index is that of a sweep and of an adduction.
+    """
     drive, report = rig.robot.drives[index], BenchReport()
     measure = drive.measure
     drive.measure = lambda angle_rad, velocity_rad_s: measure(-angle_rad, -velocity_rad_s)  # type: ignore[method-assign]
