@@ -10,11 +10,12 @@ from drivers.load_cell.line_formats import AUTO, UNITS, LineFormat
 from drivers.load_cell.stage_encoder import StageEncoderSettings
 from experiments.estimation.evaluation import SINGLE_WATERS
 from experiments.loadcell.analysis.force_motion import StageSettings
-from experiments.loadcell.comparison import CompareError, load_flipper
+from experiments.loadcell.comparison import load_flipper
 from experiments.loadcell.preparation import CellSettings
 from experiments.loadcell.run import BenchSettings, run_loadcell
 from experiments.loadcell.stage import water_of
 from experiments.loadcell.trials import TrialPlan
+from experiments.robot.bench_errors import BenchError
 
 UNNAMED = "mud"
 SIMULATED_STEP_UM = 10.0
@@ -28,7 +29,7 @@ def loadcell(options: argparse.Namespace) -> int:
         port = None if options.simulated else options.port
         bench = BenchSettings(port, options.baud, cell_of(options), encoder_of(options), options.seed)
         flipper = None if options.compare is None else load_flipper(options.compare)
-    except (ValueError, CompareError) as problem:
+    except (ValueError, BenchError) as problem:
         return refuse(str(problem))
     return conduct_bench(options, "trials", lambda session: run_loadcell(session, plan, bench, flipper))
 

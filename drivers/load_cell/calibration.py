@@ -95,12 +95,8 @@ def remarks_about(calibration: LoadCellCalibration, light: Weighing, heavy: Weig
         if abs(weighing.drift) > max(DRIFTING * weighing.drift_std_error, DRIFT_FRACTION * span):
             remarks.append(
                 f"the reading under {weighing.force_n:.3g} N drifted by {weighing.drift / calibration.per_newton:+.3g} "
-                "N while it was taken: let the weight come to rest and the amplifier warm up, then calibrate again"
+                "N: let the weight come to rest and the amplifier warm up, then calibrate again"
             )
-    if calibration.per_newton < 0.0:
-        remarks.append(
-            "the reading falls as the load grows: the cell is loaded in the other direction, which is allowed"
-        )
     return remarks
 
 

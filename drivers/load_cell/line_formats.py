@@ -34,6 +34,8 @@ PATTERNS = {
     INDICATOR: rf"(?:ST|US|SD|WT|S|U) *,? *(?:GS|NT|GR|TR|G|N|NET|GROSS) *[,:]? *{_NUMBER} *{_UNIT}?",
     NUMBER: rf"(?:[A-Za-z][\w ./#()-]*[:=] *)?{_NUMBER} *{_UNIT}?",
 }
+COLUMNS = {f"{COLUMN}{number}": rf"{_NUMBER} *{_UNIT}?" for number in range(1, 10)}
+FORMATS = f"{AUTO}, {', '.join(sorted(PATTERNS))}, {COLUMN}1 to {COLUMN}9, or a regular expression with (?P<value>...)"
 OVERLOADED = re.compile(
     r"(?:OL|UL) *,.*|.*\b(?:OL|UL|OFL|UFL|OVER|UNDER|OVERLOAD|UNDERLOAD|OUT OF RANGE|E?RR?[ -]?\d+)\b.*"
     r"|[^0-9]*[-_=^~]{4,}.*",
@@ -56,18 +58,14 @@ class LineFormat:
 
     def __init__(self, name: str) -> None:
         """Compiles the format; raises ValueError for an unknown one."""
-        self.name = name
-        self._column = 0
-        self._pattern = re.compile("")
-        if name in PATTERNS:
-            self._pattern = re.compile(PATTERNS[name], re.IGNORECASE)
-        elif re.fullmatch(rf"{COLUMN}[1-9]", name):
-            self._column = int(name[-1])
-            self._pattern = re.compile(rf"{_NUMBER} *{_UNIT}?", re.IGNORECASE)
-        elif "(?P<value>" in name:
-            self._pattern = _compiled(name)
-        else:
-            raise ValueError(f"format {name!r}: must be {describe_formats()}")
+        named = PATTERNS | COLUMNS
+        if name not in named and "(?P<value>" not in name:
+            raise ValueError(f"format {name!r}: must be {FORMATS}")
+        self.name, self._column = name, int(name[-1]) if name in COLUMNS else 0
+        try:
+            self._pattern = re.compile(named.get(name, name), re.IGNORECASE if name in named else 0)
+        except re.error as problem:
+            raise ValueError(f"format {name!r}: not a regular expression: {problem}") from problem
 
     def decode(self, line: bytes) -> Reading | None:
         """Returns the reading, or None where the line does not have this format."""
@@ -89,13 +87,6 @@ class LineFormat:
         return Reading(value, unit, at_end)
 
 
-def _compiled(pattern: str) -> re.Pattern[str]:
-    try:
-        return re.compile(pattern)
-    except re.error as problem:
-        raise ValueError(f"format {pattern!r}: not a regular expression: {problem}") from problem
-
-
 def _column(text: str, column: int) -> str:
     cells = [cell for cell in re.split(r"[,;\t ]+", text) if cell]
     return cells[column - 1] if column <= len(cells) else ""
@@ -108,10 +99,6 @@ def printable(line: bytes) -> str | None:
     except UnicodeDecodeError:
         return None
     return text if text and all(letter.isprintable() or letter == "\t" for letter in text) else None
-
-
-def describe_formats() -> str:
-    return f"{AUTO}, {', '.join(sorted(PATTERNS))}, {COLUMN}1 to {COLUMN}9, or a regular expression with (?P<value>...)"
 
 
 def find_format(lines: Sequence[bytes]) -> LineFormat | None:

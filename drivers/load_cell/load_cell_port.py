@@ -40,16 +40,13 @@ class LoadCellPort:
         samples = []
         for stamp_s, line in self.line.read_stamped(now_s):
             reading = self.line_format.decode(line)
-            self._count(line, reading)
+            self.lines += 1
             if reading is not None:
                 samples.append(self._sample(stamp_s, reading))
+            else:
+                self.malformed_lines += 1
+                self.last_malformed = printable(line[:60]) or repr(line[:30])[2:-1]
         return samples
-
-    def _count(self, line: bytes, reading: Reading | None) -> None:
-        self.lines += 1
-        if reading is None:
-            self.malformed_lines += 1
-            self.last_malformed = printable(line[:60]) or repr(line[:30])[2:-1]
 
     def _sample(self, stamp_s: float, reading: Reading) -> Sample:
         if reading.overloaded:

@@ -80,7 +80,7 @@ class Calibration:
                 self._read(step)
         except WarmError as problem:
             self._count(step, problem)
-            self.operator.report(f"{_name(step)} was not read: {problem}.")
+            self.operator.report(f"{step.name} was not read: {problem}.")
             self.weights.take_off()
         except (BenchError, CallRefusedError) as problem:
             self._recover(step, problem)
@@ -92,7 +92,7 @@ class Calibration:
         """Raise the problem after too many of them."""
         self.faults[step.key] += 1
         if self.faults[step.key] >= MOST_FAULTS:
-            raise BenchError(f"{_name(step)} of {self.joint} cannot be read: {problem}") from problem
+            raise BenchError(f"{step.name} of {self.joint} cannot be read: {problem}") from problem
 
     # the robot
 
@@ -125,7 +125,7 @@ class Calibration:
         if self._is_cool(step):
             return
         self.operator.report(
-            f"The {self.joint} winding has {self._winding_c():.0f} °C, too warm for {_name(step)}: waiting."
+            f"The {self.joint} winding has {self._winding_c():.0f} °C, too warm for {step.name}: waiting."
         )
         waited_s = 0.0
         while not self._is_cool(step):
@@ -158,7 +158,7 @@ class Calibration:
         if status["mode"] == "hold":
             raise problem
         self._count(step, problem)
-        self.operator.report(f"{_name(step)} was not read: {str(problem).rstrip('.')}.")
+        self.operator.report(f"{step.name} was not read: {str(problem).rstrip('.')}.")
         self.weights.take_off()
         self.held = None
 
@@ -186,11 +186,11 @@ class Calibration:
             except MovedError as problem:
                 trouble = str(problem)
             answers = {GO_ON: "read it again", SKIP: "skip it"}
-            question = f"{_name(step)} did not come to rest: {trouble}. Let it hang still and touch nothing."
+            question = f"{step.name} did not come to rest: {trouble}. Let it hang still and touch nothing."
             if self.operator.ask(question, answers, self._attend_hold) == SKIP:
                 break
         self.notebook.write(step.key, {"skipped": trouble})
-        self.operator.report(f"{_name(step)} of trial {step.reported_trial} is left out: {trouble}.")
+        self.operator.report(f"{step.name} of trial {step.reported_trial} is left out: {trouble}.")
         return None
 
     def _measure_friction(self) -> Sequence[Loop]:
@@ -208,12 +208,12 @@ class Calibration:
         if mismatch.other_g is not None:
             answers[OTHER] = f"it was the {mismatch.other_g:g} g"
         self.mismatches[step.key] += 1
-        question = f"{_name(step)}: {mismatch.message}"
+        question = f"{step.name}: {mismatch.message}"
         answer = self.operator.ask(question, answers, self._attend)  # the reading counts even if the robot lets go
         if answer == OTHER and mismatch.other_g is not None:
             other = replace(step, weight_g=mismatch.other_g)
             if other.key in self.notebook.entries:
-                self.operator.report(f"{_name(other)} of trial {step.trial} was read already and is not replaced.")
+                self.operator.report(f"{other.name} of trial {step.trial} was read already and is not replaced.")
             else:
                 self._keep(other, reading)
         elif answer == KEEP or self.mismatches[step.key] >= MOST_REPEATS:
@@ -223,7 +223,7 @@ class Calibration:
         self.notebook.write(step.key, entry_of(reading, doubt, loops))
         held_nm = self.constant_nm_a * reading.current_a
         self.operator.report(
-            f"{self.joint}, trial {step.reported_trial}, {_name(step)}: {reading.current_a:+.3f} A,"
+            f"{self.joint}, trial {step.reported_trial}, {step.name}: {reading.current_a:+.3f} A,"
             f" {held_nm:+.4f} N·m by the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
         )
 
@@ -241,7 +241,3 @@ def entry_of(reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> d
     }
     entry |= {"loops": [loop._asdict() for loop in loops]} if loops else {}
     return entry | ({"doubt": doubt} if doubt else {})
-
-
-def _name(step: Step) -> str:
-    return f"{step.weight_g:g} g" if step.weight_g else "the empty arm"

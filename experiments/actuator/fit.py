@@ -219,7 +219,8 @@ def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_n
     loads = [load for load in loads_of(plan, entries) if not load.doubtful]
     if not can_fit(loads):
         return None
-    empty = _of_empty_arm(plan, entries)
+    tares = (step for step in steps_of(plan) if not step.weight_g)
+    empty = [entries[step.key] for step in tares if _tare_a(entries, step.trial) is not None]  # at least one
     fit = JointFit(
         joint,
         tuple(loads),
@@ -236,12 +237,6 @@ def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_n
     )
     constants = {trial: fit.constant_without(trial) for trial in {load.trial for load in loads}}
     return fit._replace(rmse_fitted_nm=_rmse(loads, lambda load: constants[load.trial] * load.current_a))
-
-
-def _of_empty_arm(plan: Plan, entries: Mapping[str, Entry]) -> list[Entry]:
-    """Return the entries that count as tare; at least one where there are loads."""
-    empty = (step for step in steps_of(plan) if not step.weight_g)
-    return [entries[step.key] for step in empty if _tare_a(entries, step.trial) is not None]
 
 
 def _rmse(loads: Sequence[Load], sensed_nm: Callable[[Load], float]) -> float:

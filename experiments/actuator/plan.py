@@ -66,6 +66,10 @@ class Step:
         return f"trial {self.trial}, {self.weight_g:g} g"
 
     @property
+    def name(self) -> str:
+        return f"{self.weight_g:g} g" if self.weight_g else "the empty arm"
+
+    @property
     def reported_trial(self) -> int:
         """The trial as people count: the first tare is part of the first pass."""
         return max(self.trial, 1)

@@ -146,16 +146,13 @@ def make_sections(plan: Plan, readings: Readings, fits: Sequence[JointFit]) -> l
     if omitted:
         rows = [[row.joint, str(row.trial), f"{row.weight_g:g} g", row.why] for row in omitted]
         sections.append(Section("Left out", rows=[["joint", "trial", "weight", "why"], *rows]))
-    return [*sections, Section("What to set where", SETTING), Section("How it was measured", _method(plan))]
-
-
-def _method(plan: Plan) -> str:
-    return METHOD.format(
+    method = METHOD.format(
         lever_mm=1000.0 * plan.lever_tolerance_m,
         weight_percent=100.0 * plan.weight_tolerance,
         lever_cm=100.0 * plan.lever_m,
         millimetre_percent=0.1 / plan.lever_m,
     )
+    return [*sections, Section("What to set where", SETTING), Section("How it was measured", method)]
 
 
 def constant_rows(fits: Sequence[JointFit]) -> Rows:

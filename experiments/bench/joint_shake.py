@@ -19,7 +19,6 @@ from math import nan
 
 from control.rate import PERIOD_S
 from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
-from experiments.bench.reading import Reading
 from experiments.bench.test_rig import TestRig, torque_on
 from experiments.robot.bench_robot import BenchError
 
@@ -94,7 +93,3 @@ def _is_punctual(test_rig: TestRig, joint: str, law: Shake) -> bool:
 def idle(held: Torques, states: DriveStates) -> Torques:
     """A hold law: no torque, in closed loop."""
     return NO_TORQUE
-
-
-def answer_reading(joint: str, law: Shake) -> Reading:
-    return Reading(f"{joint}: answer to a shake", law.answer_rad, "rad", law.least_rad, 1.0, ADVICE)

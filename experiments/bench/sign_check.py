@@ -12,8 +12,8 @@ from math import nan, radians
 
 from control.controller import measured_angles
 from control.rate import PERIOD_S
-from control.records import JOINTS, NO_TORQUE, DriveStates, JointAngles, Joints, Torques
-from experiments.bench.joint_shake import answer_reading, idle, shake_joint
+from control.records import JOINTS, NO_TORQUE, DriveStates, Joints, Torques
+from experiments.bench.joint_shake import ADVICE, idle, shake_joint
 from experiments.bench.operator import MOTIONS, Observation
 from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.test_rig import Sample, TestRig, torque_on
@@ -54,7 +54,7 @@ def check_nudge(test_rig: TestRig, joint: str) -> Readings:
     index = JOINTS.index(joint)
     test_rig.arm(idle)
     shaken = shake_joint(test_rig, joint)
-    yield answer_reading(joint, shaken)
+    yield Reading(f"{joint}: answer to a shake", shaken.answer_rad, "rad", shaken.least_rad, 1.0, ADVICE)
     if not shaken.answered:
         test_rig.switch_off()
         return
@@ -105,7 +105,8 @@ def check_shown_motion(test_rig: TestRig, joint: str) -> Readings:
     test_rig.arm(hold_gently)
     here = measured_angles(test_rig.run_for(test_rig.configuration.motion.fade_in_s)[-1].states)
     bench_operator.start_observing()
-    test_rig.move([_with(here, index, SHOWN_RAD)], SHOWING_RAD_S, hold_gently)
+    there = Joints(*(angle_rad + SHOWN_RAD * (index == other) for other, angle_rad in enumerate(here)))
+    test_rig.move([there], SHOWING_RAD_S, hold_gently)
     test_rig.run_for(0.3)
     bench_operator.observe_farthest()
     test_rig.move([here], SHOWING_RAD_S, hold_gently)
@@ -117,7 +118,3 @@ def check_shown_motion(test_rig: TestRig, joint: str) -> Readings:
         yield left_out(what)
         return
     yield Reading(what, observation is Observation.RIGHT, "", 1, 1, observation.value.format(joint=joint))
-
-
-def _with(angles: JointAngles, index: int, more_rad: float) -> JointAngles:
-    return Joints(*(angle + more_rad * (index == other) for other, angle in enumerate(angles)))

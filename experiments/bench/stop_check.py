@@ -17,7 +17,7 @@ from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, 
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS, DriveStates, JointAngles, Joints, Phase, Torques
+from control.records import JOINTS, JointAngles, Joints, Phase
 from drivers.drive import DriveParameters
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
@@ -76,14 +76,11 @@ def check_damping(test_rig: TestRig) -> Readings:
             lambda sample: _is_fast(sample, FULL_FRACTION * FAST_RAD_S), 2.0, "The full speed of a sweep"
         )[-1]
         begun = measured_angles(test_rig.loop.states)
-        test_rig.controller.hold_law = lambda held, states: _brake(test_rig, states)
+        gains = test_rig.configuration.gains
+        test_rig.controller.hold_law = lambda held, states: damping_torques_nm(states, gains, ALL_TRUSTED, DAMPING_NM)
         samples = test_rig.run_for(2.0 * DAMPED_REST_S)
         test_rig.hold_present_pose()
     yield from _sweep_readings("damping", last, samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
-
-
-def _brake(test_rig: TestRig, states: DriveStates) -> Torques:
-    return damping_torques_nm(states, test_rig.configuration.gains, ALL_TRUSTED, DAMPING_NM)
 
 
 def check_torque_off(test_rig: TestRig) -> Readings:
@@ -138,18 +135,13 @@ def _sweep_readings(
     farthest_deg: float,
     advice: str = BRAKES,
 ) -> Readings:
-    rest_s = PERIOD_S * ticks_until(first_slow(samples), last)
+    slow = [all(abs(sample.states[index].velocity_rad_s) < REST_RAD_S for index in SWEEPS) for sample in samples]
+    first = first_lasting(slow, REST_TICKS)
+    rest_s = PERIOD_S * ticks_until(None if first is None else samples[first], last)
     yield Reading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, advice)
     for index, side in zip(SWEEPS, ("left", "right"), strict=True):
         path_deg = degrees(max(abs(sample.states[index].angle_rad - begun[index]) for sample in samples))
         yield Reading(f"{name}: travel of the {side} sweep", path_deg, "deg", 0.0, farthest_deg, advice)
-
-
-def first_slow(samples: Sequence[Sample]) -> Sample | None:
-    """Return the first sample from which all sweeps stay slow."""
-    slow = [all(abs(sample.states[index].velocity_rad_s) < REST_RAD_S for index in SWEEPS) for sample in samples]
-    first = first_lasting(slow, REST_TICKS)
-    return None if first is None else samples[first]
 
 
 def ticks_until(sample: Sample | None, last: Sample) -> float:

@@ -132,13 +132,10 @@ def order_strides(test_rig: TestRig, count: int) -> None:
 def walk(test_rig: TestRig) -> list[Sample]:
     """Walk and return to HOLD."""
     order_strides(test_rig, STRIDES)
-    longest_s = 2.0 * STRIDES * _stride_s(test_rig) + 10.0
+    stride_s = stride_duration_s(test_rig.configuration.gait, test_rig.configuration.geometry, WALK_DEPTH_M)
     test_rig.run_until(lambda sample: sample.mode is Mode.WALKING, 1.0, "The walk")
+    longest_s = 2.0 * STRIDES * stride_s + 10.0
     return test_rig.run_until(lambda sample: sample.mode is Mode.HOLD, longest_s, "The end of the walk")
-
-
-def _stride_s(test_rig: TestRig) -> float:
-    return stride_duration_s(test_rig.configuration.gait, test_rig.configuration.geometry, WALK_DEPTH_M)
 
 
 def _walk_readings(test_rig: TestRig, walked: Sequence[Sample]) -> Readings:

@@ -39,14 +39,8 @@ def check_ids(test_rig: TestRig) -> Readings:
     """Check that every drive is heard under its id on its bus."""
     for joint, drive in test_rig.configuration.drive.items():
         rate_hz = _messages_of(test_rig, drive.bus, drive.node_id) / test_rig.rig.overheard.duration_s
-        yield Reading(
-            f"{joint}: messages of node {drive.node_id} on {drive.bus}",
-            rate_hz,
-            "Hz",
-            1.0,
-            inf,
-            _whereabouts(test_rig, drive),
-        )
+        what = f"{joint}: messages of node {drive.node_id} on {drive.bus}"
+        yield Reading(what, rate_hz, "Hz", 1.0, inf, _whereabouts(test_rig, drive))
 
 
 def _messages_of(test_rig: TestRig, bus: str, node_id: int) -> int:
@@ -120,33 +114,24 @@ def check_bus_loads(test_rig: TestRig) -> Readings:
     for name, bus in test_rig.configuration.bus.items():
         drives = [drive for drive in test_rig.configuration.drive.values() if drive.bus == name]
         commands = [type_of(drives).command for _ in drives]
-        bits_s = sum(_bits(frame) for frame in overheard.frames[name]) / overheard.duration_s
+        frames = overheard.frames[name]  # an extended identifier has 20 bits more
+        bits_s = sum(frame_bits(len(frame.data))[1] + 20 * frame.is_extended for frame in frames) / overheard.duration_s
         bits_s += sum(command.rate_hz * frame_bits(command.data_bytes)[1] for command in commands)
         fraction = bits_s / (1e3 * bus.bit_rate_kbit_s)
         reported = bus_load(traffic_of(drives), 1e3 * bus.bit_rate_kbit_s)
-        advice = (
-            f"its drives should cause {reported}: remove other senders, or raise the bit rate or the message periods"
-        )
+        advice = f"its drives should cause {reported}: remove other senders, or raise bit rate or message periods"
         yield Reading(f"{name}: load with commands", 100.0 * fraction, "%", 0.0, 100.0 * MOST_FRACTION, advice)
-
-
-def _bits(frame: Frame) -> int:
-    """An extended identifier has 20 bits more."""
-    return frame_bits(len(frame.data))[1] + 20 * frame.is_extended
 
 
 def check_firmware(test_rig: TestRig) -> Readings:
     """Check that the firmware version is supported."""
     _ask(test_rig, lambda health: bool(health.firmware))
     for health in test_rig.drives.health:
-        version, supported = _major_and_minor(health.firmware), float(health.supported_firmware)
+        # 0.6 of version 0.6.11; NaN where it is unknown
+        version = float(".".join(health.firmware.split(".")[:2])) if health.firmware else nan
+        supported = float(health.supported_firmware)
         advice = f"install firmware {supported}; where it is unknown, see whether requests arrive"
         yield Reading(f"{health.joint}: firmware", version, "", supported, supported, advice)
-
-
-def _major_and_minor(version: str) -> float:
-    """0.6 of version 0.6.11; NaN where it is unknown."""
-    return float(".".join(version.split(".")[:2])) if version else nan
 
 
 def _ask(test_rig: TestRig, known: Callable[[DriveHealth], bool]) -> None:

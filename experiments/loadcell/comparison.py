@@ -12,6 +12,7 @@ from experiments.loadcell.analysis.coefficients import COEFFICIENTS, MudCoeffici
 from experiments.reports.mud_names import mud_key, mud_text
 from experiments.reports.text_tables import Rows
 from experiments.reports.value_text import N_CM3, miss_text, value_text
+from experiments.robot.bench_errors import BenchError
 from experiments.trials.load_cell_truth import TrueCoefficients
 
 OTHER_PLATE = (
@@ -43,19 +44,15 @@ class Compared(NamedTuple):
         return self.ratio * hypot(self.sensed_std_error / self.sensed, self.truth_std_error / self.truth)
 
 
-class CompareError(Exception):
-    """The flipper's results cannot be read; the text says why."""
-
-
 def load_flipper(path: Path) -> dict[str, Any]:
-    """Read the summary of a flipper experiment, or the one in a folder. Raises CompareError, OSError."""
+    """Read the summary of a flipper experiment, or the one in a folder. Raises BenchError, OSError."""
     path = path / "summary.json" if path.is_dir() else path
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as problem:
-        raise CompareError(f"{path} is no summary of an experiment: {problem}") from problem
+        raise BenchError(f"{path} is no summary of an experiment: {problem}") from problem
     if not isinstance(summary, dict) or not isinstance(summary.get("muds"), list):
-        raise CompareError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
+        raise BenchError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
     return summary
 
 

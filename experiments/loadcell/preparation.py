@@ -188,13 +188,11 @@ def check_rate(recorder: CellRecorder, operator: Operator, settings: StageSettin
         raise BenchError("too few lines arrive to measure their rate: check the amplifier")
     duration_s = settings.depth_m / settings.speed_m_s
     samples = rate_hz * duration_s
-    if samples >= LEAST_SAMPLES:
-        return
-    slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
-    operator.report(
-        f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has only {samples:.0f} samples "
-        f"and needs {LEAST_SAMPLES}. Set an HX711's RATE pin high (80 samples/s), choose a faster rate of the "
-        f"indicator, or move the stage at --speed {slower_m_s:.2g}"
-    )
-    if operator.ask("Continue with this amplifier?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
-        raise BenchError("stopped: the amplifier is too slow for the stroke")
+    if samples < LEAST_SAMPLES:
+        slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
+        operator.report(
+            f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has {samples:.0f} samples "
+            f"and needs {LEAST_SAMPLES}. Choose a faster rate (an HX711's RATE pin high), or --speed {slower_m_s:.2g}"
+        )
+        if operator.ask("Continue with this amplifier?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+            raise BenchError("stopped: the amplifier is too slow for the stroke")

@@ -31,10 +31,7 @@ ABSENCE_S = 300.0  # longest time for which the amplifier may be unplugged
 CONTACT_SAMPLES = 3  # in a row away from zero
 AVERAGED_CORRELATION = 0.6  # of successive samples, each a mean over three conversions
 LEAST_CORRELATED, LEAST_VALUES = 40, 8  # samples, and different values, for a correlation
-AVERAGED = (
-    "the cell's samples at rest hardly differ from one to the next: its amplifier averages several conversions, which "
-    "smears the strokes. Set its filter to the fastest, or move the stage more slowly"
-)
+AVERAGED = "the amplifier averages several conversions, which smears the strokes: set its filter to the fastest"
 FOLLOWING = 0.01  # gain per sample of the tracking of a drifting zero
 
 
@@ -135,21 +132,15 @@ class CellRecorder:
         forces_n = self._steady_forces_n()
         if len(forces_n) < 4 and not self.port.line.is_there:
             forces_n = self._steady_forces_n()
+        if len(forces_n) < 4 and self.port.overloads and self.port.arrivals.readable > 0.5:
+            raise BenchError("the load cell reports an overload with nothing on it: check its mounting and its wires")
         if len(forces_n) < 4:
-            raise BenchError(self._why_silent())
+            raise BenchError(f"no samples arrive from {self.port.line.path}: check the amplifier's power and cable")
         return Tare(float(np.mean(forces_n)), noise_of(np.array(forces_n)), len(forces_n), correlation(forces_n))
 
     def _steady_forces_n(self) -> list[float]:
         self.drain()
         return [sample.force_n for sample in self.listen(TARE_S) if not sample.overloaded]
-
-    def _why_silent(self) -> str:
-        if self.port.overloads and self.port.arrivals.readable > 0.5:
-            return "the load cell reports an overload with nothing on it: check its mounting and its wires"
-        return (
-            f"no samples arrive from {self.port.line.path}: check the amplifier's power and cable, and that it sends "
-            "without being asked"
-        )
 
     def record(self, noise_n: float, patience_s: float, stroke_s: float) -> StrokeRecording:
         """Record until `stroke_s` after the contact, or until the patience ends without a contact."""

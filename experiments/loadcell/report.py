@@ -118,15 +118,13 @@ def coefficient_rows(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> list[l
     head = ["mud"]
     for name in COEFFICIENTS:
         head += [f"{name} (N/cm³)", "repeatability"]
-    return [head, *([mud_text(mud), *_cells(coefficients)] for mud, coefficients in muds.items())]
-
-
-def _cells(coefficients: Mapping[str, MudCoefficient]) -> list[str]:
-    cells = []
-    for each in (coefficients[name] for name in COEFFICIENTS):
-        cells.append(value_text(each.value, each.trials_error, each.shared_error, per=N_CM3))
-        cells.append(repeatability_text(each.repeatability, len(each.trials)))
-    return cells
+    rows = [head]
+    for mud, coefficients in muds.items():
+        rows.append([mud_text(mud)])
+        for each in (coefficients[name] for name in COEFFICIENTS):
+            rows[-1].append(value_text(each.value, each.trials_error, each.shared_error, per=N_CM3))
+            rows[-1].append(repeatability_text(each.repeatability, len(each.trials)))
+    return rows
 
 
 def trial_rows(trials: Sequence[AnalysedTrial]) -> list[list[str]]:
@@ -137,15 +135,11 @@ def trial_rows(trials: Sequence[AnalysedTrial]) -> list[list[str]]:
         cells = ["" if each is None else value_text(each.value, each.std_error, per=N_CM3) for each in estimates]
         speed = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
         label = f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"
-        rows.append([label, *cells, speed, _farthest(trial), trial.problem or trial.remark])
+        farthest = "-"  # the depth of an insertion, or the travel of a shear
+        if trial.positions_m is not None:
+            farthest = value_text(100.0 * float(np.nanmax(trial.positions_m)), 100.0 * trial.position_error_m)
+        rows.append([label, *cells, speed, farthest, trial.problem or trial.remark])
     return [head, *rows]
-
-
-def _farthest(trial: AnalysedTrial) -> str:
-    """Return the depth of an insertion, or the travel of a shear."""
-    if trial.positions_m is None:
-        return "-"
-    return value_text(100.0 * float(np.nanmax(trial.positions_m)), 100.0 * trial.position_error_m)
 
 
 def compared_rows(compared: Sequence[Compared]) -> list[list[str]]:

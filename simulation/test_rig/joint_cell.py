@@ -66,13 +66,10 @@ class JointCell:
         for step in range(1, steps + 1):
             self._depth_m = from_m + path_m * step / steps
             curve.moments_nm.append(self._turn(self._angle_at_rad(self._depth_m), speed_m_s))
-            curve.moments_m4.append(self._leverage_m4())
+            plate = submerged_plate(self._geometry, self._sweep_rad, self._adduction_rad, self._surface_m)
+            curve.moments_m4.append(stroke_moment_m4(self._geometry, plate, self._sweep_rad))
             curve.depths_m.append(self._depth_m)
         return curve
-
-    def _leverage_m4(self) -> float:
-        plate = submerged_plate(self._geometry, self._sweep_rad, self._adduction_rad, self._surface_m)
-        return stroke_moment_m4(self._geometry, plate, self._sweep_rad)
 
     def hold(self, hold_s: float) -> None:
         for _ in range(round(hold_s / HOLD_STEP_S)):

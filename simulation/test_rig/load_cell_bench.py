@@ -32,7 +32,6 @@ from simulation.test_rig.stage_motion import ManualMotionParameters
 STEP_S = 0.01
 RELAXATION = 0.13  # fraction of the load that a hold loses, as in the authors' logs
 PAPER_PLATE = FlipperGeometry(plate_width_m=0.03, plate_height_m=0.035, plate_thickness_m=0.004)
-Event = tuple[float, Callable[[], None]]
 
 
 def clay_plate(water_percent: float, plate: FlipperGeometry = PAPER_PLATE) -> LoadCell:
@@ -41,7 +40,7 @@ def clay_plate(water_percent: float, plate: FlipperGeometry = PAPER_PLATE) -> Lo
 
 
 class EmulatedBench:
-    """Owns the time, and the `events` that happen at a set time."""
+    """Owns the time."""
 
     def __init__(
         self,
@@ -59,7 +58,6 @@ class EmulatedBench:
         if encoder is not None:
             encoder_link = link.with_name(f"{link.name}_position")
             self.encoder = EmulatedStageEncoder(self.stage.travelled_m, encoder, encoder_link, seed + 1)
-        self.events: list[Event] = []
         self._now_s = 0.0
         self.stage.mean_force_n(0.0)
 
@@ -70,15 +68,9 @@ class EmulatedBench:
         end_s = self._now_s + duration_s
         while self._now_s < end_s - 1e-9:
             self._now_s = min(self._now_s + STEP_S, end_s)
-            self._run_events()
             self.amplifier.step(self._now_s)
             if self.encoder is not None:
                 self.encoder.step(self._now_s)
-
-    def _run_events(self) -> None:
-        for event in [event for event in self.events if event[0] <= self._now_s]:
-            self.events.remove(event)
-            event[1]()
 
     def close(self) -> None:
         self.amplifier.close()

@@ -14,9 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.bench.channels import on_channels
 from experiments.bench.operator import BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
-from experiments.bench.rig import HardwareRig, Rig, SimulatedRig
+from experiments.bench.rig import HardwareRig, Rig, SimulatedRig, on_channels
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration

@@ -43,23 +43,18 @@ def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> 
 
 
 def _refine_measured(first: Sequence[AnalysedTrial], settings: StageSettings) -> list[AnalysedTrial]:
-    aligned = [trial.alignment for trial in first if trial.alignment is not None]
-    common = common_alignment(aligned)
-    pace = wide_pace(settings)
-    again = [analyse_trial(trial.recorded, settings, pace, common) if trial.is_measured else trial for trial in first]
-    return [
-        replace(trial, shared_uncertainty=hypot(trial.shared_uncertainty, _lag_uncertainty(trial, common, settings)))
-        if trial.is_measured
-        else trial
-        for trial in again
-    ]
+    common = common_alignment([trial.alignment for trial in first if trial.alignment is not None])
+    return [_realigned(trial, common, settings) if trial.is_measured else trial for trial in first]
 
 
-def _lag_uncertainty(trial: AnalysedTrial, common: Alignment, settings: StageSettings) -> float:
-    """Return the relative error of a coefficient from an error of the lag that all trials share."""
-    speed_m_s = trial.speed_m_s if isinstance(trial.motion, Insertion) else None
-    own_s = trial.alignment.lag_uncertainty_s if trial.alignment is not None else 0.0
-    return SHIFT * (speed_m_s or 0.0) * min(common.lag_uncertainty_s, own_s) / settings.depth_m
+def _realigned(trial: AnalysedTrial, common: Alignment, settings: StageSettings) -> AnalysedTrial:
+    """Analyse again, and add the relative error from the lag that all trials share."""
+    again = analyse_trial(trial.recorded, settings, wide_pace(settings), common)
+    if again.alignment is None or not isinstance(again.motion, Insertion):
+        return again
+    lag_s = min(common.lag_uncertainty_s, again.alignment.lag_uncertainty_s)
+    shared = SHIFT * again.motion.pace.speed_m_s * lag_s / settings.depth_m
+    return replace(again, shared_uncertainty=hypot(again.shared_uncertainty, shared))
 
 
 def _refine_by_force(first: list[AnalysedTrial], settings: StageSettings) -> list[AnalysedTrial]:

@@ -146,10 +146,7 @@ def _profile_remark(profile: Profile, motion: Insertion) -> str:
     largest_n = motion.jump_n + motion.rise_n
     if motion.residual_n <= max(RESIDUAL_NOISES * profile.noise_n, RESIDUAL_FRACTION * largest_n):
         return ""
-    return (
-        f"the force is {motion.residual_n:.3f} N off the curve of a stage of one speed: the stage stuttered, was moved "
-        "by hand, or the mud has lumps; the depth is uncertain"
-    )
+    return f"the force is {motion.residual_n:.3f} N off the curve of a stage of one speed: the depth is uncertain"
 
 
 def _k_p(profile: Profile, motion: Insertion, settings: StageSettings) -> Coefficient:
@@ -185,8 +182,7 @@ def slope(settings: StageSettings, depths_m: Array, forces_n: Array, to_m: float
     square = float(np.sum(travels_m * volumes_m3 * volumes_m3))
     if len(depths_m) < MIN_BATCHES or not square > 0.0:
         raise StrokeError(
-            "fewer than 4 samples in the mud: use a faster amplifier or a slower stage, and let the stage run at one "
-            "speed without a stop"
+            "fewer than 4 samples in the mud: use a faster amplifier or a slower stage that does not stop"
         )
     value = float(np.sum(travels_m * volumes_m3 * forces_n)) / square
     if value <= 0.0:
@@ -274,7 +270,4 @@ def speed_remark(pace: Pace, settings: StageSettings, bound: float = SPEED_BOUND
     ratio = pace.speed_m_s / settings.speed_m_s
     if abs(ratio - 1.0) <= max(bound, 2.0 * pace.speed_uncertainty):
         return ""
-    return (
-        f"the stage moved at {pace.speed_m_s:.3f} m/s, and {settings.speed_m_s:.3f} m/s was set: the depth follows the "
-        "measured speed, but mud resists more at a higher one; check the speed and the depth of the stage"
-    )
+    return f"the stage moved at {pace.speed_m_s:.3f} m/s, and {settings.speed_m_s:.3f} m/s was set: check both"

@@ -46,14 +46,10 @@ def find_contact(times_s: Array, forces_n: Array) -> Profile:
     largest_n = float(np.quantile(np.abs(forces_n - np.median(quiet_n)), 0.995))
     if largest_n < max(CONTACT_NOISES * noise_n, LEAST_FORCE_N):
         raise StrokeError(
-            f"no contact: the force stayed within {largest_n:.3f} N of its zero. Does the stage reach the mud, does "
-            "the cell measure along the stroke, and was the stage started in time?"
+            f"no contact: the force stayed within {largest_n:.3f} N of its zero. Was the stage started in time?"
         )
     if noise_n > RESTLESS_FRACTION * largest_n:
-        raise StrokeError(
-            f"the force was restless by {noise_n:.3f} N when the recording began: the stage was moving already, or it "
-            "shakes. Start it a second or two after the recording starts"
-        )
+        raise StrokeError(f"the force was restless by {noise_n:.3f} N: the stage was moving already, or it shakes")
     begin, level_n = _leaves_zero(times_s, forces_n, max(CONTACT_NOISES * noise_n, CONTACT_FRACTION * largest_n))
     turned = bool(np.median(forces_n[begin : begin + 6]) < level_n)
     sign = -1.0 if turned else 1.0

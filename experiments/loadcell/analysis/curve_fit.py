@@ -52,7 +52,10 @@ def fit_curve(
     point = _search(residuals, point, ROUNDS)
     remaining, factors = residuals(point)
     samples = remaining[: len(y)]
-    return CurveFit(point, _std_errors(residuals, point, remaining), factors, float(samples @ samples))
+    slopes = _slopes(residuals, point)
+    variance = float(remaining @ remaining) / max(len(remaining) - 2 * len(point), 1)
+    std_errors = np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(slopes.T @ slopes)), 0.0))
+    return CurveFit(point, std_errors, factors, float(samples @ samples))
 
 
 def cheaper_fit(plain: CurveFit, richer: CurveFit, factor: int, sign: float, price: float, samples: int) -> CurveFit:
@@ -98,9 +101,3 @@ def _slopes(residuals: Residuals, point: Array) -> Array:
     return np.stack(
         [(residuals(point + step)[0] - residuals(point - step)[0]) / (2.0 * DIFFERENCES) for step in steps], 1
     )
-
-
-def _std_errors(residuals: Residuals, point: Array, remaining: Array) -> Array:
-    slopes = _slopes(residuals, point)
-    variance = float(remaining @ remaining) / max(len(remaining) - 2 * len(point), 1)
-    return np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(slopes.T @ slopes)), 0.0))

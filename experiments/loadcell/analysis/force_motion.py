@@ -267,8 +267,7 @@ def find_shear(profile: Profile, settings: StageSettings, zero_n: float) -> Shea
     from_s = min(begin_s + 0.5 * stroke_s, (begin_s + to_s) / 2.0)
     if np.count_nonzero((times_s >= from_s) & (times_s <= to_s)) < 8 or plateau_n < LEAST_FORCE_N:
         raise StrokeError(
-            "no steady shear: the force fell before half of the travel. Was the stage started before the recording, or "
-            "is its travel shorter, or its speed higher, than the options say?"
+            "no steady shear: the force fell before half of the travel. Start the stage after the recording starts"
         )
     return Shear(begin_s, from_s, to_s, settings.shear_path_m / (stop_s - begin_s))
 

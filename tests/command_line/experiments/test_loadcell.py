@@ -13,7 +13,8 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 from experiments.loadcell.analysis.coefficients import MudCoefficient
-from experiments.loadcell.comparison import CompareError, compare_muds, load_flipper
+from experiments.loadcell.comparison import compare_muds, load_flipper
+from experiments.robot.bench_errors import BenchError
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
 from simulation.test_rig.load_cell import measure_shear
@@ -148,7 +149,7 @@ def test_a_missing_port_is_reported(tmp_path: Path, capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize("text", ["", "[1]", '{"muds": 3}'])
 def test_a_file_that_is_no_summary_is_refused_by_its_name(tmp_path: Path, text: str) -> None:
     (tmp_path / "summary.json").write_text(text)
-    with pytest.raises(CompareError, match="summary.json"):
+    with pytest.raises(BenchError, match="summary.json"):
         load_flipper(tmp_path)
 
 

@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 
 from control.records import JOINTS
-from experiments.bench.channels import on_channels
 from experiments.bench.operator import BenchOperator
 from experiments.bench.reading import Reading
-from experiments.bench.rig import HardwareRig, SimulatedRig, refuse_beside_daemon
+from experiments.bench.rig import HardwareRig, SimulatedRig, on_channels, refuse_beside_daemon
 from experiments.bench.sign_check import check_nudge
 from experiments.bench.test_rig import TestRig
 from experiments.bench.wiring_check import check_firmware, check_ids, check_unknown_ids, check_watchdogs

@@ -20,7 +20,7 @@ from experiments.loadcell.stage import SimulatedStage
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
 from experiments.trials.notebook import Notebook
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
-from simulation.test_rig.load_cell_bench import EmulatedBench, Event
+from simulation.test_rig.load_cell_bench import EmulatedBench
 from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
 from simulation.test_rig.stage_motion import ManualMotionParameters
 from tests.experiments.loadcell.lawful_mud import LawfulMud
@@ -29,6 +29,22 @@ from tests.scripted_operator import ScriptedOperator
 SETTINGS = StageSettings()
 KNOWN = {"k_p": 1.0e6, "k_s": 0.6e6, "k_e": 1.3e6}
 COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
+
+
+class EventfulBench(EmulatedBench):
+    """An emulated bench with events that happen at a set time."""
+
+    def __init__(self, *devices: Any) -> None:
+        self.events: list[tuple[float, Callable[[], None]]] = []
+        super().__init__(*devices)
+        self._step = self.amplifier.step
+        self.amplifier.step = self._happen_and_step  # type: ignore[method-assign]
+
+    def _happen_and_step(self, now_s: float) -> None:
+        for event in [event for event in self.events if event[0] <= now_s]:
+            self.events.remove(event)
+            event[1]()
+        self._step(now_s)
 
 
 class Laboratory:
@@ -52,7 +68,7 @@ class Laboratory:
         self.folder, self.operator = folder, operator
         if encoder is not None:
             stage = StageParameters(manual=ManualMotionParameters(), seed=seed)
-        self.bench = EmulatedBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
+        self.bench = EventfulBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
         self.port = LoadCellPort(
             str(folder / "cell"), baud, LineFormat(line_format), LoadCellCalibration("counts", 1.0)
         )
@@ -69,8 +85,7 @@ class Laboratory:
         )
 
     def at(self, after_s: float, happen: Callable[[], None]) -> None:
-        event: Event = (self.bench.now_s() + after_s, happen)
-        self.bench.events.append(event)
+        self.bench.events.append((self.bench.now_s() + after_s, happen))
 
     def measure(self, cell: CellSettings | None = None) -> None:
         prepare_cell(self.trial_bench, SETTINGS, cell or CellSettings())

@@ -16,8 +16,7 @@ from experiments.loadcell.evaluation import list_remarks
 from experiments.loadcell.preparation import CellSettings, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, correlation, load_counted
 from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
-from experiments.loadcell.trial_checks import list_problems
-from experiments.loadcell.trials import KEEP, measure, record
+from experiments.loadcell.trials import KEEP, list_problems, measure, record
 from experiments.robot.bench_robot import BenchError
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
