@@ -112,7 +112,7 @@ def test_strips_give_the_force_of_a_dense_sum(
     where suction begins to fade. At the first touch 2 mN are the dense sum's own doubt.
     """
     velocity_m_s = (0.08 * directions[0], 0.04 * directions[1], 0.06 * directions[2])
-    wrench = move(PlateContact(SIZE), Twist(*velocity_m_s), 0.5, attitude, clay)
+    wrench = move(PlateContact(SIZE), Twist(*velocity_m_s), 0.25, attitude, clay)
     dense = yielded_n(attitude, clay, velocity_m_s, 400)
     whole_n = sqrt(sum(force_n * force_n for force_n in dense[:3]))
     assert wrench[:3] == pytest.approx(dense[:3], abs=0.03 * whole_n + 2e-3)
@@ -139,7 +139,7 @@ def test_every_strip_has_the_strength_of_the_mud_at_its_own_depth(
     """
     velocity_m_s = (0.08 * directions[0], 0.04 * directions[1], 0.06 * directions[2])
     attitude = Attitude(depth_m, 0.0, 1.0)
-    wrench = move(PlateContact(SIZE), Twist(*velocity_m_s), 0.5, attitude, clay)
+    wrench = move(PlateContact(SIZE), Twist(*velocity_m_s), 0.25, attitude, clay)
     dense = yielded_n(attitude, clay, velocity_m_s, 400)
     whole_n = sqrt(sum(force_n * force_n for force_n in dense[:3]))
     slice_n = 9.0 * 6000.0 * SIZE.width_m * SIZE.height_m / 400
