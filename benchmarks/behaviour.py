@@ -9,8 +9,6 @@ deterministic, so `compare OLD NEW` accepts no difference in any digit. A name t
     python -m benchmarks.behaviour compare /tmp/old /tmp/new --renamed place_m=position_m
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

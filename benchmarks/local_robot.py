@@ -1,7 +1,5 @@
 """Runs the daemon and the simulated robot as processes on local buses, for benchmarks that kill or time them."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -5,8 +5,6 @@ reached. One of stress looks for defects and ends with status 1 where its bar is
 the progress.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Adds commands to the parser. All commands share this, and the options that find the daemon."""
 
-from __future__ import annotations
-
 import argparse
 import os
 from pathlib import Path

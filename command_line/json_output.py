@@ -4,8 +4,6 @@ A version only grows by keys. A key that changes its meaning or goes away makes 
 docs/reference/json.md describes each shape.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

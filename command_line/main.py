@@ -3,8 +3,6 @@
 The module of a command is imported only when the command is used, so `status` starts fast.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """Parses the values of options and refuses those outside their bounds, in the unit that the user typed."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from contextlib import suppress

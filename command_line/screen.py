@@ -1,7 +1,5 @@
 """Formats text for a terminal: tables, colours, progress. Piped output has no colours."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

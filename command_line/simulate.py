@@ -1,7 +1,5 @@
 """Runs `mudskipper simulate`: the simulated robot alone, for a daemon in another terminal."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

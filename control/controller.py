@@ -4,8 +4,6 @@ It owns the gait, the recovery of stuck flippers, and the paths into and out of 
 wants none. The limits decide which torques leave for the drives (control/limits.py).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import radians

@@ -5,8 +5,6 @@ while torque is on is latched: it stays at least until torque is off if its reac
 kind until an operator clears it or the daemon restarts. The modes see only the reaction of the worst present fault.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

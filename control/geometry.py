@@ -12,8 +12,6 @@ from the intersection of the axes, at the height H above the mud. The paper desc
 The published lengths disagree (0.115 m in the paper, 0.120 m in the controller): measure your robot.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, radians, sin, sqrt
 from typing import Annotated, NamedTuple

@@ -7,8 +7,6 @@ Direct-drive motors have little of either (the paper neglects both), so everythi
 is the torque that the motor loses at the angle θ and the velocity ω. The bounds suit motors of this size.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import radians, sin, tanh
 from typing import Annotated

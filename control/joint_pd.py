@@ -3,8 +3,6 @@
 The drives run in torque mode, so only this law and its limits move the robot.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, sin
 from typing import Annotated

@@ -5,8 +5,6 @@ Torque that would push a joint past its position limit is cut; near the velocity
 slew rate limits these reductions too. Only a torque that is not a number goes to zero at once.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import isfinite
 from typing import Annotated, NamedTuple

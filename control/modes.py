@@ -5,8 +5,6 @@ its reaction (faults.py), so a new fault needs no new row. The documentation's d
 Nothing arms by itself: torque needs the request `arm`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple

@@ -10,8 +10,6 @@ The exponent is learned too, and its error grows with the distance of the predic
 z₀ is the weighted mean of the strides' ln z: there the errors of ln k and m are independent, as the sum assumes.
 """
 
-from __future__ import annotations
-
 from math import exp, hypot, log
 from typing import NamedTuple
 

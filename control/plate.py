@@ -27,8 +27,6 @@ load across the face: see `cross_coupling`.) A plate that moves straight down in
 the same law, so a flipper and a load cell are comparable.
 """
 
-from __future__ import annotations
-
 from math import cos, sin, sqrt
 from typing import NamedTuple
 

@@ -4,7 +4,5 @@ Nothing else in the project states a rate or a period: the ticker, the limits, t
 log and the simulator derive theirs from here. `Loop` and `Lockstep` accept another period for tests.
 """
 
-from __future__ import annotations
-
 RATE_HZ = 380.0  # the rate at which the paper's robot logged and controlled
 PERIOD_S = 1.0 / RATE_HZ

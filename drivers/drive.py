@@ -9,8 +9,6 @@ Only `Drives` send commands on the drives' buses. Every frame passes a gate (dri
 and counts any command that the limits forbid.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil

@@ -3,8 +3,6 @@
 All drives of a robot are of one type.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from control.limits import JointLimits

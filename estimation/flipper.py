@@ -6,8 +6,6 @@ surface (surface.py) and fits k_p; when the stride closes it fits k_e (stroke_fi
 the fits need no third force component, which two torques cannot determine; forces are mapped for display only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, hypot, sin
 

@@ -14,8 +14,6 @@ The paper's map (section II-C) is rows x and z of J / l² at h = 0:
     f_x = cos α τ₁ / l          f_z = (-sin β sin α τ₁ + cos β cos α τ₂) / l
 """
 
-from __future__ import annotations
-
 from math import cos, sin
 
 from control.geometry import FlipperGeometry

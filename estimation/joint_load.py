@@ -14,8 +14,6 @@ errs by up to half of it: in a walk's quick extraction from soft mud, by a seven
 current separately, and faster or slower than the loop, so each has its own stamp.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, isfinite, sin
 from typing import NamedTuple

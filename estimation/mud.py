@@ -5,8 +5,6 @@ same samples give the same numbers to the last digit, live or from a log. Two me
 torque space, and `paper`, the published one, with its biases.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 

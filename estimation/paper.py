@@ -11,8 +11,6 @@ are fitted by least squares with a few running sums each, and closed when swing 
 mud the paper adds the body's drag to f_x; with `compensation`, half of it is added to each flipper's force.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 
 from control.geometry import FlipperGeometry

@@ -6,8 +6,6 @@ while the age is at most half of `now_s` (Sterbenz's lemma), and an age of infin
 moments of a clock that starts at zero, as a simulation's does, may the last bit differ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from control.records import DriveState, DriveStates, Joints

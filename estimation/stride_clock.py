@@ -5,8 +5,6 @@ closes on the first sample of the next phase; a stride that rest interrupts does
 lie between its phases: after a recovery the following swing closes the stride.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from control.records import Phase

@@ -5,8 +5,6 @@ phases and strides, records the largest forces, and assembles the estimate of a 
 extraction. The methods are `FlipperEstimator` (flipper.py) and `PaperEstimator` (paper.py).
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import isfinite

@@ -1,7 +1,5 @@
 """Opens the CAN buses that the configuration names."""
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable, Mapping
 from functools import partial

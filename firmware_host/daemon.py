@@ -6,8 +6,6 @@ ends in one handler, which idles the drives, reports the exception, and exits wi
 again, disarmed.
 """
 
-from __future__ import annotations
-
 import argparse
 import errno
 import os

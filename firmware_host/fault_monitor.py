@@ -3,8 +3,6 @@
 It only detects. The latch decides how long a fault is present, and the modes decide how the robot reacts.
 """
 
-from __future__ import annotations
-
 from math import isnan
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ present faults and the last command. Its parts are public for the daemon and for
 reads takes a snapshot (loop_snapshot.py).
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 

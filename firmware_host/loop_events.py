@@ -4,8 +4,6 @@ The notice answers a later `status`: why the robot stopped, or that its torque w
 robot is moved again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from math import inf
 

@@ -3,8 +3,6 @@
 Trouble of the log does not stop a robot that moves; a log that cannot be written blocks arming.
 """
 
-from __future__ import annotations
-
 from collections import deque
 
 from control.faults import Fault, FaultKind

@@ -3,8 +3,6 @@
 `take_snapshot` builds it on demand; the status socket, the checks before arming, experiments and tests read it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from control.faults import Fault

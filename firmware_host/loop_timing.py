@@ -1,7 +1,5 @@
 """Measures the loop's timing in histograms with buckets of one microsecond, so percentiles are exact to that."""
 
-from __future__ import annotations
-
 from array import array
 from typing import Any
 

@@ -4,8 +4,6 @@ Each sample goes to the estimator together with the phase in which the measured 
 Once a stride, in swing, the depth of the next stride is chosen. An insertion that meets solid mud ends early.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Opens the source of the body's pose that the configuration names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from drivers.pose.natnet_port import NatNetPort

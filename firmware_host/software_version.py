@@ -1,7 +1,5 @@
 """The version and the git commit of this software, which every log carries."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, distribution, version

@@ -5,8 +5,6 @@ is missed by a whole period or more is skipped and counted, and no tick makes up
 one stale sample are worse than a gap.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Logs as numpy arrays, and their replay."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ ticks of the loop without a recorder. The robot walks the paper's track adaptive
 simulated seconds at most; arming is not counted. The figure of a round is simulated time over elapsed time.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from statistics import median

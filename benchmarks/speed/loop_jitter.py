@@ -8,8 +8,6 @@ deadline shows as more than a period. Start and first stride of the daemon are o
 the median of those of the turns.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 import time

@@ -11,8 +11,6 @@ Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of
 of one mark, some 0.2 us; whole ticks carry one reading of the clock.
 """
 
-from __future__ import annotations
-
 import sys
 from contextlib import ExitStack
 from pathlib import Path

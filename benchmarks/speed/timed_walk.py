@@ -1,7 +1,5 @@
 """A robot that walks in lockstep over given wiring, with its ticks timed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise

@@ -4,8 +4,6 @@ SocketCAN is python-can's SocketcanBus on one end of a datagram pair, so no CAN 
 kernel's CAN code and the driver is in no figure. The options of a CAN_RAW socket, such as filters, have no effect.
 """
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager

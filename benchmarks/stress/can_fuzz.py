@@ -7,8 +7,6 @@ be raised, resident memory must not grow, and the only frames that may leave for
 requests for version and settings.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path

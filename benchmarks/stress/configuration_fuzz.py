@@ -7,8 +7,6 @@ arms, holds, walks for a while and disarms. Such a robot may refuse to arm (its 
 example), but no tick may raise an exception, and a disarmed robot may send no frame that moves a drive.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import traceback

@@ -6,8 +6,6 @@ double none, and must write a complete log. Memory is the process's peak above t
 the largest log; the slowest log shows whether anything hangs.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import traceback

@@ -6,8 +6,6 @@ machine too. Only the drives' watchdogs can end the torque. A stopped daemon is 
 robot again; the third node checks that as well.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 import time

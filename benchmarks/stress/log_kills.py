@@ -6,8 +6,6 @@ mcap-ros2-support. Ticks are numbered and count the missed ones, so a missing or
 of the last row shows how much is missing at the end.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

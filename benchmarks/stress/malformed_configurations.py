@@ -5,8 +5,6 @@ a refusal must name. A fraction of the files is valid field by field, so they ar
 contradict one another.
 """
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 Each begins with valid requests, which must be answered whether or not the rest is valid.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from random import Random
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The resources of a process, as the kernel counts them: resident memory, descriptors, threads, children."""
 
-from __future__ import annotations
-
 import os
 import resource
 from pathlib import Path

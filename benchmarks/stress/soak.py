@@ -11,8 +11,6 @@ file that is being written, and the files that the quota has preserved must cont
 allocations; a collection at the end counts the cyclic garbage.
 """
 
-from __future__ import annotations
-
 import gc
 import select
 import sys

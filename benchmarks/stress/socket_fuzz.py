@@ -8,8 +8,6 @@ programs do not count. Memory is that of the whole process with garbage collecti
 times; the growth is that of the second half, because the walking robot fills its bounded lists in the first.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections import Counter

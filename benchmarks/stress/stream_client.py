@@ -1,7 +1,5 @@
 """A client of the status socket that sends any bytes, piece by piece, and never waits."""
 
-from __future__ import annotations
-
 import socket
 from contextlib import suppress
 from pathlib import Path

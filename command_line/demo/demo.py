@@ -3,8 +3,6 @@
 It uses the interfaces that operators and their programs use, and ends with a summary, a plot and the log.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

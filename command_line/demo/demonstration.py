@@ -4,8 +4,6 @@ Both processes run in sessions of their own, so Ctrl-C reaches only this program
 daemon needs the robot to stop in order. Their files are in a folder that is removed afterwards.
 """
 
-from __future__ import annotations
-
 import shutil
 import signal
 import subprocess

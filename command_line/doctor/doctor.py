@@ -3,8 +3,6 @@
 Each check is one line with its fix. Nothing is transmitted: `check` listens whether the drives are heard.
 """
 
-from __future__ import annotations
-
 import argparse
 import grp
 import json

@@ -1,7 +1,5 @@
 """`mudskipper experiment actuator`: from its options to an order for the calibration."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

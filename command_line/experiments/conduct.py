@@ -4,8 +4,6 @@ An interrupted experiment stops its robot first. Its folder holds the trials tha
 continues from there.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

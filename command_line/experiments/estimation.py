@@ -1,7 +1,5 @@
 """`mudskipper experiment estimation`: its plan from the command line."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace

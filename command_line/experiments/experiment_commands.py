@@ -1,7 +1,5 @@
 """The parsers of `mudskipper experiment NAME`."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`mudskipper experiment loadcell`: from its options to a plan and the settings of the bench."""
 
-from __future__ import annotations
-
 import argparse
 import os
 

@@ -1,7 +1,5 @@
 """`mudskipper experiment flipper` and `walk`: trials in mud, on hardware or simulated."""
 
-from __future__ import annotations
-
 import argparse
 
 from command_line.experiments.conduct import conduct_bench, refuse

@@ -4,8 +4,6 @@ A terminal's input is discarded before each question: a second Enter, pressed to
 the hands are out of the mud. A file or a pipe holds nothing but answers, so all of it counts.
 """
 
-from __future__ import annotations
-
 import math
 import select
 import sys

@@ -1,7 +1,5 @@
 """`mudskipper experiment trackway`, `sweep` and `mud-fit`: their plans from the command line."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 

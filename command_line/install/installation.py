@@ -1,7 +1,5 @@
 """`mudskipper install` and `uninstall`: print the planned steps, do them, and report how many were done."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

@@ -7,8 +7,6 @@ counts as edited where its digest differs from the one in the manifest of the la
 written last, so an interrupted installation is repeated. The configuration always counts as edited.
 """
 
-from __future__ import annotations
-
 import json
 import shlex
 import sysconfig

@@ -1,7 +1,5 @@
 """Commands that read logs: replay, plot, film, info, export."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """Commands on the log folder: list, recover, preserve."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from shutil import disk_usage

@@ -1,7 +1,5 @@
 """`mudskipper log report`: makes a page of a log, with pictures and numbers, and a copy of the log next to it."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Turns the errors of the commands on logs into messages and exit statuses."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from functools import wraps

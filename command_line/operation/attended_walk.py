@@ -4,8 +4,6 @@ Ctrl-C stops the robot and waits until it holds. If this program dies or hangs f
 stops the robot.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from typing import Any

@@ -1,7 +1,5 @@
 """Runs `mudskipper fail`: makes a part of the robot fail on purpose, where its configuration allows that."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from typing import Any

@@ -3,8 +3,6 @@
 It imports the standard library and msgpack only, so these commands start fast.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time

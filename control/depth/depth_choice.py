@@ -19,8 +19,6 @@ continues at the depth commanded by then. (Under the stance's load the flipper s
 The drag pad's resistance k_s w d²/2 adds to the body's drag: w and d are its width and depth.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, Protocol

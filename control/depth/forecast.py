@@ -17,8 +17,6 @@ estimate, and elsewhere in proportion to depth (k_e Φ is nearly so); this is re
 there, or the mud changes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import exp, inf, isfinite, log, radians
 

@@ -15,8 +15,6 @@ The authors' swing takes 0.8 s, half of a stride at 3 cm; the simulated sweep jo
 and the estimated coefficients stay the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

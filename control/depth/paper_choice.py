@@ -12,8 +12,6 @@ limit measures no more than f_m, so its force cannot show that f_e is greater. T
 came out late and pulled the body back (or no pose excludes that) proves f_e ≥ f_m at its depth, until the mud changes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import inf
 

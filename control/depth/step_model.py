@@ -15,8 +15,6 @@ though a body that speeds up slowly still gets somewhere, and no spring, which i
 the authors' logs the sweep's force reaches its plateau with 300 to 700 N/m, the servo's give included.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import log1p, radians, sin
 from typing import NamedTuple

@@ -7,8 +7,6 @@ speed rises and falls as half a cosine, so joint velocities are continuous and z
 insertion that ends early, which stops within a tick).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, pi, radians, sin
 from typing import Annotated, NamedTuple

@@ -4,8 +4,6 @@ The controller uses it to reach the start of a stride and to raise the flippers 
 so it works from any pose that the joints can have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from control.gait.gait import smooth_progress

@@ -23,8 +23,6 @@ by no more, so that the flipper does not fly up. The swing begins where the reco
 targets fades out without a jump of position or velocity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import copysign, cos, radians, sin

@@ -6,8 +6,6 @@ sensor the second: on a wrong angle the position loop would drive the joint to i
 freezes while the joint rests shows in the velocity: a live velocity that is not zero does not repeat to the last bit.
 """
 
-from __future__ import annotations
-
 from math import degrees
 
 from control.faults import Fault, FaultKind

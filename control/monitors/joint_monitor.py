@@ -4,8 +4,6 @@
 a single sample cannot show. Bounds that depend on the machine are in FaultBounds, all others are constants here.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import degrees, isfinite, radians
 from typing import Annotated, NamedTuple

@@ -1,7 +1,5 @@
 """Measures how long a joint has been still, by its angle: a drive's velocity estimate is noisy even at rest."""
 
-from __future__ import annotations
-
 from math import inf, isfinite, isnan
 
 from control.records import UNKNOWN

@@ -10,8 +10,6 @@ low estimate: measure your motors. A sensor that reads higher corrects the model
 the model would take hours to cool from one absurd reading.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import isfinite
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Writes the reference of the command line from the parser that reads it."""
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Writes faults, modes and deliberate failures from the tables that the robot obeys."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from control.faults import Blocks, Clears, FaultKind, Reaction

@@ -1,7 +1,5 @@
 """Builds Markdown tables for the reference pages."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 

@@ -4,8 +4,6 @@ They are not checked in: a command, a configuration key, a fault or a log field 
 nowhere else. The pages of docs/reference include them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import MISSING
 from itertools import groupby

@@ -4,8 +4,6 @@ A data frame with an 11-bit identifier and n bytes is 47 + 8 n bits long, its th
 at most one bit in four of the 34 + 8 n that it covers (ISO 11898-1). The true load lies between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

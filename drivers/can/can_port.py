@@ -7,8 +7,6 @@ frames. Each frame is sent once. The kernel's cyclic transmission (BCM) is never
 watchdogs with an old command after this process has died.
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Iterable, Sequence

@@ -7,8 +7,6 @@ address, so readers check `is_error` first. A remote frame asks for data and car
 is dropped, because no drive here looks at it.
 """
 
-from __future__ import annotations
-
 import struct
 from typing import NamedTuple
 

@@ -10,8 +10,6 @@ the lost frames.
 `LocalLink` is the mesh of sockets, `LocalBus` its interface to python-can. Neither starts a thread.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os

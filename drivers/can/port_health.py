@@ -11,8 +11,6 @@ interface that was gone is back with any frame, including one from another proce
 virtual interface carries. The port that receives frames calls `on_frame` while it is off.
 """
 
-from __future__ import annotations
-
 import errno
 from enum import IntEnum
 from typing import NamedTuple

@@ -6,8 +6,6 @@ and only while the caller says that nothing moves. A port that was opened again 
 on it, because its controller may still be off the bus.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 

@@ -6,8 +6,6 @@ pyserial (write_timeout 0) may write half a line without reporting it, or retry 
 configures the device: one call reads everything that has arrived, and a line is written as a whole or refused.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 from typing import Any

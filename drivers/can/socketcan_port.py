@@ -11,8 +11,6 @@ The kernel delivers the frames that the drives listen to, and all error frames, 
 frames on the bus are neither received nor counted: `candump` shows them.
 """
 
-from __future__ import annotations
-
 import socket
 import struct
 import time

@@ -6,8 +6,6 @@ drive that the loop has disarmed. Node ids distinguish the drives. Without an ac
 a dictionary.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 from collections import deque

@@ -1,7 +1,5 @@
 """A pose source that injects failures into another one."""
 
-from __future__ import annotations
-
 from collections import deque
 from math import isfinite
 

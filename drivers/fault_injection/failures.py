@@ -7,8 +7,6 @@ wire: the `failing_*` classes ask `Failures` what fails and change what passes t
 `update`, and random draws come from a seed, so a failure in lockstep is reproducible to the last bit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum

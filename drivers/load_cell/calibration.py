@@ -6,8 +6,6 @@ The zero hardly matters, because every trial is tared. The error of the span ent
 prints grams or newtons uses its own calibration, whose standard error is unknown.
 """
 
-from __future__ import annotations
-
 import json
 from math import hypot, isfinite, sqrt
 from pathlib import Path

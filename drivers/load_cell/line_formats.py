@@ -6,8 +6,6 @@ ones: `ST,GS,+  12.34kg`, where ST is stable, US unstable, OL overload). Loggers
 prints letters or dashes in place of a number, or stays at the last count of its converter.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from math import isfinite

@@ -4,8 +4,6 @@ The amplifier sends lines of text at its own rate. Reading never waits. A malfor
 display, and an unplugged adapter is opened again as soon as it is back (serial_line.py).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from drivers.load_cell.calibration import LoadCellCalibration

@@ -9,8 +9,6 @@ measured while a busy computer delivered late would turn every few lines into a 
 period is measured again.
 """
 
-from __future__ import annotations
-
 from collections import deque
 
 from drivers.serial.serial_line import SerialLine

@@ -5,8 +5,6 @@ the stamps are as even (sample_clock.py); a constant delay remains in them. Read
 is opened again as soon as it is back.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 

@@ -10,8 +10,6 @@ kind of board, and publishes the numbers as flat_endpoints.json with the firmwar
 build the watchdog stays unknown, because a number of another build reads some other parameter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from math import isfinite, isnan, nan, pi
 from typing import NamedTuple, Protocol

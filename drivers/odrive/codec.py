@@ -6,8 +6,6 @@ published DBC for 0.6.10, with which the tests compare this table. Some commands
 program reads a drive's version before it arms it.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 from struct import Struct, error
 from typing import Any

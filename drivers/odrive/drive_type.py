@@ -1,7 +1,5 @@
 """ODrive as a drive type: its parameters, its drives, and how to read and forge its frames without commanding one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import cast

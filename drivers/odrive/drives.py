@@ -5,8 +5,6 @@ torque, through the gate (drivers/transmit_gate.py) like everything that leaves.
 caller asks for it. Frames of unknown ids and malformed frames are counted and ignored.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain

@@ -8,8 +8,6 @@ appears. The readings of two encoders, which arrive in turns, jump back and fort
 does: this shows within 10 readings.
 """
 
-from __future__ import annotations
-
 from collections import deque
 
 from control.records import NEVER_S, UNKNOWN

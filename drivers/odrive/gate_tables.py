@@ -4,8 +4,6 @@ Idle, torque mode, the configured limits and the clearing of errors may always l
 parameter. Closed loop may be asked for only while the gate is open.
 """
 
-from __future__ import annotations
-
 from math import nan
 
 from drivers.can.frames import Frame

@@ -1,7 +1,5 @@
 """The configuration of one ODrive."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil

@@ -31,8 +31,6 @@ No library is used: those on PyPI build an object for every marker, block or sta
 middle of a truncated packet. The best maintained one, natnet, serves the tests as a reference.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from math import isfinite

@@ -12,8 +12,6 @@ brings no new pose if its body is not tracked, or equals the previous one in eve
 first pose is accepted only when a second one follows, because lost capture shows old positions.
 """
 
-from __future__ import annotations
-
 from errno import EAFNOSUPPORT
 
 from control.records import NEVER_S, BodyPose

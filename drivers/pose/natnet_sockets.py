@@ -3,8 +3,6 @@
 A server that does not multicast sends its frames to the socket that sent the requests. Nothing here waits.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import socket

@@ -5,8 +5,6 @@ bridge on the same machine, two little-endian doubles: the source's own time and
 message wins; its stamp is the time when it was read.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import socket

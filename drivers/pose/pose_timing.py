@@ -6,8 +6,6 @@ filters its samples by the same least delay; the part that delays every frame st
 is assumed to keep its velocity over the last few frames.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from math import inf
 

@@ -4,8 +4,6 @@ encoder_counts.py decodes the lines and rejects implausible counts; serial_line.
 unplugged port is opened again between two ticks and only while nothing moves, because that may take milliseconds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any

@@ -5,8 +5,6 @@ count is malformed, and so is a count that no body on a rail can have reached si
 and stays there is accepted from its second line on, because a counter that was restarted begins at zero.
 """
 
-from __future__ import annotations
-
 import re
 from math import isfinite
 

@@ -7,8 +7,6 @@ another socket, `/dev/ttyUSB0` may not). pyserial opens and sets up the device, 
 one call.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

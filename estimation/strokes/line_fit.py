@@ -5,8 +5,6 @@ s² = (q - b²/S) / (n - 1) and the standard error of k is √(s²/S). The three
 is that of a batch fit to rounding.
 """
 
-from __future__ import annotations
-
 from math import inf, isfinite, sqrt
 
 from control.records import UNKNOWN, Estimate

@@ -14,8 +14,6 @@ independent residuals, and with twenty batches 87, 72 and 36 % when neighbours c
 in the tests): the slower the noise, the more of it counts as deviation from the law.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import accumulate
 from math import inf, isfinite, sqrt

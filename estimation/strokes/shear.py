@@ -13,8 +13,6 @@ body's drag the body cannot have moved; otherwise the largest force withstood is
 motor at its limit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from enum import Enum
 from math import cos, hypot, isfinite, sin

@@ -5,8 +5,6 @@ it rests, and a moving flipper leaves the same batches at any message rate. Resi
 a standard error depends on travelled distance and not on the number of messages.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from control.records import UNKNOWN

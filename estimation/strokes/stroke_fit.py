@@ -9,8 +9,6 @@ length within these limits, unless the adduction joint has no vertical lever the
 the mud's force on the plate reverses from supporting it to holding it down.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, hypot, inf, isfinite, sqrt
 from typing import NamedTuple

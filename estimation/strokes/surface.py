@@ -12,8 +12,6 @@ One insertion locates the surface to about a millimetre, and k_s depends on the 
 combined with the nominal height of the mud, weighted by precision.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import exp, hypot, inf, sqrt
 from operator import mul

@@ -8,8 +8,6 @@ the pose. The sweep joint's zero is an additional constant offset.
 The memory fades: a mean over about the last MEMORY distinct samples.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ weight is read again. The empty arm waits until the winding is cool enough for t
 a weight hangs, the operator takes the weight off.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

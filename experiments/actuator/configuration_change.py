@@ -4,8 +4,6 @@ The operator sees the difference first. The new text must be a configuration tha
 replaced atomically, so a power cut leaves the old or the new one, and the old one stays next to it as `.before`.
 """
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Mapping, MutableMapping, Sequence

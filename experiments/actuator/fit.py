@@ -23,8 +23,6 @@ every trial is evaluated by the constant of the other trials. Repeatability is t
 one weight, relative to its mean, averaged over the weights.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from math import cos, hypot, nan, sqrt
 from statistics import fmean, stdev

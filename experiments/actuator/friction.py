@@ -11,8 +11,6 @@ Loops at two speeds separate the two: slow ones in short moves, quick ones in a 
 between two short moves does no work meanwhile, so the stops do not count.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from math import degrees, hypot, nan, radians, sqrt

@@ -5,8 +5,6 @@ are none, which may be wrong by a fifth. The paper's weights differ by a third a
 except between the lightest two, which differ by less than friction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import inf, log
 from typing import Any, NamedTuple

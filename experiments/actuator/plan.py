@@ -12,8 +12,6 @@ error of the torque constant, and a joint at rest near its limit is a fault. The
 weight.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, hypot, nan, sqrt

@@ -3,8 +3,6 @@
 In black and white, joints differ by their markers, and configured from fitted; what is the paper's is grey.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite

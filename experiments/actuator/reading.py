@@ -15,8 +15,6 @@ those of the daemon's status, asked a hundred times a second: 100 of them leave 
 of the best weight's accuracy. The log keeps every row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import ceil, degrees, radians, sqrt
 from statistics import fmean, pstdev

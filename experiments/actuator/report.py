@@ -1,7 +1,5 @@
 """The report of the actuator calibration, for programs and for people: the paper's numbers next to ours."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial

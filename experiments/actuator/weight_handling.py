@@ -1,7 +1,5 @@
 """Handling of the flipper and the weights at the bench: by the operator, or in simulation (simulation.py)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import degrees
 from typing import Protocol

@@ -13,8 +13,6 @@ all. So there are few shakes, each 1.5 times as strong as the one before, with a
 leave a speed as well, and ends the shake.
 """
 
-from __future__ import annotations
-
 from math import nan
 
 from control.rate import PERIOD_S

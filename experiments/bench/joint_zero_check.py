@@ -1,7 +1,5 @@
 """Checks encoder zeros and limits without torque: against the geometry, flippers held level by hand, and the stops."""
 
-from __future__ import annotations
-
 from math import degrees, inf
 
 from control.controller import measured_angles

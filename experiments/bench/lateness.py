@@ -5,8 +5,6 @@ leave their path and currents appear late, although robot and drives may be in o
 distinguished from an overloaded computer that emulates drives.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from control.rate import PERIOD_S

@@ -4,8 +4,6 @@ No drive knows on which joint it is mounted: its angle, torque and current agree
 operator's eyes and hands are needed once. The simulated operator observes the mechanics and not the drives.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from enum import Enum

@@ -1,7 +1,5 @@
 """One measured value of the bench with its unit, its bounds, and the advice for a value outside of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple

@@ -6,8 +6,6 @@ angle, velocity and current have the sign of the torque. A drive agrees with its
 the joint is then moved further under control, and the operator observes which flipper moves, and how.
 """
 
-from __future__ import annotations
-
 from math import nan, radians
 
 from control.controller import measured_angles

@@ -7,8 +7,6 @@ one tick: a command sent at the end of a tick can be answered in the next. The p
 torque by the configured torque constant, which must agree with the drive's own.
 """
 
-from __future__ import annotations
-
 from random import Random
 from statistics import median
 from typing import NamedTuple

@@ -8,8 +8,6 @@ continue with it, and the current is seen even if a tick or message is late. Tim
 last tick before the request, because the torque does not change in a missed tick.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import degrees, nan, radians
 

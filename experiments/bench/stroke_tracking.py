@@ -4,8 +4,6 @@ The lag is the shift with the best fit of the measured to the commanded angle (n
 means, and a parabola through the best three ticks), so a constant error is no lag. It is negative where a joint leads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import degrees, radians
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Torque comes from the daemon's own loop in its own modes, so limits, gate and fa
 the held pose in HOLD may be replaced: by another path, or by a hold law of the bench.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple

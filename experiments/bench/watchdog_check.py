@@ -4,8 +4,6 @@ The flippers lie, and the adduction motors press them down a little, so that a c
 program sends nothing more. A heartbeat reports idle with a delay of up to one period; the current is exact to a tick.
 """
 
-from __future__ import annotations
-
 from math import nan
 
 from control.rate import PERIOD_S

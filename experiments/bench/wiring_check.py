@@ -4,8 +4,6 @@ Ids and rates come from the frames recorded before the loop opened the buses. Th
 versions and watchdogs, and feeds zero torque to idle drives, as the daemon does.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from math import inf, isfinite, isnan, nan

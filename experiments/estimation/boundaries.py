@@ -4,8 +4,6 @@ A transition begins with the first stride of a flipper whose insertion is in the
 once the flipper's current k_p is within FOLLOWED of the truth in that mud; the strides up to then are counted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise

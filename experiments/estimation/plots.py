@@ -1,7 +1,5 @@
 """The errors of the estimated coefficients as a picture, by setup, coefficient, mud and method."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

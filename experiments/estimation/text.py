@@ -1,7 +1,5 @@
 """The finding of the estimation experiment: its tables for the screen and the page, and its picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

@@ -4,8 +4,6 @@ the loop, moved joints, a duplicate node id. An exception ends the loop in the s
 Every step is one period of the loop, also while the loop is stalled; the loop then misses that tick.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr
 from io import StringIO

@@ -6,8 +6,6 @@ reported. Torque is that of the simulated motors. After the failure is over, the
 may arm it.
 """
 
-from __future__ import annotations
-
 from math import radians
 from random import Random
 

@@ -1,7 +1,5 @@
 """The record of one cell of the fault matrix, and the problems in it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ There is at least one mode for each kind in control/faults.py. Further modes are
 bug in each stage of its tick, and no failure at all as the control group.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from control.faults import FAULT_KINDS, FaultKind

@@ -4,8 +4,6 @@ Some use the failures of `mudskipper fail`. The others act in the simulated driv
 bus that come from neither drive nor loop. loop_injectors.py has those for the loop and the daemon.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace

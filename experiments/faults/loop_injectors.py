@@ -1,7 +1,5 @@
 """Injectors of failures in the loop and around it: modelled heat, bugs, stalls, lease, log, daemon."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace

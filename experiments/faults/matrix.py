@@ -5,8 +5,6 @@ it. The seed draws the mud, the joint, and the tick within the phase. The fields
 summary in JSON.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial

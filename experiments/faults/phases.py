@@ -3,8 +3,6 @@
 Each phase has a function that operates a robot from power-on into the phase, plus a random number of ticks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from random import Random

@@ -1,7 +1,5 @@
 """The fault matrix as a picture: each reaction time as a fraction of its bound, by failure mode and phase."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

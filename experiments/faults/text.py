@@ -1,7 +1,5 @@
 """The finding of the fault matrix: its table for the screen and the page, and its picture."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from experiments.faults.matrix import FaultsReport

@@ -5,8 +5,6 @@ should be equal, except for mud that clings to the flipper, which loads the addu
 found far from its configured height means that the base or the mud is at another height.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any
 

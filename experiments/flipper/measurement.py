@@ -5,8 +5,6 @@ coefficients of each stride. Angles and forces come from its log, and so do the 
 first stride of a trial counts, because the resistance of the same hole falls by 15 to 20 % with each stroke.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass

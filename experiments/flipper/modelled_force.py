@@ -8,8 +8,6 @@ Each law is evaluated where its coefficient is fitted: in insertion below the su
 in extraction over the last three quarters of the way up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import nan
 from typing import Any, NamedTuple

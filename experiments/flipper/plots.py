@@ -1,7 +1,5 @@
 """The single flipper's trials as pictures, after the paper's figures 4 and 5."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

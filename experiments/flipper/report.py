@@ -3,8 +3,6 @@
 The fields of these records are the keys of the summary in JSON.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

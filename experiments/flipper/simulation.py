@@ -1,7 +1,5 @@
 """The single flipper's bench in the simulator: the robot on a fixed base, with the disturbances of a laboratory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

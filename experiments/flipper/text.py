@@ -3,8 +3,6 @@
 The walking robot's page uses the same explanations of errors (experiments/walk/text.py).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path

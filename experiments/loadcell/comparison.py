@@ -1,7 +1,5 @@
 """Coefficients of muds by the load cell, compared with a flipper's and with the truth of simulated muds."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from math import hypot, isfinite, nan

@@ -1,7 +1,5 @@
 """Evaluates the recorded trials of a load cell: the coefficients of each mud with their errors, and the report."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

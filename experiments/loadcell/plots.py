@@ -1,7 +1,5 @@
 """Pictures of the load cell's trials: force and depth with the fits, and coefficients."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

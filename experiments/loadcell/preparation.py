@@ -1,7 +1,5 @@
 """Checks and calibration of the load cell before the first trial, with advice where something is wrong."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass

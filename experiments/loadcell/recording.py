@@ -4,8 +4,6 @@ All samples come through serial ports and all times from a clock, so that emulat
 own bytes, only faster than real ones. The notebook's entry of a trial names its files.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 import time

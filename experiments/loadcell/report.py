@@ -1,7 +1,5 @@
 """The load cell's results as sections of a page, and as tables for the screen."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial

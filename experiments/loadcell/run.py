@@ -5,8 +5,6 @@ out again. The stage moves at 0.1 m/s, and each kind of trial is repeated five t
 optionally, a position encoder of the stage are serial ports; the operator moves the stage.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from contextlib import ExitStack, closing

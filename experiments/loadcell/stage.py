@@ -4,8 +4,6 @@ The experiment asks for each motion and cannot tell which stage it has. Neither 
 that is found from the force.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from random import Random
 from typing import NamedTuple

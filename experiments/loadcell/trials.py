@@ -4,8 +4,6 @@ Samples are on the disk before they are evaluated, and the files of a repeated t
 file that counts. The same command continues an interrupted experiment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import count

@@ -18,8 +18,6 @@ strength. Each walk of the grid serves all three muds; then a finer grid lies ar
 report are the keys of the summary in JSON.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

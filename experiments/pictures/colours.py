@@ -1,7 +1,5 @@
 """The colours of all pictures of a walk, the same for the same thing in each."""
 
-from __future__ import annotations
-
 from experiments.pictures.stride_choice import Outcome
 
 INK = "#33302c"

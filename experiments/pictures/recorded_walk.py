@@ -5,8 +5,6 @@ the body; forces and strides are estimated from them, as in `mudskipper replay`.
 and are listed in `missing`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import nan, radians, sin
 from pathlib import Path

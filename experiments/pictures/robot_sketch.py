@@ -1,7 +1,5 @@
 """Draws the robot from the side at one row of a walk: body, arm and plate at their measured positions."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle

@@ -5,8 +5,6 @@ lower edge is at ((l + u) sin α + w cos α, (l + u) cos α - w sin α, s - h). 
 intersection of the axes (control/geometry.py), which is at height H above the mud.
 """
 
-from __future__ import annotations
-
 from cmath import phase
 from collections.abc import Iterable
 from itertools import accumulate

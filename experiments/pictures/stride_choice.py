@@ -4,8 +4,6 @@ A stride fails in one of the paper's two ways (section III-A): the mud yields an
 flipper does not come out of the mud.
 """
 
-from __future__ import annotations
-
 from enum import StrEnum
 from typing import Any, NamedTuple
 

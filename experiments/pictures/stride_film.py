@@ -1,7 +1,5 @@
 """A walk as an animated GIF from the side in real time. The camera moves with the body, the scale with the mud."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from math import ceil, floor, hypot

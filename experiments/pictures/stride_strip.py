@@ -1,7 +1,5 @@
 """Strides as strips of pictures: the flipper in the mud from one insertion to the next, and the advance of the body."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

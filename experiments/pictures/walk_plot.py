@@ -4,8 +4,6 @@ The paper shades the muds that the experimenters prepared, and so does the demo,
 not name the muds: there a mud begins with the stride after which the robot noticed it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

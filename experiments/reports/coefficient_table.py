@@ -7,8 +7,6 @@ A mud whose trials report more lower bounds than values has a bound as well (`at
 few trials in which such a mud yielded met less resistance, or pushed harder, than anybody knows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite, sqrt

@@ -5,8 +5,6 @@ A lower bound has no error: bounds are counted apart, with the fraction of them 
 the plate as the flipper carries it, leaning, with the upright plate of the paper's load cell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite

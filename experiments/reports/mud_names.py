@@ -1,7 +1,5 @@
 """Names of muds: most are their water in percent, some their strength with the unit, others free."""
 
-from __future__ import annotations
-
 import re
 
 WATER = re.compile(r"(?:w\s*=?\s*)?(\d+(?:\.\d+)?)\s*%?")  # 47.6, 47.6%, w47.6 or w = 47.6 %

@@ -1,7 +1,5 @@
 """Colours, lines and markers of muds and phases in all pictures, distinct in black and white too."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

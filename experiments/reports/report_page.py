@@ -3,8 +3,6 @@
 The page is plain HTML with the pictures inside, so it can be sent as one file and printed in black and white.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Tables as plain text, for the screen and for pages that show what the screen showed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from math import isfinite
 

@@ -4,8 +4,6 @@ Each error has two significant digits, and the value ends where the finest error
 four significant digits; with errors it never has more than six.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 
 N_CM3 = 1e6  # N/m³

@@ -3,8 +3,6 @@
 A disk that fills up while a report is written again leaves the earlier one.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

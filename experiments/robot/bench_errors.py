@@ -1,7 +1,5 @@
 """Reasons for which an experiment ends early. Each text says what happened and what to do."""
 
-from __future__ import annotations
-
 
 class BenchError(Exception):
     """The experiment cannot continue."""

@@ -4,8 +4,6 @@ The calls are those of the status socket. They reach the daemon of a robot, or t
 simulated robot; an experiment cannot distinguish the two. It sees nothing of the robot but answers and log.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path

@@ -5,8 +5,6 @@ the daemon stops the robot; and as long as the program runs, no other one arms a
 mud. The log is read while the daemon writes it, and the last rows arrive half a second late.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from contextlib import suppress

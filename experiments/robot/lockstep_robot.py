@@ -1,7 +1,5 @@
 """A simulated robot with the daemon's calls, in step with the daemon's own loop, as fast as it computes."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

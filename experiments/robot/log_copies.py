@@ -4,8 +4,6 @@ A daemon runs for weeks, and at rest its log grows by ten megabytes an hour. Eve
 its number and both clocks, so the copied ones can be read, replayed and reported without the earlier ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import takewhile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The operator at the bench, as an experiment asks for help: a person at a terminal, or automatic in simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """The depth sweep as a picture: speed over depth and strength, and where each method settles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ evaluated from its third stride on: by its speed as a fraction of the best const
 The fields of the report are the keys of the summary in JSON.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial

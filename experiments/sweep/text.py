@@ -1,7 +1,5 @@
 """The finding of the depth sweep: its table for the screen and the page, and its picture."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from experiments.reports.text_tables import number, table

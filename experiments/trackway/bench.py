@@ -7,8 +7,6 @@ a fault. The operator decides on each walk; one that the operator or a fault sto
 The strides are read from the log, and the table is the same as for the simulated trackway.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ A constant depth and the method "paper" are walked by the paper's robot, with th
 is walked by this project's robot with all of its features.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, cast, get_args

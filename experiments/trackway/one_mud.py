@@ -4,8 +4,6 @@ The first stride starts from a standing body on untouched ground and is not coun
 its first two strides and is evaluated from the third on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

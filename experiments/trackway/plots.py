@@ -1,7 +1,5 @@
 """The walks as a picture: along the trackway as in the paper's figure 8, and Table I as bars and dots."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate
 from pathlib import Path

@@ -6,8 +6,6 @@ adaptive robot still learns the mud in the first two. A trial with fewer than th
 them in both (`short_trials`). The fields of these records are the keys of the summary in JSON.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -6,8 +6,6 @@ after 90 s in one mud, or with a fault. The report compares each gait with the b
 robot walks at every depth in each mud alone, on an endless track.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass

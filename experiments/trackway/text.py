@@ -3,8 +3,6 @@
 The figures of walks against time, the paper's figure 8 B to E, come from the logs in the experiment's folder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path

@@ -7,8 +7,6 @@ by less than half an arm (the bound in the authors' optimiser). EXTRACTION: the 
 extraction, because the plates are still in the mud when they swing forward.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, sin

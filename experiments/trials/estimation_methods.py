@@ -5,8 +5,6 @@ paper               the published one, without compensation (estimation/paper.py
 paper compensated   the same, with half of the body's drag added to the thrust while the body advances
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -9,8 +9,6 @@ one lean stands for a growing one, and the cell reads 4 % more k_p at 3 cm, 13 %
 is 1 to 6 % more than the upright plate's at each of these depths.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, isfinite, sin
 from typing import NamedTuple

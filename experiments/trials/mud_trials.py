@@ -6,8 +6,6 @@ kept or repeated as the operator decides. The notebook also has the trials that 
 does not ask for them again. Torque is off whenever hands may be in the mud.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path

@@ -4,8 +4,6 @@ The file has JSON lines: the plan first, then one entry per line with its key. A
 earlier one, and a line that was cut off costs only itself.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs many trials in as many processes as there are processors. A trial is a function without arguments."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence

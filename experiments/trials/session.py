@@ -4,8 +4,6 @@ An experiment runs in a `Session`: a folder for its results, the operator at the
 ends with a `Finding`: the report for programs, sections for the page, and a text for the screen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from pathlib import Path

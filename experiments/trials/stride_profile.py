@@ -4,8 +4,6 @@ Forces and loads are the estimator's at that time, with the zero that it had the
 that a stride with pauses of 3 s stays small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Robot, drives and mud run in lockstep with the daemon's own loop, frames include
 estimator. So any number of methods can be evaluated on the same trial.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from random import Random

@@ -1,7 +1,5 @@
 """True coefficients of muds, taken from the summary of another experiment, such as a load cell's."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

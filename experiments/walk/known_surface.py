@@ -7,8 +7,6 @@ the rest is as published: f_x = cos α τ₁ / l over the steady part of the sta
 half of the body's drag added while the body advances.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ follow short walks at 3 and 5 cm in soft mud, if there is any: the paper shows t
 drag and not the mud's strength while the body moves. Every method of estimation gets the same log.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, chain

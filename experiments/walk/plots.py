@@ -1,7 +1,5 @@
 """The walks over several muds as pictures, after the paper's figures 6 and 7."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

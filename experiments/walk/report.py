@@ -5,8 +5,6 @@ the soft mud it was half of the load cell's at 5 cm, close to it at 3 cm, and be
 and that this drag was about 2.5 N. The fields of these records are the keys of the summary in JSON.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite

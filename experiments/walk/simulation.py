@@ -1,7 +1,5 @@
 """The simulated bench of the walks: fresh copies of the trackway along one track, and then the soft muds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration

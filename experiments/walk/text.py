@@ -1,7 +1,5 @@
 """The finding of the walks over several muds: sections with tables and pictures, and tables for the screen."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path

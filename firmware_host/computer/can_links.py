@@ -5,8 +5,6 @@ number in newer ones, and a virtual interface (vcan) has neither state nor bit r
 /sys/class/net shows whether an interface exists and is up, and how long its queue is.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Iterator, Sequence

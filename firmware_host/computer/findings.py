@@ -1,7 +1,5 @@
 """One line of `mudskipper doctor`: the result of a check, its severity, and what to do."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from typing import Any, NamedTuple
 

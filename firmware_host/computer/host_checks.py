@@ -4,8 +4,6 @@ A finding fails only where the robot would not work or its torque would be unsup
 late or loses logs is a warning.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ A file that cannot be read counts as empty; host_checks.py evaluates the values.
 proc_pid_stat(5). Threaded interrupts are kernel threads named irq/NUMBER-DEVICE.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

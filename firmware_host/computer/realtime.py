@@ -5,8 +5,6 @@ against paging, and no garbage collection while it runs. The robot also runs wit
 warning reports it to the operator.
 """
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os

@@ -3,8 +3,6 @@
 It does nothing where NOTIFY_SOCKET is not in the environment, as when the daemon is started from a terminal.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 from contextlib import suppress

@@ -4,8 +4,6 @@ Only values that differ from machine to machine are configuration. Each section 
 with default, unit, bounds and meaning next to each field. loading.py reads the file once, before anything is energised.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from math import radians
 from typing import Annotated, Literal

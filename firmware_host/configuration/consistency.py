@@ -4,8 +4,6 @@ The gait must be within reach of the geometry and of the joint limits, drives an
 faults must begin before harder ones. Each contradiction is one message.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Messages for people about files that the operating system refuses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

@@ -3,8 +3,6 @@
 The documentation's reference is generated from this list, so it cannot differ from what the reader enforces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints

@@ -4,8 +4,6 @@ A file is read in four steps: keys of version 0.1 get their present names, a gai
 each value is checked against its own bounds, and then the values are checked against each other.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any

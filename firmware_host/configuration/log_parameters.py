@@ -1,7 +1,5 @@
 """What the log's writer may use: how long a file grows, how much of the disk logs may take, how much rest is worth."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

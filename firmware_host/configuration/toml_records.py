@@ -5,8 +5,6 @@ model of it and of the records in it, which refuses unknown keys, other types, N
 bounds; each problem becomes one message with key, value and bound. Tables of an array are counted from 1.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass

@@ -4,8 +4,6 @@ The stall comes after a tick's work and before the wait for the next deadline, a
 reports the rows that it refused.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

@@ -4,8 +4,6 @@ The log reports each failure when it begins, with the sender of the request, and
 failures. `disarm` ends every failure first, so that it always reaches the drives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

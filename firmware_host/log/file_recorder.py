@@ -1,7 +1,5 @@
 """Writes a log in the loop's own process, for a simulated loop that may wait for the disk."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -8,8 +8,6 @@ The writer holds a lock on its file (flock), which the kernel releases when the 
 file in active/ is dead, and the file needs recovery.
 """
 
-from __future__ import annotations
-
 import errno
 import math
 import os

@@ -6,8 +6,6 @@ is visible with `ls`, and the quota cannot reach it, since it never looks there.
 versions left them, counts as one of done/.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator

@@ -8,8 +8,6 @@ dropped and counted, and an event in the log reports the loss before the next ro
 A second pipe leads back: once a second the writer reports the state of the disk. `report` never waits for it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -7,8 +7,6 @@ follow thinned rows of the same time, and the readers sort by the tick's number.
 change. Strides and events are never thinned.
 """
 
-from __future__ import annotations
-
 import struct
 from collections import deque
 from collections.abc import Iterable

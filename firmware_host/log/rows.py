@@ -5,8 +5,6 @@ define.
 Wide types come first, so that a row needs no padding between its fields.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import IntEnum
 

@@ -5,8 +5,6 @@ each aligned to its own size. The ros2msg text goes into the log file, and a log
 a field that the file lacks is NaN, 0, False or an empty text, and a field that this version does not know is kept.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Callable, Iterator, Sequence

@@ -6,8 +6,6 @@ clocks, measured again for each file, so each can be read alone. A row goes into
 written, and a new file is tried every few seconds; its first event reports the number of missing rows.
 """
 
-from __future__ import annotations
-
 import errno
 import platform
 import subprocess

@@ -7,8 +7,6 @@ the file is synchronised every second, so a crash of this program costs half a s
 next start recovers the rest (`firmware_host.log_reading.recovery`).
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -5,8 +5,6 @@ ends at the size that the chunk states, that size is limited by what LZ4 can rea
 checksum.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ angles fall there. Its motors do positive work on the mud there, so the current 
 joint without such a motion keeps its logged signs. The body moves forward in stance.
 """
 
-from __future__ import annotations
-
 import gzip
 import math
 import tomllib

@@ -10,8 +10,6 @@ A file is left as it is where recovery would cost rows that can be read in it, f
 compressed it again.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

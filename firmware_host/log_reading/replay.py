@@ -4,8 +4,6 @@ A log of this project gives the estimates that the daemon computed, to the last 
 which hold angles and currents of their own robot, are replayed with the assumptions of their method.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import nan

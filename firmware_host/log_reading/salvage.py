@@ -5,8 +5,6 @@ touches. A row that is found twice counts once. The gaps in each channel's seque
 keep the layout that the file describes; where the description is lost, they are taken to have that of this version.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from contextlib import suppress

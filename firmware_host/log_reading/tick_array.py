@@ -1,7 +1,5 @@
 """The ticks of a log as one numpy array, with one field for each field of the tick row."""
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 import numpy as np

@@ -4,8 +4,6 @@ A line fails if a present fault of its part blocks arming, and shows the fault's
 also blocks arming by force.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import degrees, isfinite
 from typing import Any

@@ -1,7 +1,5 @@
 """One client of the status socket: its buffers, its request rate and its time limit."""
 
-from __future__ import annotations
-
 import socket
 from math import inf
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Writes a number with its noun: "1 stride", "2 strides"."""
 
-from __future__ import annotations
-
 
 def counted(number: int, noun: str) -> str:
     """Return the number with the noun, whose plural must end in s."""

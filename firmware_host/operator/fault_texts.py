@@ -4,8 +4,6 @@ A message is a template over the fault's subject and measured values. A fault th
 drive's own error text or an operating system's, shows it at the end of its message.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import isfinite
 from typing import NamedTuple

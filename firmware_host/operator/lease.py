@@ -7,8 +7,6 @@ stop it. An operator may take the robot over. The previous holder is then refuse
 program that was overruled must not continue as if nothing had happened.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable
 from math import inf
 

@@ -5,8 +5,6 @@ log names the sender of every request that changes something. Methods that set t
 the holder of the lease, if there is one; methods that end a motion are not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import degrees
 from typing import Any

@@ -3,8 +3,6 @@
 Units are in the names; None stands for a number that is not known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from math import isfinite

@@ -7,8 +7,6 @@ to every user, since one group cannot own it for readers and operators; unauthor
 are resolved once, at the start: a name service may be slow, and a tick cannot wait.
 """
 
-from __future__ import annotations
-
 import grp
 import os
 import socket

@@ -6,8 +6,6 @@ extension types are refused. Lengths are bounded before memory is allocated: a h
 elements, for which the unpacker makes room at once, and headers can be nested.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any
 

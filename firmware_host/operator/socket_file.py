@@ -7,8 +7,6 @@ Symbolic links are not followed, and only a dead socket is removed: never a file
 lives or hangs. A folder that every user may write to is refused, since any user could replace the socket there.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import socket

@@ -4,8 +4,6 @@ The daemon validates every request by this table, and the reference in the docum
 that come from the configuration are named here and are checked by the method itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from enum import IntEnum, StrEnum
 from math import isfinite

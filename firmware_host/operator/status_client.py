@@ -1,7 +1,5 @@
 """A client of the status socket; it imports only the standard library and msgpack, so that commands start quickly."""
 
-from __future__ import annotations
-
 import socket
 import struct
 from contextlib import suppress

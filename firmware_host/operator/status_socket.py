@@ -7,8 +7,6 @@ loses one, so that no user can exclude another; the holder of the lease keeps it
 an error and is logged: it does not stop the robot.
 """
 
-from __future__ import annotations
-
 import select
 import socket
 from collections import Counter

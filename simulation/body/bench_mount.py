@@ -9,8 +9,6 @@ and a weight W at that point exerts the torque -W ∂z/∂q on the joints. The w
 neither a sideways pull nor a swing; only the joint that lifts the weight has to accelerate its inertia, m r².
 """
 
-from __future__ import annotations
-
 from math import cos
 
 from control.joint_pd import GRAVITY_M_S2, ArmMass

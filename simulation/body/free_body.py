@@ -28,8 +28,6 @@ under it), and no mud is ploughed up in front of it. The drag pad sinks with the
 keeps the body from rearing or tipping over: flippers that push down with more than its weight lift it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import cos, hypot, sin, sqrt

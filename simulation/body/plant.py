@@ -10,8 +10,6 @@ Euler at STEP_S: the stiffest spring, mud along a plate 5 cm deep in the stiffes
 swing at about 400 rad/s.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import copysign, radians, sin
 from operator import add

@@ -4,8 +4,6 @@ The drags of the rail and of the pad in the mud add up to one yield force. Below
 damping of half of critical for the paper's body, so that nothing rings. While the body slides, drag grows with speed.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, Protocol
 
 from simulation.mud.carriage import Carriage, Vector

@@ -6,8 +6,6 @@ three strokes; a stride that a rest interrupts does not count. Speeds are those 
 relative to the mud, so they include the body's motion.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The interface of a simulated motor drive to the simulated robot, for every protocol on the bus."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, auto

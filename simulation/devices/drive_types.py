@@ -1,7 +1,5 @@
 """The simulated drives by the type that `[drive.JOINT] type` names."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from random import Random
 

@@ -1,7 +1,5 @@
 """Messages that arrive late, by uniformly drawn times, and in order: none overtakes another."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterable, Iterator
 from random import Random

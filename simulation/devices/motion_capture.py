@@ -5,8 +5,6 @@ a given number per second on average, and their lengths are distributed exponent
 a frame of that time.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass

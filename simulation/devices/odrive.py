@@ -13,8 +13,6 @@ Cogging is the slope of an energy that repeats n times a turn, so over a turn it
     τ = -A [sin(n θ + φ) + 0.25 sin(2 (n θ + φ))]         the second harmonic is an assumption
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from math import exp, isfinite, pi, radians, sin

@@ -4,8 +4,6 @@ Motion capture's frames leave through the pose socket, as NatNet packets from th
 its server, or as counts of a rail encoder that appears where the robot looks for its device.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from drivers.pose.natnet_sockets import AXES, parse_axis, parse_version

@@ -4,8 +4,6 @@ A link with a fixed name, as under /dev/serial/by-id, points to the program's en
 finds the program's buffer full is lost, as on a real line that nobody reads.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import struct

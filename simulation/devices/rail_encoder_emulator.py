@@ -1,7 +1,5 @@
 """A rail encoder's counter on a pseudo-terminal: it writes the count of a position as an ASCII line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from simulation.devices.pseudo_terminal import PseudoTerminal

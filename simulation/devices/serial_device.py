@@ -6,8 +6,6 @@ garbled, or wait in an adapter that delivers its buffer every few milliseconds. 
 for a name below /dev/serial/by-id: it disappears when the device is unplugged and points to a new one afterwards.
 """
 
-from __future__ import annotations
-
 import termios
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A robot on blocks, as for the bench: its base does not move, and idle flippers lie on something soft below it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import radians
 

@@ -5,8 +5,6 @@ that of a robot: nothing in it says that the drives are simulated, only that the
 all processes share, signals arrive less punctually than on a robot, so their bounds are wider.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

@@ -4,8 +4,6 @@ In every tick the robot simulates until the tick's time, then the loop runs exac
 encoded and decoded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ sends the body's position to the configured pose source, at motion capture's rat
 moves the flippers back by hand from their mechanical stops, beyond the limits: no torque returns from there.
 """
 
-from __future__ import annotations
-
 import argparse
 import ctypes
 import os

@@ -4,8 +4,6 @@ It exchanges frames only. In real time a process steps it to the present; in tes
 the tick's time. The same seed gives the same result.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from random import Random
 

@@ -5,8 +5,6 @@ define unit and bounds. The file leaves out what the robot's configuration fixes
 because the daemon knows these and does not know the world.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import nan

@@ -10,8 +10,6 @@ at p = (l + u) r + (s - h) s from the intersection, so that its velocity V + w Ã
 With V = (X', 0, 0) and Î© = 0 these are those of flipper_contact.py. Depth is measured along the world's vertical.
 """
 
-from __future__ import annotations
-
 from math import cos, sin
 from typing import NamedTuple
 

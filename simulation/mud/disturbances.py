@@ -19,8 +19,6 @@ A stroke is a stay in the mud that reached 5 mm. When the plate has left the mud
 stroke. The draws do not depend on which disturbances are on.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, exp, sin
 from random import Random

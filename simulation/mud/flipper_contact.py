@@ -10,8 +10,6 @@ where X' is the body's speed. The same coefficients, transposed, turn the mud's 
 its depth is ζ = z - u cos α sin β - s cos β. A body that also rises and turns adds to all of this: see carriage.py.
 """
 
-from __future__ import annotations
-
 from math import cos, sin
 from typing import NamedTuple
 

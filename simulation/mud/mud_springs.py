@@ -11,8 +11,6 @@ included, so SIDEWAYS_YIELD_M is 15 mm. Along the plate and under its edge mud y
 thin layers do.
 """
 
-from __future__ import annotations
-
 from typing import Generic, NamedTuple, TypeVar
 
 from simulation.mud.clay import (

@@ -14,8 +14,6 @@ across and along are independent. Lean, cross-coupling and lateral pull follow f
 At rest loads relax: they fade by up to `relaxation` within half a second, and motion loads the springs again.
 """
 
-from __future__ import annotations
-
 from math import exp, sqrt
 from typing import NamedTuple
 

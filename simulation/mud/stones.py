@@ -14,8 +14,6 @@ where semi-implicit Euler ends at 2000 rad/s with a step of 1 ms. 14 N, more tha
 press the edge 0.7 mm into it. With C an arm in air rebounds from the top at six tenths of its speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum

@@ -9,8 +9,6 @@
 Each is off by default. Draws depend on their own seed only, so the ground is the same in every run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log, pi, sin, sqrt

@@ -4,8 +4,6 @@ Both print lines on a pseudo-terminal. The amplifier's converter integrates over
 rounds to a step of its own, and stops at its range. The encoder's counter starts at zero wherever it gets its power.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass

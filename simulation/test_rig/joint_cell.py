@@ -7,8 +7,6 @@ at one sweep angle, with one speed of its lower edge and in equal steps of depth
 forces within the plate's plane. The contact model is the same as under the robot.
 """
 
-from __future__ import annotations
-
 from math import degrees, hypot
 from typing import NamedTuple
 

@@ -11,8 +11,6 @@ and its height along
     n = (cos α, -sin α cos β, -sin α sin β)    r = (sin α, cos α cos β, cos α sin β)    s = (0, -sin β, cos β)
 """
 
-from __future__ import annotations
-
 from math import ceil, cos, sin
 from typing import NamedTuple
 

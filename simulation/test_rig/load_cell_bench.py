@@ -6,8 +6,6 @@ opens as any serial port, and an encoder of the stage at LINK_position. It execu
 insert, lower, drag, lift, remix [W], turn, hang [G], unplug, plug, quit.
 """
 
-from __future__ import annotations
-
 import argparse
 import select
 import sys

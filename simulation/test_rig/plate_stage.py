@@ -5,8 +5,6 @@ carries a plate down into the mud and up again, or through it at a depth; the ce
 move. The plate is any object that returns the force on it after a step of motion, such as the one of load_cell.py.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import inf
 from random import Random

@@ -4,8 +4,6 @@ A hand pushes at one speed for a few millimetres and at another for the next one
 acceleration of an arm, and sometimes rests. Its speeds, distances and rests are assumptions: nobody has measured one.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from dataclasses import dataclass
 from math import sqrt

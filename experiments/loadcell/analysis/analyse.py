@@ -4,8 +4,6 @@ All trials have the same stage and devices: speed and ramps, or an encoder's lag
 fitted again near the median of all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot, sqrt

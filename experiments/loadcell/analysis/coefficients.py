@@ -12,8 +12,6 @@ since another trial leaves the same. A mud has two errors: that of its trials (t
 these are larger) and that of the bench, which no trial shows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot, isfinite, nan, sqrt

@@ -1,7 +1,5 @@
 """Finds the start of a stroke: the force leaves its zero, which may drift before the stage moves."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ come from a linear fit, so that the search runs over the parameters alone. The s
 finite differences. A prior on a parameter counts as one more residual.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

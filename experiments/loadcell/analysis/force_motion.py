@@ -13,8 +13,6 @@ On the way out the force ends where the plate leaves the mud, and the depth is c
 is any chain of straight lines over the depth.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import partial
 from math import nan

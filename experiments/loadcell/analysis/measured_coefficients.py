@@ -4,8 +4,6 @@ Depths are the encoder's, from the surface that the force shows; only a shear ke
 to the set speed.
 """
 
-from __future__ import annotations
-
 from math import hypot
 
 import numpy as np

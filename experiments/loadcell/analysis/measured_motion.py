@@ -11,8 +11,6 @@ down against the way up, which makes it observable. Where the stage rests the mu
 the next millimetres, do not count.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from math import sqrt
 from typing import NamedTuple
