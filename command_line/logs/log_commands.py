@@ -13,7 +13,7 @@ from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
-from firmware_host.log_reading.lab_csv import write_lab_csv
+from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.log_reader import LogError, log_summary, read_log, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
 from firmware_host.operator.reports import map_report, stride_report

@@ -201,7 +201,7 @@ def _only_walk(path: Path, lab: LabLog, number: int) -> RecordedWalk:
         sweep_angle_rad=lab.angle_rad[:, 2 * shown],
         adduction_angle_rad=lab.angle_rad[:, 2 * shown + 1],
         depth_m=np.array([load.depth_m for load in reading.loads]),
-        depth_command_m=np.full(len(lab.stamp_s), lab.gait.get("insertion_angle", nan)),
+        depth_command_m=lab.commanded_depth_m,
         force_x_n=np.array([load.force_x_n for load in reading.loads]),
         force_z_n=np.array([load.force_z_n for load in reading.loads]),
         body_x_m=lab.body_x_m,

@@ -25,7 +25,7 @@ from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
 from experiments.pictures.walk_plot import mud_regions, plot_walk
-from firmware_host.log_reading.lab_csv import write_lab_csv
+from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.log_reader import read_log
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track

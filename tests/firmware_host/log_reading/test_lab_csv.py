@@ -17,7 +17,9 @@ import pytest
 from numpy.typing import NDArray
 
 from control.records import JOINTS, Phase
-from firmware_host.log_reading.lab_csv import STATE_OF_PHASE, LabLog, read_lab_csv, write_lab_csv
+from firmware_host.log_reading.lab.columns import STATE_OF_PHASE
+from firmware_host.log_reading.lab.export import write_lab_csv
+from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.log_reader import Log, LogError
 from firmware_host.log_reading.tick_array import tick_type
 from tests.folders import SHARED_DATA
@@ -149,8 +151,8 @@ def test_a_mirrored_signal_is_turned_round_again(signal: str, turned: int, tmp_p
 
 
 def test_writing_keeps_the_authors_columns_and_units() -> None:
-    settings, names, first, *_ = export(make_walk()).splitlines()
-    assert settings == "# gait header: scenario,insertion_angle,sweep_angle_deg | mudskipper,0.035,30.0"
+    settings, values, names, first, *_ = export(make_walk()).splitlines()
+    assert settings == "scenario,insertion_angle,sweep_angle_deg" and values == "mudskipper,0.035,30.0"
     assert names == HEAD.splitlines()[1] + ",OptitrackPosition_x"
     turns = [float(field) for field in first.split(",")[2:6]]
     assert turns == pytest.approx([0.1 / math.tau, 0.0, 0.1 / math.tau, 0.0])
@@ -164,7 +166,7 @@ def test_a_log_without_a_pose_has_no_column_for_it() -> None:
 
 def test_an_empty_log_is_written_as_a_head() -> None:
     walk = make_walk()
-    assert export(walk._replace(ticks=walk.ticks[:0])).count("\n") == 2
+    assert export(walk._replace(ticks=walk.ticks[:0])).count("\n") == 3
 
 
 def test_a_configuration_that_is_not_toml_is_refused() -> None:
@@ -200,19 +202,14 @@ def test_a_body_at_rest_is_not_lost(tmp_path: Path) -> None:
 
 GOOD = [ROW.format(number / 10, number / 100) for number in range(5)]
 MALFORMED = {
-    "nothing": ([], "ends at line 0"),
-    "only a head": ([HEAD], "ends at line 2; the rows begin at line 3"),
-    "no settings": ([HEAD.replace("# gait header: ", ""), *GOOD], "line 1 is not"),
-    "a value too few": ([HEAD.replace(",0.1\n", "\n"), *GOOD], "line 1 is not"),
-    "a missing column": ([HEAD.replace("time,", "t,"), *GOOD], "line 2 names no column time"),
-    "a short row": ([HEAD, *GOOD, "1,2,3"], "line 8 has 3 fields, line 2 names 10"),
-    "a long first row": ([HEAD, GOOD[0] + ",1", *GOOD], "line 3 has 11 fields, line 2 names 10"),
-    "rows all short": ([HEAD, "1,2,3", "1,2,3"], "line 3 has 3 fields, line 2 names 10"),
-    "an empty row": ([HEAD, GOOD[0], "", *GOOD], "line 4 has 1 fields, line 2 names 10"),
-    "a word": ([HEAD, *GOOD, ROW.format("mud", 0)], "line 8: 'mud' is not a number"),
-    "an empty field": ([HEAD, *GOOD, ROW.format("", 0)], "line 8: '' is not a number"),
-    "python's own number": ([HEAD, *GOOD, ROW.format("1_0", 0)], "the rows from line 3 on are not a table"),
-    "no time": ([HEAD, *GOOD, ROW.format("nan", 0)], "line 8 has no time"),
+    "nothing": ([], "none of the first 11 lines names the columns time and turtle_state"),
+    "only a head": ([HEAD], "ends at line 2, which names the columns"),
+    "no time column": ([HEAD.replace("time,", "t,"), *GOOD], "names the columns time and turtle_state"),
+    "a missing column": ([HEAD.replace("_curr", ""), *GOOD], "there is no column leftsweeping_curr"),
+    "a short row": ([HEAD, *GOOD, "1,2,3", *GOOD], "line 8 has 3 fields, the columns are 10"),
+    "a long first row": ([HEAD, GOOD[0] + ",1", *GOOD], "line 3 has 11 fields, the columns are 10"),
+    "a word": ([HEAD, *GOOD, ROW.format("mud", 0), *GOOD], "line 8: 'mud' is not a number"),
+    "python's own number": ([HEAD, *GOOD, ROW.format("1_0", 0), *GOOD], "line 8: '1_0' is not a number"),
     "time backwards": ([HEAD, ROW.format(7, 0), *GOOD], "line 4 goes back in time by more than 1 s"),
     "an unknown state": ([HEAD, *GOOD, GOOD[0].replace(",2,", ",9,")], "line 8 has a turtle_state"),
     "half a state": ([HEAD, *GOOD, GOOD[0].replace(",2,", ",2.5,")], "line 8 has a turtle_state"),
