@@ -7,7 +7,18 @@ docs/reference/json.md describes each shape.
 import json
 from typing import Any
 
-EXPERIMENTS = ("actuator", "estimation", "faults", "flipper", "loadcell", "mud-fit", "sweep", "trackway", "walk")
+EXPERIMENTS = (
+    "actuator",
+    "estimation",
+    "faults",
+    "flipper",
+    "lablogs",
+    "loadcell",
+    "mud-fit",
+    "sweep",
+    "trackway",
+    "walk",
+)
 SCHEMAS = {  # what prints it -> version
     "status": 2,
     "failures": 1,

@@ -66,6 +66,14 @@ def mud_length(text: str) -> tuple[str, float]:
     return name, value
 
 
+def group_rule(text: str) -> tuple[str, str]:
+    """Parses PATTERN=NAME."""
+    pattern, _, name = text.rpartition("=")
+    if not (pattern and name):
+        raise argparse.ArgumentTypeError(f"{text}: must be a pattern and a name, such as 'single_12.5N*=soft'")
+    return pattern, name
+
+
 def plate_cm(text: str) -> tuple[float, float, float]:
     """Parses 3x3.5 or, with its thickness, 3x3.5x0.4."""
     sides = text.lower().removesuffix("cm").split("x")

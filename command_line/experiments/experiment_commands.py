@@ -8,6 +8,7 @@ from command_line.option_types import (
     between,
     depth_cm,
     folder,
+    group_rule,
     lever_m,
     mud_length,
     plate_cm,
@@ -21,6 +22,16 @@ SEEDS, TRIALS = whole(1, 1000), whole(1, 100)
 STRENGTH_PA = between(50.0, 50000.0, "Pa")
 STAGE_SPEED_M_S = between(0.001, 1.0, "m/s")
 GRAVITY_M_S2 = between(9.7, 9.9, "m/s²")  # anywhere on Earth
+
+LABLOGS = (
+    "Evaluate the estimates from real logs by each method, without a known truth. A group is the logs of one mud, and "
+    "one log is one trial. first CV: coefficient of variation (sample standard deviation over mean) over trials of the "
+    "first stroke's value, one flipper on a fixed base. later CV: the same of each trial's geometric mean over its "
+    "later strokes. chi: scatter over claimed error, between trials and between strokes; 1 is right. Separation: "
+    "difference of two groups' first strokes in pooled standard deviations. Left against right: median of the "
+    "difference over its claimed error in walks; 0.67 is right. Logs without mud must give no values and no bounds. "
+    "Sensitivity: the same logs with currents 5 ms late or early, and with 30 percent of the rows missing."
+)
 
 
 def add_experiments(commands: Commands) -> None:
@@ -43,6 +54,7 @@ def add_experiments(commands: Commands) -> None:
     _add_flipper(names)
     _add_walk(names)
     _add_loadcell(names)
+    _add_lablogs(names)
     fit = add(
         names,
         "mud-fit",
@@ -162,6 +174,24 @@ def _add_loadcell(names: Commands) -> None:
     _add_stage_encoder(loadcell)
     option("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
     option("--seed", type=int, default=1, metavar="N", help="of the simulation")
+
+
+def _add_lablogs(names: Commands) -> None:
+    lablogs = add(names, "lablogs", "experiments.lablogs.lablogs", "Real logs: do estimates repeat as they claim?")
+    lablogs.description = LABLOGS
+    lablogs.add_argument("folders", type=Path, nargs="+", metavar="DIR", help="with logs: .csv, .csv.gz or .mcap")
+    lablogs.add_argument(
+        "--group",
+        type=group_rule,
+        action="append",
+        metavar="PATTERN=NAME",
+        help="put logs with such a file name into one group, repeatable (default: the label in the name, as 12.5N)",
+    )
+    lablogs.add_argument(
+        "--air", action="append", metavar="PATTERN", help="logs without mud, repeatable (default: detected)"
+    )
+    lablogs.add_argument("--json", action="store_true", help="for machines")
+    lablogs.add_argument("--out", type=folder, metavar="FOLDER", help="for report, figures and numbers")
 
 
 def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:

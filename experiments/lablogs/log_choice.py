@@ -1,0 +1,72 @@
+"""The logs in folders, and the group of repetitions that each belongs to by its file name.
+
+A group is a mud: by default the lab's label in the name, `12.5N` of `single_12.5N_trial1.csv.gz`. The muds of walks are
+groups of their own, `walk 15.6N`, because a walking robot does not repeat a stroke.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import NamedTuple
+
+ENDINGS = (".csv", ".csv.gz", ".mcap")
+LABEL = re.compile(r"(?<![0-9.])(\d+(?:\.\d+)?N)(?![A-Za-z0-9])")
+KIND = re.compile(r"(?:^|[^A-Za-z])(single|walk)(?![A-Za-z])", re.IGNORECASE)
+SEGMENT = re.compile(r"(.*)-\d{4}\.mcap")
+Paths = tuple[Path, ...]
+
+
+class GroupRule(NamedTuple):
+    """Logs whose file name matches the pattern, as in a shell, belong to the group."""
+
+    pattern: str
+    name: str
+
+
+def find_logs(folders: Sequence[Path]) -> list[Paths]:
+    """Return the logs in folders and the folders below them; segments of one run are one log. Also accepts files."""
+    found: dict[Path, Path] = {}
+    for folder in folders:
+        files = sorted(folder.rglob("*")) if folder.is_dir() else [folder]
+        found |= {path.resolve(): path for path in files if path.is_file() and path.name.endswith(ENDINGS)}
+    paths = list(found.values())
+    runs: dict[Path, list[Path]] = {}
+    for path in paths:
+        runs.setdefault(_first_segment(path, paths), []).append(path)
+    return [tuple(sorted(run)) for run in runs.values()]
+
+
+def _first_segment(path: Path, paths: Sequence[Path]) -> Path:
+    """Return the first segment of the run, where it is among the paths, else the path itself."""
+    segment = SEGMENT.fullmatch(path.name)
+    first = path.with_name(f"{segment[1]}-0000.mcap") if segment else path
+    return first if first in paths else path
+
+
+def matches(name: str, pattern: str) -> bool:
+    """Match a file name with its ending or without it."""
+    stem = next((name.removesuffix(ending) for ending in (".csv.gz", *ENDINGS) if name.endswith(ending)), name)
+    return fnmatchcase(name, pattern) or fnmatchcase(stem, pattern)
+
+
+def group_of(name: str, rules: Sequence[GroupRule]) -> str | None:
+    """Return the group of the first rule that matches, else that of the label in the name, else None."""
+    ruled = next((rule.name for rule in rules if matches(name, rule.pattern)), None)
+    return ruled or _labelled_group(name)
+
+
+def _labelled_group(name: str) -> str | None:
+    label = LABEL.search(name)
+    if label is None:
+        return None
+    kind = KIND.search(name[: label.start(1)])
+    return f"walk {label[1]}" if kind and kind[1].lower() == "walk" else label[1]
+
+
+def group_key(group: str) -> tuple[bool, bool, float, str]:
+    """Return a key that sorts groups: labels before names, single flippers before walks, stronger mud first."""
+    label = re.fullmatch(r"(walk )?(\d+(?:\.\d+)?)N", group)
+    return label is None, bool(label and label[1]), -float(label[2]) if label else 0.0, group

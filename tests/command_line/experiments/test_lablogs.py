@@ -1,0 +1,97 @@
+"""`mudskipper experiment lablogs`: what it refuses, and what it prints and writes of the authors' own logs."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from tests.command_line.command_lines import refusal
+from tests.folders import SHARED_DATA
+
+LABLOGS = ("experiment", "lablogs")
+LOGS = SHARED_DATA / "flipper_in_mud"
+NAMES = ("single_12N_trial1", "single_12N_trial4", "walk_15.6N_30mm_trial3")
+REPEATABILITY = {"first_cv", "later_cv", "chi", "n", "values", "bounds", "invalid"}
+measured = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared measurements are not beside the repository")
+
+
+def test_folders_patterns_and_groups_that_lead_nowhere_are_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert "no such folder" in refusal(capsys, *LABLOGS, str(tmp_path / "missing"))
+    assert "holds no log" in refusal(capsys, *LABLOGS, str(tmp_path))
+    (tmp_path / "pond.csv").write_text("no log")
+    assert "must be a pattern and a name" in refusal(capsys, *LABLOGS, str(tmp_path), "--group", "pond*")
+    assert "'lake*'" in refusal(capsys, *LABLOGS, str(tmp_path), "--group", "lake*=wet")
+    assert "'air*'" in refusal(capsys, *LABLOGS, str(tmp_path), "--air", "air*")
+
+
+def test_a_folder_without_a_readable_log_names_each_reason(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "pond.csv").write_text("no log")
+    (tmp_path / "run.mcap").write_text("no log")
+    assert main([*LABLOGS, str(tmp_path), "--json"]) == exit_codes.UNHEALTHY
+    report = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert [each["name"] for each in report["refused"]] == ["pond.csv", "run.mcap"]
+    assert all(str(tmp_path) in each["reason"] for each in report["refused"])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two trials of one mud, a walk, and a file that is no log."""
+    folder = tmp_path_factory.mktemp("logs")
+    for name in NAMES:
+        shutil.copy(LOGS / f"{name}.csv.gz", folder)
+    (folder / "notes.csv").write_text("trial,remark\n1,rain\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("out") / "made"
+    command = [*LABLOGS, str(folder), "--json", "--out", str(out), "--group", "single_12N*=firm"]
+    assert main(command) == exit_codes.OK
+    return out
+
+
+@pytest.fixture
+def report(written: Path) -> Any:
+    return json.loads((written / "summary.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
+
+
+@measured
+def test_the_default_method_is_at_the_top_and_the_others_are_below_methods(report: Any) -> None:
+    keys = {"groups", "separation", "left_right", "air", "sensitivity"}
+    assert report["schema"] == "experiment-lablogs/1"
+    assert set(report) >= keys and set(report["methods"]["paper"]) >= keys
+    for method in (report, report["methods"]["paper"]):
+        assert set(method["groups"]) == {"firm", "walk 15.6N"}
+        assert all(set(each) >= REPEATABILITY for each in method["groups"]["firm"].values())
+    assert report["groups"]["firm"]["k_s"]["n"] == 2
+    assert report["groups"]["firm"]["k_s"] != report["methods"]["paper"]["groups"]["firm"]["k_s"]
+
+
+@measured
+def test_a_file_that_is_no_log_is_listed_and_stops_nothing(report: Any) -> None:
+    assert [each["name"] for each in report["refused"]] == ["notes.csv"]
+    assert sorted(each["name"] for each in report["logs"]) == [f"{name}.csv.gz" for name in NAMES]
+    assert all(each["in_mud"] for each in report["logs"])
+
+
+@measured
+def test_disturbances_are_reported_for_each_coefficient(report: Any) -> None:
+    found = report["sensitivity"]
+    assert found["current_late"]["k_s"]["smallest"] <= found["current_late"]["k_s"]["median"]
+    assert 0.0 <= found["rows_missing"]["k_s"]["moved"] <= 1.0
+    assert set(found["groups"]) == {"firm", "walk 15.6N"}
+
+
+@measured
+def test_the_folder_has_a_page_and_figures(written: Path) -> None:
+    figures = {f"{name}.png" for name in ("strokes", "scatter", "left_right", "sensitivity")}
+    assert {path.name for path in written.iterdir()} == {"report.html", "summary.json", *figures}

@@ -1,0 +1,50 @@
+"""Logs are found in folders, and their names say which mud they were measured in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from experiments.lablogs.log_choice import GroupRule, find_logs, group_key, group_of
+
+
+@pytest.mark.parametrize(
+    ("name", "group"),
+    [
+        ("single_12.5N_trial1.csv.gz", "12.5N"),
+        ("single_12.5N_35deg_depth30mm_0.1ms_2_Thu_Jun_27_17_26_11_2024.csv.gz", "12.5N"),
+        ("walk_15.6N_50mm_trial1.csv.gz", "walk 15.6N"),
+        ("7N.csv", "7N"),
+        ("single_stiffest_trial1.csv.gz", None),
+        ("_Mon_Aug__5_19_30_04_2024.csv.gz", None),
+        ("Test_2024Nov_3Nm.csv", None),
+    ],
+)
+def test_the_label_in_a_name_is_its_group(name: str, group: str | None) -> None:
+    assert group_of(name, ()) == group
+
+
+def test_the_first_rule_that_matches_replaces_the_label() -> None:
+    rules = (GroupRule("single_12*", "firm"), GroupRule("*", "other"))
+    assert [group_of(f"{name}.csv.gz", rules) for name in ("single_12.5N_1", "single_12N_1", "single_10.3N_1")] == [
+        "firm",
+        "firm",
+        "other",
+    ]
+    assert group_of("pond.csv.gz", (GroupRule("pond", "wet"),)) == "wet"  # without the ending
+
+
+def test_groups_are_in_the_order_of_strength() -> None:
+    groups = ["walk 15.6N", "pond", "10.3N", "walk 30N", "12N", "12.5N"]
+    assert sorted(groups, key=group_key) == ["12.5N", "12N", "10.3N", "walk 30N", "walk 15.6N", "pond"]
+
+
+def test_logs_are_found_below_a_folder_once_and_segments_of_a_run_are_one(tmp_path: Path) -> None:
+    for name in ("a/one.csv", "a/b/two.csv.gz", "a/run-0000.mcap", "a/run-0001.mcap", "a/bench-0001.mcap", "a/c.txt"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    found = find_logs([tmp_path, tmp_path / "a" / "b", tmp_path / "a" / "one.csv"])
+    names = [[path.name for path in paths] for paths in found]
+    assert sorted(names) == [["bench-0001.mcap"], ["one.csv"], ["run-0000.mcap", "run-0001.mcap"], ["two.csv.gz"]]

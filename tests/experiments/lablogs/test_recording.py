@@ -1,0 +1,89 @@
+"""Disturbances act on the columns as they say, and mud is distinguished from air by torque."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from control.records import Phase
+from experiments.lablogs.lab_trial import LabTrial, read_trial
+from experiments.lablogs.recording import LabRecording, OwnRecording, read_recording
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log_reading.lab_csv import LabLog
+from firmware_host.log_reading.replay import PAPER_CONSTANT_NM_A, replay_files
+from tests.recorded_walks import record_walks
+
+ROW_S = 0.001
+
+
+def make_lab(stance_nm: float = 0.4, swing_nm: float = 0.06, rows: int = 1000, sign: float = 1.0) -> LabLog:
+    """Two strides of the right flipper; every current counts its row in addition."""
+    phase = np.resize(np.repeat([Phase.SWING, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION], rows // 8), rows)
+    torque_nm = np.select([phase == Phase.STANCE, phase == Phase.SWING], [-sign * stance_nm, swing_nm], 0.0)
+    current_a = np.full((rows, 4), np.nan)
+    current_a[:, 2] = torque_nm / PAPER_CONSTANT_NM_A + 1e-6 * np.arange(rows)
+    current_a[:, 3] = np.arange(rows)
+    angle_rad = np.full((rows, 4), np.nan)
+    angle_rad[:, 2:] = 0.001 * np.arange(rows)[:, None]
+    stamp_s = ROW_S * np.arange(rows, dtype=np.float64)
+    return LabLog(
+        stamp_s=stamp_s,
+        phase=phase,
+        angle_rad=angle_rad,
+        current_a=current_a,
+        body_x_m=np.full(rows, np.nan),
+        gait={},
+        flippers=("right",),
+        current_limit_a=np.inf,
+        commanded_depth_m=np.full(rows, 0.03),
+        body_height_m=np.full(rows, np.nan),
+        body_pitch_rad=np.full(rows, np.nan),
+    )
+
+
+@pytest.mark.parametrize("delay_s", [0.005, -0.005])
+def test_a_delay_moves_the_currents_against_the_positions(delay_s: float) -> None:
+    lab = make_lab()
+    delayed = LabRecording(lab).delay_current(delay_s)
+    rows = round(delay_s / ROW_S)
+    inside = np.arange(10, 990)
+    assert np.abs(delayed.current_a[inside, 3] - (inside - rows)).max() <= 1.0  # the stamps are rounded
+    assert np.array_equal(delayed.stamp_s, lab.stamp_s)
+    assert delayed.current_a[0, 3] == (0.0 if delay_s > 0.0 else 5.0)  # the first current is held before it came
+
+
+def test_missing_rows_are_missing_in_every_column() -> None:
+    lab = make_lab(rows=8000)
+    thinned = LabRecording(lab).remove_rows(0.3, np.random.default_rng(1))
+    assert len(thinned.stamp_s) == pytest.approx(0.7 * 8000, rel=0.03)
+    kept = np.round(thinned.stamp_s / ROW_S).astype(int)
+    assert np.array_equal(thinned.current_a[:, 3], lab.current_a[kept, 3])
+    assert np.array_equal(thinned.phase, lab.phase[kept])
+
+
+def test_a_stance_that_needs_more_than_friction_is_evidence_of_mud() -> None:
+    assert LabRecording(make_lab(stance_nm=0.4)).has_evidence_of_mud()
+    assert LabRecording(make_lab(stance_nm=0.4, sign=-1.0)).has_evidence_of_mud()  # signs may be wrong
+    assert not LabRecording(make_lab(stance_nm=0.07)).has_evidence_of_mud()
+    assert not LabRecording(make_lab(stance_nm=0.04, swing_nm=0.0)).has_evidence_of_mud()  # a swing that rested
+
+
+def test_a_log_without_stance_is_not_declared_air() -> None:
+    lab = make_lab()
+    assert LabRecording(lab._replace(phase=np.full_like(lab.phase, Phase.SWING))).has_evidence_of_mud()
+
+
+def test_a_log_of_this_project_is_replayed_and_can_be_disturbed(tmp_path: Path, configuration: Configuration) -> None:
+    path = tmp_path / "walk.mcap"
+    record_walks(path, configuration, 3)
+    recording, strides = read_recording([path]), replay_files([path]).strides
+    assert isinstance(recording, OwnRecording)
+    assert recording.has_evidence_of_mud() and not recording.fixed_base
+    assert repr(recording.estimate_strides("default")) == repr(strides)
+    trial = read_trial([path])
+    assert isinstance(trial, LabTrial)
+    disturbed = trial.replays["default"]
+    assert len(disturbed.current_late) == len(disturbed.rows_missing[0]) == len(strides)
+    assert repr(disturbed.current_late) != repr(strides) != repr(disturbed.rows_missing[0])
