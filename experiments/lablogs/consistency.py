@@ -17,7 +17,7 @@ import numpy as np
 
 from control.records import FLIPPERS, Estimate
 from estimation.mud import Method
-from experiments.lablogs.lab_trial import LabTrial, Strides, is_bound, is_value, pair_flippers
+from experiments.lablogs.lab_trial import LabTrial, Strides, claims_error, is_bound, is_value, pair_flippers
 from experiments.reports.error_table import COEFFICIENTS
 
 CONTRADICTING = 2.0  # standard errors
@@ -74,7 +74,7 @@ def flipper_pairs(trials: Sequence[LabTrial], method: Method) -> list[FlipperPai
     walks = [trial for trial in trials if len(trial.flippers) == len(FLIPPERS) and not trial.fixed_base]
     strides = [pair for trial in walks for pair in pair_flippers(trial.replays[method].recorded)]
     pairs = [FlipperPair(name, getattr(a, name), getattr(b, name)) for name in COEFFICIENTS for a, b in strides]
-    return [pair for pair in pairs if is_value(pair.left) and is_value(pair.right)]
+    return [pair for pair in pairs if claims_error(pair.left) and claims_error(pair.right)]
 
 
 def agreements(pairs: Sequence[FlipperPair]) -> dict[str, Agreement]:

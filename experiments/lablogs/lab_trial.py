@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 from zlib import crc32
@@ -59,11 +60,16 @@ class Refusal(NamedTuple):
 
 
 def is_value(estimate: Estimate) -> bool:
-    return estimate.valid and not estimate.at_least
+    return estimate.valid and not estimate.at_least and isfinite(estimate.value)
 
 
 def is_bound(estimate: Estimate) -> bool:
     return estimate.valid and estimate.at_least
+
+
+def claims_error(estimate: Estimate) -> bool:
+    """Whether the estimate is a value with an error to compare its scatter with."""
+    return is_value(estimate) and isfinite(estimate.std_error) and estimate.std_error > 0.0
 
 
 def pair_flippers(strides: Strides) -> list[tuple[StrideEstimate, StrideEstimate]]:

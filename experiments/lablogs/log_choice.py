@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 ENDINGS = (".csv", ".csv.gz", ".mcap")
 LABEL = re.compile(r"(?<![0-9.])(\d+(?:\.\d+)?N)(?![A-Za-z0-9])")
-KIND = re.compile(r"(?:^|[^A-Za-z])(single|walk)(?![A-Za-z])", re.IGNORECASE)
+KIND = re.compile(r"(?:^|[^A-Za-z])(single|walk)(?:ing)?(?![A-Za-z])", re.IGNORECASE)
 SEGMENT = re.compile(r"(.*)-\d{4}\.mcap")
 Paths = tuple[Path, ...]
 

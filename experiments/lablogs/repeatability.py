@@ -11,14 +11,14 @@ they are half of the true ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from control.records import Estimate
-from experiments.lablogs.lab_trial import is_value
+from experiments.lablogs.lab_trial import claims_error, is_value
 
 Floats = NDArray[np.float64]
 Strokes = Sequence[Estimate]  # one coefficient's estimates of one trial, in their order
@@ -76,7 +76,7 @@ def later_levels(trials: Sequence[Strokes]) -> list[float]:
 
 def scatter_between_trials(trials: Sequence[Strokes]) -> Scatter:
     """Compare first strokes with their weighted mean."""
-    first = [each for each in first_values(trials) if each.std_error > 0.0]
+    first = list(filter(claims_error, first_values(trials)))
     if len(first) < 2:
         return Scatter()
     values, errors = (np.array([getattr(each, name) for each in first]) for name in ("value", "std_error"))
@@ -108,7 +108,7 @@ def _log_table(trials: Sequence[Strokes]) -> tuple[Floats, Floats]:
     errors = np.ones_like(logs)
     for row, strokes in enumerate(trials):
         for column, estimate in enumerate(strokes):
-            if is_value(estimate) and estimate.value > 0.0 and estimate.std_error > 0.0 and isfinite(estimate.value):
+            if claims_error(estimate) and estimate.value > 0.0:
                 logs[row, column] = np.log(estimate.value)
                 errors[row, column] = estimate.std_error / estimate.value
     return logs, errors

@@ -13,7 +13,16 @@ import numpy as np
 
 from control.records import Estimate, StrideEstimate
 from estimation.mud import Method
-from experiments.lablogs.lab_trial import DELAY_S, MISSING_ROWS, SEEDS, LabTrial, Replays, Strides, is_value
+from experiments.lablogs.lab_trial import (
+    DELAY_S,
+    MISSING_ROWS,
+    SEEDS,
+    LabTrial,
+    Replays,
+    Strides,
+    claims_error,
+    is_value,
+)
 from experiments.reports.error_table import COEFFICIENTS
 
 SAME_END_S = 0.2  # missing rows move the end of a stride by a few rows, and a stride takes more than a second
@@ -37,7 +46,7 @@ class Change(NamedTuple):
     @property
     def moved_errors(self) -> float | None:
         """The change in claimed errors; None where the value was lost."""
-        if self.disturbed is None or not is_value(self.disturbed) or not self.recorded.std_error > 0.0:
+        if self.disturbed is None or not is_value(self.disturbed) or not claims_error(self.recorded):
             return None
         return abs(self.disturbed.value - self.recorded.value) / self.recorded.std_error
 

@@ -52,3 +52,8 @@ def test_a_bound_between_two_values_counts_once() -> None:
 def test_estimates_are_counted_as_values_bounds_and_invalid() -> None:
     counts = count_estimates([make_value(1.0), make_value(2.0), make_bound(1.0), INVALID])
     assert (counts.values, counts.bounds, counts.invalid) == (2, 1, 1)
+
+
+def test_a_value_that_claims_no_error_is_not_compared() -> None:
+    walk = make_walk([(make_value(1.0, 0.0), make_value(2.0, 0.0)), (make_value(1.0), make_value(float("nan")))])
+    assert flipper_pairs([walk], "default") == []
