@@ -1,9 +1,8 @@
 """Reads the CSV logs of the paper's authors into this project's conventions.
 
-The authors logged mirrored motors with signs that differ from file to file, for positions and currents separately.
-The reader therefore finds the signs from the motion. A flipper moves down in insertion and backward in stance, so its
-angles fall there. Its motors do positive work on the mud there, so the current has the sign of the change of angle. A
-joint without such a motion keeps its logged signs. The body moves forward in stance.
+The authors logged mirrored motors with signs that differ from file to file, so `lab.joint_signs` finds them. What the
+reader notices is in `findings`: rows that it drops, samples that it invalidates, and facts that the reader of a report
+must know. A log in which every number would be wrong is refused.
 """
 
 from __future__ import annotations
@@ -15,10 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from control.records import FLIPPERS, UNKNOWN
-from firmware_host.log_reading.lab.body_track import body_advance
+from control.records import FLIPPERS, UNKNOWN, Phase
+from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS, read_body_track
 from firmware_host.log_reading.lab.columns import (
-    BODY_COLUMNS,
     CURRENT_COLUMNS,
     DEPTH_COLUMN,
     PHASE_OF_STATE,
@@ -26,8 +24,12 @@ from firmware_host.log_reading.lab.columns import (
     READ_COLUMNS,
 )
 from firmware_host.log_reading.lab.csv_table import STATE, TIME, CsvTable, read_table
-from firmware_host.log_reading.lab.findings import Finding
+from firmware_host.log_reading.lab.findings import Finding, FindingKind
 from firmware_host.log_reading.lab.joint_signs import orient
+from firmware_host.log_reading.lab.log_rows import LogRows
+from firmware_host.log_reading.lab.row_order import drop_backward_rows
+from firmware_host.log_reading.lab.signal_checks import check_ranges, check_swapped_joints, drop_stuck_signals
+from firmware_host.log_reading.lab.zero_checks import check_zero
 from firmware_host.log_reading.log_reader import LogError
 
 Floats = NDArray[np.float64]
@@ -35,7 +37,7 @@ Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 
 CLIP_FRACTION, CLIPPED_ROWS = 0.9995, 200  # half a second of rows at the largest current makes it a limit
-BACKWARDS_S = 1.0  # accepted disorder of the rows' times
+MOST_UNKNOWN = 0.5  # of the rows' states; beyond it this is another column
 
 
 class LabLog(NamedTuple):
@@ -45,44 +47,56 @@ class LabLog(NamedTuple):
     phase: Integers  # of control.records.Phase
     angle_rad: Floats  # (n, 4)
     current_a: Floats  # (n, 4)
-    body_x_m: Floats  # horizontal advance; NaN where motion capture did not see the body
+    body_x_m: Floats  # along the horizontal direction of the stances; NaN where motion capture did not see the body
     gait: dict[str, float]  # the operator's settings; `insertion_angle` is the commanded depth in m
     flippers: tuple[str, ...]  # the ones that moved
     current_limit_a: float  # at which the drives clipped; infinite where they did not
     commanded_depth_m: Floats  # NaN where the log does not have it
-    body_height_m: Floats  # NaN where it is not known
-    body_pitch_rad: Floats  # NaN where it is not known
+    body_height_m: Floats  # above the origin of the capture; NaN where unknown
+    body_pitch_rad: Floats  # of the nose upward, since the first known pose; NaN where unknown
     missing_settings: tuple[str, ...] = ()  # that the head names without a value
     findings: tuple[Finding, ...] = ()
 
 
-def read_lab_csv(path: Path) -> LabLog:
-    """Reads a CSV file, plain or gzip: settings, column names, then a row per sample. Raises LogError."""
-    table = read_table(path, READ_COLUMNS)
+def read_lab_csv(path: Path, vertical: str = VERTICAL_AXIS) -> LabLog:
+    """Reads a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
+    table = drop_backward_rows(path, read_table(path, READ_COLUMNS))
     _refuse_missing(path, table)
-    stamp_s = _check_time(path, table)
-    phase = _read_phases(path, table)
-    angle_rad = math.tau * _stack(table, POSITION_COLUMNS)
-    current_a = _stack(table, CURRENT_COLUMNS)
+    phase, found = _read_phases(path, table)
+    rows = LogRows(path, table.column[TIME], table.line, phase)
+    angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
     flippers = _find_flippers(angle_rad)
     _blank_absent(angle_rad, current_a, flippers)
-    orient(angle_rad, current_a, phase)
-    body_x_m = body_advance([table.column[name] for name in BODY_COLUMNS if name in table.column], stamp_s, phase)
+    commanded_m = _commanded_depth(table)
+    current_limit_a = _find_limit_a(current_a)
+    found += _check_joints(rows, angle_rad, current_a, commanded_m, table.gait.get("extraction_height", UNKNOWN))
+    track, found_in_track = read_body_track(rows, table, vertical)
     return LabLog(
-        stamp_s=stamp_s,
+        stamp_s=rows.time_s,
         phase=phase,
         angle_rad=angle_rad,
         current_a=current_a,
-        body_x_m=body_x_m,
+        body_x_m=track.advance_m,
         gait=table.gait,
         flippers=flippers,
-        current_limit_a=_find_limit_a(current_a),
-        commanded_depth_m=_commanded_depth(table),
-        body_height_m=np.full(len(stamp_s), UNKNOWN),
-        body_pitch_rad=np.full(len(stamp_s), UNKNOWN),
+        current_limit_a=current_limit_a,
+        commanded_depth_m=commanded_m,
+        body_height_m=track.height_m,
+        body_pitch_rad=track.pitch_rad,
         missing_settings=table.missing_settings,
-        findings=table.findings,
+        findings=(*table.findings, *found, *found_in_track),
     )
+
+
+def _check_joints(
+    rows: LogRows, angle_rad: Floats, current_a: Floats, commanded_m: Floats, extraction_m: float
+) -> list[Finding]:
+    """Orients the joints' signals and invalidates wrong samples, in place. Raises LogError where all are wrong."""
+    found = check_ranges(rows, angle_rad, current_a)
+    check_swapped_joints(rows, angle_rad)
+    found += drop_stuck_signals(rows, angle_rad, current_a)
+    found += orient(rows, angle_rad, current_a)
+    return [*found, *check_zero(rows, angle_rad, commanded_m, extraction_m)]
 
 
 def _refuse_missing(path: Path, table: CsvTable) -> None:
@@ -104,23 +118,23 @@ def _commanded_depth(table: CsvTable) -> Floats:
     return np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)) if depth_m is None else depth_m
 
 
-def _check_time(path: Path, table: CsvTable) -> Floats:
-    stamp_s = table.column[TIME]
-    back_s = np.maximum.accumulate(stamp_s) - stamp_s
-    _refuse_where(back_s > BACKWARDS_S, path, table, f"goes back in time by more than {BACKWARDS_S:g} s")
-    return stamp_s
-
-
-def _read_phases(path: Path, table: CsvTable) -> Integers:
+def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
+    """Returns the phase of each row; a state that is not known is a pause. Raises LogError where most are unknown."""
     state = table.column[STATE]
-    _refuse_where(~np.isin(state, list(PHASE_OF_STATE)), path, table, "has a turtle_state that is not known")
-    phase_from_lowest = np.array([PHASE_OF_STATE[known] for known in sorted(PHASE_OF_STATE)], dtype=np.int64)
-    return phase_from_lowest[state.astype(np.int64) - min(PHASE_OF_STATE)]
-
-
-def _refuse_where(wrong: Truths, path: Path, table: CsvTable, reason: str) -> None:
-    if np.any(wrong):
-        raise LogError(f"{path}: line {int(table.line[np.argmax(wrong)])} {reason}")
+    known = np.isin(state, list(PHASE_OF_STATE))
+    phase_from_lowest = np.array([PHASE_OF_STATE[number] for number in sorted(PHASE_OF_STATE)], dtype=np.int64)
+    phase = np.full(len(state), Phase.PAUSE, dtype=np.int64)
+    phase[known] = phase_from_lowest[state[known].astype(np.int64) - min(PHASE_OF_STATE)]
+    if np.all(known):
+        return phase, []
+    first, count = int(np.argmin(known)), int(np.count_nonzero(~known))
+    text = (
+        f"the state {state[first]:g} is not known; {count} of {len(state)} rows have such a state and count as a pause"
+    )
+    found = Finding(FindingKind.UNKNOWN_STATE, STATE, float(table.column[TIME][first]), int(table.line[first]), text)
+    if count > MOST_UNKNOWN * len(state):
+        raise LogError(f"{path}: {found}")
+    return phase, [found]
 
 
 def _find_flippers(angle_rad: Floats) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from estimation.recorded_states import recorded_states
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.log_reader import (
     Log,
@@ -31,7 +32,6 @@ from firmware_host.log_reading.log_reader import (
     unwatched,
 )
 
-PAPER_CONSTANT_NM_A = 0.083
 WEIGHTLESS = ArmMass(
     arm_mass_kg=0.0, center_of_mass_m=0.0, sweep_inertia_kg_m2=0.0, adduction_inertia_kg_m2=0.0
 )  # the assumption of the authors' method; the masses of their arm are unknown

@@ -1,7 +1,8 @@
 """The authors' walks through the whole path of a pose: captured positions as NatNet frames over UDP, read tick by tick
 beside the joints, against what their log says directly.
 
-What the capture says is worked out here, from the log's own columns.
+What the capture says is worked out here, from the log's own columns. What a reader must find in them, whatever the
+capture's heading, is tested with a known truth in tests/firmware_host/log_reading/lab/test_body_track.py.
 """
 
 from __future__ import annotations
@@ -30,15 +31,19 @@ from tests.folders import SHARED_DATA
 
 Floats = NDArray[np.float64]
 SHARED = SHARED_DATA
-WALKS = sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz"))
+WALKS = [
+    *sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz")),
+    *sorted((SHARED / "as_published").glob("Increse_torque_*.csv.gz")),
+]
 PHASES = tuple(Phase)
 INSERTION, STANCE = 2, 3  # of turtle_state
+HORIZONTAL = (1.0, 0.0, 1.0)  # the capture's y is its vertical: a body that sinks does not advance
 FROZEN_S, JUMP_M = 0.5, 0.02
 BOUND_M = 0.003
 LATENCIES_S = (0.0, 0.008)  # from exposure to arrival: none, and a usual one
 
 pytestmark = pytest.mark.skipif(not WALKS, reason="the shared measurements are not beside the repository")
-each_walk = pytest.mark.parametrize("path", WALKS, ids=lambda path: path.name.removesuffix(".csv.gz"))
+each_walk = pytest.mark.parametrize("path", WALKS, ids=lambda path: path.name.removesuffix(".csv.gz")[:21])
 each_latency = pytest.mark.parametrize("latency_s", LATENCIES_S)
 
 
@@ -55,7 +60,7 @@ class Capture:
 
     @property
     def x_m(self) -> Floats:
-        """Along the direction in which the stances moved the body; NaN where the capture was lost."""
+        """Along the horizontal direction in which the stances moved the body; NaN where the capture was lost."""
         x_m: Floats = np.where(self.lost, np.nan, self.position_m @ self.direction)
         return x_m
 
@@ -67,8 +72,9 @@ class Capture:
 @cache
 def capture_of(path: Path) -> Capture:
     lines = gzip.decompress(path.read_bytes()).decode().splitlines()
-    names = [name.strip() for name in lines[1].split(",")]
-    table = np.loadtxt(lines[2:], delimiter=",")
+    head = next(number for number, line in enumerate(lines) if line.startswith("time,"))
+    names = [name.strip() for name in lines[head].split(",")]
+    table = np.loadtxt(lines[head + 1 :], delimiter=",")
     time_s, state = (table[:, names.index(name)] for name in ("time", "turtle_state"))
     position_m = table[:, [names.index(f"OptitrackPosition_{axis}") for axis in "xyz"]]
     first = np.flatnonzero(np.any(np.diff(position_m, axis=0, prepend=np.nan) != 0.0, axis=1))
@@ -76,7 +82,7 @@ def capture_of(path: Path) -> Capture:
     leaps_m = np.append(np.linalg.norm(np.diff(position_m[first], axis=0), axis=1), 0.0)
     lost = np.repeat((time_s[ends - 1] - time_s[first] > FROZEN_S) & (leaps_m > JUMP_M), ends - first)
     inside = (state[1:] == STANCE) & (state[:-1] == STANCE) & ~lost[1:] & ~lost[:-1]
-    path_m = np.diff(position_m, axis=0)[inside].sum(axis=0)
+    path_m = np.diff(position_m, axis=0)[inside].sum(axis=0) * HORIZONTAL
     return Capture(time_s, state, position_m, first, lost, path_m / np.linalg.norm(path_m))
 
 

@@ -18,3 +18,5 @@ STATE_OF_PHASE = {phase: state for state, phase in enumerate(PHASES_BY_STATE)} |
     Phase.RECOVERY: 5  # the authors have no such state; it is between extraction and swing, as their pauses are
 }
 PHASE_OF_STATE = {-1: Phase.REST, **dict(enumerate(PHASES_BY_STATE)), **dict.fromkeys((6, 7, 8), Phase.PAUSE)}
+
+PAPER_CONSTANT_NM_A = 0.083  # of the authors' motors

@@ -107,8 +107,9 @@ def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], 
     names, values = _split_settings([line for line in head if line.strip()])
     if len(names) != len(values):
         count = f"{len(names)} names and {len(values)} values"
-        text = f"the head has {count} of settings: they cannot be assigned, so {', '.join(names)} are not known"
-        return {}, _without_texts(names), [of_whole_log(FindingKind.MISSING_SETTING, text)]
+        missing = _without_texts(names)
+        text = f"the head has {count} of settings, so no value can be assigned to {', '.join(missing)}"
+        return {}, missing, [of_whole_log(FindingKind.MISSING_SETTING, text)]
     if not names:
         text = f"the file has no settings: {', '.join(USED_SETTINGS)} are not known"
         return {}, USED_SETTINGS, [of_whole_log(FindingKind.MISSING_SETTING, text)]

@@ -150,7 +150,7 @@ def test_the_authors_form_gives_depth_and_force_as_our_log_does(as_csv: Path, tw
 
 def test_what_the_authors_form_does_not_hold_is_named(as_csv: Path, tmp_path: Path) -> None:
     lines = gzip.decompress(as_csv.read_bytes()).decode().splitlines()
-    names, rows = lines[1].split(","), [line.split(",") for line in lines[2:]]
+    names, rows = lines[2].split(","), [line.split(",") for line in lines[3:]]
     path = tmp_path / "bare.csv"
     kept = [number for number, name in enumerate(names) if not name.startswith("Optitrack")]
     table = [",".join(row[number] for number in kept) for row in [names, *rows]]
@@ -164,14 +164,14 @@ def test_what_the_authors_form_does_not_hold_is_named(as_csv: Path, tmp_path: Pa
 
 def test_one_flipper_alone_is_the_one_shown(as_csv: Path, tmp_path: Path) -> None:
     lines = gzip.decompress(as_csv.read_bytes()).decode().splitlines()
-    names = lines[1].split(",")
+    names = lines[2].split(",")
     still = [number for number, name in enumerate(names) if name.startswith("right")]
-    rows = [line.split(",") for line in lines[2:]]
+    rows = [line.split(",") for line in lines[3:]]
     for row in rows:
         for number in still:
             row[number] = "0"
     path = tmp_path / "left.csv"
-    path.write_text("\n".join([*lines[:2], *(",".join(row) for row in rows)]), encoding="utf-8")
+    path.write_text("\n".join([*lines[:3], *(",".join(row) for row in rows)]), encoding="utf-8")
     walk = read_walk(path)
     assert walk.flipper == "left"
     assert walk.strides == walk.own_strides != []

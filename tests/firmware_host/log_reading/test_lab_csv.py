@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from control.records import JOINTS, Phase
 from firmware_host.log_reading.lab.columns import STATE_OF_PHASE
 from firmware_host.log_reading.lab.export import write_lab_csv
+from firmware_host.log_reading.lab.findings import FindingKind
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.log_reader import Log, LogError
 from firmware_host.log_reading.tick_array import tick_type
@@ -83,8 +84,10 @@ def make_walk(strides: int = 3, rate_hz: float = 100.0) -> Log:
     ticks = np.zeros(len(time_s), tick_type())
     ticks["stamp_s"] = 1234.5 + time_s
     ticks["phase"] = np.repeat(phases, int(rate_hz))
-    ticks["angle_rad"] = np.column_stack([*angles, *angles])
-    ticks["current_a"] = 3.0 * np.sign(np.gradient(ticks["angle_rad"], axis=0)) + 0.1
+    noise = np.random.default_rng(3).normal(0.0, 1e-5, (2, len(time_s), 4))
+    moving = np.gradient(np.column_stack([*angles, *angles]), axis=0)
+    ticks["angle_rad"] = np.column_stack([*angles, *angles]) + noise[0]
+    ticks["current_a"] = 3.0 * np.sign(moving) + 0.5 + noise[1]
     ticks["stride_depth_m"] = 0.035
     ticks["body_x_m"] = np.cumsum(ticks["phase"] == Phase.STANCE) * 1e-4
     return Log({}, "[gait]\nsweep_angle_deg = 30.0\nprotocol = 'walking'\n", ticks, [], [], True)
@@ -116,15 +119,17 @@ def test_measured_motion_has_the_signs_of_a_walk(path: Path) -> None:
         assert travel(log, joint, Phase.STANCE) < 0.0 < travel(log, joint, Phase.SWING)
         assert work(log, joint, Phase.STANCE) > 0.0
     advance_m = np.nansum(np.diff(log.body_x_m)[inside(log, Phase.STANCE)])
-    assert np.isnan(log.body_x_m).all() if single else 0.03 < advance_m < 0.1
+    assert np.isnan(log.body_x_m).all() if single else 0.005 < advance_m < 0.1
 
 
 @needs_measurements
-def test_a_walk_of_70_mm_pulls_itself_back_in_swing() -> None:
-    (path,) = (path for path in MEASURED if "70mm" in path.name)
-    log = read_lab_csv(path)
-    steps_m = np.diff(log.body_x_m)
-    assert np.sum(steps_m[inside(log, Phase.SWING)]) < -0.5 * np.sum(steps_m[inside(log, Phase.STANCE)])
+def test_most_measured_walks_of_january_sink_further_than_they_advance() -> None:
+    """The capture's y is its vertical; the largest motion of these bodies is no advance."""
+    logs = [read_lab_csv(path) for path in MEASURED if path.name.startswith("walk")]
+    sinking_m = [float(np.nanmax(log.body_height_m) - np.nanmin(log.body_height_m)) for log in logs]
+    advance_m = [float(np.nansum(np.diff(log.body_x_m)[inside(log, Phase.STANCE)])) for log in logs]
+    assert sum(down > forward for down, forward in zip(sinking_m, advance_m, strict=True)) >= 3
+    assert all(any(finding.kind is FindingKind.POSE for finding in log.findings) for log in logs)
 
 
 def test_what_was_written_is_read_back(tmp_path: Path) -> None:
@@ -155,7 +160,7 @@ def test_writing_keeps_the_authors_columns_and_units() -> None:
     assert settings == "scenario,insertion_angle,sweep_angle_deg" and values == "mudskipper,0.035,30.0"
     assert names == HEAD.splitlines()[1] + ",OptitrackPosition_x"
     turns = [float(field) for field in first.split(",")[2:6]]
-    assert turns == pytest.approx([0.1 / math.tau, 0.0, 0.1 / math.tau, 0.0])
+    assert turns == pytest.approx([0.1 / math.tau, 0.0, 0.1 / math.tau, 0.0], abs=1e-5)
 
 
 def test_a_log_without_a_pose_has_no_column_for_it() -> None:
@@ -176,7 +181,7 @@ def test_a_configuration_that_is_not_toml_is_refused() -> None:
 
 def test_states_become_phases(tmp_path: Path) -> None:
     states = (-1, 0, 1, 2, 3, 4, 5, 6, 7, 8)
-    rows = [f"{number},{state},0,0,0,0,0,0,0,0" for number, state in enumerate(states)]
+    rows = [f"{number / 10},{state},0,0,0,0,0,0,0,0" for number, state in enumerate(states)]
     log = read_lab_csv(write(tmp_path / "states.csv", HEAD, *rows))
     still = [Phase.PAUSE] * 4
     moving = [Phase.SWING, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION]
@@ -187,7 +192,7 @@ def test_states_become_phases(tmp_path: Path) -> None:
 def test_lost_poses_are_not_positions(tmp_path: Path) -> None:
     """An old pose held until the true one is found, and zeros, are no motion of the body."""
     body_m = [0.8] * 10 + [0.1, 0.11, 0.12, 0.0, 0.13, 0.14]
-    rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,0,{x_m},0" for number, x_m in enumerate(body_m)]
+    rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,{x_m},0,0" for number, x_m in enumerate(body_m)]
     head = HEAD + ",OptitrackPosition_x,OptitrackPosition_y,OptitrackPosition_z"
     log = read_lab_csv(write(tmp_path / "lost.csv", head, *rows))
     np.testing.assert_allclose(log.body_x_m, [math.nan] * 10 + [0.1, 0.11, 0.12, math.nan, 0.13, 0.14])
@@ -210,9 +215,12 @@ MALFORMED = {
     "a long first row": ([HEAD, GOOD[0] + ",1", *GOOD], "line 3 has 11 fields, the columns are 10"),
     "a word": ([HEAD, *GOOD, ROW.format("mud", 0), *GOOD], "line 8: 'mud' is not a number"),
     "python's own number": ([HEAD, *GOOD, ROW.format("1_0", 0), *GOOD], "line 8: '1_0' is not a number"),
-    "time backwards": ([HEAD, ROW.format(7, 0), *GOOD], "line 4 goes back in time by more than 1 s"),
-    "an unknown state": ([HEAD, *GOOD, GOOD[0].replace(",2,", ",9,")], "line 8 has a turtle_state"),
-    "half a state": ([HEAD, *GOOD, GOOD[0].replace(",2,", ",2.5,")], "line 8 has a turtle_state"),
+    "time backwards": ([HEAD, *GOOD[::-1]], "line 4, column time, at 0.300 s: the time runs backward by 0.100 s"),
+    "times in ms": ([HEAD, *[ROW.format(10 * number, 0) for number in range(5)]], "rows are 10 s apart"),
+    "unknown states": (
+        [HEAD, *[row.replace(",2,", ",9,") for row in GOOD]],
+        "turtle_state, at 0.000 s: the state 9 is",
+    ),
 }
 
 
@@ -223,9 +231,19 @@ def test_a_malformed_file_is_refused_by_line(lines: list[str], reason: str, tmp_
         read_lab_csv(path)
 
 
-def test_small_disorder_is_kept_as_it_is(tmp_path: Path) -> None:
-    path = write(tmp_path / "run.csv", HEAD, *(ROW.format(stamp_s, 0) for stamp_s in (0.0, 0.9, 0.2, 1.0)))
-    assert read_lab_csv(path).stamp_s.tolist() == [0.0, 0.9, 0.2, 1.0]
+def test_rows_whose_time_runs_backward_are_dropped_and_named(tmp_path: Path) -> None:
+    path = write(tmp_path / "run.csv", HEAD, *(ROW.format(stamp_s, 0) for stamp_s in (0.0, 0.3, 0.2, 0.3, 0.4)))
+    log = read_lab_csv(path)
+    assert log.stamp_s.tolist() in ([0.0, 0.2, 0.3, 0.4], [0.0, 0.3, 0.3, 0.4])
+    (found,) = [finding for finding in log.findings if finding.kind is FindingKind.TIME]
+    assert (found.column, found.time_s, found.line) == ("time", 0.2, 5)
+
+
+@pytest.mark.parametrize("state", ["9", "2.5"])
+def test_a_state_that_is_not_known_is_a_pause(state: str, tmp_path: Path) -> None:
+    log = read_lab_csv(write(tmp_path / "run.csv", HEAD, *GOOD, GOOD[-1].replace(",2,", f",{state},")))
+    assert log.phase.tolist() == [Phase.INSERTION] * 5 + [Phase.PAUSE]
+    assert [(f.column, f.line) for f in log.findings if f.kind is FindingKind.UNKNOWN_STATE] == [("turtle_state", 8)]
 
 
 def test_bytes_that_are_no_text_are_named_by_line(tmp_path: Path) -> None:
@@ -237,7 +255,7 @@ def test_bytes_that_are_no_text_are_named_by_line(tmp_path: Path) -> None:
 
 def test_a_broken_off_archive_names_the_last_good_line(tmp_path: Path) -> None:
     chance = np.random.default_rng(4)
-    rows = [ROW.format(number / 10, noise) for number, noise in enumerate(chance.random(5000))]
+    rows = [ROW.format(number / 10, noise / 10) for number, noise in enumerate(chance.random(5000))]
     packed = gzip.compress("\n".join([HEAD, *rows]).encode())
     path = tmp_path / "run.csv.gz"
     path.write_bytes(packed)
