@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from control.records import FLIPPERS, Phase, StrideEstimate
 from estimation.mud import Method
+from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.log_reader import Log, read_logs
-from firmware_host.log_reading.replay import PAPER_CONSTANT_NM_A, configuration_of, replay_lab, replay_log
+from firmware_host.log_reading.replay import configuration_of, replay_lab, replay_log
 
 Floats = NDArray[np.float64]
 LARGEST_FRICTION_NM = 0.12  # dry friction of a sweep joint, over the authors' logs that were recorded in air

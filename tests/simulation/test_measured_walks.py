@@ -31,10 +31,7 @@ from tests.folders import SHARED_DATA
 
 Floats = NDArray[np.float64]
 SHARED = SHARED_DATA
-WALKS = [
-    *sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz")),
-    *sorted((SHARED / "as_published").glob("Increse_torque_*.csv.gz")),
-]
+WALKS = sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz"))
 PHASES = tuple(Phase)
 INSERTION, STANCE = 2, 3  # of turtle_state
 HORIZONTAL = (1.0, 0.0, 1.0)  # the capture's y is its vertical: a body that sinks does not advance
@@ -43,7 +40,7 @@ BOUND_M = 0.003
 LATENCIES_S = (0.0, 0.008)  # from exposure to arrival: none, and a usual one
 
 pytestmark = pytest.mark.skipif(not WALKS, reason="the shared measurements are not beside the repository")
-each_walk = pytest.mark.parametrize("path", WALKS, ids=lambda path: path.name.removesuffix(".csv.gz")[:21])
+each_walk = pytest.mark.parametrize("path", WALKS, ids=lambda path: path.name.removesuffix(".csv.gz"))
 each_latency = pytest.mark.parametrize("latency_s", LATENCIES_S)
 
 
