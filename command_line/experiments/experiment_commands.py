@@ -25,12 +25,13 @@ GRAVITY_M_S2 = between(9.7, 9.9, "m/s²")  # anywhere on Earth
 
 LABLOGS = (
     "Evaluate the estimates from real logs by each method, without a known truth. A group is the logs of one mud, and "
-    "one log is one trial. first CV: coefficient of variation (sample standard deviation over mean) over trials of the "
-    "first stroke's value, one flipper on a fixed base. later CV: the same of each trial's geometric mean over its "
-    "later strokes. chi: scatter over claimed error, between trials and between strokes; 1 is right. Separation: "
-    "difference of two groups' first strokes in pooled standard deviations. Left against right: median of the "
-    "difference over its claimed error in walks; 0.67 is right. Logs without mud must give no values and no bounds. "
-    "Sensitivity: the same logs with currents 5 ms late or early, and with 30 percent of the rows missing."
+    "one log is one trial (in .mcap, each walk is). first CV: coefficient of variation (sample standard deviation "
+    "over mean) over trials of the first stroke's value, one flipper on a fixed base. later CV: the same of each "
+    "trial's geometric mean over its later strokes. chi: scatter over claimed error, between trials and between "
+    "strokes; 1 is right. Separation: difference of two groups' first strokes in pooled standard deviations. Left "
+    "against right: median of the difference over its claimed error in walks; 0.67 is right. Logs without mud must "
+    "give no values and no bounds. Sensitivity: the same logs with currents 5 ms late or early, and with 30 percent "
+    "of the rows missing."
 )
 
 

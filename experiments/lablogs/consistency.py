@@ -17,7 +17,15 @@ import numpy as np
 
 from control.records import FLIPPERS, Estimate
 from estimation.mud import Method
-from experiments.lablogs.lab_trial import LabTrial, Strides, claims_error, is_bound, is_value, pair_flippers
+from experiments.lablogs.lab_trial import (
+    LabTrial,
+    Strides,
+    claims_error,
+    is_bound,
+    is_value,
+    pair_flippers,
+    split_walks,
+)
 from experiments.reports.error_table import COEFFICIENTS
 
 CONTRADICTING = 2.0  # standard errors
@@ -91,9 +99,10 @@ def _agreement(sizes: Sequence[float]) -> Agreement:
 
 def contradictions(trials: Sequence[LabTrial], method: Method) -> Contradictions:
     rows = [
-        [stride.k_e for stride in trial.replays[method].recorded if stride.flipper == flipper]
+        estimates_of(walk, "k_e")
         for trial in trials
         for flipper in trial.flippers
+        for walk in split_walks(trial.replays[method].recorded, flipper)
     ]
     found = [neighbours for row in rows for neighbours in _bounds_with_neighbours(row)]
     return Contradictions(

@@ -1,4 +1,8 @@
-"""One log as a trial: its strides by each method, as recorded and with each disturbance."""
+"""One log: its strides by each method, as recorded and with each disturbance.
+
+A CSV of the authors is one trial. A log of this project has a trial for each of its walks: the count of strides begins
+again there.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +50,9 @@ class LabTrial(NamedTuple):
         strides = self.replays[method].recorded
         return max(self.flippers, key=lambda flipper: sum(_count_values(s) for s in strides if s.flipper == flipper))
 
-    def strokes(self, method: Method) -> list[StrideEstimate]:
-        """Return the strides of the flipper in the mud, on a fixed base."""
-        flipper = self.stroke_flipper(method)
-        return [stride for stride in self.replays[method].recorded if stride.flipper == flipper]
+    def strokes(self, method: Method) -> list[Strides]:
+        """Return the strides of the flipper in the mud, on a fixed base, by walk."""
+        return split_walks(self.replays[method].recorded, self.stroke_flipper(method))
 
 
 class Refusal(NamedTuple):
@@ -70,6 +73,17 @@ def is_bound(estimate: Estimate) -> bool:
 def claims_error(estimate: Estimate) -> bool:
     """Whether the estimate is a value with an error to compare its scatter with."""
     return is_value(estimate) and isfinite(estimate.std_error) and estimate.std_error > 0.0
+
+
+def split_walks(strides: Strides, flipper: str) -> list[Strides]:
+    """Return the strides of one flipper by walk."""
+    walks: list[list[StrideEstimate]] = []
+    for stride in strides:
+        if stride.flipper == flipper:
+            if not walks or stride.index <= walks[-1][-1].index:
+                walks.append([])
+            walks[-1].append(stride)
+    return list(walks)
 
 
 def pair_flippers(strides: Strides) -> list[tuple[StrideEstimate, StrideEstimate]]:

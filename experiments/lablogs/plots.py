@@ -13,9 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from estimation.mud import Method
 from experiments.lablogs.consistency import FlipperPair, flipper_pairs
-from experiments.lablogs.lab_trial import DELAY_S, METHODS, MISSING_ROWS, LabTrial
+from experiments.lablogs.lab_trial import DELAY_S, METHODS, MISSING_ROWS, Strides
 from experiments.lablogs.lablogs import Evaluated
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
 from experiments.lablogs.report import strokes_of
@@ -37,7 +36,7 @@ def plot_strokes(evaluated: Evaluated, path: Path) -> None:
     figure, panels = _panels(max(len(groups), 1), sharey="row")
     for row, method in zip(panels, METHODS, strict=True):
         for panel, (name, trials) in zip(row, groups.items(), strict=False):
-            _plot_trials(panel, trials, method)
+            _plot_trials(panel, [strokes for trial in trials for strokes in trial.strokes(method)])
             panel.set_title(f"{name}, method {method}", **SMALL)
             panel.set_xlabel("stroke")
         row[0].set_ylabel("$k_s$ (N/cm³)")
@@ -45,10 +44,10 @@ def plot_strokes(evaluated: Evaluated, path: Path) -> None:
     figure.savefig(path, dpi=DOTS_PER_INCH)
 
 
-def _plot_trials(panel: Axes, trials: Sequence[LabTrial], method: Method) -> None:
-    for number, trial in enumerate(trials):
+def _plot_trials(panel: Axes, trials: Sequence[Strides]) -> None:
+    for number, strides in enumerate(trials):
         style: dict[str, Any] = {"fmt": MARKS[number % len(MARKS)], "color": f"C{number}", "markersize": 5}
-        strokes = [(i, stride.k_s) for i, stride in enumerate(trial.strokes(method), 1) if stride.k_s.valid]
+        strokes = [(i, stride.k_s) for i, stride in enumerate(strides, 1) if stride.k_s.valid]
         x = np.array([i for i, _ in strokes]) + DODGE * (number - (len(trials) - 1) / 2.0)
         values, errors = ([getattr(k_s, name) / PER_CM3 for _, k_s in strokes] for name in ("value", "std_error"))
         bounds = [k_s.at_least for _, k_s in strokes]  # an arrow upward

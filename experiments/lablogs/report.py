@@ -141,7 +141,7 @@ def method_report(trials: Sequence[LabTrial], groups: Groups, method: Method) ->
 
 def strokes_of(trials: Sequence[LabTrial], method: Method, name: str) -> list[Strokes]:
     """Return one coefficient's estimates of each trial on a fixed base."""
-    return [estimates_of(trial.strokes(method), name) for trial in trials if trial.fixed_base]
+    return [estimates_of(strokes, name) for trial in trials if trial.fixed_base for strokes in trial.strokes(method)]
 
 
 def repeatability(trials: Sequence[LabTrial], method: Method, name: str) -> Repeatability:

@@ -52,6 +52,12 @@ def test_groups_have_the_variation_and_the_counts_of_their_trials(trials: list[L
     assert groups["12N"]["k_p"].invalid == 9
 
 
+def test_each_walk_of_a_log_on_a_fixed_base_is_a_trial() -> None:
+    strides = [make_stride(index=i, k_s=make_value(k * d)) for k in FIRM for i, d in enumerate((1.0, 0.8))]
+    found = evaluated(make_trial(strides, "bench_12N.mcap")).report.default.groups["12N"]["k_s"]
+    assert (found.first_cv, found.later_cv, found.n) == (0.15, 0.15, 3)
+
+
 def test_separations_have_the_sign_of_the_labels(trials: list[LabTrial]) -> None:
     (found,) = evaluated(*trials).report.default.separation
     assert (found.groups, found.coefficient, found.n) == (("12N", "10.3N"), "k_s", (3, 3))
