@@ -2,8 +2,9 @@
 
 Each stroke is stored as batches of equal travel (stroke.py). At the end of the insertion the estimator finds the
 surface (surface.py) and fits k_p; when the stride closes it fits k_e (stroke_fit.py), and fits or bounds k_s
-(shear.py). The zero is measured again in every swing (tare.py). The coefficients are linear in the joint torques, so
-the fits need no third force component, which two torques cannot determine; forces are mapped for display only.
+(shear.py). The clinging weight and the joint's friction are measured again in every swing (tare.py, air.py). A stride
+without evidence of mud has no coefficients. The coefficients are linear in the joint torques, so the fits need no third
+force component, which two torques cannot determine; forces are mapped for display only.
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,8 @@ from control.records import UNKNOWN, Estimate, FlipperLoad, Phase
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_between
 from estimation.stride_estimator import Learned, StrideEstimator, larger
+from estimation.strokes.air import AirSwing
+from estimation.strokes.origin_fit import median
 from estimation.strokes.shear import Base, Shear, find_shear
 from estimation.strokes.stroke import Batch, Stroke
 from estimation.strokes.stroke_fit import (
@@ -24,11 +27,13 @@ from estimation.strokes.stroke_fit import (
     fit_insertion,
     level_free,
 )
-from estimation.strokes.surface import NO_SURFACE, combined, find_surface
+from estimation.strokes.surface import find_surface
+from estimation.strokes.surface_memory import SurfaceMemory, unknown_surface
 from estimation.strokes.tare import Tare
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.002}
 OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a stroke's own force begins
+NO_MUD = "no evidence of mud: the torques are those of friction"
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
 CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
 
@@ -48,6 +53,9 @@ class FlipperEstimator(StrideEstimator):
         self.base = base
         self.body_drag_n = body_drag_n
         self.surface_error_m = surface_error_m
+        self._surfaces = SurfaceMemory(surface_error_m, base is Base.FIXED)
+        self._own_surfaces = SurfaceMemory(max(surface_error_m, OWN_ERROR_M), base is Base.FIXED)
+        self._air = AirSwing()
         self._free_m = -FREE_FRACTION * geometry.clearance_m
         self._tare = Tare()
         self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
@@ -55,23 +63,30 @@ class FlipperEstimator(StrideEstimator):
 
     def reset(self) -> None:
         self._tare.reset()
+        self._air.reset()
+        self._surfaces.reset()
+        self._own_surfaces.reset()
         self._travel_m = UNKNOWN
         super().reset()
 
     def _reset_stride(self) -> None:
         for stroke in self._strokes.values():
             stroke.reset()
-        self._surface = combined(NO_SURFACE, self.surface_error_m, 0.0)
+        self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
+        self._rise_nm = 0.0  # torque at the end of an insertion in which the force grows with depth
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         sweep_rad, adduction_rad, depth_m, rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm, saturated = load
         rise_adduction_m -= CLINGING_M * sin(adduction_rad)
         stroke = self._strokes.get(phase)
         if stroke is None and depth_m < self._free_m and phase is not Phase.RECOVERY:
-            self._tare.update(rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm)
-        weight_n, offset_nm, _ = self._tare.zero
-        sweep_nm += weight_n * rise_sweep_m - offset_nm
+            self._tare.update(rise_adduction_m, adduction_nm)
+            self._air.update(sweep_rad, sweep_nm)
+        weight_n, _ = self._tare.zero
+        sweep_nm += weight_n * rise_sweep_m
+        if phase is Phase.STANCE:
+            sweep_nm -= self._air.friction_nm
         adduction_nm += weight_n * rise_adduction_m
         force_x_n, force_z_n = smallest_force_n(self.geometry, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
         if phase is Phase.STANCE:
@@ -92,7 +107,8 @@ class FlipperEstimator(StrideEstimator):
 
     def _begin_phase(self, phase: Phase) -> None:
         if phase is Phase.INSERTION:
-            self._tare.set_zero()
+            self._air.close()
+            self._tare.set_zero(self._air.is_air)
 
     def _learn_insertion(self, batches: Sequence[Batch]) -> None:
         """Find the surface, correct the zero by the force above it, and fit k_p.
@@ -105,12 +121,13 @@ class FlipperEstimator(StrideEstimator):
         samples = sum([b.samples for b in batches])
         sample_m = (depths_m[-1] - depths_m[0]) / samples if samples else 0.0
         found = find_surface(depths_m, forces_n)
-        self._surface = combined(found, self.surface_error_m, sample_m)
+        self._surface = self._surfaces.update(found, sample_m)
         level_n, level_error_n = (value * arm_m / length_m for value in self._surface[2:4])
         corrected_n = self._tare.correct(-level_n, level_error_n)
         below = level_free(batches, -corrected_n * length_m)
-        own = combined(found, max(self.surface_error_m, OWN_ERROR_M), 0.0)
+        own = self._own_surfaces.update(found, 0.0)
         self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+        self._rise_nm = below[-1].adduction_nm if found.found else 0.0
 
     @property
     def surface_m(self) -> float:
@@ -119,6 +136,9 @@ class FlipperEstimator(StrideEstimator):
 
     def _learned(self) -> Learned:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
+        if not self._met_mud(stance.batches):
+            no_mud = NOT_THERE._replace(reason=NO_MUD)
+            return Learned(k_p=no_mud, k_s=no_mud, k_e=no_mud, surface_m=self.surface_m, extraction_torque_nm=UNKNOWN)
         shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.body_drag_n)
         return Learned(
             k_p=self._k_p,
@@ -132,19 +152,25 @@ class FlipperEstimator(StrideEstimator):
             tare_drift_n=self._tare.drift_n,
         )
 
+    def _met_mud(self, stance: Sequence[Batch]) -> bool:
+        """Return whether the stance, or the end of the insertion, needs more torque than friction."""
+        torques_nm = [batch.sweep_nm + self._air.friction_nm for batch in stance]
+        return self._air.is_mud(median(torques_nm) if torques_nm else 0.0) or self._air.is_mud(self._rise_nm)
+
     def _learn_extraction(self, stroke: Stroke) -> Estimate:
         reported = fit_extraction(
             self.geometry, stroke.moving(), self._surface, self._tare.zero.std_error_n, stroke.first_m
         )
-        if reported.valid or not self._stuck:
+        if reported.valid or not (self._stuck and self._is_held):
             return reported
         return bound_extraction(self.geometry, stroke.batches, self._surface)
 
     def _shear_estimate(self, shear: Shear) -> Estimate:
-        """Add the error of the surface: dk = 2 k dδ / z, since the pressure grows with depth."""
+        """Add the errors of the surface, dk = 2 k dδ / z since the pressure grows with depth, and of the friction."""
         if shear.fit is None:
             return NOT_THERE._replace(samples=shear.samples, reason=shear.reason or NOT_THERE.reason)
         depth_m = self._deepest_m - self.surface_m
         surface = 2.0 * shear.fit.slope * self._surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
-        estimate = evaluated(shear.fit, surface, shear.samples)
+        friction = self._air.std_error_nm / shear.moment_m4
+        estimate = evaluated(shear.fit, hypot(surface, friction), shear.samples)
         return estimate._replace(at_least=shear.at_least, reason=estimate.reason or shear.reason)

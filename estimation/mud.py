@@ -63,6 +63,7 @@ class MudEstimator:
         )
         self._knowledge = MudKnowledge()
         self._commands_s = NO_COMMANDS  # the loop sends new commands after each sample
+        self._closed: list[StrideEstimate] = []  # of one flipper, while the other one waits for its exit
         self.map = MudMap()
         self.mud_estimate: MudEstimate = NOTHING_KNOWN
 
@@ -71,6 +72,7 @@ class MudEstimator:
         self.right.reset()
         self._knowledge.reset()
         self._commands_s = NO_COMMANDS
+        self._closed.clear()
         self.map.reset()
         self.mud_estimate = NOTHING_KNOWN
 
@@ -84,9 +86,14 @@ class MudEstimator:
         right, right_stride = self.right.update(
             now_s, phase, states.right_sweep, states.right_adduction, body_x_m, commands_s
         )
-        if left_stride is None and right_stride is None:
+        if left_stride is not None:
+            self._closed.append(left_stride)
+        if right_stride is not None:
+            self._closed.append(right_stride)
+        if not self._closed or self.left.is_closing or self.right.is_closing:
             return MudReading(left, right)
-        strides = tuple(stride for stride in (left_stride, right_stride) if stride is not None)
+        strides = tuple(self._closed)
+        self._closed.clear()
         self.mud_estimate = self._knowledge.update(strides)
         self.map.update(body_x_m, strides)
         return MudReading(left, right, strides)

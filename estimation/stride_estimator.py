@@ -1,13 +1,13 @@
 """The shell of both estimators: it follows one flipper through its strides and closes each of them in swing.
 
 A method learns coefficients from the samples of a stride; the shell does the rest. It turns currents into loads, counts
-phases and strides, records the largest forces, and assembles the estimate of a stride on the first sample after its
-extraction. The methods are `FlipperEstimator` (flipper.py) and `PaperEstimator` (paper.py).
+phases and strides, records the largest forces, and assembles the estimate of a stride once the flipper has left the mud
+after its extraction. The methods are `FlipperEstimator` (flipper.py) and `PaperEstimator` (paper.py).
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from math import isfinite
+from math import inf, isfinite
 from typing import NamedTuple
 
 from control.gait.recovery import is_in_mud
@@ -15,6 +15,8 @@ from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
 from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoad, JointLoads, JointMotion
 from estimation.stride_clock import StrideClock
+
+GRACE_S = 0.3  # after the extraction, for a flipper that is still in the mud: joints follow late by up to 0.2 s
 
 
 class Learned(NamedTuple):
@@ -57,7 +59,8 @@ class StrideEstimator(ABC):
 
     def _begin_stride(self, now_s: float, body_x_m: float) -> None:
         self._clock.begin(now_s)
-        self._stuck = False
+        self._stuck = self._is_held = self.is_closing = False
+        self._extracted_s = inf
         self._deepest_m = self._body_at_insertion_m = UNKNOWN
         self._insertion_n = self._stance_n = self._extraction_n = UNKNOWN
         if self._clock.index == 0 and not isfinite(self._body_at_close_m):
@@ -73,8 +76,15 @@ class StrideEstimator(ABC):
         body_x_m: float,
         commands_s: CommandTimes = NO_COMMANDS,
     ) -> tuple[FlipperLoad, StrideEstimate | None]:
-        """Return the load now and, on the first sample after a stride's extraction, the estimate of that stride."""
-        closed = self._change_phase(now_s, phase, body_x_m) if phase is not self._clock.phase else None
+        """Return the load now and, once the flipper has left the mud after its extraction, the estimate of the stride.
+
+        A flipper that is still in the mud has GRACE_S to come out.
+        """
+        closed = None
+        if phase is not self._clock.phase:
+            closed = self._change_phase(now_s, phase, body_x_m)
+        elif self._extracted_s < inf:
+            closed = self._wait_for_exit(now_s, body_x_m)
         if not isfinite(sweep.angle_rad + adduction.angle_rad + sweep.current_a + adduction.current_a):
             return NO_LOAD, closed
         load = self._loads.update(sweep, adduction, commands_s)
@@ -85,13 +95,36 @@ class StrideEstimator(ABC):
     def _change_phase(self, now_s: float, phase: Phase, body_x_m: float) -> StrideEstimate | None:
         change = self._clock.change(now_s, phase)
         self._end_phase(now_s, change.ended)
-        if phase is Phase.RECOVERY or change.closes_stride:
-            self._stuck = self._stuck or is_in_mud(self.geometry, *self._loads.angles_rad)
-        closed = self._close(now_s, body_x_m) if change.closes_stride else None
+        if change.ended is Phase.EXTRACTION:
+            self._extracted_s = now_s
+        is_late = (phase is Phase.RECOVERY or change.closes_stride) and self._is_in_mud()
+        if change.closes_stride and is_late and phase is Phase.SWING and change.ended is Phase.EXTRACTION:
+            self.is_closing = True
+            return None
+        self._stuck = self._stuck or is_late
+        closes = change.closes_stride or self.is_closing
+        closed = self._close(now_s, body_x_m) if closes else None
         if change.begins_stride:
             self._begin_stride(now_s, body_x_m)
         self._begin_phase(phase)
         return closed
+
+    def _wait_for_exit(self, now_s: float, body_x_m: float) -> StrideEstimate | None:
+        """Close the stride that waits, as soon as its flipper is out of the mud or is held by it."""
+        is_in_mud = self._is_in_mud()
+        if is_in_mud and now_s - self._extracted_s < GRACE_S:
+            return None
+        self._is_held = is_in_mud
+        self._extracted_s = inf
+        if not self.is_closing:
+            return None
+        self._stuck = is_in_mud
+        closed = self._close(now_s, body_x_m)
+        self._begin_stride(now_s, body_x_m)
+        return closed
+
+    def _is_in_mud(self) -> bool:
+        return is_in_mud(self.geometry, *self._loads.angles_rad)
 
     def _close(self, now_s: float, body_x_m: float) -> StrideEstimate:
         learned, duration_s = self._learned(), self._clock.duration_s

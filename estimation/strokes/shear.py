@@ -15,7 +15,7 @@ motor at its limit.
 
 from collections.abc import Sequence
 from enum import Enum
-from math import cos, hypot, isfinite, sin
+from math import cos, hypot, inf, isfinite, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
@@ -28,6 +28,7 @@ MOBILISED_M = 0.025  # in the authors' logs the force is on its plateau after 2 
 SLIPPING = 0.2  # of the flipper's own travel; a batch with more slips
 QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the speed
 STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
+BOUND_DEPTH_M = 0.005  # a shallower batch measures the surface, not the mud
 HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
 
 
@@ -44,6 +45,7 @@ class Shear(NamedTuple):
     case: str  # "yield", "body", "mixed", "unknown", "saturated"
     samples: int
     reason: str = ""
+    moment_m4: float = inf  # mean Ψ of the batches that count, by which an error of the torque becomes one of k_s
 
 
 def find_shear(
@@ -60,8 +62,8 @@ def find_shear(
     if len(steady) >= MIN_BATCHES:
         return _value(_case(geometry, batches, slips), steady, batches, moments)
     if any(batch.saturated for batch in batches):
-        return _bound("saturated", "a motor at its limit", batches, moments)
-    return _bound("body", "the mud held: the body moved", batches, moments)
+        return _bound(geometry, "saturated", "a motor at its limit", batches, moments)
+    return _bound(geometry, "body", "the mud held: the body moved", batches, moments)
 
 
 def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> float:
@@ -72,7 +74,8 @@ def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> flo
 
 def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: Sequence[float]) -> Shear:
     fit = fit_through_origin([moments[i] for i in steady], [batches[i].sweep_nm for i in steady])
-    return Shear(fit, False, case, sum(batches[i].samples for i in steady))
+    moment_m4 = sum(moments[i] for i in steady) / len(steady)
+    return Shear(fit, False, case, sum(batches[i].samples for i in steady), moment_m4=moment_m4)
 
 
 def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> list[float] | None:
@@ -109,12 +112,17 @@ def _without_pose(
         steady = _yielding(geometry, batches, slips_m(geometry, batches, Base.FIXED))
         if len(steady) >= MIN_BATCHES:
             return _value("yield", steady, batches, moments)
-    return _bound("unknown", "no pose: the body may have moved", batches, moments)
+    return _bound(geometry, "unknown", "no pose: the body may have moved", batches, moments)
 
 
-def _bound(case: str, reason: str, batches: Sequence[Batch], moments: Sequence[float]) -> Shear:
+def _bound(
+    geometry: FlipperGeometry, case: str, reason: str, batches: Sequence[Batch], moments: Sequence[float]
+) -> Shear:
     """Return the largest k_s that HELD batches in a row withstood; mud withstands a first quick push better."""
-    withstood = [b.sweep_nm / moment if moment > 0.0 else UNKNOWN for b, moment in zip(batches, moments, strict=True)]
+    least_m4 = geometry.flipper_length_m * geometry.plate_width_m * BOUND_DEPTH_M**2 / 2.0
+    withstood = [
+        b.sweep_nm / moment if moment > least_m4 else UNKNOWN for b, moment in zip(batches, moments, strict=True)
+    ]
     run = min(max(len(withstood) // 3, HELD[0]), HELD[1])
     runs = [withstood[i : i + run] for i in range(len(withstood) - run + 1)]
     held = [(median(each), max(each) - min(each)) for each in runs if all(isfinite(k) for k in each)]
@@ -123,4 +131,5 @@ def _bound(case: str, reason: str, batches: Sequence[Batch], moments: Sequence[f
         return Shear(None, True, case, samples, reason)
     largest, spread = max(held)
     scatter = spread / 4.0  # of the median of five, whose range is 2.3 times their scatter
-    return Shear(OriginFit(largest, hypot(scatter, QUICK_UNCERTAINTY * largest)), True, case, samples, reason)
+    fit = OriginFit(largest, hypot(scatter, QUICK_UNCERTAINTY * largest))
+    return Shear(fit, True, case, samples, reason, max(moments))

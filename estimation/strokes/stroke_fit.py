@@ -16,7 +16,7 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
-from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
 from estimation.strokes.stroke import Batch
 from estimation.strokes.surface import Surface
 
@@ -26,7 +26,9 @@ MIN_VERTICAL_LEVER_M = 0.03  # below it an upward force hardly loads the adducti
 TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
 CROSS_COUPLING_UNCERTAINTY = 0.25  # of the cross-coupling: its centre of pressure is that of the law, not the mud's
 LARGEST_UNCERTAINTY = 0.75  # of a coefficient: beyond it even the 80 % interval reaches zero
-TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of way in the mud"
+BOUND_DEPTH_M = 0.005  # a shallower batch measures the surface, not the mud
+HELD_BATCHES = 3  # in a row, 6 mm of rise, that must withstand a bound
+TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of travel in the mud"
 NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
 NOT_OUT = "the flipper did not come out"
 UNOBSERVABLE = f"vertical lever under {100.0 * MIN_VERTICAL_LEVER_M:g} cm: not observable in this pose"
@@ -47,20 +49,27 @@ def fit_extraction(
 
 
 def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> Estimate:
-    """Return the lower bound of k_e from a flipper that did not come out: the largest that the mud withstood."""
-    withstood = [_withstood(geometry, batch, surface) for batch in batches]
-    samples = sum(batch.samples for batch in batches)
-    bound = max(withstood, default=0.0)
+    """Return the lower bound of k_e from a flipper that did not come out.
+
+    It is the greatest median of HELD_BATCHES in a row: one sample is no bound. Batches near the surface do not count,
+    since an error of the surface would be a large part of their depth.
+    """
+    deep = [batch for batch in batches if batch.travel_m - surface.depth_m >= BOUND_DEPTH_M]
+    withstood = [_withstood(geometry, batch, surface) for batch in deep]
+    runs = [withstood[i : i + HELD_BATCHES] for i in range(len(withstood) - HELD_BATCHES + 1)]
+    samples = sum(batch.samples for batch in deep)
+    bound, spread = max(((median(run), max(run) - min(run)) for run in runs), default=(0.0, 0.0))
     if not (bound > 0.0 and isfinite(2.0 * bound)):
         return NOT_THERE._replace(samples=samples)
-    return Estimate(bound, TORQUE_REPEATABILITY * bound, samples, True, NOT_OUT, at_least=True)
+    depth_m = max(batch.travel_m for batch in deep) - surface.depth_m
+    error = hypot(TORQUE_REPEATABILITY * bound, spread / 2.0, 1.5 * bound * surface.std_error_m / depth_m)
+    return Estimate(bound, error, samples, True, NOT_OUT, at_least=True)
 
 
 def _withstood(geometry: FlipperGeometry, batch: Batch, surface: Surface) -> float:
     plate = submerged_plate(geometry, batch.sweep_rad, batch.adduction_rad, surface.depth_m)
-    moment_m4 = stroke_moment_m4(geometry, plate, batch.sweep_rad)
     across_nm = cross_coupling(geometry, plate, batch.sweep_rad) * batch.sweep_nm
-    return (across_nm - batch.adduction_nm) / moment_m4 if moment_m4 > 0.0 else 0.0
+    return (across_nm - batch.adduction_nm) / stroke_moment_m4(geometry, plate, batch.sweep_rad)
 
 
 class _Pieces(NamedTuple):

@@ -8,8 +8,8 @@ residuals weight the shapes: each counts with exp(-½ residual/variance), with A
 parameter. The surface is their weighted mean; its standard error includes theirs and their difference. The error of a
 jump is the range of borders that fit almost as well (a likelihood interval), that of a kink the intercept's.
 
-One insertion locates the surface to about a millimetre, and k_s depends on the square of depth. So the result is
-combined with the nominal height of the mud, weighted by precision.
+One insertion locates the surface to about a millimetre; `SurfaceMemory` (surface_memory.py) combines it with the
+nominal height and with the other strokes.
 """
 
 from collections.abc import Sequence
@@ -23,6 +23,7 @@ from estimation.strokes.origin_fit import NORMAL_MAD, median
 MIN_ABOVE, MIN_BELOW = 2, 4  # batches
 FREEDOM = 2.0  # residual variances that a jump must save for its additional parameter, after Akaike
 CLEAR = 12.0  # F of border and line against a constant alone; from there on the stroke met mud
+LAW_FRACTION = 0.18  # of the depth below a kink: what a force with the exponent 1.5 in place of 1 shifts it
 LIKELY = 4.0  # residual variances by which a border may fit worse and still be likely
 LEAST_VARIANCE_N2 = 1e-12
 SHARPEST_M = 1e-5  # smallest standard error: no mud is smoother
@@ -40,20 +41,6 @@ class Surface(NamedTuple):
 
 
 NO_SURFACE = Surface(UNKNOWN, UNKNOWN, 0.0, inf, False)
-
-
-def combined(surface: Surface, expected_error_m: float, sample_m: float) -> Surface:
-    """Combine a surface with the prior: it lies at its nominal height with the error `expected_error_m`.
-
-    `sample_m` is the travel between two samples, by which angle and current may be offset (uniformly distributed).
-    """
-    if not surface.found:
-        return surface._replace(depth_m=0.0, std_error_m=expected_error_m)
-    error_m = max(hypot(surface.std_error_m, sample_m / sqrt(12.0)), SHARPEST_M)
-    reported = 1.0 / (error_m * error_m)
-    expected = 1.0 / (expected_error_m * expected_error_m)
-    weight = reported / (reported + expected)
-    return surface._replace(depth_m=weight * surface.depth_m, std_error_m=1.0 / sqrt(reported + expected))
 
 
 def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Surface:
@@ -148,7 +135,7 @@ def _border_error_m(depths_m: Sequence[float], first: int, last: int) -> float:
 
 
 def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, residual: float) -> Surface:
-    """Return the kink, with the standard error of the intersection of line and constant."""
+    """Return the kink, with the errors of the intersection of line and constant and of the law's exponent."""
     n, below = len(x), len(x) - border
     travels_m = [depth_m - kink_m for depth_m in x[border:]]
     mean_m = sum(travels_m) / n
@@ -156,7 +143,8 @@ def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, re
     mean_x, _, _, spread = _line(x[border:], y[border:])
     variance = max(residual / max(n - 3, 1), LEAST_VARIANCE_N2)
     error_n = sqrt(variance * (1.0 / border + 1.0 / below + (kink_m - mean_x) ** 2 / spread))
-    return Surface(kink_m, error_n / slope, -slope * mean_m, sqrt(variance / border), True)
+    error_m = hypot(error_n / slope, LAW_FRACTION * (x[-1] - kink_m))
+    return Surface(kink_m, error_m, -slope * mean_m, sqrt(variance / border), True)
 
 
 def _mean(jump: Surface, kink: Surface, fraction: float) -> Surface:

@@ -32,6 +32,8 @@ from firmware_host.log_reading.log_reader import (
     unwatched,
 )
 
+UNEVEN_M = 0.005  # the same under their walking robot, which sinks and pitches by several millimetres
+LEVELLED_M = 0.0003  # std_error of the mud's height on the authors' bench: what the scatter of first strokes leaves
 WEIGHTLESS = ArmMass(
     arm_mass_kg=0.0, center_of_mass_m=0.0, sweep_inertia_kg_m2=0.0, adduction_inertia_kg_m2=0.0
 )  # the assumption of the authors' method; the masses of their arm are unknown
@@ -120,6 +122,7 @@ def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: 
     A single flipper was mounted on a fixed bench; two flippers carried a body.
     """
     geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters()
+    parameters = replace(parameters, surface_error_m=LEVELLED_M if len(lab.flippers) == 1 else UNEVEN_M)
     if configuration:
         geometry, drives, parameters = configuration.geometry, configuration.flipper_drives, configuration.estimation
     left, right = (drive._replace(current_limit_a=min(lab.current_limit_a, drive.current_limit_a)) for drive in drives)
