@@ -51,18 +51,19 @@ def fit_extraction(
 def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> Estimate:
     """Return the lower bound of k_e from a flipper that did not come out.
 
-    It is the greatest median of HELD_BATCHES in a row: one sample is no bound. Batches near the surface do not count,
-    since an error of the surface would be a large part of their depth.
+    It is the greatest median of HELD_BATCHES in a row, or of all of a flipper that hardly moved. Batches near the
+    surface do not count, since an error of the surface would be a large part of their depth.
     """
     deep = [batch for batch in batches if batch.travel_m - surface.depth_m >= BOUND_DEPTH_M]
     withstood = [_withstood(geometry, batch, surface) for batch in deep]
-    runs = [withstood[i : i + HELD_BATCHES] for i in range(len(withstood) - HELD_BATCHES + 1)]
+    length = min(HELD_BATCHES, len(withstood))
+    runs = [withstood[i : i + length] for i in range(len(withstood) - length + 1)] if length else []
     samples = sum(batch.samples for batch in deep)
     bound, spread = max(((median(run), max(run) - min(run)) for run in runs), default=(0.0, 0.0))
-    if not (bound > 0.0 and isfinite(2.0 * bound)):
-        return NOT_THERE._replace(samples=samples)
-    depth_m = max(batch.travel_m for batch in deep) - surface.depth_m
+    depth_m = max([batch.travel_m for batch in deep], default=inf) - surface.depth_m
     error = hypot(TORQUE_REPEATABILITY * bound, spread / 2.0, 1.5 * bound * surface.std_error_m / depth_m)
+    if not (bound > 0.0 and isfinite(bound + error)):
+        return NOT_THERE._replace(samples=samples)
     return Estimate(bound, error, samples, True, NOT_OUT, at_least=True)
 
 

@@ -38,6 +38,7 @@ class Surface(NamedTuple):
     level_n: float  # force above the mud: the error of the tare
     level_std_error_n: float
     found: bool
+    law_error_m: float = 0.0  # if the force below grows otherwise than in proportion to depth
 
 
 NO_SURFACE = Surface(UNKNOWN, UNKNOWN, 0.0, inf, False)
@@ -135,7 +136,7 @@ def _border_error_m(depths_m: Sequence[float], first: int, last: int) -> float:
 
 
 def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, residual: float) -> Surface:
-    """Return the kink, with the errors of the intersection of line and constant and of the law's exponent."""
+    """Return the kink, with the standard error of the intersection of line and constant."""
     n, below = len(x), len(x) - border
     travels_m = [depth_m - kink_m for depth_m in x[border:]]
     mean_m = sum(travels_m) / n
@@ -143,8 +144,8 @@ def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, re
     mean_x, _, _, spread = _line(x[border:], y[border:])
     variance = max(residual / max(n - 3, 1), LEAST_VARIANCE_N2)
     error_n = sqrt(variance * (1.0 / border + 1.0 / below + (kink_m - mean_x) ** 2 / spread))
-    error_m = hypot(error_n / slope, LAW_FRACTION * (x[-1] - kink_m))
-    return Surface(kink_m, error_m, -slope * mean_m, sqrt(variance / border), True)
+    law_m = LAW_FRACTION * (x[-1] - kink_m)
+    return Surface(kink_m, error_n / slope, -slope * mean_m, sqrt(variance / border), True, law_m)
 
 
 def _mean(jump: Surface, kink: Surface, fraction: float) -> Surface:
@@ -160,6 +161,7 @@ def _mean(jump: Surface, kink: Surface, fraction: float) -> Surface:
         fraction * jump.level_n + rest * kink.level_n,
         uncertainty(jump.level_std_error_n, kink.level_std_error_n, jump.level_n - kink.level_n),
         True,
+        rest * kink.law_error_m,
     )
 
 

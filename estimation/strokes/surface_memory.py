@@ -4,9 +4,9 @@ k_s depends on the square of depth, so a surface that scatters from stroke to st
 
     s_i = m + δ_i      m ~ N(0, σ²)      δ_i ~ N(0, σ²)      found_i = s_i + ε_i      ε_i ~ N(0, e_i²)
 
-with σ the configured error of the nominal height and e_i the error of the find, of which a part is that angle and
-current may be one gap between samples apart. Where the surfaces found scatter more than both explain, one of them is
-too small by Birge's ratio r, at least 1:
+with σ the configured error of the nominal height and e_i the error of the find, in which the law of the force and a
+delay of up to one gap between samples of angle and current have a part. Where the surfaces found scatter more than both
+explain, one of them is too small by Birge's ratio r, at least 1:
 
     on a fixed base     e_i → r e_i: the surface belongs to the trial, and the find is in error. In the authors' bench
                         logs the finds scatter by 3 to 4 mm, claim 0.6 to 2, and ln k_s follows them (correlation 0.92)
@@ -46,7 +46,7 @@ class SurfaceMemory:
         if not found.found:
             scatter_m2 = nominal_m2 if self.fixed_base else self._ratio() * nominal_m2
             return found._replace(depth_m=offset_m, std_error_m=sqrt(scatter_m2))
-        own_m2 = max(hypot(found.std_error_m, sample_m / sqrt(3.0)), SHARPEST_M) ** 2
+        own_m2 = max(hypot(found.std_error_m, found.law_error_m, sample_m / sqrt(3.0)), SHARPEST_M) ** 2
         self._remember(found.depth_m, 1.0 / (own_m2 + nominal_m2))
         ratio = self._ratio()
         expected_m2 = nominal_m2 + (offset_m2 if self._finds > 1.0 else 0.0)

@@ -33,7 +33,7 @@ from firmware_host.log_reading.log_reader import (
 )
 
 UNEVEN_M = 0.005  # the same under their walking robot, which sinks and pitches by several millimetres
-LEVELLED_M = 0.0003  # std_error of the mud's height on the authors' bench: what the scatter of first strokes leaves
+LEVELLED_M = 0.0002  # std_error of the mud's height on the authors' bench: what the scatter of first strokes leaves
 WEIGHTLESS = ArmMass(
     arm_mass_kg=0.0, center_of_mass_m=0.0, sweep_inertia_kg_m2=0.0, adduction_inertia_kg_m2=0.0
 )  # the assumption of the authors' method; the masses of their arm are unknown

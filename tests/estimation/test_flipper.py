@@ -10,7 +10,7 @@ as a surface that is too deep. Where a test wants the laws without that, it says
 from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import pairwise
-from math import cos, inf, isfinite, nan, radians, sin
+from math import copysign, cos, inf, isfinite, nan, radians, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ from control.records import NO_LOAD, DriveState, Estimate, GaitTarget, Phase, St
 from estimation.flipper import CLINGING_M, FlipperEstimator
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive
+from estimation.stride_estimator import GRACE_S
 from estimation.strokes.shear import Base
 from estimation.strokes.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT
 
@@ -47,7 +48,7 @@ class Mud(NamedTuple):
     surface_m: float = 0.0
     face_fraction: float = 0.0  # of the stance's load that the face also bears in insertion and extraction
     weight_n: float = 0.0  # clings to the flipper
-    offset_nm: float = 0.0  # of the sweep motor
+    friction_nm: float = 0.0  # dry, of the sweep joint
 
     def times(self, factor: float) -> "Mud":
         return self._replace(k_p=factor * self.k_p, k_s=factor * self.k_s, k_e=factor * self.k_e)
@@ -133,7 +134,9 @@ def mud_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
 def clinging_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
     """-W ∂z/∂q of the point CLINGING_M above the edge, whose height is l cos α sin β - (h - CLINGING_M) cos β."""
     sa, ca, sb, cb = (trig(angle) for angle in (moment.sweep_rad, moment.adduction_rad) for trig in (sin, cos))
-    sweep_nm = mud.weight_n * LENGTH_M * sa * sb + mud.offset_nm
+    sweep_nm = mud.weight_n * LENGTH_M * sa * sb - copysign(mud.friction_nm, moment.sweep_rad_s) * (
+        moment.sweep_rad_s != 0.0
+    )
     return sweep_nm, -mud.weight_n * (LENGTH_M * ca * cb + (DROP_M - CLINGING_M) * sb)
 
 
@@ -164,6 +167,13 @@ def estimator(
     drive: FlipperDrive = WEIGHTLESS, surface_error_m: float = 0.001, base: Base = Base.FIXED
 ) -> FlipperEstimator:
     return FlipperEstimator("left", GEOMETRY, drive, base, 2.5, surface_error_m)
+
+
+def waiting(rows: Sequence[Row]) -> list[Row]:
+    """The flipper stays where its extraction ended, for longer than it has to come out."""
+    lifted_rad, ticks = rows[-2].adduction.angle_rad, round(1.1 * GRACE_S * RATE_HZ)
+    assert rows[-2].phase is not rows[-1].phase is Phase.SWING
+    return [*rows[:-1], *(later(rows[-1], tick / RATE_HZ, lifted_rad) for tick in range(ticks))]
 
 
 def closed(rows: Iterable[Row], flipper: FlipperEstimator | None = None) -> list[StrideEstimate]:
@@ -318,7 +328,7 @@ def test_mud_that_clings_and_its_drift_are_reported() -> None:
         for turn, weight_n in enumerate(weights_n)
         for row in rows_of(
             (moment._replace(now_s=moment.now_s + turn * period_s) for moment in single[:-1]),
-            MUD._replace(weight_n=weight_n, offset_nm=0.02),
+            MUD._replace(weight_n=weight_n, friction_nm=0.02),
         )
     ]
     strides = closed([*rows, rows[0]._replace(now_s=rows[-1].now_s + 1.0 / RATE_HZ)])
@@ -328,9 +338,11 @@ def test_mud_that_clings_and_its_drift_are_reported() -> None:
     assert later == pytest.approx([0.4, -0.2], abs=2e-3)  # the first sample of a swing is half of the stride before
 
 
-@pytest.mark.parametrize(("weight_n", "offset_nm"), [(0.7, 0.0), (0.0, 0.02), (1.5, -0.03)])
-def test_what_clings_changes_no_coefficient(weight_n: float, offset_nm: float) -> None:
-    clean, dirty = (one(rows_of(motion(), mud)) for mud in (MUD, MUD._replace(weight_n=weight_n, offset_nm=offset_nm)))
+@pytest.mark.parametrize(("weight_n", "friction_nm"), [(0.7, 0.0), (0.0, 0.02), (1.5, 0.06)])
+def test_what_clings_and_dry_friction_change_no_coefficient(weight_n: float, friction_nm: float) -> None:
+    clean, dirty = (
+        one(rows_of(motion(), mud)) for mud in (MUD, MUD._replace(weight_n=weight_n, friction_nm=friction_nm))
+    )
     for a, b in zip(coefficients(clean), coefficients(dirty), strict=True):
         assert b.value == pytest.approx(a.value, rel=1e-3)  # samples are 2.6 ms apart, levers in between a mean
         assert b.std_error == pytest.approx(a.std_error, rel=1e-2)
@@ -453,7 +465,7 @@ def test_the_interval_of_95_percent_covers_the_truth_about_that_often() -> None:
         pairs = [(coefficients(stride)[place], mud[place]) for mud, stride in reported]
         assert sum(each.valid for each, _ in pairs) >= 297
         hits = [abs(each.value - truth) <= 1.96 * each.std_error for each, truth in pairs if each.valid]
-        assert 0.88 <= np.mean(hits) <= 0.995
+        assert 0.88 <= np.mean(hits) <= 0.998  # k_p's includes the error of the law, which this mud does not have
 
 
 def test_no_coefficient_is_biased_by_more_than_half_its_uncertainty() -> None:
@@ -492,7 +504,7 @@ def stuck(at_rad: float) -> list[Moment]:
 
 @pytest.mark.parametrize("base", [Base.FIXED, Base.FREE])
 def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_strength(base: Base) -> None:
-    """The mud could bear twice of what this motor gives, 1.7 N·m on 1.35 cm⁴ of Ψ."""
+    """The mud could withstand more than this motor gives, 1.7 N·m on 1.5 cm⁴ of Ψ at 10 degrees."""
     limit_a = 20.0
     drive = WEIGHTLESS._replace(current_limit_a=limit_a)
     rows = [
@@ -502,7 +514,9 @@ def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_stren
     stride = one(rows, estimator(drive, base=base))
     assert (stride.stance, stride.k_s.reason) == ("saturated", "a motor at its limit")
     assert stride.k_s.at_least and stride.k_s.valid
-    assert stride.k_s.value == pytest.approx(limit_a * 0.083 / 1.35e-6, rel=0.1)  # Ψ at 3 cm, the arm straight
+    at_rad = radians(10.0)
+    plate = submerged_plate(GEOMETRY, at_rad, GEOMETRY.adduction_rad(at_rad, 0.03))
+    assert stride.k_s.value == pytest.approx(limit_a * 0.083 / stance_moment_m4(GEOMETRY, plate), rel=0.02)
     assert stride.k_s.value < 2.0e6
 
 
@@ -559,7 +573,7 @@ def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
     """To 10 mN·m, which is 0.08 N of the zero; half a tick before the newest sample, since acceleration is told
     between two.
     """
-    mud, flipper = MUD._replace(weight_n=0.7, offset_nm=0.02), estimator()
+    mud, flipper = MUD._replace(weight_n=0.7, friction_nm=0.02), estimator()
     moments = motion()
     for i, row in enumerate(rows_of(moments, mud)[:-1]):
         load, _ = flipper.update(*row)
@@ -621,7 +635,7 @@ def test_a_stride_cut_short_does_not_close_and_is_not_counted(phase: Phase) -> N
     later = [row._replace(now_s=row.now_s + 60.0) for row in rows]
     stride = one(later, flipper)
     assert stride.index == 0
-    assert ratios(stride, MUD) == pytest.approx(ratios(one(rows), MUD), rel=1e-3)  # the zero is that of both airs
+    assert ratios(stride, MUD) == pytest.approx(ratios(one(rows), MUD), rel=0.01)  # zero and surface are those of both
 
 
 @pytest.mark.parametrize("lacking", [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION])
@@ -674,7 +688,7 @@ def test_released_follows_the_gaits_condition_at_any_height_of_the_mud(
     moments = lifted_to(edge_depth_m(OUT_M + below_m))
     *_, last = (moment for moment in moments if moment.phase is Phase.EXTRACTION)
     assert is_in_mud(GEOMETRY, last.sweep_rad, last.adduction_rad) is not released
-    assert one(rows_of(moments, MUD._replace(surface_m=surface_m))).released is released
+    assert one(waiting(rows_of(moments, MUD._replace(surface_m=surface_m)))).released is released
 
 
 def with_recovery(rows: Sequence[Row], weight_a: float) -> list[Row]:
@@ -701,9 +715,9 @@ def later(row: Row, seconds: float, adduction_rad: float) -> Row:
 
 def test_a_stride_with_a_recovery_closes_with_the_swing_and_was_not_released() -> None:
     rows = rows_of(lifted_to(0.02))
-    stride, longer = one(rows), one(with_recovery(rows, 2.0))
+    stride, longer = one(waiting(rows)), one(with_recovery(rows, 2.0))
     assert not longer.released
-    assert longer.t_end_s == pytest.approx(stride.t_end_s + 1.0)
+    assert longer.t_end_s == pytest.approx(rows[-1].now_s + 1.0)
     assert coefficients(longer) == coefficients(stride)
     assert longer.extraction_s == pytest.approx(stride.extraction_s)
 
@@ -724,7 +738,7 @@ def test_a_recovery_does_not_shift_the_zero() -> None:
 
 def test_a_flipper_that_stays_down_gives_only_a_lower_bound() -> None:
     """To 5 %: a batch of 33 samples, the first of which is half in stance."""
-    stride = one(noisy(rows_of(lifted_to(0.03)), 1, 0.01), estimator(surface_error_m=KNOWN_M))
+    stride = one(noisy(waiting(rows_of(lifted_to(0.03))), 1, 0.01), estimator(surface_error_m=KNOWN_M))
     assert not stride.released
     assert (stride.k_e.at_least, stride.k_e.reason) == (True, NOT_OUT)
     assert stride.k_e.value == pytest.approx(MUD.k_e, rel=0.05)

@@ -31,6 +31,7 @@ from control.records import (
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
+from estimation.stride_estimator import GRACE_S
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 EDGE_M2, WIDTH_M, LENGTH_M = 0.025 * 0.004, 0.025, 0.12
@@ -450,7 +451,7 @@ def test_a_flipper_that_stays_down_is_not_released() -> None:
     stuck = [
         sample._replace(adduction_rad=bottom) if sample.phase is Phase.EXTRACTION else sample for sample in samples
     ]
-    stride = one(noisy(stuck, 5, 0.01))
+    stride = one(noisy(waiting(stuck), 5, 0.01))
     assert not stride.released
     assert stride.k_p.valid
     assert not stride.k_e.valid
@@ -458,7 +459,7 @@ def test_a_flipper_that_stays_down_is_not_released() -> None:
 
 @pytest.mark.parametrize(("below_m", "released"), [(1e-6, False), (-1e-6, True)])
 def test_a_flipper_is_released_from_where_its_lowest_corner_counts_as_out(below_m: float, released: bool) -> None:
-    held = held_at(triggered(motion(), MUD), OUT_M + below_m)
+    held = waiting(held_at(triggered(motion(), MUD), OUT_M + below_m))
     assert one(held).released is released
     assert one(held).surface_m > 0.002  # the height that the mud was found at does not count
 
@@ -466,7 +467,7 @@ def test_a_flipper_is_released_from_where_its_lowest_corner_counts_as_out(below_
 def test_a_flipper_that_comes_out_at_the_last_moment_is_released() -> None:
     """The sample that tells it is the last one before swing."""
     samples = held_at(triggered(motion(), MUD), 0.01)
-    assert not one(samples).released
+    assert not one(waiting(samples)).released
     *_, last = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
     samples[last] = samples[last]._replace(adduction_rad=0.0)
     assert one(samples).released
@@ -481,10 +482,20 @@ def test_a_recovered_flipper_was_not_released_and_the_other_was() -> None:
 
 def test_a_recovery_teaches_nothing() -> None:
     samples = held_at(triggered(motion(), MUD), 0.01)
-    stride, longer = one(samples), one(recovered(samples))
+    stride, longer = one(waiting(samples)), one(recovered(samples))
     assert longer.k_e == stride.k_e
     assert longer.extraction_s == pytest.approx(stride.extraction_s)
     assert longer.extraction_force_n == stride.extraction_force_n
+
+
+def waiting(samples: Sequence[Sample]) -> list[Sample]:
+    """The flipper stays where its extraction ended, for longer than it has to come out."""
+    *_, end = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
+    held, out_s = samples[end], samples[end].now_s + 1.1 * GRACE_S
+    return [
+        held._replace(now_s=sample.now_s, phase=sample.phase) if i > end and sample.now_s < out_s else sample
+        for i, sample in enumerate(samples)
+    ]
 
 
 def held_at(samples: Sequence[Sample], lowest_depth_m: float) -> list[Sample]:

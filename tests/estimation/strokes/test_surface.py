@@ -14,9 +14,7 @@ from estimation.strokes.surface import (
     MIN_ABOVE,
     MIN_BELOW,
     NO_SURFACE,
-    SHARPEST_M,
     Surface,
-    combined,
     find_surface,
     hampel_filtered,
 )
@@ -248,8 +246,7 @@ modest_depths = st.floats(-0.1, 0.1)
 @given(st.lists(st.tuples(modest_depths, st.floats()), max_size=40))
 def test_nothing_makes_the_search_raise(pairs: list[tuple[float, float]]) -> None:
     """Depths come from finite angles and may go to and fro; forces may be anything."""
-    surface = find_surface([depth_m for depth_m, _ in pairs], [force_n for _, force_n in pairs])
-    combined(surface, 0.0015, 0.0003)
+    find_surface([depth_m for depth_m, _ in pairs], [force_n for _, force_n in pairs])
 
 
 @given(st.lists(st.tuples(modest_depths, st.floats(-100.0, 100.0)), max_size=40))
@@ -289,55 +286,3 @@ def test_forces_without_wild_batches_are_left_as_they_are(jump_n: float) -> None
         ).tolist()
         changed += sum(a != b for a, b in zip(forces_n, hampel_filtered(forces_n), strict=True))
     assert changed < 0.001 * 100 * BATCH_COUNT
-
-
-# with what is known beforehand
-
-depth_values, errors = st.floats(-0.02, 0.02), st.floats(1e-5, 0.02)
-
-
-@given(depth_values, errors, errors, st.floats(0.0, 0.005))
-def test_knowledge_is_added_by_its_precision(
-    depth_m: float, error_m: float, expected_m: float, sample_m: float
-) -> None:
-    """As two independent normal readings: one at the depth, one at the nominal height, zero."""
-    reported = 1.0 / (error_m**2 + sample_m**2 / 12.0)
-    both = combined(Surface(depth_m, error_m, 0.3, 0.1, True), expected_m, sample_m)
-    assert both.depth_m == pytest.approx(depth_m * reported / (reported + expected_m**-2), rel=1e-9, abs=1e-15)
-    assert both.std_error_m == pytest.approx((reported + expected_m**-2) ** -0.5, rel=1e-9)
-    assert (both.level_n, both.level_std_error_n, both.found) == (0.3, 0.1, True)
-
-
-@given(depth_values, errors, errors, st.floats(0.0, 0.005))
-def test_together_they_lie_between_and_are_surer_than_each(
-    depth_m: float, error_m: float, expected_m: float, sample_m: float
-) -> None:
-    both = combined(Surface(depth_m, error_m, 0.0, 0.1, True), expected_m, sample_m)
-    assert min(0.0, depth_m) <= both.depth_m <= max(0.0, depth_m)
-    assert both.std_error_m <= expected_m
-    assert both.std_error_m <= max(sqrt(error_m**2 + sample_m**2 / 12.0), SHARPEST_M) * (1.0 + 1e-12)
-
-
-@given(depth_values)
-def test_an_expectation_never_wins_against_good_data(depth_m: float) -> None:
-    """A surface told to 0.3 mm stays within a twentieth of where it is, where 1.5 mm were expected."""
-    both = combined(Surface(depth_m, 0.0003, 0.0, 0.1, True), 0.0015, 0.0003)
-    assert abs(both.depth_m - depth_m) <= 0.05 * abs(depth_m)
-
-
-def test_slow_messages_make_the_reported_surface_count_less() -> None:
-    reported = Surface(0.004, 0.0003, 0.0, 0.1, True)
-    weights = [combined(reported, 0.0015, sample_m).depth_m / 0.004 for sample_m in (0.0, 0.001, 0.005, 0.02)]
-    assert weights == sorted(weights, reverse=True)
-    assert weights[0] > 0.95
-    assert weights[-1] < 0.1
-
-
-def test_where_nothing_was_found_the_nominal_height_is_all_there_is() -> None:
-    assert combined(NO_SURFACE, 0.0015, 0.001) == Surface(0.0, 0.0015, 0.0, inf, False)
-
-
-def test_no_error_at_all_is_survived() -> None:
-    both = combined(Surface(0.004, 0.0, 0.0, 0.1, True), 0.0015, 0.0)
-    assert both.depth_m == pytest.approx(0.004, rel=1e-3)
-    assert both.std_error_m == pytest.approx(SHARPEST_M, rel=1e-3)

@@ -1,0 +1,104 @@
+"""The friction of the sweep joint from swings in air, and the evidence of mud."""
+
+from math import cos, isclose, pi
+
+import numpy as np
+import pytest
+
+from estimation.strokes.air import AIR_NM, MEASURED_NM, SHORTEST_RAD, UNKNOWN_FRICTION_NM, AirSwing
+
+COUNT = 200
+
+
+def swing(
+    air: AirSwing, friction_nm: float, inertia_nm: float = 0.0, offset_nm: float = 0.0, back: bool = False
+) -> None:
+    """From -35 to +35 degrees, from rest to rest: dry friction, inertia, and an offset of the current."""
+    for i in range(COUNT + 1):
+        time = i / COUNT
+        sweep_rad = -0.6 * cos(pi * time) * (-1.0 if back else 1.0)
+        resisting_nm = (friction_nm if back else -friction_nm) if 0 < i < COUNT else 0.0
+        accelerating_nm = inertia_nm * cos(pi * time) * (-1.0 if back else 1.0)
+        air.update(sweep_rad, resisting_nm + accelerating_nm + offset_nm)
+
+
+def test_before_any_swing_the_friction_is_unknown() -> None:
+    air = AirSwing()
+    assert (air.friction_nm, air.std_error_nm) == (0.0, UNKNOWN_FRICTION_NM)
+
+
+@pytest.mark.parametrize("friction_nm", [0.0, 0.02, 0.06, 0.12])
+@pytest.mark.parametrize("inertia_nm", [0.0, 0.3])
+def test_dry_friction_is_found_under_any_inertia(friction_nm: float, inertia_nm: float) -> None:
+    air = AirSwing()
+    swing(air, friction_nm, inertia_nm)
+    air.close()
+    assert air.friction_nm == pytest.approx(friction_nm, abs=1e-3)
+    assert air.std_error_nm == MEASURED_NM
+
+
+def test_an_offset_cancels_in_a_swing_of_both_directions() -> None:
+    air = AirSwing()
+    swing(air, 0.05, offset_nm=0.03)
+    swing(air, 0.05, offset_nm=0.03, back=True)
+    air.close()
+    assert air.friction_nm == pytest.approx(0.05, abs=1e-3)
+
+
+def test_dragged_mud_only_adds_so_the_least_swing_counts() -> None:
+    air = AirSwing()
+    for dragged_nm in (0.0, 0.05, 0.08, 0.03):
+        swing(air, 0.05 + dragged_nm)
+        air.close()
+    assert air.friction_nm == pytest.approx(0.05, abs=1e-3)
+
+
+def test_a_swing_through_mud_is_no_air_and_changes_nothing() -> None:
+    air = AirSwing()
+    swing(air, 0.04)
+    air.close()
+    before_nm = air.friction_nm
+    swing(air, AIR_NM + 0.1)
+    air.close()
+    assert not air.is_air
+    assert air.friction_nm == before_nm
+    swing(air, 0.05)
+    air.close()
+    assert air.is_air
+
+
+def test_a_short_movement_is_no_swing() -> None:
+    air = AirSwing()
+    for sweep_rad in np.linspace(0.0, 0.9 * SHORTEST_RAD, 20):
+        air.update(float(sweep_rad), -0.1)
+    air.close()
+    assert air.std_error_nm == UNKNOWN_FRICTION_NM
+
+
+def test_samples_at_rest_do_not_count() -> None:
+    air = AirSwing()
+    swing(air, 0.05)
+    for _ in range(1000):
+        air.update(0.6, -0.3)
+    air.close()
+    assert isclose(air.friction_nm, 0.05, abs_tol=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("friction_nm", "stance_nm", "is_mud"),
+    [(0.05, 0.07, False), (0.09, 0.12, False), (0.0, 0.03, False), (0.05, 0.44, True), (0.0, 0.1, True)],
+)
+def test_mud_needs_much_more_torque_than_friction(friction_nm: float, stance_nm: float, is_mud: bool) -> None:
+    """In the authors' logs a stance in mud begins at 0.44 N·m, and in air it has 0.05 to 0.07 N·m."""
+    air = AirSwing()
+    swing(air, friction_nm)
+    air.close()
+    assert air.is_mud(stance_nm) is is_mud
+
+
+def test_a_reset_forgets_the_friction() -> None:
+    air = AirSwing()
+    swing(air, 0.05)
+    air.close()
+    air.reset()
+    assert (air.friction_nm, air.std_error_nm, air.is_air) == (0.0, UNKNOWN_FRICTION_NM, True)
