@@ -7,6 +7,7 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.json_output import print_json
+from command_line.logs.lab_findings import complain_of, show_lab_log
 from command_line.logs.refusals import UsageError, explain_errors
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
@@ -14,6 +15,8 @@ from experiments.pictures.stride_choice import Stride, choose_strides, duration_
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.log_reading.lab.export import write_lab_csv
+from firmware_host.log_reading.lab.summary import finding_reports, lab_summary
+from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
 from firmware_host.log_reading.log_reader import LogError, log_summary, read_log, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
 from firmware_host.operator.reports import map_report, stride_report
@@ -29,16 +32,18 @@ def replay(options: Options) -> int:
     configuration = load_configuration(options.config) if options.config else None
     with watched() as watch:
         replayed = replay_files(options.files, configuration, options.method, watch)
-    _show_replay(replayed, options.json)
+    _show_replay(options.files[0], replayed, options.json)
     return exit_codes.OK
 
 
-def _show_replay(replayed: Replay, as_json: bool) -> None:
+def _show_replay(path: Path, replayed: Replay, as_json: bool) -> None:
     strides = [stride_report(stride) for stride in replayed.strides]
     if as_json:
         report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
-        print_json("replay", report | {"complete": replayed.complete})
+        findings = finding_reports(path, replayed.findings)
+        print_json("replay", report | {"complete": replayed.complete, "findings": findings})
         return
+    complain_of(path, replayed.findings)
     print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):
         forces = f"{stride.insertion_force_n:7.1f} {stride.stance_force_n:6.1f} {stride.extraction_force_n:7.1f}"
@@ -99,6 +104,7 @@ def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
         walk = read_walk(options.files[0], options.walk, options.files[1:], watch)
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise LogError(f"{path} cannot be written; choose another path with --out")
+    complain_of(options.files[0], walk.findings)
     if walk.walks > 1 and not options.walk:
         complain(f"the last of {walk.walks} walks in this log; --walk N takes another")
     if walk.missing:
@@ -140,6 +146,9 @@ def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
 
 @explain_errors
 def info(options: Options) -> int:
+    if len(options.files) == 1 and is_lab_csv(options.files[0]):
+        _show_lab_info(options.files[0], options.json)
+        return exit_codes.OK
     with watched() as watch:
         summary = log_summary(read_logs(options.files, watch))
     if options.json:
@@ -148,6 +157,15 @@ def info(options: Options) -> int:
         for name, value in summary.items():
             print(f"{name:16} {value}")
     return exit_codes.OK
+
+
+def _show_lab_info(path: Path, as_json: bool) -> None:
+    """Raises LogError."""
+    lab = read_lab_csv(path)
+    if as_json:
+        print_json("log-info", lab_summary(path, lab))
+    else:
+        show_lab_log(path, lab)
 
 
 @explain_errors

@@ -9,6 +9,7 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.json_output import print_json
+from command_line.logs.lab_findings import complain_of
 from command_line.logs.refusals import explain_errors
 from command_line.screen import coefficient, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
@@ -16,6 +17,7 @@ from experiments.pictures.stride_choice import choose_strides
 from experiments.reports.report_page import PAGE, Figure, Section, to_json, write_report
 from experiments.reports.text_tables import number
 from experiments.reports.whole_files import copy_whole
+from firmware_host.log_reading.lab.summary import finding_reports
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
 from firmware_host.operator.reports import map_report, stride_report
@@ -30,8 +32,9 @@ def log_report(options: argparse.Namespace) -> int:
     folder: Path = options.out or _report_folder(options.files[0])
     folder.mkdir(parents=True, exist_ok=True)
     with watched() as watch:
-        report, sections = _read_report(options.files, watch)
+        report, sections, replayed = _read_report(options.files, watch)
     logs = [_copy(path, folder) for path in options.files]
+    complain_of(options.files[0], replayed.findings)
     written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
     if options.json:
         print_json("log-report", to_json(report))
@@ -53,7 +56,7 @@ def _copy(log: Path, folder: Path) -> Path:
     return copy
 
 
-def _read_report(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section]]:
+def _read_report(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section], Replay]:
     """Raises LogError."""
     ours = read_logs(files, watch) if files[0].suffix == ".mcap" else None
     replayed = replay_files(files, watch=watch)
@@ -65,9 +68,17 @@ def _read_report(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Sect
         "strides": [stride_report(stride) for stride in replayed.strides],
         "map": map_report(replayed.map),
         "events": ours.events if ours else [],
+        "findings": finding_reports(files[0], replayed.findings),
     }
     sections = [*_walk_sections(files, watch), _strides_section(replayed)]
-    return report, ([_summary_section(ours), *sections, _events_section(ours)] if ours else sections)
+    if ours:
+        return report, [_summary_section(ours), *sections, _events_section(ours)], replayed
+    return report, [_findings_section(replayed), *sections], replayed
+
+
+def _findings_section(replayed: Replay) -> Section:
+    rows = [["", ""], *([str(finding.kind), str(finding)] for finding in replayed.findings)]
+    return Section("Findings", "What the reader noticed in the file." if replayed.findings else "None.", rows=rows)
 
 
 def _summary_section(log: Log) -> Section:

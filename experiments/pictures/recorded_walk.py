@@ -19,8 +19,10 @@ from control.records import FLIPPERS, BodyPose, FlipperLoad, StrideEstimate
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.recorded_states import recorded_states
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.rows import STRIDE, stride_row
-from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
+from firmware_host.log.row_packing import stride_row
+from firmware_host.log.rows import STRIDE
+from firmware_host.log_reading.lab.findings import Finding
+from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv
 from firmware_host.log_reading.log_reader import (
     Log,
     LogError,
@@ -67,6 +69,7 @@ class RecordedWalk(NamedTuple):
     begun_s: float = 0.0  # since the beginning of the log
     complete: bool = True  # False if the writer of the log was interrupted, or still writes
     cut: str = ""  # how the walk may extend beyond this log
+    findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
 
     @property
     def geometric_step_m(self) -> float:
@@ -94,7 +97,7 @@ def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Wat
     """Read walk `number` of a log from 1; 0 is the last one. `more` are segments of the same run. Raises LogError."""
     if more:
         return numbered_walk(path, read_logs([path, *more], watch), number)
-    if path.name.endswith((".csv", ".csv.gz")):
+    if is_lab_csv(path):
         return _only_walk(path, read_lab_csv(path), number)
     if path.suffix == ".mcap":
         return numbered_walk(path, read_log(path, watch), number)
@@ -207,4 +210,5 @@ def _only_walk(path: Path, lab: LabLog, number: int) -> RecordedWalk:
         body_x_m=lab.body_x_m,
         strides=[_since(start_s, row) for row in rows],
         noticed_s=[now_s - start_s for now_s in reading.noticed_s],
+        findings=lab.findings,
     )

@@ -58,6 +58,11 @@ class LabLog(NamedTuple):
     findings: tuple[Finding, ...] = ()
 
 
+def is_lab_csv(path: Path) -> bool:
+    """Returns whether a file's name is that of a CSV, compressed or not."""
+    return path.name.endswith((".csv", ".csv.gz"))
+
+
 def read_lab_csv(path: Path, vertical: str = VERTICAL_AXIS) -> LabLog:
     """Reads a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
     table = drop_backward_rows(path, read_table(path, READ_COLUMNS))

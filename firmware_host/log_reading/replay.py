@@ -21,7 +21,8 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
-from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
+from firmware_host.log_reading.lab.findings import Finding
+from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv
 from firmware_host.log_reading.log_reader import (
     Log,
     LogError,
@@ -57,6 +58,7 @@ class Replay:
     complete: bool = True  # False where the writer of the log was cut off, or still writes
     segment: int = 0  # of the run with which the log begins
     begin_s: float = 0.0  # on the log's own clock, which is also that of the strides
+    findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
 
 
 def replay_files(
@@ -70,7 +72,7 @@ def replay_files(
     `configuration` and `method` replace those of the log.
     """
     path = paths[0]
-    if len(paths) == 1 and path.name.endswith((".csv", ".csv.gz")):
+    if len(paths) == 1 and is_lab_csv(path):
         return replay_lab(read_lab_csv(path), configuration, method)
     if len(paths) == 1 and path.suffix != ".mcap":
         raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
@@ -131,7 +133,8 @@ def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: 
     drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
     estimator = MudEstimator(geometry, (left, right), parameters, drag_n)
     strides = [stride for stride in _strides_of_lab(estimator, lab) if stride.flipper in lab.flippers]
-    return Replay(strides, lab.flippers, estimator.map.rows(), begin_s=float(lab.stamp_s[0]))
+    begin_s = float(lab.stamp_s[0])
+    return Replay(strides, lab.flippers, estimator.map.rows(), begin_s=begin_s, findings=lab.findings)
 
 
 def _strides_of_lab(estimator: MudEstimator, lab: LabLog) -> Iterator[StrideEstimate]:

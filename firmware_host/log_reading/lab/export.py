@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.records import Phase
-from firmware_host.log_reading.lab.columns import BODY_COLUMNS, JOINT_COLUMNS, STATE_OF_PHASE, WRITTEN_ORDER
+from firmware_host.log_reading.lab.columns import (
+    BODY_COLUMNS,
+    DEPTH_COLUMN,
+    JOINT_COLUMNS,
+    STATE_OF_PHASE,
+    WRITTEN_ORDER,
+)
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, unwatched
 
 Floats = NDArray[np.float64]
@@ -55,6 +61,7 @@ def _columns(log: Log) -> dict[str, Floats]:
         columns[f"{JOINT_COLUMNS[joint]}_pos"] = log.ticks["angle_rad"][:, joint] / math.tau
     for joint in WRITTEN_ORDER:
         columns[f"{JOINT_COLUMNS[joint]}_curr"] = log.ticks["current_a"][:, joint]
+    columns[DEPTH_COLUMN] = log.ticks["stride_depth_m"]
     if np.any(np.isfinite(log.ticks["body_x_m"])):
         columns[BODY_COLUMNS[0]] = log.ticks["body_x_m"]
     return columns

@@ -26,6 +26,8 @@ RANGES_DEG = (SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG) * 2
 CURRENT_RANGE_A = 120.0  # peak of the largest drive of this kind; the robot's drives clip at 10 to 25 A
 MOST_BEYOND = 0.05  # of the rows of the gait; fewer are disturbed samples, more are wrong units
 STUCK_S, STUCK_VALUES = 0.3, 10  # a signal hangs for longer while the other has more values; the drives sample at 50 Hz
+LEAP_RAD = 0.0175  # 1°: ten times what an encoder resolves, and less than any joint moves in STUCK_S of a stroke
+MOVING = ((Phase.STANCE, Phase.SWING), (Phase.INSERTION, Phase.EXTRACTION)) * 2  # the phases in which each joint moves
 STALE_S = 0.5  # both hang; the logger repeats a state for up to 0.35 s
 AT_PEAK = 0.9995  # of the largest current: there the drive clips it, and it does not vary
 
@@ -85,7 +87,8 @@ def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> l
         angles, currents = angle_rad[:, joint], current_a[:, joint]
         clipped = np.abs(currents) >= AT_PEAK * peak_a
         stuck += [(current, currents, held) for held in _stuck(rows, currents, angles) if not clipped[held.start]]
-        stuck += [(position, angles, held) for held in _stuck(rows, angles, currents)]
+        held_angles = [held for held in _stuck(rows, angles, currents) if _must_move(rows, joint, angles, held)]
+        stuck += [(position, angles, held) for held in held_angles]
         stale = [held for held in _stale(rows, angles, currents) if not clipped[held.start]]
         stuck += [(position, angles, held) for held in stale] + [(current, currents, held) for held in stale]
     findings = [_report_stuck(rows, column, held) for column, _, held in stuck]
@@ -98,6 +101,13 @@ def _stuck(rows: LogRows, values: Floats, other: Floats) -> list[slice]:
     """Returns the rows in which a signal has one value and the other signal of its joint has many."""
     held = [each for each in _held(values) if _duration_s(rows, each) > STUCK_S and np.any(rows.in_gait[each])]
     return [each for each in held if len(np.unique(other[each])) > STUCK_VALUES]
+
+
+def _must_move(rows: LogRows, joint: int, angles: Floats, held: slice) -> bool:
+    """Returns whether a joint moved while its position hung: it leaps then, or strokes passed. Joints also rest."""
+    before, after = angles[max(held.start - 1, 0)], angles[min(held.stop, len(angles) - 1)]
+    leap_rad = max(abs(after - angles[held.start]), abs(before - angles[held.start]))
+    return bool(leap_rad > LEAP_RAD or set(MOVING[joint]) <= set(rows.phase[held].tolist()))
 
 
 def _stale(rows: LogRows, angles: Floats, currents: Floats) -> list[slice]:

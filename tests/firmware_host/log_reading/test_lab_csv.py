@@ -137,7 +137,7 @@ def test_what_was_written_is_read_back(tmp_path: Path) -> None:
     log = read_lab_csv(write(tmp_path / "walk.csv", export(walk)))
     assert log.gait == {"insertion_angle": 0.035, "sweep_angle_deg": 30.0}  # the settings that are numbers
     assert log.phase.tolist() == walk.ticks["phase"].tolist()
-    assert log.flippers == ("left", "right")
+    assert log.flippers == ("left", "right") and set(log.commanded_depth_m.tolist()) == {0.035}
     np.testing.assert_allclose(log.stamp_s, walk.ticks["stamp_s"] - 1234.5, atol=1e-9)
     np.testing.assert_allclose(log.angle_rad, walk.ticks["angle_rad"], rtol=1e-8, atol=1e-12)
     np.testing.assert_allclose(log.current_a, walk.ticks["current_a"], rtol=1e-8, atol=1e-12)
@@ -158,7 +158,7 @@ def test_a_mirrored_signal_is_turned_round_again(signal: str, turned: int, tmp_p
 def test_writing_keeps_the_authors_columns_and_units() -> None:
     settings, values, names, first, *_ = export(make_walk()).splitlines()
     assert settings == "scenario,insertion_angle,sweep_angle_deg" and values == "mudskipper,0.035,30.0"
-    assert names == HEAD.splitlines()[1] + ",OptitrackPosition_x"
+    assert names == HEAD.splitlines()[1] + ",insertiondepth,OptitrackPosition_x"
     turns = [float(field) for field in first.split(",")[2:6]]
     assert turns == pytest.approx([0.1 / math.tau, 0.0, 0.1 / math.tau, 0.0], abs=1e-5)
 
