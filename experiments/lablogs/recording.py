@@ -91,7 +91,7 @@ class LabRecording(Recording):
 
     def _with_rows(self, rows: NDArray[np.bool_]) -> Recording:
         fields: dict[str, Any] = self._lab._asdict()
-        columns = {name: value[rows] for name, value in fields.items() if isinstance(value, np.ndarray)}
+        columns: dict[str, Any] = {name: value[rows] for name, value in fields.items() if isinstance(value, np.ndarray)}
         return LabRecording(self._lab._replace(**columns))
 
 
