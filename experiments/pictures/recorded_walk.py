@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.modes import Mode
-from control.records import FLIPPERS, BodyPose, FlipperLoad, StrideEstimate
-from estimation.mud import EstimationParameters, MudEstimator
-from estimation.recorded_states import recorded_states
+from control.records import FLIPPERS, FlipperLoad, StrideEstimate
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.row_packing import stride_row
 from firmware_host.log.rows import STRIDE
@@ -34,7 +32,7 @@ from firmware_host.log_reading.log_reader import (
     segment_of,
     unwatched,
 )
-from firmware_host.log_reading.replay import LAB_DRIVE, NO_VELOCITY, PHASES, configuration_of
+from firmware_host.log_reading.replay import configuration_of, lab_estimator, lab_readings
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
@@ -172,16 +170,9 @@ class _LabReading(NamedTuple):
 
 
 def _read_lab(lab: LabLog, flipper: str) -> _LabReading:
-    """Estimate one run with the assumptions of `replay_lab` on the authors' robot."""
-    drive = LAB_DRIVE._replace(current_limit_a=lab.current_limit_a)
-    parameters = EstimationParameters(fixed_base=len(lab.flippers) == 1)
-    estimator, reading = MudEstimator(FlipperGeometry(), (drive, drive), parameters), _LabReading([], [], [])
-    columns = (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a, lab.body_x_m)
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    for now_s, phase, angles_rad, currents_a, body_x_m in rows:
-        reported = estimator.update(
-            now_s, PHASES[phase], recorded_states(now_s, angles_rad, NO_VELOCITY, currents_a), BodyPose(now_s, body_x_m)
-        )
+    """Estimate one run as `replay_lab` does."""
+    estimator, reading = lab_estimator(lab), _LabReading([], [], [])
+    for now_s, reported in lab_readings(estimator, lab):
         reading.loads.append(reported.left if flipper == FLIPPERS[0] else reported.right)
         reading.strides.extend(stride for stride in reported.strides if stride.flipper in lab.flippers)
         if reported.strides and estimator.mud_estimate.boundary:

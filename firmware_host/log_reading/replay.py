@@ -14,7 +14,7 @@ from control.joint_pd import ArmMass
 from control.modes import Mode
 from control.records import BodyPose, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
-from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator
+from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
 from estimation.mud_map import MapRow
 from estimation.recorded_states import recorded_states
 from firmware_host.configuration.configuration import Configuration
@@ -119,7 +119,18 @@ def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator
 
 
 def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
-    """Replays with the paper's torque constant and a weightless arm, unless a configuration is given.
+    """Replays with `lab_estimator`."""
+    estimator = lab_estimator(lab, configuration, method)
+    strides = [stride for _, reading in lab_readings(estimator, lab) for stride in reading.strides]
+    own = [stride for stride in strides if stride.flipper in lab.flippers]
+    begin_s = float(lab.stamp_s[0])
+    return Replay(own, lab.flippers, estimator.map.rows(), begin_s=begin_s, findings=lab.findings)
+
+
+def lab_estimator(
+    lab: LabLog, configuration: Configuration | None = None, method: Method | None = None
+) -> MudEstimator:
+    """Returns an estimator with the paper's torque constant and a weightless arm, unless a configuration is given.
 
     A single flipper was mounted on a fixed bench; two flippers carried a body.
     """
@@ -131,17 +142,14 @@ def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: 
     fixed_base = parameters.fixed_base or len(lab.flippers) == 1
     parameters = replace(parameters, method=method or parameters.method, fixed_base=fixed_base)
     drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
-    estimator = MudEstimator(geometry, (left, right), parameters, drag_n)
-    strides = [stride for stride in _strides_of_lab(estimator, lab) if stride.flipper in lab.flippers]
-    begin_s = float(lab.stamp_s[0])
-    return Replay(strides, lab.flippers, estimator.map.rows(), begin_s=begin_s, findings=lab.findings)
+    return MudEstimator(geometry, (left, right), parameters, drag_n)
 
 
-def _strides_of_lab(estimator: MudEstimator, lab: LabLog) -> Iterator[StrideEstimate]:
+def lab_readings(estimator: MudEstimator, lab: LabLog) -> Iterator[tuple[float, MudReading]]:
+    """Yields the time of each row and the estimator's reading of it."""
     for now_s, phase, angles_rad, currents_a, body_x_m in zip(
         *(column.tolist() for column in (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a, lab.body_x_m)),
         strict=True,
     ):
         states = recorded_states(now_s, angles_rad, NO_VELOCITY, currents_a)
-        reading = estimator.update(now_s, PHASES[phase], states, BodyPose(now_s, body_x_m))
-        yield from reading.strides
+        yield now_s, estimator.update(now_s, PHASES[phase], states, BodyPose(now_s, body_x_m))

@@ -25,6 +25,7 @@ SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG = (
 RANGES_DEG = (SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG) * 2
 CURRENT_RANGE_A = 120.0  # peak of the largest drive of this kind; the robot's drives clip at 10 to 25 A
 MOST_BEYOND = 0.05  # of the rows of the gait; fewer are disturbed samples, more are wrong units
+CLEAR_TRAVEL_RAD = 0.1
 STUCK_S, STUCK_VALUES = 0.3, 10  # a signal hangs for longer while the other has more values; the drives sample at 50 Hz
 LEAP_RAD = 0.0175  # 1°: ten times what an encoder resolves, and less than any joint moves in STUCK_S of a stroke
 MOVING = ((Phase.STANCE, Phase.SWING), (Phase.INSERTION, Phase.EXTRACTION)) * 2  # the phases in which each joint moves
@@ -69,7 +70,8 @@ def check_swapped_joints(rows: LogRows, angle_rad: Floats) -> None:
         sweep, adduction = 2 * number, 2 * number + 1
         stance = [_travel_rad(rows, angle_rad[:, joint], Phase.STANCE) for joint in (sweep, adduction)]
         insertion = [_travel_rad(rows, angle_rad[:, joint], Phase.INSERTION) for joint in (sweep, adduction)]
-        if stance[1] > stance[0] and insertion[0] > insertion[1]:
+        clear = min(stance[1], insertion[0]) > CLEAR_TRAVEL_RAD  # a joint that holds still drifts less
+        if clear and stance[1] > 2.0 * stance[0] and insertion[0] > 2.0 * insertion[1]:
             first = int(np.argmax(rows.phase == Phase.STANCE))
             text = f"moves less in stance than {POSITION_COLUMNS[adduction]}, and more in insertion: are they swapped?"
             raise rows.refusal(FindingKind.RANGE, POSITION_COLUMNS[sweep], first, text)
