@@ -26,6 +26,7 @@ AXES = "xyz"
 VERTICAL_AXIS = "y"  # of the authors' capture
 FROZEN_S, LEAP_M = 0.5, 0.02  # a pose is invalid where it is constant for so long and then changes by so much
 MUCH_HEIGHT_M = 0.005  # as much as the depth of a stride; three times the uncertainty of the surface
+LEAST_AGREEMENT = 0.7  # of the stances' sum to their path: on average within 45° of the advance
 MUCH_PITCH_RAD = 0.06  # lifts or lowers the flipper by 5 mm at 85 mm of sweep to the front
 
 
@@ -52,7 +53,8 @@ def read_body_track(rows: LogRows, table: CsvTable, vertical: str = VERTICAL_AXI
     height_m = position_m[:, up] if BODY_COLUMNS[up] in columns else unknown
     track = BodyTrack(advance_m, height_m, _find_pitch(table, lost, forward, up))
     findings = [*_report_lost(rows, columns[0], lost), *_report_height(rows, height_m, BODY_COLUMNS[up])]
-    return track, [*findings, *_report_pitch(rows, track.pitch_rad)]
+    findings += _report_direction(rows, position_m, up, columns[0])
+    return track, [*findings, *_report_tilt(rows, _find_tilt(table, lost, up), track.pitch_rad)]
 
 
 def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
@@ -78,17 +80,28 @@ def _find_forward(rows: LogRows, position_m: Floats, up: int) -> Floats | None:
 
 def _find_pitch(table: CsvTable, lost: Truths, forward: Floats | None, up: int) -> Floats:
     """Returns by how much the body's forward direction rose since the first known pose."""
-    pitch_rad = np.full(len(lost), UNKNOWN)
-    if forward is None or not set(ORIENTATION_COLUMNS) <= table.column.keys():
-        return pitch_rad
+    if forward is None:
+        return np.full(len(lost), UNKNOWN)
+    return np.arcsin(_rise(table, lost, forward, up))
+
+
+def _find_tilt(table: CsvTable, lost: Truths, up: int) -> Floats:
+    """Returns by how much the body's vertical leaned over, to any side, since the first known pose."""
+    return np.arccos(_rise(table, lost, np.eye(len(AXES))[up], up))
+
+
+def _rise(table: CsvTable, lost: Truths, direction: Floats, up: int) -> Floats:
+    """Returns the vertical part of the body's axis that had a direction in the first known pose."""
+    rise = np.full(len(lost), UNKNOWN)
+    if not set(ORIENTATION_COLUMNS) <= table.column.keys():
+        return rise
     quaternion = np.column_stack([table.column[name] for name in ORIENTATION_COLUMNS])
     size = np.linalg.norm(quaternion, axis=1)
     known = ~lost & (np.abs(size - 1.0) < 0.01)
     if np.any(known):
         turned = _rotation_matrices(quaternion[known] / size[known, None])
-        nose = turned[0].T @ forward  # in the body's own axes
-        pitch_rad[known] = np.arcsin(np.clip(turned[:, up, :] @ nose, -1.0, 1.0))
-    return pitch_rad
+        rise[known] = np.clip(turned[:, up, :] @ (turned[0].T @ direction), -1.0, 1.0)
+    return rise
 
 
 def _rotation_matrices(quaternion: Floats) -> Floats:
@@ -122,11 +135,30 @@ def _report_height(rows: LogRows, height_m: Floats, column: str) -> list[Finding
     return [rows.finding(FindingKind.POSE, column, row, text)]
 
 
-def _report_pitch(rows: LogRows, pitch_rad: Floats) -> list[Finding]:
-    change_rad, row = _largest_change(rows, pitch_rad)
-    if abs(change_rad) < MUCH_PITCH_RAD:
+def _report_direction(rows: LogRows, position_m: Floats, up: int, column: str) -> list[Finding]:
+    """Reports stances that moved the body to different sides: then the direction of the advance is not certain."""
+    strokes = [np.delete(position_m[each], up, axis=1) for each in rows.strokes(Phase.STANCE)]
+    known = [stroke[np.isfinite(stroke[:, 0])] for stroke in strokes]
+    steps_m = np.array([stroke[-1] - stroke[0] for stroke in known if len(stroke)])
+    if not len(steps_m):
         return []
-    text = f"the body pitches by {np.degrees(change_rad):+.0f}° after the first insertion, nose up positive"
+    sum_m, path_m = float(np.linalg.norm(steps_m.sum(axis=0))), float(np.linalg.norm(steps_m, axis=1).sum())
+    if sum_m >= LEAST_AGREEMENT * path_m:
+        return []
+    path = f"{1e3 * path_m:.0f} mm in different horizontal directions, {1e3 * sum_m:.0f} mm in all"
+    text = f"the stances moved the body by {path}: the direction of the advance is uncertain"
+    return [rows.finding(FindingKind.POSE, column, int(np.argmax(rows.phase == Phase.STANCE)), text)]
+
+
+def _report_tilt(rows: LogRows, tilt_rad: Floats, pitch_rad: Floats) -> list[Finding]:
+    tilt_rad = np.where(np.isfinite(tilt_rad) & rows.in_gait, tilt_rad, 0.0)
+    row = int(np.argmax(tilt_rad))
+    if tilt_rad[row] < MUCH_PITCH_RAD:
+        return []
+    pitch = (
+        f"{np.degrees(pitch_rad[row]):+.0f}° of it nose up" if np.isfinite(pitch_rad[row]) else "its side is not known"
+    )
+    text = f"the body tilts by {np.degrees(tilt_rad[row]):.0f}° from its first pose, {pitch}"
     return [rows.finding(FindingKind.POSE, ORIENTATION_COLUMNS[0], row, text)]
 
 

@@ -67,11 +67,21 @@ def test_much_sinking_and_pitch_are_reported_with_their_size(tmp_path: Path) -> 
     log = read(tmp_path, 0.061, 0.3, 35.0)
     height, pitch = (finding for finding in log.findings if finding.kind is FindingKind.POSE)
     assert height.column == "OptitrackPosition_y" and "sinks by 61 mm" in height.text
-    assert pitch.column == "OptitrackOrientation_x" and "+17°" in pitch.text
+    assert pitch.column == "OptitrackOrientation_x" and "tilts by 17°" in pitch.text and "+17°" in pitch.text
 
 
 def test_a_level_walk_reports_nothing(tmp_path: Path) -> None:
     assert read(tmp_path, 0.002, 0.01, 35.0).findings == ()
+
+
+def test_stances_that_move_the_body_to_all_sides_are_reported(tmp_path: Path) -> None:
+    columns = lab_columns(strides=4)
+    add_pose(columns, 0.0, 0.0, 0.0)
+    stances = np.flatnonzero(np.diff((columns["turtle_state"] == 3).astype(int)) == 1) + 1
+    forward_m = columns["OptitrackPosition_x"].copy()
+    columns["OptitrackPosition_x"][stances[1] :] = 2.0 * forward_m[stances[1]] - forward_m[stances[1] :]
+    (finding,) = read_lab_csv(write_lab_log(tmp_path / "walk.csv", columns)).findings
+    assert finding.kind is FindingKind.POSE and "different horizontal directions" in finding.text
 
 
 def test_a_log_with_one_coordinate_has_the_advance_alone(tmp_path: Path) -> None:
