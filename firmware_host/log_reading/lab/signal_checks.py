@@ -71,7 +71,7 @@ def check_swapped_joints(rows: LogRows, angle_rad: Floats) -> None:
         stance = [_travel_rad(rows, angle_rad[:, joint], Phase.STANCE) for joint in (sweep, adduction)]
         insertion = [_travel_rad(rows, angle_rad[:, joint], Phase.INSERTION) for joint in (sweep, adduction)]
         clear = min(stance[1], insertion[0]) > CLEAR_TRAVEL_RAD  # a joint that holds still drifts less
-        if clear and stance[1] > 2.0 * stance[0] and insertion[0] > 2.0 * insertion[1]:
+        if clear and stance[1] > stance[0] and insertion[0] > insertion[1]:
             first = int(np.argmax(rows.phase == Phase.STANCE))
             text = f"moves less in stance than {POSITION_COLUMNS[adduction]}, and more in insertion: are they swapped?"
             raise rows.refusal(FindingKind.RANGE, POSITION_COLUMNS[sweep], first, text)
