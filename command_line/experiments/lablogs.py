@@ -1,7 +1,5 @@
 """`mudskipper experiment lablogs`: its plan from the command line."""
 
-from __future__ import annotations
-
 import argparse
 
 from command_line.experiments.conduct import conduct, refuse

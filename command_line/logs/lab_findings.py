@@ -1,7 +1,5 @@
 """Prints what the reader noticed in a CSV of the paper's authors, and what such a file contains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -13,8 +13,6 @@ Mud that is dragged along only adds to c, so the least swing of a trial counts. 
 in four of the authors' walks the body has sunk, and the flipper swings through mud with 0.2 to 0.83 N·m.
 """
 
-from __future__ import annotations
-
 from control.records import UNKNOWN
 
 AIR_NM = 0.15  # twice the largest friction of these motors: 0.05 to 0.07 N·m in the authors' logs without mud

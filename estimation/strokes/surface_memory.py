@@ -16,8 +16,6 @@ The finds of a trial share the error of the law and of the delay, so their mean 
 more of them that lie CONTRADICTION errors off the nominal height show that the height is wrong, and replace it.
 """
 
-from __future__ import annotations
-
 from math import hypot, sqrt
 
 from estimation.strokes.surface import NO_SURFACE, Surface

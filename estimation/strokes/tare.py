@@ -8,8 +8,6 @@ the pose. Part of it falls off on the way down: in one log 1.28 N at the end of 
 The memory fades: a mean over about the last MEMORY distinct samples.
 """
 
-from __future__ import annotations
-
 from math import hypot, sqrt
 from typing import NamedTuple
 

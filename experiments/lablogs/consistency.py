@@ -5,8 +5,6 @@ normal deviation is 0.67. A bound says that the mud is at least so strong, so th
 A log without mud has neither values nor bounds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

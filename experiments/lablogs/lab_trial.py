@@ -4,8 +4,6 @@ A CSV of the authors is one trial. A log of this project has a trial for each of
 again there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from math import isfinite

@@ -4,8 +4,6 @@ Any folder of logs is evaluated by each method: trials of one mud against each o
 flipper against the right one, mud against air, and each log against itself with disturbed columns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -4,8 +4,6 @@ A group is a mud: by default the lab's label in the name, `12.5N` of `single_12.
 groups of their own, `walk 15.6N`, because a walking robot does not repeat a stroke.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from fnmatch import fnmatchcase

@@ -1,7 +1,5 @@
 """The evaluation of real logs as pictures, with one row of panels for each method."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi
 from pathlib import Path

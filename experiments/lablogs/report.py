@@ -1,7 +1,5 @@
 """The report of `experiment lablogs`. Its fields are the keys of the summary in JSON; None where logs are too few."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations

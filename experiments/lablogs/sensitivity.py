@@ -3,8 +3,6 @@
 A stride of the disturbed log is compared with the one of the same flipper that ends at the same time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

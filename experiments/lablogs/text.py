@@ -1,7 +1,5 @@
 """The evaluation of real logs as tables for the screen and as a page with figures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

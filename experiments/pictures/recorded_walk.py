@@ -17,8 +17,7 @@ from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import FLIPPERS, FlipperLoad, StrideEstimate
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.row_packing import stride_row
-from firmware_host.log.rows import STRIDE
+from firmware_host.log.rows import STRIDE, stride_row
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv
 from firmware_host.log_reading.log_reader import (

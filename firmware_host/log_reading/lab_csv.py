@@ -5,8 +5,6 @@ reader notices is in `findings`: rows that it drops, samples that it invalidates
 must know. A log in which every number would be wrong is refused.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import NamedTuple

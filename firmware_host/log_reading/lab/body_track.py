@@ -6,8 +6,6 @@ the direction in which the stances moved the body. The direction of the largest 
 authors' walks the body sinks further than it advances.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Columns and states of the authors' CSV."""
 
-from __future__ import annotations
-
 from control.records import Phase
 
 JOINT_COLUMNS = ("leftsweeping", "leftadduction", "rightsweeping", "rightadduction")  # in the order of JOINTS

@@ -5,8 +5,6 @@ The authors publish two head lines, names and then values. This project joined t
 the settings are missing.
 """
 
-from __future__ import annotations
-
 import gzip
 import math
 import re

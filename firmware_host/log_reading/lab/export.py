@@ -1,7 +1,5 @@
 """Writes logs of this project in the form that the paper's authors publish."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from typing import TextIO

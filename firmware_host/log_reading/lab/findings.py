@@ -1,7 +1,5 @@
 """What the reader notices in a log of the paper's authors: one record for each, with its place in the file."""
 
-from __future__ import annotations
-
 import math
 from enum import StrEnum
 from typing import NamedTuple

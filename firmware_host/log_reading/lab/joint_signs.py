@@ -6,8 +6,6 @@ friction, so it has the direction of the motion; the adduction's current support
 negative weight is impossible. A joint without such a motion keeps its logged signs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import NamedTuple

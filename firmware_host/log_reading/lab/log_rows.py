@@ -1,7 +1,5 @@
 """The rows of one log: their times, lines and phases, from which findings take their place in the file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Brings rows into the order of their times: rows whose time runs backward are dropped."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 What makes every number wrong is refused. What spoils some rows is a finding, and the signal is NaN in those rows.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Summarises a log of the paper's authors for `mudskipper log info`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

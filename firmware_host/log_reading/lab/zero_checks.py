@@ -4,8 +4,6 @@ The commanded depth is that of the authors' controller, whose geometry is not pu
 project's geometry lie up to 24 mm at 70 mm, because the motor is not stiff and mud resists, and 9 mm the other way.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -23,7 +23,7 @@ Change = Callable[[list[str]], list[str]]
 
 
 def test_the_replay_of_a_log_of_version_0_1_gives_the_same_numbers(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main.main(["replay", str(OLD_LOG), "--json"]) == 0
+    assert main.main(["replay", str(OLD_LOG), "--method", "paper", "--json"]) == 0
     replayed = json.loads(capsys.readouterr().out)
     expected = json.loads(OLD_LOG.with_name("walk_0_1_replay.json").read_text(encoding="utf-8"))
     assert {name: replayed[name] for name in expected} == expected
