@@ -74,7 +74,6 @@ class FlipperEstimator(StrideEstimator):
             stroke.reset()
         self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
-        self._rise_nm = 0.0  # torque at the end of an insertion in which the force grows with depth
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         sweep_rad, adduction_rad, depth_m, rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm, saturated = load
@@ -127,7 +126,6 @@ class FlipperEstimator(StrideEstimator):
         below = level_free(batches, -corrected_n * length_m)
         own = self._own_surfaces.update(found, 0.0)
         self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
-        self._rise_nm = below[-1].adduction_nm if found.found else 0.0
 
     @property
     def surface_m(self) -> float:
@@ -136,7 +134,7 @@ class FlipperEstimator(StrideEstimator):
 
     def _learned(self) -> Learned:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
-        if not self._met_mud(stance.batches):
+        if not self._met_mud(stance.batches, extraction.batches):
             no_mud = NOT_THERE._replace(reason=NO_MUD)
             return Learned(k_p=no_mud, k_s=no_mud, k_e=no_mud, surface_m=self.surface_m, extraction_torque_nm=UNKNOWN)
         shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.body_drag_n)
@@ -152,10 +150,11 @@ class FlipperEstimator(StrideEstimator):
             tare_drift_n=self._tare.drift_n,
         )
 
-    def _met_mud(self, stance: Sequence[Batch]) -> bool:
-        """Return whether the stance, or the end of the insertion, needs more torque than friction."""
-        torques_nm = [batch.sweep_nm + self._air.friction_nm for batch in stance]
-        return self._air.is_mud(median(torques_nm) if torques_nm else 0.0) or self._air.is_mud(self._rise_nm)
+    def _met_mud(self, stance: Sequence[Batch], extraction: Sequence[Batch]) -> bool:
+        """Return whether the stance or the extraction needs more torque than friction."""
+        pushed_nm = median([batch.sweep_nm + self._air.friction_nm for batch in stance]) if stance else 0.0
+        pulled_nm = median([-batch.adduction_nm for batch in extraction]) if extraction else 0.0
+        return self._air.is_push(pushed_nm) or self._air.is_pull(pulled_nm)
 
     def _learn_extraction(self, stroke: Stroke) -> Estimate:
         reported = fit_extraction(

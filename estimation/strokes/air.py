@@ -20,7 +20,7 @@ UNKNOWN_FRICTION_NM = 0.05  # std_error before any swing in air: as large as it 
 MEASURED_NM = 0.01  # std_error of a measured friction: the scatter of the first swings in ten of the authors' logs
 SHORTEST_RAD = 0.05  # of a swing that counts
 MUD_RATIO = 3.0  # of stance torque over friction: in air they are equal
-MUD_NM = 0.02  # added to the friction: cogging and noise of a motor that has none
+MUD_NM = 0.03  # added to the friction: cogging and noise of a motor that has none
 
 
 class AirSwing:
@@ -59,6 +59,10 @@ class AirSwing:
                 self.std_error_nm, self._measured = MEASURED_NM, True
         self.begin()
 
-    def is_mud(self, stance_nm: float) -> bool:
-        """Return whether a stance torque, with friction, needs mud to explain it."""
+    def is_push(self, stance_nm: float) -> bool:
+        """Return whether the sweep torque of a stance, friction included, needs mud to explain it."""
         return stance_nm > MUD_RATIO * (self.friction_nm + MUD_NM)
+
+    def is_pull(self, extraction_nm: float) -> bool:
+        """Return whether the adduction torque of an extraction is more than any friction, so that mud holds on."""
+        return extraction_nm > AIR_NM + self.friction_nm

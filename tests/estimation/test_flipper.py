@@ -220,7 +220,7 @@ def test_where_the_surface_is_known_shear_and_extraction_are_found(
 
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
 @pytest.mark.parametrize("depth_m", [0.02, 0.025, 0.03])
-@pytest.mark.parametrize("factor", [0.25, 1.0, 3.0])
+@pytest.mark.parametrize("factor", [0.4, 1.0, 3.0])  # softer mud at 17 mm pushes as little as friction
 def test_where_the_surface_has_to_be_found_truth_is_within_the_uncertainty_of_it(
     factor: float, depth_m: float, surface_m: float
 ) -> None:

@@ -86,14 +86,22 @@ def test_samples_at_rest_do_not_count() -> None:
 
 @pytest.mark.parametrize(
     ("friction_nm", "stance_nm", "is_mud"),
-    [(0.05, 0.07, False), (0.09, 0.12, False), (0.0, 0.03, False), (0.05, 0.44, True), (0.0, 0.1, True)],
+    [(0.05, 0.07, False), (0.09, 0.12, False), (0.0, 0.03, False), (0.05, 0.44, True), (0.0, 0.12, True)],
 )
 def test_mud_needs_much_more_torque_than_friction(friction_nm: float, stance_nm: float, is_mud: bool) -> None:
     """In the authors' logs a stance in mud begins at 0.44 N·m, and in air it has 0.05 to 0.07 N·m."""
     air = AirSwing()
     swing(air, friction_nm)
     air.close()
-    assert air.is_mud(stance_nm) is is_mud
+    assert air.is_push(stance_nm) is is_mud
+
+
+@pytest.mark.parametrize(("extraction_nm", "is_pull"), [(0.07, False), (0.14, False), (0.25, True)])
+def test_only_mud_pulls_harder_than_any_friction(extraction_nm: float, is_pull: bool) -> None:
+    air = AirSwing()
+    swing(air, 0.05)
+    air.close()
+    assert air.is_pull(extraction_nm) is is_pull
 
 
 def test_a_reset_forgets_the_friction() -> None:
