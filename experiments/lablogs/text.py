@@ -152,18 +152,12 @@ def _log_tables(report: LablogsReport) -> Sequence[TitledRows]:
     rows = [["log", "group", "flippers", "base", "", "strides", "findings"]]
     for log in report.logs:
         base, mud = "fixed" if log.fixed_base else "free", "mud" if log.in_mud else "air"
-        rows.append(
-            [
-                log.name,
-                log.group or "-",
-                " and ".join(log.flippers),
-                base,
-                mud,
-                str(log.strides),
-                "; ".join(log.findings),
-            ]
-        )
+        flippers, count = " and ".join(log.flippers), str(len(log.findings) or "-")
+        rows.append([log.name, log.group or "-", flippers, base, mud, str(log.strides), count])
     tables: list[TitledRows] = [("Logs", rows)] if report.logs else []
+    tables += [
+        (f"Findings in {log.name}", [[finding] for finding in log.findings]) for log in report.logs if log.findings
+    ]
     if report.refused:
         tables.append(("Not evaluated", [["reason"], *([each.reason] for each in report.refused)]))
     return tables
