@@ -19,6 +19,7 @@ from estimation.mud import EstimationParameters
 from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, PlateRow, error_rows, plate_rows
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method
+from experiments.trials.latency import LATENCY_S
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Show
@@ -31,16 +32,21 @@ SINGLE_WATERS = (47.6, 48.6, 49.5, 50.3, 51.2)  # figure 5 of the paper
 WALKING_WATERS = (47.6, 49.5, 51.2)  # figure 6
 ENDLESS_M = 100.0
 COMPARTMENT_M = 0.5
-REPEATS, TORQUE = "repeats", "torque"
-LAYERS = ("clinging", "remoulding", "relaxation", "surface", "noise", "saturation", REPEATS, TORQUE)
+REPEATS, TORQUE, LATENCY = "repeats", "torque", "latency"
+LAYERS_OF_TRIAL = (REPEATS, TORQUE, LATENCY)  # of the samples and of what is known, not of mud and drives
 FIELD_OF_LAYER = {
     "clinging": "clinging_n",
+    "shaking": "shaken_fraction",
     "remoulding": "remoulding",
     "relaxation": "relaxation",
     "surface": "surface_sd_m",
+    "trial-surface": "trial_surface_sd_m",
+    "sweep-friction": "sweep_friction_nm",
+    "adduction-friction": "adduction_friction_nm",
     "noise": "current_noise_a",
     "saturation": "current_limit_a",
 }
+LAYERS = (*FIELD_OF_LAYER, *LAYERS_OF_TRIAL)
 
 
 class Method(NamedTuple):
@@ -52,7 +58,11 @@ class Method(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """The trials to run. `repeats`: rows come more often than new samples. `torque`: torque constants have errors."""
+    """The trials to run.
+
+    `repeats`: rows come more often than new samples. `torque`: torque constants have errors. `latency`: currents or
+    angles are late.
+    """
 
     single: tuple[Clay, ...] = tuple(clay_of_water(water) for water in SINGLE_WATERS)
     walking: tuple[Clay, ...] = tuple(clay_of_water(water) for water in WALKING_WATERS)
@@ -63,6 +73,7 @@ class Plan:
     disturbances: Disturbances = LAB
     repeats: bool = True
     torque: bool = True
+    latency: bool = True
 
     def parts(self) -> list[Part]:
         """Return the trials, the longest first, so that the last ones end together."""
@@ -94,12 +105,13 @@ def with_layers(plan: Plan, layers: Sequence[str]) -> Plan:
     if unknown:
         raise ValueError(f"layer {unknown[0]!r}: must be one of {', '.join(LAYERS)}, or none")
     fields = {field: getattr(LAB, field) for layer, field in FIELD_OF_LAYER.items() if layer in layers}
-    return replace(plan, disturbances=replace(NONE, **fields), repeats=REPEATS in layers, torque=TORQUE in layers)
+    repeats, torque, latency = (layer in layers for layer in LAYERS_OF_TRIAL)
+    return replace(plan, disturbances=replace(NONE, **fields), repeats=repeats, torque=torque, latency=latency)
 
 
 def methods_of(setup: Setup) -> tuple[Method, ...]:
     """Return the methods to evaluate. All know how uneven the mud is, as an operator would see."""
-    known = EstimationParameters(fixed_base=setup.fixed_base, surface_error_m=LAB.surface_sd_m)
+    known = EstimationParameters(fixed_base=setup.fixed_base, surface_error_m=LAB.surface_error_m)
     names = (DEFAULT, PAPER) if setup.fixed_base else (DEFAULT, PAPER, COMPENSATED)
     methods = [Method(name, setup.name, True, with_method(known, name)) for name in names]
     without_pose = Method(DEFAULT, f"{setup.name} without pose", False, known)
@@ -119,7 +131,8 @@ def run_part(part: Part, plan: Plan) -> Outcome:
     track = Track([(length_m, clay) for clay in part.muds])
     setup = part.setup if plan.repeats else replace(part.setup, row_period_s=0.0)
     torque_error = TORQUE_ERROR if plan.torque else 0.0
-    trial = run_trial(setup, track, plan.disturbances, part.strides, part.seed, torque_error)
+    latency_s = LATENCY_S if plan.latency else 0.0
+    trial = run_trial(setup, track, plan.disturbances, part.strides, part.seed, torque_error, latency_s)
     truths = {
         (truth.flipper, truth.index): load_cell_truth(
             truth, trial.configuration.geometry, plan.disturbances.relaxation, setup.gait.pause_s
@@ -154,6 +167,7 @@ class Settings:
     disturbances: Mapping[str, float]
     repeats: bool
     torque_error: float
+    latency_s: float  # largest of a trial
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,5 +191,6 @@ def report_of(plan: Plan, outcome: Outcome) -> EstimationReport:
             disturbances=asdict(plan.disturbances),
             repeats=plan.repeats,
             torque_error=TORQUE_ERROR if plan.torque else 0.0,
+            latency_s=LATENCY_S if plan.latency else 0.0,
         ),
     )

@@ -22,7 +22,7 @@ protocol = "single_flipper"
 
 [estimation]
 fixed_base = true
-surface_error_m = {LAB.surface_sd_m}  # as an operator would see it
+surface_error_m = {LAB.surface_error_m:.4g}  # as an operator would see it
 
 [limits]
 torque_nm = {BENCH_TORQUE_NM}

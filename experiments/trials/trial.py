@@ -7,16 +7,16 @@ estimator. So any number of methods can be evaluated on the same trial.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from random import Random
-from typing import NamedTuple
 
 from control.controller import WalkOrder
 from control.gait.gait import SINGLE_FLIPPER, GaitParameters
 from control.mud_estimate import MudEstimate
 from control.rate import PERIOD_S
-from control.records import BodyPose, DriveStates, Phase, StrideEstimate
+from control.records import BodyPose, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
 from experiments.robot.lockstep_robot import simulated_configuration
+from experiments.trials.latency import Sample, drawn_latency_s, with_latency
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.lockstep import Lockstep
@@ -26,15 +26,6 @@ from simulation.mud.track import Track
 BENCH_TORQUE_NM, BENCH_CURRENT_A = 1.65, 20.0  # the authors' drives in their trials with a single flipper
 LONGEST_STRIDE_S = 40.0
 TORQUE_ERROR = 0.032  # of a motor's constant: the paper's repeatability
-
-
-class Sample(NamedTuple):
-    """The estimator's input in one tick."""
-
-    now_s: float
-    phase: Phase
-    states: DriveStates
-    body: BodyPose
 
 
 @dataclass(frozen=True)
@@ -74,23 +65,42 @@ def _with_bench_drives(configuration: Configuration) -> Configuration:
 
 
 def run_trial(
-    setup: Setup, track: Track, disturbances: Disturbances, strides: int, seed: int, torque_error: float = 0.0
+    setup: Setup,
+    track: Track,
+    disturbances: Disturbances,
+    strides: int,
+    seed: int,
+    torque_error: float = 0.0,
+    latency_s: float = 0.0,
 ) -> Trial:
-    """`torque_error` is the relative standard deviation of each motor's constant from the known one."""
+    """Simulate a trial.
+
+    `torque_error` is the relative standard deviation of each motor's constant from the known one, `latency_s` the
+    largest latency between current and angle.
+    """
     configuration = configuration_of(setup)
     lockstep = Lockstep(configuration, track, seed, disturbances=disturbances, fixed_base=setup.fixed_base)
     lockstep.arm()
     lockstep.walk(WalkOrder(setup.depth_m, adaptive=False))
     reference, samples, truths = StrokeReference(), list[Sample](), list[StrideTruth]()
-    held, end_s = _sample_of(lockstep), lockstep.now_s + strides * LONGEST_STRIDE_S
+    first, end_s = _sample_of(lockstep), lockstep.now_s + strides * LONGEST_STRIDE_S
     while len(truths) < 2 * strides and lockstep.now_s < end_s:
         lockstep.step()
-        phase = lockstep.loop.target.phase
-        if lockstep.now_s >= held.now_s + setup.row_period_s:
-            held = _sample_of(lockstep)
-        samples.append(held._replace(now_s=lockstep.now_s, phase=phase))
-        truths += reference.step(PERIOD_S, lockstep.robot.plant, phase)
-    return Trial(configuration, _known_drives(configuration, torque_error, seed), samples, truths)
+        samples.append(_sample_of(lockstep))
+        truths += reference.step(PERIOD_S, lockstep.robot.plant, samples[-1].phase)
+    samples = with_latency(samples, drawn_latency_s(latency_s, seed))
+    rows = rows_of(first, samples, setup.row_period_s)
+    return Trial(configuration, _known_drives(configuration, torque_error, seed), rows, truths)
+
+
+def rows_of(first: Sample, samples: Sequence[Sample], row_period_s: float) -> list[Sample]:
+    """Return a row for each sample, which repeats the states and the pose of the last row that was new."""
+    held, rows = first, list[Sample]()
+    for sample in samples:
+        if sample.now_s >= held.now_s + row_period_s:
+            held = sample
+        rows.append(held._replace(now_s=sample.now_s, phase=sample.phase))
+    return rows
 
 
 def _known_drives(configuration: Configuration, torque_error: float, seed: int) -> tuple[FlipperDrive, FlipperDrive]:

@@ -12,7 +12,7 @@ from simulation.mud.track import Track
 
 TAIL_M = 0.5  # the last mud is longer, so that no stride meets the next copy
 SOFT_WALK_M, STRIP_M = 2.0, 1000.0  # length for a walk in soft mud, length of each soft mud
-SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_sd_m}  # as an operator would see it\n"
+SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_error_m:.4g}  # as an operator would see it\n"
 
 
 def walking_bench(folder: Path, plan: Plan, seed: int) -> tuple[LockstepRobot, CarriedBed]:

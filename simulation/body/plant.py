@@ -66,11 +66,11 @@ class PlantParameters:
 class Arm:
     """Owns the motion of one flipper arm."""
 
-    def __init__(self, parameters: PlantParameters, track: Track, seed: int) -> None:
+    def __init__(self, parameters: PlantParameters, track: Track, seed: int, trial_surface_m: float = 0.0) -> None:
         self.parameters = parameters
         self.track = track
         self.contact = FlipperContact(parameters.geometry, parameters.disturbances.relaxation)
-        self.history = StrokeHistory(parameters.disturbances, seed)
+        self.history = StrokeHistory(parameters.disturbances, seed, trial_surface_m)
         self.stones = StoneContact(track.stones) if track.stones else None
         self._disturbed = parameters.disturbances != NONE
         self.mount: BenchMount | None = None  # over the edge of a bench, in place of the mud
@@ -176,13 +176,16 @@ class Arm:
     def _move(
         self, dt_s: float, sweep_nm: float, lift_nm: float, sweep_inertia_kg_m2: float, lift_inertia_kg_m2: float
     ) -> None:
-        coulomb_nm = self.parameters.joint_coulomb_nm
+        coulomb_nm, disturbances = self.parameters.joint_coulomb_nm, self.parameters.disturbances
+        sweep_dry_nm = coulomb_nm + disturbances.sweep_friction_nm
+        lift_dry_nm = coulomb_nm + disturbances.adduction_friction_nm
         self.sweep_velocity_rad_s += dt_s * sweep_nm / sweep_inertia_kg_m2
         self.adduction_velocity_rad_s += dt_s * lift_nm / lift_inertia_kg_m2
-        if coulomb_nm:
-            impulse_nm_s = dt_s * coulomb_nm
-            self.sweep_velocity_rad_s = _slowed(self.sweep_velocity_rad_s, impulse_nm_s / sweep_inertia_kg_m2)
-            self.adduction_velocity_rad_s = _slowed(self.adduction_velocity_rad_s, impulse_nm_s / lift_inertia_kg_m2)
+        if sweep_dry_nm:
+            self.sweep_velocity_rad_s = _slowed(self.sweep_velocity_rad_s, dt_s * sweep_dry_nm / sweep_inertia_kg_m2)
+        if lift_dry_nm:
+            loss_rad_s = dt_s * lift_dry_nm / lift_inertia_kg_m2
+            self.adduction_velocity_rad_s = _slowed(self.adduction_velocity_rad_s, loss_rad_s)
         self.sweep_rad, self.sweep_velocity_rad_s = _moved(
             self.sweep_rad, self.sweep_velocity_rad_s, dt_s, END_STOPS_RAD[0]
         )
@@ -217,7 +220,9 @@ class Plant:
         self.parameters = parameters
         self.track = track
         random = random or Random(1)
-        left, right = (Arm(parameters, track, random.getrandbits(32)) for _ in range(2))
+        seeds = random.getrandbits(32), random.getrandbits(32)
+        surface_m = Random(f"surface {seeds}").gauss(0.0, parameters.disturbances.trial_surface_sd_m)
+        left, right = (Arm(parameters, track, seed, surface_m) for seed in seeds)
         self.arms = (left, right)
         self.body = body_of(parameters, track)
         self.reset()

@@ -9,12 +9,12 @@ import pytest
 
 from control.records import FLIPPERS, Phase
 from estimation.mud import EstimationParameters, MudEstimator
+from experiments.trials.latency import Sample
 from experiments.trials.trial import (
     BENCH_CURRENT_A,
     BENCH_TORQUE_NM,
     SINGLE,
     WALKING,
-    Sample,
     Setup,
     Trial,
     configuration_of,

@@ -25,7 +25,7 @@ from simulation.harness.world import (
     parse_world,
 )
 from simulation.mud.clay import MUDS, Clay, Layer, clay_of_water
-from simulation.mud.disturbances import NONE, Disturbances
+from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, Ridges
 from tests.folders import EXAMPLE_WORLD
@@ -61,7 +61,7 @@ def test_the_example_has_the_values_that_it_documents() -> None:
     assert world.track.stones == (Stone(0.40, 0.46, 0.015),)
     assert world.track.ridges == Ridges(0.002, 0.25)
     assert world.track.clay_at(0.3).strength_pa != clay_of_water(48.5).strength_pa
-    assert world.disturbances == Disturbances(0.7, 1.0, 0.13, 0.0015)
+    assert world.disturbances == replace(LAB, current_noise_a=0.0, current_limit_a=0.0)  # those of the drives apart
     assert world.robot_changes == {
         "body_mass_kg": 1.0,
         "rail_drag_n": 2.5,

@@ -3,6 +3,7 @@
 from dataclasses import fields, replace
 from itertools import pairwise
 from math import exp
+from random import Random
 from statistics import mean, pstdev
 
 import pytest
@@ -15,10 +16,10 @@ from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.monitors.joint_monitor import FaultBounds
 from control.rate import PERIOD_S
-from control.records import Phase
+from control.records import Joints, Phase
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.plant import Arm
-from simulation.body.reference_sensor import StrideTruth, StrokeReference
+from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
+from simulation.body.reference_sensor import StrideTruth, StrokeReference, snapshot_of
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import (
@@ -101,6 +102,54 @@ def test_the_amounts_spread_evenly_by_forty_percent_around_their_mean() -> None:
     assert max(amounts_n) > 1.39
 
 
+def pulled_out(shaken_fraction: float, highest_m: float = 0.014) -> tuple[StrokeHistory, float]:
+    """A flipper above the mud after a stroke, and the weight that it took along."""
+    history = lowered(StrokeHistory(Disturbances(clinging_n=0.7, shaken_fraction=shaken_fraction), 1))
+    history.step(-0.001, 0.0)
+    weight_n = history.clinging_n
+    history.step(-highest_m, 0.0)
+    return history, weight_n
+
+
+def test_mud_falls_off_on_the_way_down_in_proportion_to_it() -> None:
+    history, weight_n = pulled_out(0.3)
+    for height_m, part in ((0.014, 0.0), (0.0105, 0.25), (0.007, 0.5), (0.0, 1.0)):
+        history.step(-height_m, 0.0)
+        assert history.clinging_n == pytest.approx(weight_n * (1.0 - 0.3 * part))
+    history.step(0.02, 0.0)
+    assert history.clinging_n == pytest.approx(0.7 * weight_n)  # in the mud it stays, until the next extraction
+
+
+def test_mud_stays_while_the_flipper_rises_and_swings_and_what_fell_off_does_not_return() -> None:
+    history, weight_n = pulled_out(0.3, 0.007)
+    for height_m in (0.010, 0.014, 0.014, 0.014):
+        history.step(-height_m, 0.0)
+        assert history.clinging_n == weight_n
+    for height_m in (0.007, 0.012, 0.014, 0.007):
+        history.step(-height_m, 0.0)
+        assert history.clinging_n == pytest.approx(0.85 * weight_n)
+    for height_m in (0.028, 0.014):  # half of a longer way is no more than before
+        history.step(-height_m, 0.0)
+    assert history.clinging_n == pytest.approx(0.85 * weight_n)
+
+
+def test_a_plate_that_trembles_just_above_the_mud_loses_little() -> None:
+    history, weight_n = pulled_out(1.0, 0.001)
+    for height_m in (0.0008, 0.001, 0.0008):
+        history.step(-height_m, 0.0)
+    assert history.clinging_n == pytest.approx(weight_n * (1.0 - 0.0002 / 0.005))
+
+
+def test_every_extraction_takes_new_mud_along_whatever_fell_off() -> None:
+    shaken, steady = (
+        StrokeHistory(Disturbances(clinging_n=0.7, shaken_fraction=fraction), 1) for fraction in (1.0, 0.0)
+    )
+    for _ in range(5):
+        stroke(shaken)
+        stroke(steady)
+        assert shaken.clinging_n == steady.clinging_n > 0.0
+
+
 @pytest.mark.parametrize(("depth_m", "clings"), [(0.004, False), (0.006, True)])
 def test_a_touch_of_less_than_half_a_centimetre_is_no_stroke(depth_m: float, clings: bool) -> None:
     history = StrokeHistory(Disturbances(clinging_n=0.7, remoulding=1.0), 1)
@@ -153,6 +202,33 @@ def test_every_stroke_meets_its_own_surface() -> None:
     assert len(set(found_m)) == len(found_m)
     assert mean(found_m) == pytest.approx(0.0, abs=1.4e-4)  # four standard errors
     assert pstdev(found_m) == pytest.approx(0.0015, rel=0.07)
+
+
+def test_the_surface_of_a_trial_moves_those_of_all_its_strokes() -> None:
+    alone = StrokeHistory(Disturbances(surface_sd_m=0.0015), 1)
+    moved = StrokeHistory(Disturbances(surface_sd_m=0.0015), 1, trial_surface_m=0.002)
+    differences_m = [b - a for a, b in zip(surfaces_m(alone, 50), surfaces_m(moved, 50), strict=True)]
+    assert differences_m == pytest.approx([0.002] * 50)
+
+
+def test_a_trial_s_surface_is_common_to_both_flippers_and_scatters_from_trial_to_trial() -> None:
+    found_m = []
+    for seed in range(1000):
+        plant = Plant(PlantParameters(disturbances=Disturbances(trial_surface_sd_m=0.001)), SOFT, Random(seed))
+        left_m, right_m = (arm.surface_m for arm in plant.arms)
+        assert left_m == right_m
+        plant.reset()
+        assert plant.arms[0].surface_m == left_m
+        found_m.append(left_m)
+    assert mean(found_m) == pytest.approx(0.0, abs=1.3e-4)  # four standard errors
+    assert pstdev(found_m) == pytest.approx(0.001, rel=0.09)
+
+
+def test_a_stroke_s_error_has_the_parts_of_trial_and_stroke() -> None:
+    disturbances = Disturbances(surface_sd_m=0.0015, trial_surface_sd_m=0.0008)
+    plants = [Plant(PlantParameters(disturbances=disturbances), SOFT, Random(seed)) for seed in range(1000)]
+    assert pstdev(plant.arms[0].surface_m for plant in plants) == pytest.approx(disturbances.surface_error_m, rel=0.09)
+    assert disturbances.surface_error_m == pytest.approx(0.0017)
 
 
 def test_the_surface_stays_through_a_stroke_and_never_rises_over_a_plate_outside() -> None:
@@ -232,6 +308,68 @@ def test_clinging_mud_is_felt_in_swing_from_the_first_extraction_on(configuratio
     mean_a = 0.7 * lever_m / configuration.drive["left_adduction"].torque_constant_nm_a
     for clean, weighed in zip(clean_a[1:], weighed_a[1:], strict=True):
         assert 0.55 * mean_a < weighed - clean < 1.45 * mean_a
+
+
+def test_clinging_mud_is_lighter_just_above_the_mud_than_at_the_end_of_the_swing(configuration: Configuration) -> None:
+    firm = Track([(5.0, MUDS["48.5"])])
+    lockstep = single_flipper(configuration, Disturbances(clinging_n=0.7, shaken_fraction=0.5), firm)
+    history = lockstep.robot.plant.arms[0].history
+    lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.SWING, 20.0)
+    lockstep.run_until(lambda: lockstep.loop.target.phase is not Phase.SWING, 20.0)
+    before_n = history.clinging_n
+    arm = lockstep.robot.plant.arms[0]
+    edge_m = snapshot_of(arm, 0.0).depth_m
+    assert edge_m < -0.005
+    lockstep.run_until(lambda: snapshot_of(arm, 0.0).depth_m > 0.002, 20.0)
+    assert history.clinging_n < 0.75 * before_n
+
+
+def friction_nm(lockstep: Lockstep, joint: int) -> float:
+    """The work of a motor over the travel of its joint, in the air: two swings of the left flipper."""
+    constant_nm_a = 0.083
+    work_j = travel_rad = 0.0
+    for _ in range(2):
+        lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.SWING, 20.0)
+        while lockstep.loop.target.phase is Phase.SWING:
+            before_rad = lockstep.robot.plant.angles_rad[joint]
+            lockstep.step()
+            turn_rad = lockstep.robot.plant.angles_rad[joint] - before_rad
+            work_j += constant_nm_a * lockstep.loop.states[joint].current_a * turn_rad
+            travel_rad += abs(turn_rad)
+    return work_j / travel_rad
+
+
+@pytest.mark.parametrize("torque_nm", [0.01, 0.05])
+def test_the_sweep_motor_works_against_the_stated_friction(configuration: Configuration, torque_nm: float) -> None:
+    without_nm = friction_nm(single_flipper(configuration, NONE), 0)
+    with_nm = friction_nm(single_flipper(configuration, Disturbances(sweep_friction_nm=torque_nm)), 0)
+    assert with_nm - without_nm == pytest.approx(torque_nm, abs=0.002)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize(("field", "joint"), [("sweep_friction_nm", 0), ("adduction_friction_nm", 1)])
+def test_friction_opposes_one_joint_in_each_direction(field: str, joint: int, direction: float) -> None:
+    """As much slower as the same torque backward, whatever else acts."""
+    rates_rad_s = []
+    for disturbances, torque_nm in ((NONE, -0.05 * direction), (Disturbances(**{field: 0.05}), 0.0)):
+        plant = Plant(PlantParameters(disturbances=disturbances), SOFT)
+        arm = plant.arms[0]
+        arm.adduction_rad = 1.0  # far above the mud
+        arm.sweep_velocity_rad_s = arm.adduction_velocity_rad_s = 10.0 * direction
+        for _ in range(5):
+            plant.step(STEP_S, Joints(*(torque_nm if each == joint else 0.0 for each in range(4))))
+        rates_rad_s.append((arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s))
+    assert rates_rad_s[0] == pytest.approx(rates_rad_s[1])
+
+
+def test_friction_adds_to_that_of_the_plant_and_holds_a_resting_joint() -> None:
+    parameters = PlantParameters(disturbances=Disturbances(sweep_friction_nm=0.03), joint_coulomb_nm=0.02)
+    plant = Plant(parameters, SOFT)
+    for arm in plant.arms:
+        arm.adduction_rad = 1.0
+    for torque_nm, moves in ((0.0499, False), (0.0501, True)):
+        plant.step(STEP_S, Joints(torque_nm, 0.0, -torque_nm, 0.0))
+        assert [arm.sweep_velocity_rad_s != 0.0 for arm in plant.arms] == [moves, moves]
 
 
 def peak_thrusts_n(lockstep: Lockstep, strides: int) -> list[float]:

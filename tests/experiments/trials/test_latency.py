@@ -1,0 +1,86 @@
+"""The latency between current and angle: the one that was asked for, in the samples alone."""
+
+from functools import cache
+from math import cos, sin
+from statistics import fmean
+
+import pytest
+
+from control.rate import PERIOD_S
+from control.records import BodyPose, DriveState, Phase, same_for_all
+from experiments.trials.latency import LATENCY_S, Sample, drawn_latency_s, with_latency
+from experiments.trials.trial import WALKING, Trial, run_trial
+from simulation.mud.clay import clay_of_water
+from simulation.mud.disturbances import NONE
+from simulation.mud.track import Track
+
+RATE_RAD_S = 3.0
+
+
+def swinging(ticks: int = 400) -> list[Sample]:
+    """Joints whose current is in phase with the angle; messages come half a millisecond before the tick."""
+    samples = []
+    for tick in range(ticks):
+        now_s = tick * PERIOD_S
+        stamp_s = now_s - 0.0005
+        angle_rad, velocity_rad_s = sin(RATE_RAD_S * stamp_s), RATE_RAD_S * cos(RATE_RAD_S * stamp_s)
+        state = DriveState(angle_rad, velocity_rad_s, stamp_s, 2.0 * angle_rad, stamp_s)
+        samples.append(Sample(now_s, Phase.SWING, same_for_all(state), BodyPose()))
+    return samples
+
+
+def latency_of(samples: list[Sample]) -> float:
+    """How much later the current is than the angle: I - 2 θ = -2 θ' δ, by least squares."""
+    states = [sample.states.right.adduction for sample in samples[10:]]
+    slopes = [-2.0 * state.velocity_rad_s for state in states]
+    lags = [state.current_a - 2.0 * state.angle_rad for state in states]
+    return fmean(a * b for a, b in zip(slopes, lags, strict=True)) / fmean(slope * slope for slope in slopes)
+
+
+@pytest.mark.parametrize("ticks", [-2, -1, 0, 1, 2])
+def test_the_latency_is_found_again(ticks: int) -> None:
+    late = with_latency(swinging(), ticks * PERIOD_S)
+    assert latency_of(late) == pytest.approx(ticks * PERIOD_S, rel=0.01, abs=1e-9)
+
+
+def test_without_latency_the_samples_are_the_same() -> None:
+    assert with_latency(swinging(), 0.0) == swinging()
+    assert with_latency(swinging(), 0.4 * PERIOD_S) == swinging()  # to the nearest tick
+
+
+@pytest.mark.parametrize(("late_s", "late", "prompt"), [(0.005, (3, 4), (0, 1, 2)), (-0.005, (0, 1, 2), (3, 4))])
+def test_late_signals_bear_the_time_of_their_arrival_and_the_others_stay(
+    late_s: float, late: tuple[int, ...], prompt: tuple[int, ...]
+) -> None:
+    before, after = swinging(), with_latency(swinging(), late_s)
+    for number in range(2, len(before)):
+        was, earlier, now = (
+            samples.states.left.sweep for samples in (before[number], before[number - 2], after[number])
+        )
+        assert all(now[field] == was[field] for field in prompt)
+        assert now[late[0]] == earlier[late[0]]
+        stamp = late[-1]
+        assert now[stamp] == pytest.approx(was[stamp])
+        assert after[number][:2] == before[number][:2]
+
+
+def test_each_trial_has_its_own_latency_in_either_direction() -> None:
+    drawn_s = [drawn_latency_s(LATENCY_S, seed) for seed in range(1000)]
+    assert drawn_s == [drawn_latency_s(LATENCY_S, seed) for seed in range(1000)]
+    assert fmean(drawn_s) == pytest.approx(0.0, abs=4e-4)  # four standard errors
+    assert -LATENCY_S <= min(drawn_s) < -0.98 * LATENCY_S
+    assert 0.98 * LATENCY_S < max(drawn_s) <= LATENCY_S
+    assert drawn_latency_s(0.0, 1) == 0.0
+
+
+@cache
+def trial(latency_s: float) -> Trial:
+    return run_trial(WALKING, Track([(5.0, clay_of_water(47.6))]), NONE, 1, 1, latency_s=latency_s)
+
+
+def test_the_robot_does_the_same_and_only_the_samples_differ() -> None:
+    assert abs(drawn_latency_s(0.02, 1)) > PERIOD_S
+    assert trial(0.02).truths == trial(0.0).truths
+    assert repr(trial(0.02).samples) != repr(trial(0.0).samples)
+    for late, prompt in zip(trial(0.02).samples, trial(0.0).samples, strict=True):
+        assert (late.now_s, late.phase, late.body) == (prompt.now_s, prompt.phase, prompt.body)
