@@ -86,6 +86,8 @@ class FlipperEstimator(StrideEstimator):
         sweep_nm += weight_n * rise_sweep_m
         if phase is Phase.STANCE:
             sweep_nm -= self._air.friction_nm
+        elif stroke is not None:
+            adduction_nm += self._air.friction_nm if phase is Phase.EXTRACTION else -self._air.friction_nm
         adduction_nm += weight_n * rise_adduction_m
         force_x_n, force_z_n = smallest_force_n(self.geometry, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
         if phase is Phase.STANCE:

@@ -7,7 +7,9 @@ negative in a forward swing),
 
 Inertia cancels from rest to rest, gravity over a symmetric swing, and an offset of the current where the swing has both
 directions. Dry friction changes its sign with the direction: a zero taken in the forward swing and subtracted in the
-backward stance would count it twice. So the stance is corrected by +c, and nothing is subtracted at rest.
+backward stance would count it twice. So the load of the stance is corrected by -c, and nothing is subtracted at rest.
+The adduction joint has the same motor and, in the authors' logs without mud, the same friction (0.045 where the sweep
+has 0.055 N·m, 0.01 in both in other months): its load is corrected by -c on the way down and by +c on the way up.
 
 Mud that is dragged along only adds to c, so the least swing of a trial counts. A swing above AIR_NM is not in the air:
 in four of the authors' walks the body has sunk, and the flipper swings through mud with 0.2 to 0.83 N·m.
