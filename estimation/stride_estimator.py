@@ -98,10 +98,10 @@ class StrideEstimator(ABC):
         if change.ended is Phase.EXTRACTION:
             self._extracted_s = now_s
         is_late = (phase is Phase.RECOVERY or change.closes_stride) and self._is_in_mud()
+        self._stuck = self._stuck or is_late
         if change.closes_stride and is_late and phase is Phase.SWING and change.ended is Phase.EXTRACTION:
             self.is_closing = True
             return None
-        self._stuck = self._stuck or is_late
         closes = change.closes_stride or self.is_closing
         closed = self._close(now_s, body_x_m) if closes else None
         if change.begins_stride:
@@ -118,7 +118,6 @@ class StrideEstimator(ABC):
         self._extracted_s = inf
         if not self.is_closing:
             return None
-        self._stuck = is_in_mud
         closed = self._close(now_s, body_x_m)
         self._begin_stride(now_s, body_x_m)
         return closed

@@ -66,5 +66,5 @@ class AirSwing:
         return stance_nm > MUD_RATIO * (self.friction_nm + MUD_NM)
 
     def is_pull(self, extraction_nm: float) -> bool:
-        """Return whether the adduction torque of an extraction is more than any friction, so that mud holds on."""
-        return extraction_nm > AIR_NM + self.friction_nm
+        """Return whether the adduction torque of an extraction, without friction, needs mud that holds on."""
+        return extraction_nm > AIR_NM

@@ -175,7 +175,7 @@ def trial_of(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("layer", "period_s", "error", "latency_s"),
-    [(REPEATS, 0.005, 0.0, 0.0), (TORQUE, 0.0, 0.032, 0.0), (LATENCY, 0.0, 0.0, 0.005)],
+    [(REPEATS, 0.005, 0.0, 0.0), (TORQUE, 0.0, 0.032, 0.0), (LATENCY, 0.0, 0.0, LATENCY_S)],
 )
 def test_rows_torque_constants_and_times_are_disturbed_as_asked(
     layer: str, period_s: float, error: float, latency_s: float, monkeypatch: pytest.MonkeyPatch
