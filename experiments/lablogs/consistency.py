@@ -1,4 +1,4 @@
-"""What one robot's strides must have in common, whatever the mud is.
+"""Properties that the strides of one robot share in any mud.
 
 Both flippers of a walk are in the same mud, so their difference is explained by their errors: the median size of a
 normal deviation is 0.67. A bound says that the mud is at least so strong, so the strides next to it may not be weaker.

@@ -110,7 +110,7 @@ def _replay(recording: Recording, method: Method) -> Replays:
 
 
 def _replay_disturbed(name: str, recording: Recording, method: Method) -> Replays:
-    """Also replay with each disturbance. A log loses the same rows by each method and in whatever folder it is."""
+    """Also replay with each disturbance. A log loses the same rows by each method and in any folder."""
     key = crc32(name.encode(errors="surrogateescape"))
     return Replays(
         recorded=recording.estimate_strides(method),

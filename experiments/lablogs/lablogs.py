@@ -1,4 +1,4 @@
-"""Estimates from real logs, where nobody knows the truth: do they repeat, and do their errors say how well?
+"""Estimates from real logs, of which the truth is unknown: do they repeat, and do their errors say how well?
 
 Any folder of logs is evaluated by each method: trials of one mud against each other, muds against each other, the left
 flipper against the right one, mud against air, and each log against itself with disturbed columns.

@@ -1,7 +1,7 @@
 """Finds the body's advance, height and pitch in the pose that motion capture recorded.
 
 The authors' capture has its vertical along y, as systems of its maker do by default: in every walk the body starts 6 to
-10 cm below the capture's origin in y, whatever its x and z. The advance is the motion in the horizontal plane, along
+10 cm below the capture's origin in y, at any x and z. The advance is the motion in the horizontal plane, along
 the direction in which the stances moved the body. The direction of the largest motion would be wrong: in most of the
 authors' walks the body sinks further than it advances.
 """

@@ -66,7 +66,7 @@ def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
 
 
 def _unpack(path: Path) -> bytes:
-    """Returns the contents, decompressed if they are compressed, whatever the name says."""
+    """Returns the contents, decompressed if they are compressed; the name does not matter."""
     pieces: list[bytes] = []
     try:
         with path.open("rb") as file:

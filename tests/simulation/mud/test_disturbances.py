@@ -140,7 +140,7 @@ def test_a_plate_that_trembles_just_above_the_mud_loses_little() -> None:
     assert history.clinging_n == pytest.approx(weight_n * (1.0 - 0.0002 / 0.005))
 
 
-def test_every_extraction_takes_new_mud_along_whatever_fell_off() -> None:
+def test_every_extraction_takes_new_mud_along_after_any_loss() -> None:
     shaken, steady = (
         StrokeHistory(Disturbances(clinging_n=0.7, shaken_fraction=fraction), 1) for fraction in (1.0, 0.0)
     )
@@ -349,7 +349,7 @@ def test_the_sweep_motor_works_against_the_stated_friction(configuration: Config
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize(("field", "joint"), [("sweep_friction_nm", 0), ("adduction_friction_nm", 1)])
 def test_friction_opposes_one_joint_in_each_direction(field: str, joint: int, direction: float) -> None:
-    """As much slower as the same torque backward, whatever else acts."""
+    """It slows a joint as much as the same torque backward does."""
     rates_rad_s = []
     for disturbances, torque_nm in ((NONE, -0.05 * direction), (Disturbances(**{field: 0.05}), 0.0)):
         plant = Plant(PlantParameters(disturbances=disturbances), SOFT)

@@ -1,4 +1,4 @@
-"""Advance, sinking and pitch that were put into a capture come out of it, whatever its heading."""
+"""Advance, sinking and pitch that were put into a capture come out of it at any heading."""
 
 from __future__ import annotations
 
