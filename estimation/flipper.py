@@ -39,7 +39,7 @@ CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke
 
 
 class FlipperEstimator(StrideEstimator):
-    """Owns the strokes and the tare of one flipper."""
+    """Owns the strokes, the surfaces, the friction and the tare of one flipper."""
 
     def __init__(
         self,
@@ -76,29 +76,40 @@ class FlipperEstimator(StrideEstimator):
         self._k_p = NOT_THERE
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
-        sweep_rad, adduction_rad, depth_m, rise_sweep_m, rise_adduction_m, sweep_nm, adduction_nm, saturated = load
-        rise_adduction_m -= CLINGING_M * sin(adduction_rad)
-        stroke = self._strokes.get(phase)
-        if stroke is None and depth_m < self._free_m and phase is not Phase.RECOVERY:
-            self._tare.update(rise_adduction_m, adduction_nm)
-            self._air.update(sweep_rad, sweep_nm)
-        weight_n, _ = self._tare.zero
-        sweep_nm += weight_n * rise_sweep_m
-        if phase is Phase.STANCE:
-            sweep_nm -= self._air.friction_nm
-        elif stroke is not None:
-            adduction_nm += self._air.friction_nm if phase is Phase.EXTRACTION else -self._air.friction_nm
-        adduction_nm += weight_n * rise_adduction_m
+        sweep_rad, adduction_rad, depth_m = load[:3]
+        if phase not in self._strokes and depth_m < self._free_m and phase is not Phase.RECOVERY:
+            self._tare.update(self._rise_m(load), load.adduction_nm)
+            self._air.update(sweep_rad, load.sweep_nm)
+        sweep_nm, adduction_nm = self._mud_torques_nm(phase, load)
         force_x_n, force_z_n = smallest_force_n(self.geometry, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
         if phase is Phase.STANCE:
             force_z_n = UNKNOWN
         self._load = FlipperLoad(sweep_nm, adduction_nm, force_x_n, force_z_n, depth_m)
+        stroke = self._strokes.get(phase)
         if stroke is not None:
             self._travel_m = self.geometry.flipper_length_m * sweep_rad if phase is Phase.STANCE else depth_m
-            stroke.update(now_s, self._travel_m, sweep_rad, adduction_rad, sweep_nm, adduction_nm, body_x_m, saturated)
+            stroke.update(
+                now_s, self._travel_m, sweep_rad, adduction_rad, sweep_nm, adduction_nm, body_x_m, load.saturated
+            )
             if phase is not Phase.EXTRACTION:
                 self._deepest_m = larger(depth_m, self._deepest_m)
             self._record_extremes(phase, self._load, body_x_m)
+
+    def _mud_torques_nm(self, phase: Phase, load: JointLoad) -> tuple[float, float]:
+        """Return the load on sweep and adduction without the clinging mud, and without friction in a stroke."""
+        friction_nm, weight_n = self._air.friction_nm, self._tare.zero.weight_n
+        sweep_nm = load.sweep_nm + weight_n * load.rise_sweep_m
+        adduction_nm = load.adduction_nm + weight_n * self._rise_m(load)
+        if phase is Phase.STANCE:
+            return sweep_nm - friction_nm, adduction_nm
+        if phase is Phase.INSERTION:
+            return sweep_nm, adduction_nm - friction_nm
+        return sweep_nm, adduction_nm + friction_nm if phase is Phase.EXTRACTION else adduction_nm
+
+    @staticmethod
+    def _rise_m(load: JointLoad) -> float:
+        """Return the rise of the clinging mud's centre per radian of adduction."""
+        return load.rise_adduction_m - CLINGING_M * sin(load.adduction_rad)
 
     def _end_phase(self, now_s: float, ended: Phase) -> None:
         if ended in self._strokes:

@@ -1,7 +1,7 @@
 """The authors' walks through the whole path of a pose: captured positions as NatNet frames over UDP, read tick by tick
 beside the joints, against what their log says directly.
 
-What the capture says is worked out here, from the log's own columns. What a reader must find in them at any heading of the
+The motion in the capture is computed here, from the log's own columns. That a reader finds it at any heading of the
 capture is tested with a known truth in tests/firmware_host/log_reading/lab/test_body_track.py.
 """
 
