@@ -92,7 +92,7 @@ class MudEstimator:
             self._closed.append(right_stride)
         if not self._closed or self.left.is_closing or self.right.is_closing:
             return MudReading(left, right)
-        strides = tuple(self._closed)
+        strides = tuple(sorted(self._closed, key=lambda stride: (stride.index, FLIPPERS.index(stride.flipper))))
         self._closed.clear()
         self.mud_estimate = self._knowledge.update(strides)
         self.map.update(body_x_m, strides)

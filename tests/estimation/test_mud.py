@@ -5,6 +5,7 @@ rightly is for its own tests; here it must be told what it would be told alone.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import isfinite, nan, pi, sin
 
 import pytest
@@ -81,6 +82,21 @@ def test_both_strides_close_with_one_sample() -> None:
     for a, b in zip(walk(1), walk(2), strict=True):
         sizes.add(len(update(mud, a, b).strides))
     assert sizes == {0, 2}
+
+
+@pytest.mark.parametrize("late", FLIPPERS)
+def test_a_flipper_that_leaves_the_mud_late_is_waited_for(late: str) -> None:
+    """Its extraction ends in the mud: the other flipper's stride closes with it, and the left one comes first."""
+    swings = [i for i, (a, b) in enumerate(pairwise(walk(1)), 1) if a.phase is Phase.EXTRACTION is not b.phase]
+    rows = {flipper: walk(seed) for seed, flipper in enumerate(FLIPPERS, 1)}
+    for i in swings[:-1]:
+        deep = rows[late][i - 1].adduction._replace(angle_rad=GEOMETRY.adduction_rad(0.5, 0.02))
+        rows[late][i - 1] = rows[late][i - 1]._replace(adduction=deep)
+    mud = estimator()
+    readings = [update(mud, a, b).strides for a, b in zip(rows["left"], rows["right"], strict=True)]
+    closed = [[(stride.flipper, stride.index) for stride in strides] for strides in readings if strides]
+    assert closed == [[("left", index), ("right", index)] for index in range(STRIDES)]
+    assert not readings[swings[0]]
 
 
 def test_a_flipper_that_is_not_heard_does_not_disturb_the_other_one() -> None:
