@@ -15,6 +15,8 @@ Mud that is dragged along only adds to c, so the least swing of a trial counts. 
 in four of the authors' walks the body has sunk, and the flipper swings through mud with 0.2 to 0.83 N·m.
 """
 
+from math import isfinite
+
 from control.records import UNKNOWN
 
 AIR_NM = 0.15  # twice the largest friction of these motors: 0.05 to 0.07 N·m in the authors' logs without mud
@@ -36,17 +38,17 @@ class AirSwing:
         self.std_error_nm = UNKNOWN_FRICTION_NM
         self.is_air = True  # of the last swing; a trial begins in air
         self._measured = False
-        self.begin()
+        self._begin()
 
-    def begin(self) -> None:
-        """Forget the swing under way."""
+    def _begin(self) -> None:
+        """Begin the sums of a swing."""
         self._sweep_rad = self._sweep_nm = UNKNOWN
         self._work_j = self._travel_rad = 0.0
 
     def update(self, sweep_rad: float, sweep_nm: float) -> None:
         """Add a sample in free air."""
         turn_rad = sweep_rad - self._sweep_rad
-        if turn_rad == turn_rad:
+        if isfinite(turn_rad):
             self._work_j += turn_rad * (sweep_nm + self._sweep_nm) / 2.0
             self._travel_rad += abs(turn_rad)
         self._sweep_rad, self._sweep_nm = sweep_rad, sweep_nm
@@ -59,7 +61,7 @@ class AirSwing:
             if self.is_air:
                 self.friction_nm = min(friction_nm, self.friction_nm) if self._measured else friction_nm
                 self.std_error_nm, self._measured = MEASURED_NM, True
-        self.begin()
+        self._begin()
 
     def is_push(self, stance_nm: float) -> bool:
         """Return whether the sweep torque of a stance, friction included, needs mud to explain it."""

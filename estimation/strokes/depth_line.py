@@ -19,11 +19,12 @@ from typing import NamedTuple
 
 from control.mud_estimate import Coefficient
 from control.records import Estimate
+from estimation.strokes.withstood import SHALLOWEST_M
 
 REPEATABILITY = 0.08  # of k, from stride to stride in the same mud
 REMEMBERED_STRIDES = 8
 SURE_EXPONENT = 0.1  # its smallest standard error: mud's law is no exact power
-DEPTHS_M = (0.005, 0.5)  # a shallower stride measures the surface, not the mud
+DEPTHS_M = (SHALLOWEST_M, 0.5)
 COEFFICIENTS_N_M3 = (1e2, 1e10)  # 0.0001 to 10000 N/cm³: what lies outside is not mud
 
 

@@ -21,14 +21,14 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from control.plate import stance_moment_m4, submerged_plate
 from control.records import UNKNOWN
-from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
 from estimation.strokes.stroke import Batch
+from estimation.strokes.withstood import SHALLOWEST_M, most_withstood
 
 MOBILISED_M = 0.025  # in the authors' logs the force is on its plateau after 2 to 3 cm
 SLIPPING = 0.2  # of the flipper's own travel; a batch with more slips
 QUICK_UNCERTAINTY = 0.05  # of a bound: mud withstands a tenth more at twice the speed
 STANDS = 0.8  # of the body's drag; with less thrust the body certainly stands
-BOUND_DEPTH_M = 0.005  # a shallower batch measures the surface, not the mud
 HELD = (3, 5)  # batches in a row that must withstand a bound: at most 3 cm, fewer in a short stance
 
 
@@ -119,17 +119,16 @@ def _bound(
     geometry: FlipperGeometry, case: str, reason: str, batches: Sequence[Batch], moments: Sequence[float]
 ) -> Shear:
     """Return the largest k_s that HELD batches in a row withstood; mud withstands a first quick push better."""
-    least_m4 = geometry.flipper_length_m * geometry.plate_width_m * BOUND_DEPTH_M**2 / 2.0
+    least_m4 = geometry.flipper_length_m * geometry.plate_width_m * SHALLOWEST_M**2 / 2.0
     withstood = [
         b.sweep_nm / moment if moment > least_m4 else UNKNOWN for b, moment in zip(batches, moments, strict=True)
     ]
     run = min(max(len(withstood) // 3, HELD[0]), HELD[1])
-    runs = [withstood[i : i + run] for i in range(len(withstood) - run + 1)]
-    held = [(median(each), max(each) - min(each)) for each in runs if all(isfinite(k) for k in each)]
+    most = most_withstood(withstood, run)
     samples = sum(batch.samples for batch in batches)
-    if not held:
+    if most is None:
         return Shear(None, True, case, samples, reason)
-    largest, spread = max(held)
+    largest, spread = most
     scatter = spread / 4.0  # of the median of five, whose range is 2.3 times their scatter
     fit = OriginFit(largest, hypot(scatter, QUICK_UNCERTAINTY * largest))
     return Shear(fit, True, case, samples, reason, max(moments))

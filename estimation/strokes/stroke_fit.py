@@ -16,9 +16,10 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
-from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin, median
+from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
 from estimation.strokes.stroke import Batch
 from estimation.strokes.surface import Surface
+from estimation.strokes.withstood import SHALLOWEST_M, most_withstood
 
 REVERSAL_FRACTION = 0.25  # of the rise
 SHORTEST_M = 1e-9  # a shorter piece of travel is rounding
@@ -26,7 +27,6 @@ MIN_VERTICAL_LEVER_M = 0.03  # below it an upward force hardly loads the adducti
 TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
 CROSS_COUPLING_UNCERTAINTY = 0.25  # of the cross-coupling: its centre of pressure is that of the law, not the mud's
 LARGEST_UNCERTAINTY = 0.75  # of a coefficient: beyond it even the 80 % interval reaches zero
-BOUND_DEPTH_M = 0.005  # a shallower batch measures the surface, not the mud
 HELD_BATCHES = 3  # in a row, 6 mm of rise, that must withstand a bound
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of travel in the mud"
 NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
@@ -54,12 +54,10 @@ def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surfac
     It is the greatest median of HELD_BATCHES in a row, or of all of a flipper that hardly moved. Batches near the
     surface do not count, since an error of the surface would be a large part of their depth.
     """
-    deep = [batch for batch in batches if batch.travel_m - surface.depth_m >= BOUND_DEPTH_M]
+    deep = [batch for batch in batches if batch.travel_m - surface.depth_m >= SHALLOWEST_M]
     withstood = [_withstood(geometry, batch, surface) for batch in deep]
-    length = min(HELD_BATCHES, len(withstood))
-    runs = [withstood[i : i + length] for i in range(len(withstood) - length + 1)] if length else []
     samples = sum(batch.samples for batch in deep)
-    bound, spread = max(((median(run), max(run) - min(run)) for run in runs), default=(0.0, 0.0))
+    bound, spread = most_withstood(withstood, min(HELD_BATCHES, len(withstood))) or (0.0, 0.0)
     depth_m = max([batch.travel_m for batch in deep], default=inf) - surface.depth_m
     error = hypot(TORQUE_REPEATABILITY * bound, spread / 2.0, 1.5 * bound * surface.std_error_m / depth_m)
     if not (bound > 0.0 and isfinite(bound + error)):
