@@ -26,7 +26,7 @@ from firmware_host.log_reading.lab.findings import Finding, FindingKind
 from firmware_host.log_reading.lab.joint_signs import orient
 from firmware_host.log_reading.lab.log_rows import LogRows
 from firmware_host.log_reading.lab.row_order import drop_backward_rows
-from firmware_host.log_reading.lab.signal_checks import check_ranges, check_swapped_joints, drop_stuck_signals
+from firmware_host.log_reading.lab.signal_checks import AT_PEAK, check_ranges, check_swapped_joints, drop_stuck_signals
 from firmware_host.log_reading.lab.zero_checks import check_zero
 from firmware_host.log_reading.log_reader import LogError
 
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 
-CLIP_FRACTION, CLIPPED_ROWS = 0.9995, 200  # half a second of rows at the largest current makes it a limit
+CLIPPED_ROWS = 200  # half a second of rows at the largest current makes it a limit
 MOST_UNKNOWN = 0.5  # of the rows' states; beyond it this is another column
 
 
@@ -158,5 +158,5 @@ def _find_limit_a(current_a: Floats) -> float:
     """Returns the largest current if one joint shows it in many rows: then the drive clipped it."""
     size_a = np.nan_to_num(np.abs(current_a))
     peak_a = float(size_a.max(initial=0.0))
-    at_peak = size_a >= CLIP_FRACTION * peak_a
+    at_peak = size_a >= AT_PEAK * peak_a
     return peak_a if peak_a > 0.0 and int(at_peak.sum(axis=0).max()) >= CLIPPED_ROWS else math.inf

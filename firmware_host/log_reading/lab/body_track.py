@@ -15,7 +15,7 @@ from control.records import UNKNOWN, Phase
 from firmware_host.log_reading.lab.columns import BODY_COLUMNS, ORIENTATION_COLUMNS
 from firmware_host.log_reading.lab.csv_table import CsvTable
 from firmware_host.log_reading.lab.findings import Finding, FindingKind
-from firmware_host.log_reading.lab.log_rows import LogRows, runs, steps_inside
+from firmware_host.log_reading.lab.log_rows import LogRows, runs
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
@@ -69,8 +69,7 @@ def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
 
 def _find_forward(rows: LogRows, position_m: Floats, up: int) -> Floats | None:
     """Returns the horizontal direction in which the stances moved the body; None if they did not."""
-    steps_m = np.diff(position_m, axis=0)[steps_inside(rows.phase, Phase.STANCE)]
-    stance_m: Floats = np.nansum(steps_m, axis=0)
+    stance_m = rows.change(position_m, Phase.STANCE)
     stance_m[up] = 0.0
     distance_m = float(np.linalg.norm(stance_m))
     return stance_m / distance_m if distance_m > 0.0 else None

@@ -50,7 +50,7 @@ class Evidence(NamedTuple):
 def orient(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
     """Inverts angles and currents where needed, in place; invalidates strides whose current has the wrong sign."""
     for joint, pushing in enumerate(PUSHING):
-        if _change(rows, angle_rad[:, joint], pushing) > 0.0:
+        if rows.change(angle_rad[:, joint], pushing) > 0.0:
             angle_rad[:, joint] *= -1.0
     evidence = find_evidence(rows, angle_rad, current_a)
     for joint in range(len(PUSHING)):
@@ -63,10 +63,6 @@ def orient(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]
         reported = [*_check_holds(rows, current_a), *_check_swings(rows, angle_rad, current_a, FRICTION_LIMIT_NM)]
         return [*reported, *_drop_contradictions(rows, angle_rad, current_a)]
     return [_report_air(evidence), *_check_swings(rows, angle_rad, current_a, 0.0)]
-
-
-def _change(rows: LogRows, values: Floats, wanted: Phase) -> float:
-    return float(np.nansum(np.diff(values)[steps_inside(rows.phase, wanted)]))
 
 
 def _work(rows: LogRows, angles: Floats, currents: Floats, wanted: Phase) -> float:
@@ -157,9 +153,9 @@ def _check_swings(rows: LogRows, angle_rad: Floats, current_a: Floats, allowed_n
     findings = []
     for joint in range(0, len(PUSHING), 2):
         angles, currents = angle_rad[:, joint], current_a[:, joint]
-        travel_rad = abs(_change(rows, angles, Phase.SWING))
+        travel_rad = abs(float(rows.change(angles, Phase.SWING)))
         work_j = PAPER_CONSTANT_NM_A * _work(rows, angles, currents, Phase.SWING)
-        has_stance = _change(rows, angles, Phase.STANCE) != 0.0
+        has_stance = rows.change(angles, Phase.STANCE) != 0.0
         if has_stance and travel_rad > 0.0 and work_j < -allowed_nm * travel_rad:
             text = (
                 f"by the stances' sign the motor does negative work in swing, {work_j:.2f} J: the sign is not certain"

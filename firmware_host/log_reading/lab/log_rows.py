@@ -36,6 +36,11 @@ class LogRows(NamedTuple):
         """Returns the error of a log in which every number is wrong."""
         return LogError(f"{self.path}: {self.finding(kind, column, row, text)}")
 
+    def change(self, values: Floats, wanted: Phase) -> Floats:
+        """Returns the sum of a signal's steps in a phase, column by column; steps from or to NaN do not count."""
+        total: Floats = np.nansum(np.diff(values, axis=0)[steps_inside(self.phase, wanted)], axis=0)
+        return total
+
     def strokes(self, wanted: Phase) -> list[slice]:
         """Returns the rows of each uninterrupted run of a phase."""
         return runs(self.phase == wanted)

@@ -11,15 +11,12 @@ from numpy.typing import NDArray
 from control.records import FLIPPERS, Phase
 from firmware_host.log_reading.lab.columns import CURRENT_COLUMNS, POSITION_COLUMNS
 from firmware_host.log_reading.lab.findings import Finding, FindingKind
-from firmware_host.log_reading.lab.log_rows import LogRows, runs, steps_inside
+from firmware_host.log_reading.lab.log_rows import LogRows, runs
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
-SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG = (
-    100.0,
-    90.0,
-)  # to either side; beyond it the arm meets the body or the other joint
+SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG = 100.0, 90.0  # to either side; beyond it the arm meets body or joint
 RANGES_DEG = (SWEEP_RANGE_DEG, ADDUCTION_RANGE_DEG) * 2
 CURRENT_RANGE_A = 120.0  # peak of the largest drive of this kind; the robot's drives clip at 10 to 25 A
 MOST_BEYOND = 0.05  # of the rows of the gait; fewer are disturbed samples, more are wrong units
@@ -66,17 +63,13 @@ def check_swapped_joints(rows: LogRows, angle_rad: Floats) -> None:
     """Refuses a flipper that sweeps in insertion and adducts in stance. Raises LogError."""
     for number in range(len(FLIPPERS)):
         sweep, adduction = 2 * number, 2 * number + 1
-        stance = [_travel_rad(rows, angle_rad[:, joint], Phase.STANCE) for joint in (sweep, adduction)]
-        insertion = [_travel_rad(rows, angle_rad[:, joint], Phase.INSERTION) for joint in (sweep, adduction)]
+        stance = np.abs(rows.change(angle_rad, Phase.STANCE))[[sweep, adduction]]
+        insertion = np.abs(rows.change(angle_rad, Phase.INSERTION))[[sweep, adduction]]
         clear = min(stance[1], insertion[0]) > CLEAR_TRAVEL_RAD  # a joint that holds still drifts less
         if clear and stance[1] > stance[0] and insertion[0] > insertion[1]:
             first = int(np.argmax(rows.phase == Phase.STANCE))
             text = f"moves less in stance than {POSITION_COLUMNS[adduction]}, and more in insertion: are they swapped?"
             raise rows.refusal(FindingKind.RANGE, POSITION_COLUMNS[sweep], first, text)
-
-
-def _travel_rad(rows: LogRows, angle_rad: Floats, wanted: Phase) -> float:
-    return abs(float(np.nansum(np.diff(angle_rad)[steps_inside(rows.phase, wanted)])))
 
 
 def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
