@@ -85,9 +85,9 @@ def split_walks(strides: Strides, flipper: str) -> list[Strides]:
 
 
 def pair_flippers(strides: Strides) -> list[tuple[StrideEstimate, StrideEstimate]]:
-    """Return the left and the right flipper's part of each stride: both close with the same sample."""
-    left, right = ({stride.t_end_s: stride for stride in strides if stride.flipper == name} for name in FLIPPERS)
-    return [(left[t_end_s], right[t_end_s]) for t_end_s in left if t_end_s in right]
+    """Return the left and the right flipper's part of each stride: both begin with the same sample."""
+    left, right = ({stride.t_start_s: stride for stride in strides if stride.flipper == name} for name in FLIPPERS)
+    return [(left[t_start_s], right[t_start_s]) for t_start_s in left if t_start_s in right]
 
 
 def read_trial(paths: Sequence[Path], disturbed: bool = True) -> LabTrial | Refusal:

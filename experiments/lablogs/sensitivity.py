@@ -1,6 +1,6 @@
 """How far the estimates of a log move when its currents come late or early, or some of its rows are missing.
 
-A stride of the disturbed log is compared with the one of the same flipper that ends at the same time.
+A stride of the disturbed log is compared with the one of the same flipper that begins at the same time.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ from experiments.lablogs.lab_trial import (
 )
 from experiments.reports.error_table import COEFFICIENTS
 
-SAME_END_S = 0.2  # missing rows move the end of a stride by a few rows, and a stride takes more than a second
+SAME_START_S = 0.2  # missing rows move the start of a stride by a few rows, and a stride takes more than a second
 MOVED = 2.0  # claimed errors
 
 
@@ -105,8 +105,8 @@ def changes(
 
 def _same_stride(stride: StrideEstimate, others: Strides) -> StrideEstimate | None:
     own = [other for other in others if other.flipper == stride.flipper]
-    near = min(own, key=lambda other: abs(other.t_end_s - stride.t_end_s), default=None)
-    return near if near is not None and abs(near.t_end_s - stride.t_end_s) <= SAME_END_S else None
+    near = min(own, key=lambda other: abs(other.t_start_s - stride.t_start_s), default=None)
+    return near if near is not None and abs(near.t_start_s - stride.t_start_s) <= SAME_START_S else None
 
 
 def late_changes(trials: Sequence[LabTrial], method: Method) -> list[Change]:

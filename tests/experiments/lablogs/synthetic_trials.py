@@ -26,7 +26,7 @@ def make_stride(
     k_s: Estimate = INVALID,
     k_e: Estimate = INVALID,
 ) -> StrideEstimate:
-    """A stride of four seconds; both flippers close the same stride with the same sample."""
+    """A stride of four seconds; both flippers begin the same stride with the same sample."""
     return StrideEstimate(
         flipper, index, 4.0 * index, 4.0 * index + 4.0, 1.0, 1.0, 1.0, k_p, k_s, k_e,
         0.0, 0.03, True, 2.0, 8.0, -2.0, UNKNOWN,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,13 @@ def test_only_strides_with_two_values_are_compared_and_no_single_flipper_is() ->
     walk = make_walk([(make_value(1.0), make_bound(2.0)), (INVALID, make_value(1.0)), (make_value(1.0),) * 2])
     single = make_trial([make_stride(k_s=make_value(1.0))])
     assert len(flipper_pairs([walk, single], "default")) == 1
+
+
+def test_a_flipper_that_leaves_the_mud_late_is_compared_too() -> None:
+    """Its stride closes up to 0.3 s after the other flipper's."""
+    left, right = (make_stride(flipper, k_s=make_value(1.0)) for flipper in ("left", "right"))
+    walk = make_trial([replace(left, t_end_s=left.t_end_s + 0.25), right], flippers=("left", "right"))
+    assert len(flipper_pairs([walk], "default")) == 1
 
 
 def contradictions_of(*k_e: Estimate) -> tuple[int, int, int]:
