@@ -65,7 +65,7 @@ def _finding(report: TrackwayReport, logs: Sequence[Path] = (), walks: Sequence[
 
 
 def walk_figures(walks: Mapping[str, LoggedTime], folder: Path, operator: Operator) -> list[Figure]:
-    """Make the figure of each walk whose log is there, and tell the operator why another walk has none."""
+    """Make the figure of each walk whose log is there, and report to the operator why another walk has none."""
     from experiments.pictures.walk_plot import plot_walk
 
     figures = []
