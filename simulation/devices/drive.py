@@ -19,6 +19,7 @@ class SimulatedDriveParameters:
     zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
     torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # in the drive's own settings
     torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # fraction by which the true one is larger
+    commutation_error_deg: Annotated[float, Bounds(-180.0, 180.0)] = 0.0  # electrical: 60 halves, 180 inverts torque
     cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
     cogging_per_turn: Annotated[int, Bounds(1, 1000)] = 84  # 12 slots and 14 magnets, as many small motors have
     cogging_phase_deg: Annotated[float, Bounds(-360.0, 360.0)] = 0.0
@@ -27,6 +28,7 @@ class SimulatedDriveParameters:
     encoder_counts: Annotated[int, Bounds(16, 16777216)] = 16384
     encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # reported minus true angle of the joint
     encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
+    encoder_frozen: bool = False  # the last angle for ever, and exactly zero velocity: a magnet that came off
     watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
     encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
     current_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
@@ -36,6 +38,7 @@ class SimulatedDriveParameters:
     repeated_fraction: Annotated[float, Bounds(0.0, 0.99)] = 0.0  # of the messages of angle, and of current
     velocity_gain_nm_s_turn: Annotated[float, Bounds(0.0, 100.0)] = 1.0 / 6.0  # ODrive's default vel_gain, in the clamp
     velocity_noise_rad_s: Annotated[float, Bounds(0.0, 5.0)] = 0.0  # of the drive's estimate
+    overspeed_fraction: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # of the velocity limit that trips; ODrive: 1.2
     temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
     bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
     motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
@@ -55,6 +58,7 @@ class Forgery(Enum):
 class DriveError(Enum):
     OVERCURRENT = auto()
     WATCHDOG = auto()
+    OVERSPEED = auto()
 
 
 class SimulatedDrive(Protocol):

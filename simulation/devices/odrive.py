@@ -1,37 +1,35 @@
 """Simulates a motor drive on the bus: ODrive CANSimple 0.6, byte for byte.
 
 It has the axis state machine (idle, closed loop), the error word with the disarm reason, the watchdog, torque mode with
-the velocity-limit clamp and the current limits, cyclic messages, and requests by remote frame.
+the velocity-limit clamp, the current limits and, where it is on, the overspeed trip, cyclic messages, and requests by
+remote frame.
 
 Between the drive and the joint lie imperfections that no drive reports, each off at 0. The motor's true torque constant
-differs from the drive's value; current follows its command with a first-order lag; magnets pull towards detents at any
-current. The encoder has steps, noise and an offset; the current has noise. Messages arrive in order, late by uniformly
-drawn times, and some repeat their old values.
-
-Cogging is the slope of an energy that repeats n times a turn, so over a turn it does no work. It is no pure sine:
-
-    τ = -A [sin(n θ + φ) + 0.25 sin(2 (n θ + φ))]         the second harmonic is an assumption
+differs from the drive's value, and an error of its commutation weakens or inverts the torque; current follows its
+command with a first-order lag; magnets pull towards detents at any current. The encoder has steps, noise and an offset,
+and may freeze; the current has noise. Messages arrive in order, late by uniformly drawn times, and some repeat their
+old values.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from math import exp, isfinite, pi, radians, sin
+from math import cos, exp, isfinite, pi, radians
 from random import Random
 
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
+from simulation.devices.cogging import cogging_torque_nm
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages
 
 TURN_RAD = 2.0 * pi
-SECOND_HARMONIC = 0.25
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
 WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
 TORQUE_MODES = (codec.TORQUE_CONTROL, codec.PASSTHROUGH)
-ERROR_FLAGS = {DriveError.OVERCURRENT: 0x400, DriveError.WATCHDOG: codec.ERROR_WATCHDOG}
+ERROR_FLAGS = {DriveError.OVERCURRENT: 0x400, DriveError.WATCHDOG: codec.ERROR_WATCHDOG, DriveError.OVERSPEED: 0x8000}
 OLD_FIRMWARE = (2, 4, 4, 58, 0, 5, 6, 0)
 BOOT_S = 1.0  # silence of a drive that restarts
 
@@ -72,7 +70,7 @@ class SimulatedOdrive:
         self._fed_s = now_s
         self._current_a = 0.0
         self._stepped_s = now_s
-        self._turns = self._turns_s = 0.0
+        self._turns = self._turns_s = self._reported_turns = 0.0
         self._boots_until_s = NEVER_S
         self._initializing = False
         self._reported: dict[Message, Frame] = {}
@@ -186,16 +184,22 @@ class SimulatedOdrive:
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""
         parameters = self.parameters
-        if self.axis_state is AxisState.CLOSED_LOOP and 0.0 < parameters.watchdog_s < now_s - self._fed_s:
-            self._disarm(codec.ERROR_WATCHDOG)
+        if self.axis_state is AxisState.CLOSED_LOOP:
+            fastest_turn_s = parameters.overspeed_fraction * self._velocity_limit_turn_s
+            if 0.0 < parameters.watchdog_s < now_s - self._fed_s:
+                self.trip(DriveError.WATCHDOG)
+            elif 0.0 < fastest_turn_s < abs(self._turns_s):
+                self.trip(DriveError.OVERSPEED)
         torque_nm = 0.0
         if self.axis_state is AxisState.CLOSED_LOOP and self._modes == TORQUE_MODES:
             torque_nm = self._computed_nm(now_s) * (1.0 + parameters.torque_constant_error)
+            if parameters.commutation_error_deg:
+                torque_nm *= cos(radians(parameters.commutation_error_deg))
         else:
             self._current_a = 0.0
         self._stepped_s = now_s
         if parameters.cogging_nm:
-            torque_nm += self._cogging_nm()
+            torque_nm += cogging_torque_nm(parameters, self._turns)
         return parameters.sign * torque_nm
 
     def _computed_nm(self, now_s: float) -> float:
@@ -212,12 +216,6 @@ class SimulatedOdrive:
             torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
         self._current_a = torque_nm / parameters.torque_constant_nm_a
         return torque_nm
-
-    def _cogging_nm(self) -> float:
-        """Returns the torque at the motor, from its true angle."""
-        parameters = self.parameters
-        angle = parameters.cogging_per_turn * TURN_RAD * self._turns + radians(parameters.cogging_phase_deg)
-        return -parameters.cogging_nm * (sin(angle) + SECOND_HARMONIC * sin(2.0 * angle))
 
     def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
         """Sets the joint's true angle and velocity, from which the encoder's messages are made."""
@@ -255,15 +253,17 @@ class SimulatedOdrive:
 
     def _encoder(self) -> bytes:
         parameters = self.parameters
+        if parameters.encoder_frozen:
+            return codec.GET_ENCODER_ESTIMATES.encode(self._reported_turns, 0.0)
         error_rad = parameters.encoder_offset_rad
         if parameters.encoder_noise_rad:
             error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
         turns = self._turns + parameters.sign * error_rad / TURN_RAD
-        reported_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        self._reported_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
         turns_s = self._turns_s
         if parameters.velocity_noise_rad_s:
             turns_s += self._random.gauss(0.0, parameters.velocity_noise_rad_s) / TURN_RAD
-        return codec.GET_ENCODER_ESTIMATES.encode(reported_turns, turns_s)
+        return codec.GET_ENCODER_ESTIMATES.encode(self._reported_turns, turns_s)
 
     def _iq(self) -> bytes:
         noise_a = self.parameters.current_noise_a

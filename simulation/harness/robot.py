@@ -4,7 +4,7 @@ It exchanges frames only. In real time a process steps it to the present; in tes
 the tick's time. The same seed gives the same result.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from random import Random
 
 from control.records import JOINTS, Joints, Torques
@@ -37,6 +37,7 @@ class SimulatedRobot:
             for port in ports.values()
         ]
         self.now_s = start_s
+        self.observers: list[Callable[[float, Torques], None]] = []  # of each step's length and the motors' torques
         self._put_back_requested = False
         for drive in self.drives:
             drive.reset(start_s)
@@ -56,6 +57,8 @@ class SimulatedRobot:
             torques: Torques = Joints(a.torque_nm(now_s), b.torque_nm(now_s), c.torque_nm(now_s), d.torque_nm(now_s))
             self.plant.step(STEP_S, torques)
             self._measure()
+            for observe in self.observers:
+                observe(STEP_S, torques)
             for drive, port in wires:
                 for frame in drive.cyclic_frames(now_s):
                     port.send(frame)

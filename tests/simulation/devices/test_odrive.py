@@ -1,6 +1,7 @@
 """The simulated drive, held against what ODrive documents: states, watchdog, clamps, periods, answers."""
 
 from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 from math import exp, isfinite, pi
 from random import Random
@@ -424,3 +425,30 @@ def test_a_drive_that_was_restarted_has_forgotten_its_mode() -> None:
 def ask_at(drive: SimulatedOdrive, message: Message, now_s: float) -> tuple[float, ...]:
     (answer,) = drive.receive(Frame(arbitration_id(NODE, message), is_remote=True), now_s)
     return message.decode(answer.data)
+
+
+def test_a_commutation_error_weakens_and_inverts_the_torque_that_the_drive_reports_unchanged() -> None:
+    for error_deg, fraction in ((0.0, 1.0), (60.0, 0.5), (-90.0, 0.0), (180.0, -1.0)):
+        drive = make_armed_drive(commutation_error_deg=error_deg, current_noise_a=0.0)
+        report(drive, SET_INPUT_TORQUE, 0.5)
+        assert drive.torque_nm(0.001) == pytest.approx(fraction * 0.5, abs=1e-9)
+        assert ask(drive, GET_IQ)[1] == pytest.approx(0.5 / drive.parameters.torque_constant_nm_a, rel=1e-6)
+
+
+def test_a_frozen_encoder_repeats_its_last_angle_at_exactly_zero_velocity() -> None:
+    drive = make_armed_drive()
+    drive.measure(0.5, 3.0)
+    before_turns, _ = ask(drive, GET_ENCODER_ESTIMATES)
+    drive.parameters = replace(drive.parameters, encoder_frozen=True)
+    drive.measure(0.9, 5.0)
+    assert ask(drive, GET_ENCODER_ESTIMATES) == (before_turns, 0.0)
+
+
+def test_overspeed_trips_only_where_it_is_on_and_above_its_fraction_of_the_limit() -> None:
+    for fraction, turns_s, trips in ((0.0, 9.0, False), (1.2, 4.7, False), (1.2, 4.9, True), (1.2, -4.9, True)):
+        drive = make_armed_drive(overspeed_fraction=fraction)
+        report(drive, SET_LIMITS, 4.0, 12.0)
+        drive.measure(0.0, 2.0 * pi * turns_s)
+        drive.torque_nm(0.001)
+        assert drive.failed is trips
+        assert drive.energised is not trips
