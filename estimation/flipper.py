@@ -17,6 +17,7 @@ from estimation.joint_load import FlipperDrive, JointLoad, motion_between
 from estimation.stride_estimator import Learned, StrideEstimator, larger
 from estimation.strokes.air import AirSwing
 from estimation.strokes.origin_fit import median
+from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.shear import Base, Shear, find_shear
 from estimation.strokes.stroke import Batch, Stroke
 from estimation.strokes.stroke_fit import (
@@ -31,7 +32,7 @@ from estimation.strokes.surface import find_surface
 from estimation.strokes.surface_memory import SurfaceMemory, unknown_surface
 from estimation.strokes.tare import Tare
 
-STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.002}
+STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.001}
 OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a stroke's own force begins
 NO_MUD = "no evidence of mud: the torques are those of friction"
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
@@ -58,6 +59,7 @@ class FlipperEstimator(StrideEstimator):
         self._air = AirSwing()
         self._free_m = -FREE_FRACTION * geometry.clearance_m
         self._tare = Tare()
+        self._insertions, self._extractions = ScatterMemory(), ScatterMemory()
         self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
         super().__init__(flipper, geometry, drive, motion_between)
 
@@ -66,6 +68,8 @@ class FlipperEstimator(StrideEstimator):
         self._air.reset()
         self._surfaces.reset()
         self._own_surfaces.reset()
+        self._insertions.reset()
+        self._extractions.reset()
         self._travel_m = UNKNOWN
         super().reset()
 
@@ -138,7 +142,7 @@ class FlipperEstimator(StrideEstimator):
         corrected_n = self._tare.correct(-level_n, level_error_n)
         below = level_free(batches, -corrected_n * length_m)
         own = self._own_surfaces.update(found, 0.0)
-        self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+        self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n, self._insertions)
 
     @property
     def surface_m(self) -> float:
@@ -170,8 +174,9 @@ class FlipperEstimator(StrideEstimator):
         return self._air.is_push(pushed_nm) or self._air.is_pull(pulled_nm)
 
     def _learn_extraction(self, stroke: Stroke) -> Estimate:
+        zero_error_n, start_m = self._tare.zero.std_error_n, stroke.first_m
         reported = fit_extraction(
-            self.geometry, stroke.moving(), self._surface, self._tare.zero.std_error_n, stroke.first_m
+            self.geometry, stroke.moving(), self._surface, zero_error_n, self._extractions, start_m
         )
         if reported.valid or not (self._stuck and self._is_held):
             return reported

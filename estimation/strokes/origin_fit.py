@@ -33,6 +33,9 @@ STUDENT = (1.0, 6.48, 2.195, 1.624, 1.417, 1.312, 1.248, 1.207, 1.177, 1.154, 1.
 class OriginFit(NamedTuple):
     slope: float
     std_error: float
+    square: float = 0.0  # Σ w x²
+    variance: float = 0.0  # of the residuals, correlation included: std_error² = Student's factor² · variance / square
+    freedom: int = 0
 
 
 def fit_through_origin(x: Sequence[float], y: Sequence[float]) -> OriginFit | None:
@@ -48,7 +51,7 @@ def fit_through_origin(x: Sequence[float], y: Sequence[float]) -> OriginFit | No
         before, slope = slope, _weighted_slope(x, y, weights)
         if abs(slope - before) <= CONVERGED * abs(slope):
             break
-    return OriginFit(slope, _std_error(x, y, weights, slope)) if isfinite(slope) else None
+    return _evaluated(x, y, weights, slope) if isfinite(slope) else None
 
 
 def median(values: Sequence[float]) -> float:
@@ -69,8 +72,8 @@ def _weighted_slope(x: Sequence[float], y: Sequence[float], weights: Sequence[fl
     return slope
 
 
-def _std_error(x: Sequence[float], y: Sequence[float], weights: Sequence[float], slope: float) -> float:
-    """Return Newey and West's standard error, but never less than that of independent residuals.
+def _evaluated(x: Sequence[float], y: Sequence[float], weights: Sequence[float], slope: float) -> OriginFit:
+    """Return the fit with Newey and West's standard error, but never less than that of independent residuals.
 
     Their weighted lags are the squared sums of all L + 1 batches in a row; from few batches they are too small.
     """
@@ -82,7 +85,8 @@ def _std_error(x: Sequence[float], y: Sequence[float], weights: Sequence[float],
     sums = list(accumulate([0.0] * (LAGS + 1) + scores + [0.0] * LAGS))
     together = sum([(b - a) * (b - a) for a, b in zip(sums, sums[LAGS + 1 :], strict=False)]) / (LAGS + 1)
     apart = square * sum([w * r * r for w, r in zip(weights, residuals, strict=True)])
-    return student_factor(n - 2) * sqrt(max(n * together, apart) / (n - 2)) / square
+    variance = max(n * together, apart) / (n - 2) / square
+    return OriginFit(slope, student_factor(n - 2) * sqrt(variance / square), square, variance, n - 2)
 
 
 def student_factor(freedom: int) -> float:

@@ -17,6 +17,7 @@ from control.geometry import FlipperGeometry
 from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
+from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.stroke import Batch
 from estimation.strokes.surface import Surface
 from estimation.strokes.withstood import SHALLOWEST_M, most_withstood
@@ -35,17 +36,26 @@ UNOBSERVABLE = f"vertical lever under {100.0 * MIN_VERTICAL_LEVER_M:g} cm: not o
 
 
 def fit_insertion(
-    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float
+    geometry: FlipperGeometry,
+    batches: Sequence[Batch],
+    surface: Surface,
+    zero_error_n: float,
+    scatter: ScatterMemory,
 ) -> Estimate:
-    return _fit(geometry, batches, surface, zero_error_n, 1.0, inf)
+    return _fit(geometry, batches, surface, zero_error_n, scatter, 1.0, inf)
 
 
 def fit_extraction(
-    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float, start_m: float
+    geometry: FlipperGeometry,
+    batches: Sequence[Batch],
+    surface: Surface,
+    zero_error_n: float,
+    scatter: ScatterMemory,
+    start_m: float,
 ) -> Estimate:
     """Fit k_e; `start_m` is the depth from which the flipper rises."""
     deepest_m = surface.depth_m + (1.0 - REVERSAL_FRACTION) * (start_m - surface.depth_m)
-    return _fit(geometry, batches, surface, zero_error_n, -1.0, deepest_m)
+    return _fit(geometry, batches, surface, zero_error_n, scatter, -1.0, deepest_m)
 
 
 def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> Estimate:
@@ -87,6 +97,7 @@ def _fit(
     batches: Sequence[Batch],
     surface: Surface,
     zero_error_n: float,
+    scatter: ScatterMemory,
     sign: float,
     deepest_m: float,
 ) -> Estimate:
@@ -101,7 +112,7 @@ def _fit(
         _slope_per_surface(fit, pieces.moments, pieces.torques, pieces.depths_m) * surface.std_error_m,
         1.5 * zero_error_n / (edge_m2 * max(pieces.depths_m)),
     )
-    return evaluated(fit, systematic, pieces.samples)
+    return evaluated(scatter.pooled(fit), systematic, pieces.samples)
 
 
 def _pieces(

@@ -12,6 +12,7 @@ from control.geometry import FlipperGeometry
 from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import Estimate
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit
+from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.stroke import Batch
 from estimation.strokes.stroke_fit import (
     CROSS_COUPLING_UNCERTAINTY,
@@ -89,13 +90,13 @@ def up(
 
 
 def insertion(batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0) -> Estimate:
-    return fit_insertion(GEOMETRY, batches, surface, zero_error_n)
+    return fit_insertion(GEOMETRY, batches, surface, zero_error_n, ScatterMemory())
 
 
 def extraction(
     batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0, start_m: float = 0.03
 ) -> Estimate:
-    return fit_extraction(GEOMETRY, batches, surface, zero_error_n, start_m)
+    return fit_extraction(GEOMETRY, batches, surface, zero_error_n, ScatterMemory(), start_m)
 
 
 # the law is found
