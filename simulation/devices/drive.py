@@ -97,3 +97,6 @@ class SimulatedDrive(Protocol):
 
     def forge_current(self, current_a: float) -> Frame:
         """Makes a report of another current than the motor has."""
+
+    def forge_torque(self, torque_nm: float) -> Frame:
+        """Makes a command of a torque of the joint, as another program on the bus sends it."""

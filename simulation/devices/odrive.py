@@ -11,7 +11,7 @@ and may freeze; the current has noise. Messages arrive in order, late by uniform
 old values.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from math import cos, exp, isfinite, pi, radians
 from random import Random
@@ -23,23 +23,20 @@ from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbi
 from simulation.devices.cogging import cogging_torque_nm
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages
+from simulation.devices.odrive_forgeries import (
+    ENABLE_WATCHDOG_ENDPOINT,
+    WATCHDOG_TIMEOUT_ENDPOINT,
+    forged_current,
+    forged_frame,
+    forged_torque,
+)
 
 TURN_RAD = 2.0 * pi
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
-WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
 TORQUE_MODES = (codec.TORQUE_CONTROL, codec.PASSTHROUGH)
 ERROR_FLAGS = {DriveError.OVERCURRENT: 0x400, DriveError.WATCHDOG: codec.ERROR_WATCHDOG, DriveError.OVERSPEED: 0x8000}
-OLD_FIRMWARE = (2, 4, 4, 58, 0, 5, 6, 0)
 BOOT_S = 1.0  # silence of a drive that restarts
-
-FORGERIES: Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]] = {  # message, values, and bytes after them
-    Forgery.EMERGENCY_STOP: (codec.ESTOP, (), b""),
-    Forgery.CLOSE_LOOP: (codec.SET_AXIS_STATE, (AxisState.CLOSED_LOOP,), b""),
-    Forgery.OLD_FIRMWARE: (codec.GET_VERSION, OLD_FIRMWARE, b""),
-    Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
-    Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
-}
 
 
 def finite(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -68,7 +65,7 @@ class SimulatedOdrive:
         self._set_limits(2.0, 10.0)  # ODrive's defaults
         self._velocity_gain_nm_s_turn = self.parameters.velocity_gain_nm_s_turn
         self._fed_s = now_s
-        self._current_a = 0.0
+        self._current_a = self._setpoint_a = 0.0  # the motor's, and the one that it follows
         self._stepped_s = now_s
         self._turns = self._turns_s = self._reported_turns = 0.0
         self._boots_until_s = NEVER_S
@@ -174,12 +171,13 @@ class SimulatedOdrive:
         self._disarm(ERROR_FLAGS[error])
 
     def forge(self, forgery: Forgery) -> Frame:
-        message, values, value = FORGERIES[forgery]
-        return Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values) + value)
+        return forged_frame(self.parameters.node_id, forgery)
 
     def forge_current(self, current_a: float) -> Frame:
-        data = codec.GET_IQ.encode(current_a, current_a)
-        return Frame(arbitration_id(self.parameters.node_id, codec.GET_IQ), data)
+        return forged_current(self.parameters.node_id, current_a)
+
+    def forge_torque(self, torque_nm: float) -> Frame:
+        return forged_torque(self.parameters.node_id, self.parameters.sign * torque_nm)
 
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""
@@ -196,7 +194,7 @@ class SimulatedOdrive:
             if parameters.commutation_error_deg:
                 torque_nm *= cos(radians(parameters.commutation_error_deg))
         else:
-            self._current_a = 0.0
+            self._current_a = self._setpoint_a = 0.0
         self._stepped_s = now_s
         if parameters.cogging_nm:
             torque_nm += cogging_torque_nm(parameters, self._turns)
@@ -211,6 +209,7 @@ class SimulatedOdrive:
         torque_nm = highest_nm if highest_nm < torque_nm else torque_nm
         torque_nm = -largest_nm if -largest_nm > torque_nm else torque_nm
         torque_nm = largest_nm if largest_nm < torque_nm else torque_nm
+        self._setpoint_a = torque_nm / parameters.torque_constant_nm_a
         if parameters.current_lag_s:
             before_nm = self._current_a * parameters.torque_constant_nm_a
             torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
@@ -268,7 +267,7 @@ class SimulatedOdrive:
     def _iq(self) -> bytes:
         noise_a = self.parameters.current_noise_a
         measured_a = self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
-        return codec.GET_IQ.encode(self._current_a, measured_a)
+        return codec.GET_IQ.encode(self._setpoint_a, measured_a)
 
     def _heartbeat(self) -> bytes:
         errors = self.errors | codec.ERROR_INITIALIZING if self._initializing else self.errors

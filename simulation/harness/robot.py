@@ -9,9 +9,11 @@ from random import Random
 
 from control.records import JOINTS, Joints, Torques
 from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
 from simulation.body.plant import STEP_S, Plant, PlantParameters
 from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive
+from simulation.devices.foreign_master import ForeignMaster
 from simulation.mud.track import Track
 
 
@@ -38,6 +40,7 @@ class SimulatedRobot:
         ]
         self.now_s = start_s
         self.observers: list[Callable[[float, Torques], None]] = []  # of each step's length and the motors' torques
+        self.foreign_masters: list[ForeignMaster] = []  # other programs that command the drives
         self._put_back_requested = False
         for drive in self.drives:
             drive.reset(start_s)
@@ -77,6 +80,17 @@ class SimulatedRobot:
                 for drive in drives:
                     for answer in drive.receive(frame, self.now_s):
                         port.send(answer)
+                for master in self.foreign_masters:
+                    if master.drive in drives:
+                        self._command(master, frame, port)
+
+    def _command(self, master: ForeignMaster, frame: Frame, port: CanPort) -> None:
+        """Lets another program command its drive after a frame of the loop."""
+        foreign = master.answer(frame)
+        if foreign is not None:
+            master.drive.receive(foreign, self.now_s)
+            if master.heard:
+                port.send(foreign)
 
     def _measure(self) -> None:
         """Gives each drive its joint's true motion; without records in between, as this runs in every step."""

@@ -1,0 +1,34 @@
+"""Forges ODrive frames that a bus carries in the name of a drive, or to it, though neither drive nor loop sent them."""
+
+from collections.abc import Mapping
+
+from drivers.can.frames import Frame
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, Message, arbitration_id
+from simulation.devices.drive import Forgery
+
+WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
+OLD_FIRMWARE = (2, 4, 4, 58, 0, 5, 6, 0)
+
+FORGERIES: Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]] = {  # message, values, and bytes after them
+    Forgery.EMERGENCY_STOP: (codec.ESTOP, (), b""),
+    Forgery.CLOSE_LOOP: (codec.SET_AXIS_STATE, (AxisState.CLOSED_LOOP,), b""),
+    Forgery.OLD_FIRMWARE: (codec.GET_VERSION, OLD_FIRMWARE, b""),
+    Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
+    Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
+}
+
+
+def forged_frame(node_id: int, forgery: Forgery) -> Frame:
+    message, values, value = FORGERIES[forgery]
+    return Frame(arbitration_id(node_id, message), message.encode(*values) + value)
+
+
+def forged_current(node_id: int, current_a: float) -> Frame:
+    """Reports a current that is also the set-point, as of a drive that follows another torque."""
+    return Frame(arbitration_id(node_id, codec.GET_IQ), codec.GET_IQ.encode(current_a, current_a))
+
+
+def forged_torque(node_id: int, torque_nm: float) -> Frame:
+    """Commands a torque of the motor."""
+    return Frame(arbitration_id(node_id, codec.SET_INPUT_TORQUE), codec.SET_INPUT_TORQUE.encode(torque_nm))
