@@ -132,7 +132,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         recorder = open_recorder(configuration)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         loop = _make_loop(configuration, drives, pose, recorder, failures)
-        warnings: list[str] = []
+        warnings = status.warnings
         calls = OperatorCalls(loop, warnings, time.monotonic)
         status.methods = with_failures(calls.methods, failures, loop.events.report, time.monotonic)
         status.on_hang_up = loop.lease.hang_up

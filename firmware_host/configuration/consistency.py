@@ -18,6 +18,7 @@ from firmware_host.configuration.toml_records import shown
 
 LONGEST_INTERFACE = 15  # IFNAMSIZ with its final zero
 LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
+LONGEST_STATUS_PATH = 97  # the operators' own socket next to it has a name with 10 bytes more
 ROUNDING = 1e-6  # relative error of a number that a file gives with few digits
 ORDERED = (  # pairs of keys, the first of which must be at most the second
     ("faults.late_s", "faults.quiet_s"),  # milder reactions come first
@@ -47,9 +48,12 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
     name, status, pose = configuration.robot.name, configuration.status.socket, configuration.pose.socket
     if not re.fullmatch(r"[\w.-]{1,64}", name, re.ASCII) or name.startswith("."):
         yield f"robot.name = {name!r}: must be 1 to 64 letters, digits, dots, dashes or underscores"
-    for key, path in (("status.socket", status), ("pose.socket", pose)):
-        if "\0" in path or len(path.encode()) > LONGEST_SOCKET_PATH:
-            yield f"{key} = {path!r}: must be at most {LONGEST_SOCKET_PATH} bytes long, without a zero byte"
+    for key, path, longest in (
+        ("status.socket", status, LONGEST_STATUS_PATH),
+        ("pose.socket", pose, LONGEST_SOCKET_PATH),
+    ):
+        if "\0" in path or len(path.encode()) > longest:
+            yield f"{key} = {path!r}: must be at most {longest} bytes long, without a zero byte"
     if not status:
         yield "status.socket = '': must name a socket"
     if pose and pose == status:

@@ -1,7 +1,8 @@
-"""The file of a listening Unix socket: open to every user, and replaced if a dead daemon left it.
+"""The file of a listening Unix socket: open to every user or to one group, and replaced if a dead daemon left it.
 
 Connecting requires the right to write to the file and to enter its folder. The credentials of a connection decide what
-it may do (rights.py), not the file: an existing folder keeps its permissions, and a new one is open to every user.
+it may do (rights.py), not the file: an existing folder keeps its permissions, and a new one is open to every user. The
+operators' own file admits their group alone.
 
 Symbolic links are not followed, and only a dead socket is removed: never a file, a link, or the socket of a daemon that
 lives or hangs. A folder that every user may write to is refused, since any user could replace the socket there.
@@ -16,7 +17,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 PROBE_S = 1.0  # the longest wait for a daemon to accept a connection
-OPEN_FILE, OPEN_FOLDER = 0o666, 0o755
+OPEN_FILE, GROUP_FILE, OPEN_FOLDER = 0o666, 0o660, 0o755
+OPERATORS = "-operators"  # in the name of their own socket
+
+
+def operators_path(path: Path) -> Path:
+    """Return the path of the operators' own socket, next to the socket for every user."""
+    return path.with_name(f"{path.stem}{OPERATORS}{path.suffix}")
 
 
 class AlreadyServedError(Exception):
@@ -26,8 +33,11 @@ class AlreadyServedError(Exception):
 class SocketFile:
     """Owns the listening socket and its file."""
 
-    def __init__(self, path: Path, backlog: int) -> None:
-        """Bind and listen; raises AlreadyServedError, or OSError if the path cannot be bound."""
+    def __init__(self, path: Path, backlog: int, group: int | None = None) -> None:
+        """Bind and listen, for one group where it is given.
+
+        Raises AlreadyServedError, or OSError if the path cannot be bound.
+        """
         with _umask(0o777 & ~OPEN_FOLDER):
             path.parent.mkdir(parents=True, exist_ok=True)
         _refuse_open_folder(path.parent)
@@ -35,7 +45,8 @@ class SocketFile:
         self.path = path
         self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self.listener.setblocking(False)
-        _bind(self.listener, path)
+        _bind(self.listener, path, OPEN_FILE if group is None else GROUP_FILE)
+        self.has_group = group is None or _give_to(path, group)
         self._identity = _identity(path)
         self.listener.listen(backlog)
 
@@ -46,9 +57,18 @@ class SocketFile:
             self.path.unlink(missing_ok=True)
 
 
-def _bind(listener: socket.socket, path: Path) -> None:
+def _give_to(path: Path, group: int) -> bool:
+    """Give the file to a group; returns whether this was permitted: of its own files, to a group of its own."""
     try:
-        with _umask(0o777 & ~OPEN_FILE):
+        os.chown(path, -1, group, follow_symlinks=False)  # fchown would change the socket instead of its file
+    except PermissionError:
+        return False
+    return True
+
+
+def _bind(listener: socket.socket, path: Path, mode: int) -> None:
+    try:
+        with _umask(0o777 & ~mode):
             listener.bind(str(path))
     except OSError as problem:
         listener.close()

@@ -9,6 +9,7 @@ from typing import Any
 import msgpack
 
 from firmware_host.operator.rpc import NOT_PERMITTED, REQUEST
+from firmware_host.operator.socket_file import operators_path
 
 ANSWER_S = 5.0
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
@@ -34,20 +35,26 @@ class CallRefusedError(Exception):
 
 
 class StatusClient:
+    """Connects through the operators' own socket where this user may, else through the one for every user."""
+
     def __init__(self, path: Path, timeout_s: float = ANSWER_S) -> None:
         self._path = path
         self._number = 0
         self._unpacker = msgpack.Unpacker(raw=False)
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        patience = TIMEVAL.pack(*divmod(int(1e6 * timeout_s), 10**6))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
         try:
-            self._socket.connect(str(path))  # blocking: with Python's own timeout a full queue is an error at once
-        except PermissionError as problem:
-            raise NotPermittedError(f"no permission to use {path}: its folder lets only its owner in") from problem
-        except OSError as problem:
-            raise NoDaemonError(f"no daemon answers on {path}") from problem
+            self._socket = _connected(operators_path(path), timeout_s)
+        except OSError:
+            self._socket = self._connect_as_anyone(timeout_s)
         self._socket.settimeout(timeout_s)
+
+    def _connect_as_anyone(self, timeout_s: float) -> socket.socket:
+        try:
+            return _connected(self._path, timeout_s)
+        except PermissionError as problem:
+            why = f"no permission to use {self._path}: its folder lets only its owner in"
+            raise NotPermittedError(why) from problem
+        except OSError as problem:
+            raise NoDaemonError(f"no daemon answers on {self._path}") from problem
 
     @property
     def daemon_pid(self) -> int:
@@ -91,3 +98,15 @@ class StatusClient:
 
     def close(self) -> None:
         self._socket.close()
+
+
+def _connected(path: Path, timeout_s: float) -> socket.socket:
+    """Return a connected socket; raises OSError. A full queue is waited for: with Python's own timeout it would not."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, TIMEVAL.pack(*divmod(int(1e6 * timeout_s), 10**6)))
+        connection.connect(str(path))
+    except BaseException:
+        connection.close()
+        raise
+    return connection

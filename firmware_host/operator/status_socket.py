@@ -2,14 +2,16 @@
 
 The loop calls `serve` once a tick. It never waits, answers at most one request, and takes the clients in turn. Every
 client has bounded buffers, a bounded rate and a bounded time to send a request: faster requests wait in the kernel, and
-malformed ones get an error and end the connection. When all connections are in use, the user with the most of them
-loses one, so that no user can exclude another; the holder of the lease keeps its own. A method with a bug answers with
-an error and is logged: it does not stop the robot.
+malformed ones get an error and end the connection. A method with a bug answers with an error and is logged: it does not
+stop the robot.
+
+There are two listeners. Every user may connect to the first one. The second one is for operators: the permissions of
+its file admit them alone, so its queue and its places stay free when other accounts fill those of the first.
 """
 
 import select
 import socket
-from collections import Counter
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -18,11 +20,15 @@ from typing import Any
 import msgpack
 
 from firmware_host.operator.connection import LONGEST_BACKLOG, NOTHING, Caller, Client
+from firmware_host.operator.listener import Listener
 from firmware_host.operator.rights import Peer, Rights, read_peer
 from firmware_host.operator.rpc import RESPONSE, MalformedError, RefusedError, read_params, read_shape
-from firmware_host.operator.socket_file import SocketFile
+from firmware_host.operator.socket_file import SocketFile, operators_path
 
-MOST_CLIENTS = 16
+MOST_CLIENTS, MOST_OPERATORS = 16, 8  # of the socket for every user, and of the operators' own
+BACKLOG = 4096  # connections that wait to be accepted; the kernel limits it to net.core.somaxconn
+MOST_ACCEPTS, ACCEPTING_S = 32, 0.0004  # in one tick: the time is 15 % of its period
+MOST_EVENTS = 8  # handled in one tick; the kernel reports the others in the next ones, in turn
 
 Methods = Mapping[str, Callable[[dict[str, Any], Caller], Any]]
 
@@ -36,8 +42,9 @@ class StatusSocket:
         methods: Methods,
         rights: Rights,
         peer_of: Callable[[socket.socket], Peer] = read_peer,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Raises AlreadyServedError, or OSError if the path cannot be bound."""
+        """Raises AlreadyServedError, or OSError if a path cannot be bound."""
         self.path = path
         self.methods = methods
         self.report_bug: Callable[[str], None] = lambda message: None
@@ -45,19 +52,36 @@ class StatusSocket:
         self.is_protected: Callable[[Caller], bool] = lambda caller: False  # its disconnection would stop the robot
         self._rights = rights
         self._peer_of = peer_of
-        self._file = SocketFile(path, MOST_CLIENTS)
-        self._listener = self._file.listener
+        self.clock = clock
+        self._for_everyone = Listener(SocketFile(path, BACKLOG), MOST_CLIENTS)
+        self._for_operators = self._open_for_operators(path)
+        self._turns = [self._for_operators, self._for_everyone]  # the next one to answer comes first
         self._poll = select.epoll()
-        self._poll.register(self._listener.fileno(), select.EPOLLIN)
-        self._clients: dict[int, Client] = {}  # ordered by their last message, oldest first
-        self._waiting: dict[int, None] = {}  # clients that may have an unanswered request, in turn
+        for listener in self._turns:
+            self._poll.register(listener.file.listener.fileno(), select.EPOLLIN)
+        self._listeners: dict[int, Listener] = {}  # of every client, by its descriptor
         self._accepted = self._malformed = self._not_permitted = self._too_slow = self._made_room = 0
+
+    def _open_for_operators(self, path: Path) -> Listener:
+        try:
+            file = SocketFile(operators_path(path), BACKLOG, self._rights.operators.gid)
+        except BaseException:
+            self._for_everyone.file.close()
+            raise
+        return Listener(file, MOST_OPERATORS)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Why operators share the socket of all users, if they do."""
+        group = self._rights.operators.name
+        problem = f"the group {group} cannot be given a socket of its own, so other accounts may delay its commands"
+        return [] if self._for_operators.file.has_group else [f"{problem}: make the daemon's user a member of {group}"]
 
     @property
     def counters(self) -> dict[str, int]:
         """Counts since the start, and the number of present clients."""
         return {
-            "clients": len(self._clients),
+            "clients": len(self._listeners),
             "accepted_clients": self._accepted,
             "malformed_requests": self._malformed,
             "not_permitted": self._not_permitted,
@@ -67,25 +91,38 @@ class StatusSocket:
 
     def serve(self, now_s: float) -> None:
         """Accept, read and send as far as possible without waiting, and answer at most one request."""
-        for descriptor, events in self._poll.poll(0.0):
-            if descriptor == self._listener.fileno():
-                self._accept()
-            elif descriptor in self._clients:
-                self._handle_events(descriptor, events)
+        for descriptor, events in self._poll.poll(0.0, MOST_EVENTS):
+            if listener := self._listeners.get(descriptor):
+                self._handle_events(listener, descriptor, events)
+            else:
+                self._accept_some(descriptor)
         self._answer_next(now_s)
-        for descriptor in [each for each, client in self._clients.items() if client.is_overdue(now_s)]:
-            self._too_slow += 1
-            self._drop(descriptor)
+        for listener in self._turns:
+            for descriptor in [each for each, client in listener.clients.items() if client.is_overdue(now_s)]:
+                self._too_slow += 1
+                self._drop(descriptor)
 
-    def _accept(self) -> None:
+    def _accept_some(self, descriptor: int) -> None:
+        """Accept clients for a bounded time, and until a user loses its only connection: that one was just accepted."""
+        listener = next((each for each in self._turns if each.file.listener.fileno() == descriptor), None)
+        if listener is None:  # a client that was dropped while these events were handled
+            return
+        until_s = self.clock() + ACCEPTING_S
+        for _ in range(MOST_ACCEPTS):
+            if not self._accept(listener) or self.clock() >= until_s:
+                return
+
+    def _accept(self, listener: Listener) -> bool:
+        """Accept one client; returns whether another one may follow in this tick."""
         try:
-            connection, _ = self._listener.accept()
-        except OSError:  # the client disconnected before it was accepted
-            return None
+            connection, _ = listener.file.listener.accept()
+        except OSError:  # none waits, or it disconnected before it was accepted
+            return False
         try:
             peer = self._peer_of(connection)
         except OSError:
-            return connection.close()
+            connection.close()
+            return True
         level = self._rights.level(peer)
         connection.setblocking(False)
         refused = self._rights.refusal_to_connect(level)
@@ -93,54 +130,52 @@ class StatusSocket:
             self._not_permitted += 1
             with connection, suppress(OSError):  # the client may have disconnected already
                 connection.send(msgpack.packb([RESPONSE, None, refused, None]))
-            return None
+            return True
         self._accepted += 1
-        if len(self._clients) >= MOST_CLIENTS:
-            self._drop_for(peer)
-        caller = Caller(self._accepted, peer, level)
-        client = self._clients[connection.fileno()] = Client(connection, caller)
+        more = not listener.is_full or self._make_room(listener, peer)
+        client = Client(connection, Caller(self._accepted, peer, level))
+        listener.add(connection.fileno(), client)
+        self._listeners[connection.fileno()] = listener
         client.watched = select.EPOLLIN
-        return self._poll.register(connection.fileno(), client.watched)
+        self._poll.register(connection.fileno(), client.watched)
+        return more
 
-    def _drop_for(self, newcomer: Peer) -> None:
-        """Drop the longest silent client of the user with the most connections; of equal users, the less privileged."""
-        connections = Counter(client.caller.peer.uid for client in self._clients.values())
-        connections[newcomer.uid] += 1
-
-        def claim(descriptor: int) -> tuple[int, int, bool]:
-            caller = self._clients[descriptor].caller
-            return connections[caller.peer.uid], -caller.level, descriptor not in self._waiting
-
-        candidates = [each for each, client in self._clients.items() if not self.is_protected(client.caller)]
+    def _make_room(self, listener: Listener, newcomer: Peer) -> bool:
+        """Drop a client for a newcomer; returns whether its user has others."""
+        victim = listener.choose_victim(newcomer, self.is_protected)
         self._made_room += 1
-        self._drop(max(candidates or self._clients, key=claim))  # the first of equals
+        self._drop(victim.descriptor)
+        return not victim.is_only
 
-    def _handle_events(self, descriptor: int, events: int) -> None:
+    def _handle_events(self, listener: Listener, descriptor: int, events: int) -> None:
         """Read from a client, unless an earlier request of it still waits; further data stays in the kernel."""
-        client = self._clients[descriptor]
+        client = listener.clients[descriptor]
         if events & select.EPOLLHUP:
             self.on_hang_up(client.caller)
-        if events & (select.EPOLLIN | select.EPOLLHUP) and descriptor not in self._waiting and not client.ended:
-            self._clients[descriptor] = self._clients.pop(descriptor)  # to the end of the order
+        if events & (select.EPOLLIN | select.EPOLLHUP) and descriptor not in listener.waiting and not client.ended:
+            listener.clients[descriptor] = listener.clients.pop(descriptor)  # to the end of the order
             try:
                 client.receive()
-                self._waiting[descriptor] = None
+                listener.waiting[descriptor] = None
             except MalformedError as problem:
                 self._reject(client, str(problem))
             except OSError:
                 return self._drop(descriptor)
-        return self._flush(descriptor)
+        return self._flush(listener, descriptor)
 
     def _answer_next(self, now_s: float) -> None:
-        """Answer the first client in turn whose request rate permits it."""
-        for descriptor in self._waiting:
-            if self._clients[descriptor].may_request(now_s):
-                del self._waiting[descriptor]
-                return self._answer_one(descriptor, now_s)
+        """Answer one request. The listeners take turns, so that neither's clients wait for all of the other's."""
+        for listener in self._turns:
+            while listener.waiting and (descriptor := listener.next_to_answer(now_s)) is not None:
+                if self._answer_one(listener, descriptor, now_s):
+                    self._turns.remove(listener)
+                    return self._turns.append(listener)
         return None
 
-    def _answer_one(self, descriptor: int, now_s: float) -> None:
-        client = self._clients[descriptor]
+    def _answer_one(self, listener: Listener, descriptor: int, now_s: float) -> bool:
+        """Answer one request of a client; returns whether it had one."""
+        client = listener.clients[descriptor]
+        message: Any = None
         try:
             message = client.next_message(now_s)
             request = None if message is NOTHING else read_shape(message)
@@ -149,9 +184,10 @@ class StatusSocket:
         else:
             if request is not None:
                 client.budget -= 1.0
-                self._waiting[descriptor] = None  # another request may follow
+                listener.waiting[descriptor] = None  # another request may follow
                 self._answer(client, *request)
-        self._flush(descriptor)
+        self._flush(listener, descriptor)
+        return message is not NOTHING
 
     def _answer(self, client: Client, number: int, method: str, params: Any) -> None:
         if method not in self.methods:
@@ -174,22 +210,22 @@ class StatusSocket:
         client.send([RESPONSE, None, message, None])
         client.closing = True
 
-    def _flush(self, descriptor: int) -> None:
+    def _flush(self, listener: Listener, descriptor: int) -> None:
         """Send pending answers; drop a client that is rejected, too slow, or finished."""
-        client = self._clients[descriptor]
+        client, waiting = listener.clients[descriptor], listener.waiting
         try:
             client.flush()
         except OSError:  # the client has disconnected; its earlier requests still count
             client.ended = True
             client.outgoing.clear()
-            self._waiting.setdefault(descriptor)
+            waiting.setdefault(descriptor)
         slow = len(client.outgoing) > LONGEST_BACKLOG
         self._too_slow += slow
-        done = client.ended and descriptor not in self._waiting and not client.outgoing
+        done = client.ended and descriptor not in waiting and not client.outgoing
         if done or slow or client.closing:
             self._drop(descriptor)
         else:
-            self._watch(client, descriptor in self._waiting)
+            self._watch(client, descriptor in waiting)
 
     def _watch(self, client: Client, waits: bool) -> None:
         wanted = 0 if client.ended or waits else select.EPOLLIN
@@ -199,14 +235,15 @@ class StatusSocket:
             self._poll.modify(client.connection.fileno(), wanted)
 
     def _drop(self, descriptor: int) -> None:
-        client = self._clients.pop(descriptor)
+        listener = self._listeners.pop(descriptor)
+        client = listener.remove(descriptor)
         self._poll.unregister(descriptor)
         client.connection.close()
-        self._waiting.pop(descriptor, None)
         self.on_hang_up(client.caller)
 
     def close(self) -> None:
-        for descriptor in list(self._clients):
+        for descriptor in list(self._listeners):
             self._drop(descriptor)
         self._poll.close()
-        self._file.close()
+        for listener in self._turns:
+            listener.file.close()

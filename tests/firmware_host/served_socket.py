@@ -13,6 +13,7 @@ from control.rate import PERIOD_S
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.rights import Group, Peer, Rights
 from firmware_host.operator.rpc import RefusedError
+from firmware_host.operator.socket_file import operators_path
 from firmware_host.operator.status_socket import StatusSocket
 
 
@@ -38,8 +39,12 @@ OPERATOR, READER, OTHER_USER = (
 class Served(StatusSocket):
     def __init__(self, path: Path, rights: Rights = RIGHTS) -> None:
         self.coming: list[Peer] = []
-        super().__init__(path, METHODS, rights, lambda connection: self.coming.pop(0))
+        super().__init__(path, METHODS, rights, self._next_peer, clock=lambda: self.now_s)
         self.now_s = 1000.0
+
+    def _next_peer(self, connection: socket.socket) -> Peer:
+        """Return the credentials of the next test client; an operator's on the operators' socket."""
+        return OPERATOR if connection.getsockname() == str(operators_path(self.path)) else self.coming.pop(0)
 
     def tick(self, ticks: int = 1) -> None:
         for _ in range(ticks):

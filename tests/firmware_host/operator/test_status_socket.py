@@ -93,7 +93,7 @@ def test_a_request_counts_although_its_client_has_disconnected(served: Served) -
     gone.close()
     serve(served, 30)
     assert done == ["disarm"]
-    assert len(served._clients) == 1
+    assert served.counters["clients"] == 1
 
 
 def test_a_client_that_stopped_sending_still_gets_a_long_answer(served: Served) -> None:
@@ -109,7 +109,7 @@ def test_a_client_that_stopped_sending_still_gets_a_long_answer(served: Served) 
             received += client.recv(65536)
     ((_, _, _, result),) = unpacked(bytes(received))
     assert len(result) == 300_000
-    assert served._clients == {}
+    assert served.counters["clients"] == 0
 
 
 def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
