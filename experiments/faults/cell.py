@@ -2,8 +2,8 @@
 
 Ticks are counted by the loop from the injection on. The robot has reacted when its mode is at least as strict as the
 fault's kind demands; where the mode was that strict before, or the fault only blocks arming, when the fault is
-reported. Torque is that of the simulated motors. After the failure is over, the robot is observed for a while: nothing
-may arm it.
+reported. Torque and energy are those of the simulated motors. After the failure is over, the robot is observed for a
+while: nothing may arm it.
 """
 
 from math import radians
@@ -14,19 +14,18 @@ from control.modes import ENERGISED, Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.rate import PERIOD_S
 from experiments.faults.bench import FaultBench
+from experiments.faults.energy_bounds import DELAY_TICKS, SLEWING_TICKS, WATCHDOG_TICKS
 from experiments.faults.evaluation import LONGEST_STOP_S, Cell, problems
 from experiments.faults.failure_modes import BY_NAME, REPORTED_S, FailureMode
+from experiments.faults.motor_energy import MotorEnergy
 from experiments.faults.phases import bench_for, enter_phase
 
 STRICTNESS = {  # arming has no torque yet
     Mode.BOOT: 4, Mode.IDLE: 4, Mode.FAULT: 4, Mode.DAMPING: 3, Mode.STOPPING: 2, Mode.HOLD: 1, Mode.ARMING: 1,
     Mode.WALKING: 0,
 }  # fmt: skip
-WATCHDOG_TICKS = 40  # 0.1 s, and one tick for the command to the drive and one for its answer
 BUG_BOUND_TICKS = 2
 FORBIDDEN_TICKS = 80  # two heartbeats: a drive reports closed loop and is commanded idle again
-DELAY_TICKS = 2  # from the loop's torque to the motor's
-SLEWING_TICKS = 3  # from full torque to the largest damping in the other direction, at the torque's slew rate
 AFTER_S = 1.0  # in which nothing may come back
 WALKED_ON_S = 0.3  # with a fault that does not stop the robot
 
@@ -58,13 +57,15 @@ def _inject_and_measure(mode: FailureMode, cell: Cell, random: Random) -> None:
 def _reaction_text(mode: FailureMode) -> str:
     if mode.kind:
         return mode.kind.reaction.name.lower()
-    return "none" if mode.fault == "none" else "drives_idle"
+    return "drives_idle" if mode.ends_loop else "none"
 
 
 def _bound_ticks(mode: FailureMode) -> int | None:
     if mode.kind:
         return mode.bound_ticks or mode.kind.bound_ticks
-    return {"none": None, "bug_in_the_tick": BUG_BOUND_TICKS}.get(mode.fault, WATCHDOG_TICKS)
+    if not mode.ends_loop:
+        return None
+    return BUG_BOUND_TICKS if mode.ends_daemon else WATCHDOG_TICKS
 
 
 class Measurement:
@@ -85,6 +86,7 @@ class Measurement:
         self._disarmed_steps = 0
         self._missing_rows = bench.loop_ticks - bench.rows.ticks
         self._travel_rad = 0.0
+        self._energy = MotorEnergy(bench, mode)
 
     def run(self, duration_s: float, until_reported: bool = False) -> None:
         most_ticks = self._failure_mode.kind.bound_ticks * 2 + 10 if until_reported and self._failure_mode.kind else 0
@@ -108,7 +110,7 @@ class Measurement:
     def _walks_on(self) -> bool:
         kind = self._failure_mode.kind
         if kind is None:
-            return self._failure_mode.fault == "none"
+            return not self._failure_mode.ends_loop
         return kind.reaction < Reaction.HOLD and self._cell.phase != "idle"
 
     def _step(self) -> None:
@@ -199,17 +201,13 @@ class Measurement:
 
     @property
     def _longest_off_ticks(self) -> int:
-        return (
-            WATCHDOG_TICKS
-            if self._failure_mode.no_commands or self._bench.dead and not self._bench.bug
-            else DELAY_TICKS
-        )
+        unreachable = self._failure_mode.no_commands or self._bench.dead and not self._bench.bug
+        return WATCHDOG_TICKS if unreachable else DELAY_TICKS
 
     def _measure_damping(self, torque_nm: float) -> None:
         damping = self._bench.loop.mode is Mode.DAMPING
         self._damping_steps = self._damping_steps + 1 if damping else 0
-        unreachable = self._failure_mode.no_commands and self._steps <= WATCHDOG_TICKS
-        if self._damping_steps > SLEWING_TICKS + DELAY_TICKS and not unreachable:
+        if self._damping_steps > SLEWING_TICKS + self._longest_off_ticks:
             self._cell.damping_torque_nm = max(self._cell.damping_torque_nm, torque_nm)
 
     def _end(self) -> None:
@@ -221,9 +219,10 @@ class Measurement:
         cell.rows_lost = bench.loop_ticks - bench.rows.ticks - self._missing_rows
         if self._steps - self._last_torque_steps > DELAY_TICKS:
             cell.zero_torque_ticks = self._last_torque_steps
+        self._energy.record(cell, self._steps * PERIOD_S)
         if not self._walks_on:
             cell.travel_rad = self._travel_rad
-        if self._failure_mode.kind is None and self._failure_mode.fault != "none":
+        if self._failure_mode.ends_loop:
             cell.reaction_ticks = cell.zero_torque_ticks
 
 

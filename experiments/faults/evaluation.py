@@ -30,6 +30,10 @@ class Cell:
     peak_torque_nm: float = 0.0  # of any motor since the injection
     damping_torque_nm: float = 0.0  # after the start of damping
     zero_torque_ticks: int | None = None  # from the injection to the last torque; None where there is torque at the end
+    energy_j: float = 0.0  # that its motor put into the joint that received most, since the injection
+    energy_bound_j: float = 0.0
+    pushed_ticks: int = 0  # against an end stop by the motor
+    pushed_bound_ticks: int = 0
     travel_rad: float | None = None  # of the joint that moved most, where the walk ends
     stop_s: float | None = None  # from a soft stop or damping to idle drives
     true_too: list[str] = field(default_factory=list)  # other faults of joints that are true in the plant
@@ -47,6 +51,8 @@ def problems(cell: Cell, mode: FailureMode) -> Iterator[str]:
     if mode.fault == "none":
         if cell.reported:
             yield f"without a failure it reported {', '.join(cell.reported)}"
+        return
+    if not mode.demands_reaction:
         return
     yield from _late(cell)
     others = set(cell.reported) - {cell.fault, *cell.true_too, *CONSEQUENCES.get(cell.fault, ())}
@@ -68,10 +74,19 @@ def _always_wrong(cell: Cell, mode: FailureMode) -> Iterator[str]:
         yield f"an exception escaped: {cell.exception}"
     if not cell.disarmed:
         yield "torque or closed loop came back by itself"
-    if cell.rows_lost > (1 if mode.ends_daemon else 0):
+    if cell.rows_lost > (1 if mode.ends_daemon else 0) and not mode.loses_rows:
         yield f"{counted(cell.rows_lost, 'row')} missing in the log"
+    yield from _out_of_bounds(cell)
     if cell.damping_torque_nm > DAMPING_NM + 1e-6:
         yield f"{cell.damping_torque_nm:.3f} N·m while damping, {DAMPING_NM} are the most"
+
+
+def _out_of_bounds(cell: Cell) -> Iterator[str]:
+    if cell.energy_j > cell.energy_bound_j:
+        yield f"a motor put {cell.energy_j:.2f} J into its joint, {cell.energy_bound_j:.2f} J are the most"
+    if cell.pushed_ticks > cell.pushed_bound_ticks:
+        pushed = counted(cell.pushed_ticks, "tick")
+        yield f"a motor pushed its joint against the end stop for {pushed}, {cell.pushed_bound_ticks} are the most"
 
 
 def _late(cell: Cell) -> Iterator[str]:

@@ -48,6 +48,7 @@ NO_SPACE = "Nothing can be written to the log: No space left on device."
 REPORTED_S = 0.0  # the failure lasts until its fault is reported
 TURNING_JOINT = {"insertion": "adduction", "stance": "sweep", "extraction": "adduction", "swing": "sweep"}
 MOVING = ("hold", *GAIT, "stopping")
+DAEMON_FAULTS = ("daemon_killed", "daemon_hung", "bug_in_the_tick")
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,9 @@ class FailureMode:
     ends_daemon: bool = False
     bound_ticks: int | None = None  # where this mode is detected sooner than the kind's bound
     turns: bool = False  # only a joint that turns in the phase is chosen: it is detected at no other
+    demands_reaction: bool = True  # False: any reaction will do, as long as no motor puts in too much energy
+    torque_nm: float = 0.0  # of another program's commands, above the torque limit
+    loses_rows: bool = False  # of the log
 
     @property
     def name(self) -> str:
@@ -72,6 +76,11 @@ class FailureMode:
         """Return the joints from which one is drawn."""
         turning = TURNING_JOINT.get(phase, "") if self.turns else ""
         return tuple(joint for joint in JOINTS if joint.endswith(turning))
+
+    @property
+    def ends_loop(self) -> bool:
+        """Return whether the failure is one of the daemon's own, whose loop ends or hangs."""
+        return self.fault in DAEMON_FAULTS
 
     @property
     def kind(self) -> FaultKind | None:

@@ -55,7 +55,10 @@ class Plan:
 
 @dataclass(frozen=True)
 class ModeSummary:
-    """One failure mode over all of its cells: the slowest reaction, the largest torque and travel."""
+    """One failure mode over all of its cells: the slowest reaction, the largest torque, energy and travel.
+
+    The energy is that of the cell that comes closest to its bound.
+    """
 
     mode_name: str = field(metadata={"key": "way"})
     fault: str
@@ -65,6 +68,8 @@ class ModeSummary:
     slowest_ticks: int | None
     bound_ticks: int | None
     peak_torque_nm: float
+    energy_j: float
+    energy_bound_j: float
     travel_rad: float | None
 
 
@@ -102,6 +107,7 @@ def report_of(plan: Plan, cells: Sequence[Cell]) -> FaultsReport:
 
 def _summary(cells: Sequence[Cell]) -> ModeSummary:
     first = cells[0]
+    closest = max(cells, key=lambda cell: cell.energy_j - cell.energy_bound_j)
     return ModeSummary(
         mode_name=first.mode_name,
         fault=first.fault,
@@ -111,5 +117,7 @@ def _summary(cells: Sequence[Cell]) -> ModeSummary:
         slowest_ticks=max((cell.reaction_ticks for cell in cells if cell.reaction_ticks is not None), default=None),
         bound_ticks=first.bound_ticks,
         peak_torque_nm=max(cell.peak_torque_nm for cell in cells),
+        energy_j=closest.energy_j,
+        energy_bound_j=closest.energy_bound_j,
         travel_rad=max((cell.travel_rad for cell in cells if cell.travel_rad is not None), default=None),
     )

@@ -18,7 +18,10 @@ DARK_PERCENT = 65.0  # from here on letters are white
 
 
 def plot_faults(report: FaultsReport, path: Path) -> None:
-    """Draw the ticks of the slowest seed, coloured by their fraction of the bound; a red cross is a failed cell."""
+    """Draw the ticks of the slowest seed, coloured by their fraction of the bound; a red cross is a failed cell.
+
+    The label of a row has the bound of the ticks, and the energy of a motor with its bound.
+    """
     rows = report.faults
     phases = [phase for phase in report.settings.phases if any(cell.phase == phase for cell in report.cells)]
     columns = min(COLUMNS, len(rows))
@@ -57,7 +60,7 @@ def _plot_panel(panel: Axes, report: FaultsReport, rows: Sequence[ModeSummary], 
 
 def _label(row: ModeSummary) -> str:
     bound = "" if row.bound_ticks is None else f"  ≤ {row.bound_ticks}"
-    return f"{row.mode_name}{bound}"
+    return f"{row.mode_name}{bound}  {row.energy_j:.1f} ≤ {row.energy_bound_j:.1f} J"
 
 
 def _write_cell(panel: Axes, x: int, y: int, cells: Sequence[Cell]) -> float:

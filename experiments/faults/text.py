@@ -6,6 +6,10 @@ from experiments.faults.matrix import FaultsReport
 from experiments.reports.text_tables import number, table
 from experiments.trials.session import Ending, Finding, screen_finding
 
+HEAD = (
+    "fault", "reaction", "ok", "slowest (ticks)", "bound", "peak torque (N·m)", "energy (J)", "bound", "travel (rad)",
+)  # fmt: skip
+
 
 def faults_finding(report: FaultsReport) -> Finding:
     from experiments.faults.plots import plot_faults  # matplotlib takes its time
@@ -15,7 +19,6 @@ def faults_finding(report: FaultsReport) -> Finding:
 
 
 def faults_text(report: FaultsReport) -> str:
-    head = ["fault", "reaction", "ok", "slowest (ticks)", "bound (ticks)", "peak torque (N·m)", "travel (rad)"]
     rows = [
         [
             row.mode_name,
@@ -24,6 +27,8 @@ def faults_text(report: FaultsReport) -> str:
             number(row.slowest_ticks, 0),
             number(row.bound_ticks, 0),
             number(row.peak_torque_nm, 2),
+            number(row.energy_j, 2),
+            number(row.energy_bound_j, 2),
             number(row.travel_rad, 2),
         ]
         for row in report.faults
@@ -33,4 +38,4 @@ def faults_text(report: FaultsReport) -> str:
         for cell in report.cells
         if not cell.ok
     ]
-    return "\n".join([table([head, *rows]), "", *failed, f"{report.ok} of {len(report.cells)} cells ok"])
+    return "\n".join([table([HEAD, *rows]), "", *failed, f"{report.ok} of {len(report.cells)} cells ok"])

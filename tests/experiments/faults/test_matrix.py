@@ -148,6 +148,8 @@ def test_a_good_cell_has_no_problem() -> None:
         ({"mode": "hold"}, "mode hold"),
         ({"stop_s": 3.3}, "3.3 s"),
         ({"exception": "KeyError: 1"}, "KeyError"),
+        ({"energy_j": 0.51, "energy_bound_j": 0.5}, "0.51 J"),
+        ({"pushed_ticks": 6, "pushed_bound_ticks": 5}, "end stop"),
     ],
 )
 def test_every_deviation_fails_the_cell(change: dict[str, Any], word: str) -> None:

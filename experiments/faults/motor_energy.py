@@ -1,0 +1,60 @@
+"""The energy that the motors put into the joints of one cell since the injection, and the bound that applies to it."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from control.faults import FAULT_KINDS, Reaction
+from control.modes import Mode
+from control.rate import PERIOD_S
+from experiments.faults.bench import FaultBench
+from experiments.faults.energy_bounds import (
+    DELAY_TICKS,
+    SLEWING_TICKS,
+    STOPPING,
+    WATCHDOG_TICKS,
+    detection_ticks,
+    energy_bounds,
+)
+from experiments.faults.evaluation import Cell
+from experiments.faults.failure_modes import FailureMode
+from simulation.harness.joint_energy import JointEnergy
+
+REACTING_TICKS = SLEWING_TICKS + DELAY_TICKS
+
+
+class MotorEnergy:
+    """Owns the work of the motors since it was made."""
+
+    def __init__(self, bench: FaultBench, mode: FailureMode) -> None:
+        configuration = bench.loop.configuration
+        self._failure_mode = mode
+        self._bounds = energy_bounds(configuration)
+        if mode.torque_nm:
+            self._bounds = replace(self._bounds, torque_nm=mode.torque_nm)
+        self._walks = bench.loop.mode in (Mode.WALKING, Mode.STOPPING)
+        self._work = JointEnergy(bench.robot, configuration.joint_ranges)
+
+    def record(self, cell: Cell, duration_s: float) -> None:
+        """Write the energy in the `duration_s` since the injection and its bound into the cell."""
+        cell.energy_j, cell.energy_bound_j = self._work.energy_j, self._bound_j(cell.reported, duration_s)
+        cell.pushed_ticks, cell.pushed_bound_ticks = round(self._work.pushed_s / PERIOD_S), self._pushing_ticks
+
+    def _bound_j(self, reported: Iterable[str], duration_s: float) -> float:
+        mode, bounds = self._failure_mode, self._bounds
+        if mode.ends_loop:
+            return bounds.stopping_j(WATCHDOG_TICKS, Reaction.DRIVES_IDLE)
+        if mode.kind and mode.kind.reaction in STOPPING:
+            ticks = WATCHDOG_TICKS if mode.no_commands else 0
+            return bounds.stopping_j(max(detection_ticks(mode.kind), ticks), mode.kind.reaction)
+        if self._walks:
+            return bounds.walking_j(duration_s)
+        raises = any(FAULT_KINDS[name].reaction is Reaction.SOFT_STOP for name in reported)
+        return bounds.kinetic_j + (bounds.torque_nm * bounds.raising_rad if raises else 0.0)
+
+    @property
+    def _pushing_ticks(self) -> int:
+        """Return the ticks for which a motor may push against an end stop: until the reaction takes effect."""
+        mode = self._failure_mode
+        if mode.ends_loop or mode.no_commands:
+            return WATCHDOG_TICKS
+        return REACTING_TICKS + (detection_ticks(mode.kind) if mode.kind and mode.kind.reaction in STOPPING else 0)

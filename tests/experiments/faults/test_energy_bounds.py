@@ -1,0 +1,44 @@
+"""The published energy bounds follow from torque, speed and time, and no healthy motion of full torque exceeds them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from control.faults import FaultKind, Reaction
+from control.rate import PERIOD_S
+from experiments.faults.energy_bounds import STOPPING, WATCHDOG_TICKS, energy_bounds
+from experiments.trials.trial import WALKING, configuration_of
+
+CONFIGURATION = configuration_of(WALKING)
+BOUNDS = energy_bounds(CONFIGURATION)
+
+
+def test_a_motor_at_full_torque_and_speed_until_the_drives_idle_stays_within_the_bound() -> None:
+    duration_s = (10 + 2) * PERIOD_S
+    assert BOUNDS.stopping_j(10, Reaction.DRIVES_IDLE) >= BOUNDS.torque_nm * BOUNDS.speed_rad_s * duration_s
+
+
+def test_a_joint_that_speeds_up_from_rest_at_full_torque_stays_within_the_bound() -> None:
+    for ticks in (1, 5, 12, 30):
+        turned_rad = 0.5 * BOUNDS.torque_nm / BOUNDS.inertia_kg_m2 * (ticks * PERIOD_S) ** 2
+        if turned_rad < 3.4:  # then it is at its end stop
+            assert BOUNDS.torque_nm * turned_rad <= BOUNDS.stopping_j(ticks, Reaction.DRIVES_IDLE)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in FaultKind if kind.reaction in STOPPING])
+def test_later_detection_and_more_torque_never_lower_the_bound(kind: FaultKind) -> None:
+    ticks = kind.bound_ticks
+    assert BOUNDS.stopping_j(ticks, kind.reaction) <= BOUNDS.stopping_j(ticks + 1, kind.reaction)
+    assert BOUNDS.fault_j(kind) < replace(BOUNDS, torque_nm=2.0 * BOUNDS.torque_nm).fault_j(kind)
+
+
+def test_a_drive_that_hears_nothing_may_exert_torque_until_its_watchdog_ends_it() -> None:
+    unheard = BOUNDS.stopping_j(WATCHDOG_TICKS, Reaction.DAMPING)
+    assert BOUNDS.fault_j(FaultKind.DRIVE_QUIET) == unheard > BOUNDS.fault_j(FaultKind.POSITION_STALE)
+
+
+def test_the_bound_of_a_walk_grows_with_its_strides() -> None:
+    first_j, second_j = BOUNDS.walking_j(BOUNDS.stride_s), BOUNDS.walking_j(2.0 * BOUNDS.stride_s)
+    assert second_j - first_j == pytest.approx(BOUNDS.torque_nm * BOUNDS.stride_rad)
