@@ -35,15 +35,17 @@ from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.fault_injection.failing_host import FailingClock, FailingRecorder, FailingTicker
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
 from firmware_host.log.log_folder import first_path, new_run_id
-from firmware_host.log.recorder import NullRecorder, Recorder, Recording
+from firmware_host.log.recorder import NullRecorder, Recorder, Recording, StreamSettings
+from firmware_host.log.row_stream import stream_path
 from firmware_host.loop import Loop
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Rights, load_rights
+from firmware_host.operator.rights import Rights
 from firmware_host.operator.socket_file import AlreadyServedError
 from firmware_host.operator.status_socket import StatusSocket
 from firmware_host.pose_sources import open_pose
 from firmware_host.software_version import build_metadata
 from firmware_host.ticker import Tick, Ticker
+from firmware_host.user_groups import load_rights
 
 EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0  # then torque goes off wherever the flippers are
@@ -100,7 +102,7 @@ class Shutdown:
         return False
 
 
-def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
+def open_recorder(configuration: Configuration, rights: Rights) -> Recorder | NullRecorder:
     """Start the log of a new run; raises OSError if the log cannot be written."""
     if not configuration.log.enabled:
         return NullRecorder()
@@ -110,7 +112,8 @@ def open_recorder(configuration: Configuration) -> Recorder | NullRecorder:
         raise PermissionError(errno.EACCES, "is not writable", str(folder))
     run_id = new_run_id(robot)
     metadata = {"robot": robot, "run_id": run_id} | build_metadata()
-    return Recorder(first_path(folder, run_id), configuration.text, metadata, configuration.log)
+    stream = StreamSettings(str(stream_path(Path(configuration.status.socket))), rights)
+    return Recorder(first_path(folder, run_id), configuration.text, metadata, configuration.log, stream)
 
 
 def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
@@ -129,7 +132,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         stack.callback(drives.close)
         pose = open_pose(configuration.pose)
         stack.callback(pose.close)
-        recorder = open_recorder(configuration)
+        recorder = open_recorder(configuration, rights)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         loop = _make_loop(configuration, drives, pose, recorder, failures)
         warnings = status.warnings

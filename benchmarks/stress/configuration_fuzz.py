@@ -26,7 +26,7 @@ from control.modes import ENERGISED, Mode, Request
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
-from firmware_host.operator.rights import load_rights
+from firmware_host.user_groups import load_rights
 from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import World, load_world
 from simulation.mud.clay import MUDS

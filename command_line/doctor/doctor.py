@@ -47,7 +47,6 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.reports import check_item
-from firmware_host.operator.rights import load_rights
 from firmware_host.operator.status_client import (
     CallRefusedError,
     DroppedError,
@@ -57,6 +56,7 @@ from firmware_host.operator.status_client import (
 )
 from firmware_host.pose_sources import open_pose
 from firmware_host.software_version import software_version
+from firmware_host.user_groups import load_rights
 
 ROOT = Path("/")
 MARKS = {Level.OK: ("ok  ", GREEN), Level.WARN: ("warn", YELLOW), Level.FAIL: ("FAIL", RED)}

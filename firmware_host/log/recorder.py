@@ -16,21 +16,21 @@ import struct
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from fcntl import F_SETPIPE_SZ, fcntl
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import present_path
-from firmware_host.log.rows import EVENT, EVENT_KIND
+from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_RECORD
 
 PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz
-HEADER = struct.Struct("<BI")  # number of the row's kind, its length; the opening comes first, as kind 0
 STAMP = struct.Struct("<4xd")  # every row of this version: four bytes of encapsulation, then its stamp
 REPORT_BYTES = 256  # left free for the report of a loss, which is sent together with a row
-LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES
+LARGEST_ROW = select.PIPE_BUF - ROW_RECORD.size - REPORT_BYTES
 LONGEST_TEXT = LARGEST_ROW - len(EVENT.encode(0.0, ""))  # bytes
 REPORT_CALLS = 95  # calls of `report` between two reads of its pipe: four reads a second at 380 Hz
 REPORT_OVERDUE_S = 3.0  # without a report: the writer waits for its disk
@@ -51,6 +51,13 @@ REPORT_TYPES = (bool, int, str, float, int, float)  # of its fields, in the mess
 HEALTHY = LogReport(  # until the writer reports
     alive=True, dropped=0, problem="", free_fraction=1.0, free_bytes=1 << 62, slowest_write_s=0.0
 )
+
+
+class StreamSettings(NamedTuple):
+    """What the writer needs to serve rows to subscribers."""
+
+    path: str  # of the socket
+    rights: Sequence[Any]  # those of the status socket, as JSON carries them
 
 
 class Recording(Protocol):
@@ -90,7 +97,12 @@ class Recorder:
     """Owns the writer and the pipe to it. Start it before the loop takes real-time priority."""
 
     def __init__(
-        self, path: Path, configuration_text: str, metadata: dict[str, str], parameters: LogParameters = ONE_FILE
+        self,
+        path: Path,
+        configuration_text: str,
+        metadata: dict[str, str],
+        parameters: LogParameters = ONE_FILE,
+        stream: StreamSettings | None = None,
     ) -> None:
         self.path = path  # the file that is being written, or was written last
         self.dropped = 0
@@ -107,13 +119,13 @@ class Recorder:
         os.set_blocking(self._reports, False)
         with suppress(PermissionError):  # beyond the user's limit: the pipe keeps its 64 KiB
             fcntl(self._pipe, F_SETPIPE_SZ, PIPE_BYTES)
-        self._send_opening(configuration_text, metadata, parameters)
+        opening = {"configuration_text": configuration_text, "metadata": metadata, "parameters": asdict(parameters)}
+        self._send_opening(opening if stream is None else opening | {"stream": stream._asdict()})
         os.set_blocking(self._pipe, False)
 
-    def _send_opening(self, configuration_text: str, metadata: dict[str, str], parameters: LogParameters) -> None:
-        opening = {"configuration_text": configuration_text, "metadata": metadata, "parameters": asdict(parameters)}
+    def _send_opening(self, opening: dict[str, Any]) -> None:
         row = json.dumps(opening).encode()
-        unsent = memoryview(HEADER.pack(0, len(row)) + row)
+        unsent = memoryview(ROW_RECORD.pack(0, len(row)) + row)
         try:
             while unsent:
                 unsent = unsent[os.write(self._pipe, unsent) :]
@@ -124,7 +136,7 @@ class Recorder:
         """Sends one row without waiting; returns False where it was lost."""
         if len(row) > LARGEST_ROW:
             row = _shorten(row)
-        record = HEADER.pack(number, len(row)) + row
+        record = ROW_RECORD.pack(number, len(row)) + row
         if self._write(self._loss_report() + record if self._unreported else record):
             self._unreported = 0
             return True
@@ -149,7 +161,7 @@ class Recorder:
         """Is sent together with the next row: alone it would fit into gaps that are too small for a row."""
         text = f"rows missing here: {self._unreported}, the log's writer did not keep up"
         row = EVENT.encode(self._loss_stamp_s, text)
-        return HEADER.pack(EVENT_KIND, len(row)) + row
+        return ROW_RECORD.pack(EVENT_KIND, len(row)) + row
 
     def report(self) -> LogReport:
         """Returns the newest report; cheap enough for every tick, since it seldom reads the pipe."""

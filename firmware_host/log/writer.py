@@ -16,12 +16,15 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import FreeSpace, free_space
-from firmware_host.log.recorder import HEADER, PIPE_BYTES, STAMP, LogReport
-from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.recorder import PIPE_BYTES, STAMP, LogReport
+from firmware_host.log.row_stream import RowStream, read_rights
+from firmware_host.log.rows import ROW_KINDS, ROW_RECORD
 from firmware_host.log.segments import LogSegments
 
 GATHER_S = 0.05  # asleep between batches, so that not every row wakes the writer, which would slow the loop
@@ -70,15 +73,30 @@ def write_log(pipe: int, reports: int, path: Path) -> bool:
         return True
     opening = json.loads(rows.pop(0)[1])
     log = LogSegments(path, opening, LogParameters(**opening["parameters"]) if "parameters" in opening else ONE_FILE)
-    reporter = Reporter(reports)
+    reporter, stream = Reporter(reports), _open_stream(opening)
     reporter.update(log)
-    log.write(_valid(rows))
-    for rows in batches:
-        log.write(_valid(rows))
+    for batch in chain([rows], batches):
+        valid = _valid(batch)
+        if stream is not None:
+            stream.publish(valid)  # first: a disk may be slow
+        log.write(valid)
         reporter.update(log)
+    if stream is not None:
+        stream.close()
     whole = log.close()
     reporter.send(log)
     return whole
+
+
+def _open_stream(opening: dict[str, Any]) -> RowStream | None:
+    """Returns the stream for subscribers; None where the loop asks for none."""
+    wanted = opening.get("stream")
+    if wanted is None:
+        return None
+    stream = RowStream(Path(wanted["path"]), read_rights(wanted["rights"]), opening["metadata"])
+    if stream.problem:
+        print(f"warning: {stream.problem}", file=sys.stderr, flush=True)
+    return stream
 
 
 def _valid(rows: Rows) -> Rows:
@@ -107,12 +125,12 @@ def _split(unread: bytes) -> tuple[Rows, bytes]:
     """Returns the whole rows and the bytes after them."""
     rows: Rows = []
     start = 0
-    while start + HEADER.size <= len(unread):
-        number, length = HEADER.unpack_from(unread, start)
-        end = start + HEADER.size + length
+    while start + ROW_RECORD.size <= len(unread):
+        number, length = ROW_RECORD.unpack_from(unread, start)
+        end = start + ROW_RECORD.size + length
         if end > len(unread):
             break
-        rows.append((number, unread[start + HEADER.size : end]))
+        rows.append((number, unread[start + ROW_RECORD.size : end]))
         start = end
     return rows, unread[start:]
 

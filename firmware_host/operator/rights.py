@@ -3,18 +3,13 @@
 SO_PEERCRED and SO_PEERGROUPS (unix(7), Linux 4.13) give user, process and groups of the other end at the time when it
 connected; a client cannot forge them. There are three levels: every user may stop the robot, readers see its state,
 operators move it. Operators also read; root and the daemon's own user may do everything. The file of the socket is open
-to every user, since one group cannot own it for readers and operators; unauthorised users are refused here. Group names
-are resolved once, at the start: a name service may be slow, and a tick cannot wait.
+to every user, since one group cannot own it for readers and operators; unauthorised users are refused here.
 """
 
-import grp
-import os
 import socket
 import struct
 from typing import NamedTuple
 
-from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.rpc import FOR_MEMBERS, NOT_PERMITTED
 from firmware_host.operator.socket_methods import METHODS
 from firmware_host.operator.socket_methods import Level as Level  # the rights of a method
@@ -65,32 +60,6 @@ def _for_members(what: str, group: Group) -> str:
         f"{NOT_PERMITTED}{what} is {FOR_MEMBERS}{group.name}."
         f" Have root run 'adduser YOU {group.name}', then log in again"
     )
-
-
-def load_rights(parameters: StatusParameters) -> Rights:
-    """Resolve the configured groups; raises ConfigurationError for a group that does not exist."""
-    groups, problems = [], []
-    for key, name in (("read_group", parameters.read_group), ("drive_group", parameters.drive_group)):
-        try:
-            groups.append(_find_group(name))
-        except KeyError:
-            missing = f"status.{key} = {name!r}: there is no such group"
-            problems.append(f"{missing}; make it with 'groupadd {name}', or leave the key out")
-    if problems:
-        raise ConfigurationError(problems)
-    readers, operators = groups
-    return Rights(readers, operators, os.geteuid(), parameters.anyone_may_stop)
-
-
-def _find_group(name: str) -> Group:
-    """Return the group with this name, or the daemon's own group for an empty name; raises KeyError."""
-    if name:
-        return Group(name, grp.getgrnam(name).gr_gid)
-    own = os.getegid()
-    try:
-        return Group(grp.getgrgid(own).gr_name, own)
-    except KeyError:
-        return Group(str(own), own)
 
 
 def read_peer(connection: socket.socket) -> Peer:

@@ -33,7 +33,7 @@ class AlreadyServedError(Exception):
 class SocketFile:
     """Owns the listening socket and its file."""
 
-    def __init__(self, path: Path, backlog: int, group: int | None = None) -> None:
+    def __init__(self, path: Path, backlog: int, group: int | None = None, kind: int = socket.SOCK_STREAM) -> None:
         """Bind and listen, for one group where it is given.
 
         Raises AlreadyServedError, or OSError if the path cannot be bound.
@@ -41,9 +41,9 @@ class SocketFile:
         with _umask(0o777 & ~OPEN_FOLDER):
             path.parent.mkdir(parents=True, exist_ok=True)
         _refuse_open_folder(path.parent)
-        _remove_stale(path)
+        _remove_stale(path, kind)
         self.path = path
-        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.listener = socket.socket(socket.AF_UNIX, kind)
         self.listener.setblocking(False)
         _bind(self.listener, path, OPEN_FILE if group is None else GROUP_FILE)
         self.has_group = group is None or _give_to(path, group)
@@ -99,22 +99,22 @@ def _refuse_open_folder(folder: Path) -> None:
         raise PermissionError(errno.EPERM, "everybody may write to it: run 'chmod o-w' on it", str(folder))
 
 
-def _remove_stale(path: Path) -> None:
+def _remove_stale(path: Path, kind: int) -> None:
     """Remove the socket of a daemon that died; raises OSError or AlreadyServedError for anything else."""
     try:
-        kind = path.lstat().st_mode
+        mode = path.lstat().st_mode
     except FileNotFoundError:
         return
-    if not stat.S_ISSOCK(kind):
+    if not stat.S_ISSOCK(mode):
         raise FileExistsError(errno.EEXIST, "is there already and is no socket: remove it", str(path))
-    if _answers(path):
+    if _answers(path, kind):
         raise AlreadyServedError(f"another daemon is already running on {path}")
     path.unlink(missing_ok=True)
 
 
-def _answers(path: Path) -> bool:
+def _answers(path: Path, kind: int) -> bool:
     """Whether a daemon listens; one that accepts no connection in time hangs, but is not dead."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+    with socket.socket(socket.AF_UNIX, kind) as probe:
         probe.settimeout(PROBE_S)
         try:
             probe.connect(str(path))

@@ -16,9 +16,9 @@ import pytest
 from command_line import exit_codes
 from command_line.operation import operation
 from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.operator.rights import load_rights
 from firmware_host.operator.status_client import NotPermittedError, StatusClient
 from firmware_host.operator.status_socket import Methods, StatusSocket
+from firmware_host.user_groups import load_rights
 from tests.running_bench import Bench
 
 NOBODY = 65534

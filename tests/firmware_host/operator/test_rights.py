@@ -12,7 +12,8 @@ import pytest
 
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.configuration.toml_records import ConfigurationError
-from firmware_host.operator.rights import Level, Peer, load_rights, read_peer
+from firmware_host.operator.rights import Level, Peer, read_peer
+from firmware_host.user_groups import load_rights
 
 ANY_GROUP = grp.getgrall()[-1]
 NOBODY = 65534

@@ -1,0 +1,146 @@
+"""Serves the log's rows to subscribers on a Unix socket, from the writer's process.
+
+The loop knows nothing of it: it hands its rows to the writer, and the writer passes them on. The socket keeps the
+boundaries of packets (SOCK_SEQPACKET), so a packet is sent whole or not at all. A subscriber that does not read fills
+its own buffer in the kernel and then loses whole packets; the number of lost rows is sent to it before the next row.
+
+A packet is a sequence of records, each a kind (one byte), a length (four, little-endian) and so many bytes:
+
+    0 to 2      rows of the log: tick, stride, event (rows.py)
+    OPENING     JSON, the first record: the kinds with topic, name and ros2msg definition, and the run's metadata
+    LOST        JSON, the number of rows that this subscriber has lost here
+    REFUSAL     text, the only record for a user without the right to read; the connection then ends
+"""
+
+import json
+import socket
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from firmware_host.log.rows import ROW_KINDS, ROW_RECORD
+from firmware_host.operator.rights import Group, Level, Peer, Rights, read_peer
+from firmware_host.operator.socket_file import AlreadyServedError, SocketFile
+
+OPENING, LOST, REFUSAL = 255, 254, 253
+MOST_SUBSCRIBERS = 8
+PACKET_BYTES = 32 * 1024  # less than the kernel's smallest usual buffer
+BUFFER_BYTES = 512 * 1024  # of one subscriber: two seconds of rows; the kernel may allow less
+
+
+def stream_path(status_socket: Path) -> Path:
+    """Return the path of the rows' socket, next to the status socket."""
+    return status_socket.with_name(f"{status_socket.stem}-rows.sock")
+
+
+def read_rights(values: Sequence[Any]) -> Rights:
+    """Return rights that have been JSON on their way from the loop."""
+    readers, operators, own_uid, anyone_may_stop = values
+    return Rights(Group(*readers), Group(*operators), own_uid, anyone_may_stop)
+
+
+def record(kind: int, content: bytes) -> bytes:
+    return ROW_RECORD.pack(kind, len(content)) + content
+
+
+class Subscriber:
+    """Owns one connection and the count of its lost rows."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+        self._lost = 0
+        connection.setblocking(False)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
+
+    def send(self, packet: bytes, rows: int) -> bool:
+        """Send a packet of so many rows, or count them as lost; return whether the subscriber is still there."""
+        report = record(LOST, json.dumps({"rows": self._lost}).encode()) if self._lost else b""
+        try:
+            self._connection.send(report + packet)
+        except BlockingIOError:
+            self._lost += rows
+            return True
+        except OSError:
+            return False
+        self._lost = 0
+        return True
+
+    def close(self) -> None:
+        self._connection.close()
+
+
+class RowStream:
+    """Owns the listening socket and the subscribers. No method raises OSError; `problem` says why nothing is served."""
+
+    def __init__(
+        self,
+        path: Path,
+        rights: Rights,
+        metadata: dict[str, Any],
+        peer_of: Callable[[socket.socket], Peer] = read_peer,
+    ) -> None:
+        self.problem = ""
+        self._rights, self._peer_of = rights, peer_of
+        kinds = [{"topic": k.topic, "schema": k.schema_name, "definition": k.definition} for k in ROW_KINDS]
+        self._opening = record(OPENING, json.dumps({"kinds": kinds, "metadata": metadata}).encode())
+        self._subscribers: list[Subscriber] = []
+        self._file: SocketFile | None = None
+        try:
+            self._file = SocketFile(path, MOST_SUBSCRIBERS, kind=socket.SOCK_SEQPACKET)
+        except (OSError, AlreadyServedError) as problem:
+            self.problem = f"rows are not served on {path}: {problem}"
+
+    def publish(self, rows: Sequence[tuple[int, bytes]]) -> None:
+        """Accept those who wait, and send the rows to every subscriber; call this regularly, without rows too."""
+        self._accept()
+        if not self._subscribers:
+            return
+        for packet, count in packets(rows):
+            self._subscribers = [each for each in self._subscribers if self._send(each, packet, count)]
+
+    def _send(self, subscriber: Subscriber, packet: bytes, count: int) -> bool:
+        if subscriber.send(packet, count):
+            return True
+        subscriber.close()
+        return False
+
+    def _accept(self) -> None:
+        while self._file is not None and len(self._subscribers) < MOST_SUBSCRIBERS:
+            try:
+                connection, _ = self._file.listener.accept()
+            except OSError:
+                return
+            self._admit(connection)
+
+    def _admit(self, connection: socket.socket) -> None:
+        refusal: str | None = "the connection has ended"
+        with suppress(OSError):
+            level = self._rights.level(self._peer_of(connection))
+            refusal = None if level >= Level.READ else self._rights.refusal("status", level)
+        subscriber = Subscriber(connection)
+        admitted = subscriber.send(record(REFUSAL, refusal.encode()) if refusal else self._opening, 0)
+        if admitted and refusal is None:
+            self._subscribers.append(subscriber)
+        else:
+            subscriber.close()
+
+    def close(self) -> None:
+        for subscriber in self._subscribers:
+            subscriber.close()
+        self._subscribers = []
+        if self._file is not None:
+            self._file.close()
+
+
+def packets(rows: Sequence[tuple[int, bytes]]) -> list[tuple[bytes, int]]:
+    """Return the rows as packets of at most PACKET_BYTES, each with its number of rows."""
+    made: list[tuple[bytes, int]] = []
+    packet, count = b"", 0
+    for kind, row in rows:
+        piece = record(kind, row)
+        if packet and len(packet) + len(piece) > PACKET_BYTES:
+            made.append((packet, count))
+            packet, count = b"", 0
+        packet, count = packet + piece, count + 1
+    return [*made, (packet, count)] if packet else made

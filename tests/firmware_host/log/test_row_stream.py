@@ -1,0 +1,121 @@
+"""Rows reach every subscriber; a slow one loses its own rows alone and is told how many."""
+
+import os
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from firmware_host.log.row_stream import PACKET_BYTES, RowStream, packets, stream_path
+from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
+from firmware_host.log_reading.live_rows import LiveRows
+from firmware_host.operator.rights import Group, Peer, Rights
+from firmware_host.operator.status_client import NoDaemonError, NotPermittedError
+
+OWN = Rights(Group("own", os.getegid()), Group("own", os.getegid()), os.geteuid())
+RIGHTS_OF_OTHERS = Rights(Group("readers", 77777), Group("operators", 77778), 77779)
+
+
+@pytest.fixture
+def path(short_folder: Path) -> Path:
+    return short_folder / "rows"
+
+
+@pytest.fixture
+def stream(path: Path) -> Iterator[RowStream]:
+    made = RowStream(path, OWN, {"robot": "test"})
+    assert made.problem == ""
+    yield made
+    made.close()
+
+
+def tick(number: int) -> tuple[int, bytes]:
+    return TICK_KIND, TICK.encode_named(stamp_s=0.1 * number, tick=number)
+
+
+def subscribe(stream: RowStream, path: Path) -> LiveRows:
+    with ThreadPoolExecutor(1) as threads:
+        waiting = threads.submit(LiveRows, path)
+        while not waiting.done():
+            stream.publish([])
+            time.sleep(0.001)
+        return waiting.result()
+
+
+def received(rows: LiveRows) -> list[int]:
+    numbers: list[int] = []
+    while found := rows.read(0.05):
+        numbers += [row.values["tick"] for row in found if row.kind.topic == "/tick"]
+    return numbers
+
+
+def test_every_subscriber_gets_every_row_with_its_values(stream: RowStream, path: Path) -> None:
+    first, second = subscribe(stream, path), subscribe(stream, path)
+    stream.publish([tick(1), (EVENT_KIND, EVENT.encode(0.2, "walk")), tick(2)])
+    for subscriber in (first, second):
+        rows = subscriber.read(1.0)
+        assert [row.kind.topic for row in rows] == ["/tick", "/event", "/tick"]
+        assert rows[1].values == {"stamp_s": 0.2, "text": "walk"}
+        assert subscriber.metadata == {"robot": "test"}
+
+
+def test_a_subscriber_that_hangs_loses_its_own_rows_and_learns_how_many(stream: RowStream, path: Path) -> None:
+    reading, hanging = subscribe(stream, path), subscribe(stream, path)
+    got: list[int] = []
+    for number in range(6000):
+        stream.publish([tick(number)])
+        if number % 100 == 99:
+            got += received(reading)
+    assert got == list(range(6000)) and reading.lost == 0
+    late = received(hanging)
+    stream.publish([tick(6000)])
+    late += received(hanging)
+    assert late[-1] == 6000 and hanging.lost > 0
+    assert len(late) + hanging.lost == 6001
+
+
+def test_a_subscriber_that_leaves_costs_the_others_nothing(stream: RowStream, path: Path) -> None:
+    leaving, staying = subscribe(stream, path), subscribe(stream, path)
+    leaving.close()
+    stream.publish([tick(1)])
+    stream.publish([tick(2)])
+    assert received(staying) == [1, 2]
+
+
+def test_a_user_without_the_right_to_read_is_refused_with_the_reason(path: Path) -> None:
+    stream = RowStream(path, RIGHTS_OF_OTHERS, {}, peer_of=lambda connection: Peer(1, 1, frozenset()))
+    with pytest.raises(NotPermittedError, match="readers"):
+        subscribe(stream, path)
+    stream.close()
+
+
+def test_without_a_daemon_the_error_says_what_is_missing(path: Path) -> None:
+    with pytest.raises(NoDaemonError, match="serves rows"):
+        LiveRows(path)
+
+
+def test_the_end_of_the_daemon_is_reported(stream: RowStream, path: Path) -> None:
+    rows = subscribe(stream, path)
+    stream.close()
+    with pytest.raises(NoDaemonError, match="ended"):
+        rows.read(1.0)
+
+
+def test_a_stale_socket_is_replaced_and_a_live_one_is_not(path: Path, stream: RowStream) -> None:
+    assert "already" in RowStream(path, OWN, {}).problem
+    stream.close()
+    path.touch()
+    assert "no socket" in RowStream(path, OWN, {}).problem
+
+
+def test_a_packet_is_never_longer_than_its_bound() -> None:
+    rows = [tick(number) for number in range(200)]
+    made = packets(rows)
+    assert all(len(packet) <= PACKET_BYTES for packet, _ in made)
+    assert sum(count for _, count in made) == 200
+
+
+def test_the_rows_have_a_socket_next_to_that_of_operators() -> None:
+    assert stream_path(Path("/run/mudskipper/mudskipper.sock")) == Path("/run/mudskipper/mudskipper-rows.sock")
