@@ -56,15 +56,15 @@ clean:  ## remove the environment and everything that was built
 .venv/setup: pyproject.toml
 	@echo "Installing into .venv (a minute or two) ..."
 	@$(PYTHON) -m venv .venv
-	@$(PIP) --editable ".[plots,serial]"
+	@$(PIP) --editable ".[plots,serial,data]"
 	@touch $@
 
 .venv/test: .venv/setup
 	@echo "Installing what the tests need ..."
-	@$(PIP) --editable ".[plots,serial,test]"
+	@$(PIP) --editable ".[plots,serial,data,test]"
 	@touch $@
 
 .venv/docs: .venv/setup
 	@echo "Installing what the documentation needs ..."
-	@$(PIP) --editable ".[plots,serial,docs]"
+	@$(PIP) --editable ".[plots,serial,data,docs]"
 	@touch $@

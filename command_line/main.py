@@ -20,7 +20,7 @@ from command_line.screen import complain
 from firmware_host.configuration.file_problems import why_not
 
 METHODS = ("default", "paper")  # of estimation
-PICTURE_MODULES = ("matplotlib", "PIL")  # an extra of this package
+EXTRA_OF = {"matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data"}  # by module
 COUNT = whole(0, 100000)
 SEVERAL_FILES = "log of this project; several files are the segments of one run"
 ANY_LOG = "log of this project, its segments, or a CSV file of the paper's authors"
@@ -181,10 +181,7 @@ def _add_logs(commands: Commands) -> None:
     report = add(actions, "report", "logs.log_report.log_report", "Write a log as one page with pictures.")
     report.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
     report.add_argument("--out", type=folder, metavar="DIR", help="(default: a folder named after the log)")
-    export = add(actions, "export", "logs.log_commands.export", "Write a log in the columns of the authors' plotter.")
-    export.add_argument("file", type=Path)
-    export.add_argument("--csv", action="store_true", required=True, help="the format; CSV is the only one")
-    export.add_argument("--out", type=Path, help="file to write (default: standard output)")
+    _add_export(actions)
     preserve = add(actions, "preserve", "logs.log_folder_commands.preserve_log", "Exclude logs from the quota.")
     preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
     preserve.add_argument("--undo", action="store_true", help="include them again")
@@ -195,6 +192,15 @@ def _add_logs(commands: Commands) -> None:
     for parser in (listing, recover):
         parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
     add_json(info, report, listing, recover)
+
+
+def _add_export(actions: Commands) -> None:
+    export = add(actions, "export", "logs.log_export.export", "Write a log in a form that other programs read.")
+    export.add_argument("files", type=Path, nargs="+", metavar="FILE", help=SEVERAL_FILES)
+    form = export.add_mutually_exclusive_group(required=True)
+    form.add_argument("--csv", action="store_true", help="the columns of the authors' plotter, to standard output")
+    form.add_argument("--parquet", action="store_true", help="tables of ticks, strides and events, into this folder")
+    export.add_argument("--out", type=Path, metavar="PATH", help="write this file, for --parquet into this folder")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -209,9 +215,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
     except ModuleNotFoundError as problem:
-        if (problem.name or "").partition(".")[0] not in PICTURE_MODULES:
+        module = (problem.name or "").partition(".")[0]
+        if module not in EXTRA_OF:
             raise
-        complain("pictures need matplotlib: install mudskipper with its extra 'plots'")
+        complain(f"{module} is not installed, which this needs: install mudskipper with its extra '{EXTRA_OF[module]}'")
         return exit_codes.UNHEALTHY
     except BrokenPipeError:  # the reader of the output, such as `head`, has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -3,19 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from estimation.mud import Method
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.rows import EVENT, STRIDE
-from firmware_host.log.schema import RowKind
+from firmware_host.log.rows import EVENT, STRIDE, TICK
 from firmware_host.log_reading.log_reader import read_logs
 from firmware_host.log_reading.replay import Replay, configuration_of, replay_files
+from firmware_host.open_data.flat_columns import stack_rows
+from mudskipper.rows import Rows
 
-Rows = NDArray[np.void]  # a structured array: rows["stamp_s"] is the column of that field
 Paths = str | Path | Sequence[str | Path]
 
 
@@ -43,7 +39,11 @@ def open_log(path: Paths) -> OpenedLog:
     """Reads an MCAP log, or several segments of one run. Raises LogError."""
     paths = _as_paths(path)
     log = read_logs(paths)
-    arrays = {"strides": _as_array(log.strides, STRIDE), "events": _as_array(log.events, EVENT)}
+    arrays = {
+        "ticks": Rows.of(log.ticks, TICK),
+        "strides": Rows.of(stack_rows(log.strides, STRIDE), STRIDE),
+        "events": Rows.of(stack_rows(log.events, EVENT), EVENT),
+    }
     return OpenedLog(paths=paths, **(log._asdict() | arrays))
 
 
@@ -57,13 +57,3 @@ def replay(path: Paths, method: Method | None = None, configuration: Configurati
 
 def _as_paths(path: Paths) -> tuple[Path, ...]:
     return (Path(path),) if isinstance(path, str | Path) else tuple(Path(each) for each in path)
-
-
-def _as_array(rows: list[dict[str, Any]], kind: RowKind) -> Rows:
-    missing = {field.name: field.missing for field in kind.fields}
-    names = {name: None for row in rows or [missing] for name in row}
-    columns = {name: np.array([row[name] for row in rows or [missing]]) for name in names}
-    array = np.empty(len(rows), [(name, column.dtype, column.shape[1:]) for name, column in columns.items()])
-    for name, column in columns.items():
-        array[name] = column[: len(rows)]
-    return array

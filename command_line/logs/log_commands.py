@@ -1,8 +1,7 @@
-"""Commands that read logs: replay, plot, film, info, export."""
+"""Commands that read logs: replay, plot, film, info."""
 
 import argparse
 import os
-import sys
 from pathlib import Path
 
 from command_line import exit_codes
@@ -14,10 +13,9 @@ from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
-from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.lab.summary import finding_reports, lab_summary
 from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_reader import LogError, log_summary, read_log, read_logs
+from firmware_host.log_reading.log_reader import LogError, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
 from firmware_host.operator.reports import map_report, stride_report
 
@@ -166,17 +164,3 @@ def _show_lab_info(path: Path, as_json: bool) -> None:
         print_json("log-info", lab_summary(path, lab))
     else:
         show_lab_log(path, lab)
-
-
-@explain_errors
-def export(options: Options) -> int:
-    with watched() as watch:
-        log = read_log(options.file, watch)
-    if options.out is None:
-        write_lab_csv(log, sys.stdout)
-        return exit_codes.OK
-    if options.out.exists() and options.out.samefile(options.file):
-        raise UsageError(f"{options.out} is the log itself; name another file")
-    with Path(options.out).open("w", encoding="utf-8") as out, watched() as watch:
-        write_lab_csv(log, out, watch)
-    return exit_codes.OK

@@ -16,7 +16,7 @@ from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides
 from experiments.reports.report_page import PAGE, Figure, Section, to_json, write_report
 from experiments.reports.text_tables import number
-from experiments.reports.whole_files import copy_whole
+from firmware_host.log.whole_files import copy_whole
 from firmware_host.log_reading.lab.summary import finding_reports
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files

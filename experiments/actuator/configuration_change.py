@@ -17,13 +17,13 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
 
 from experiments.actuator.fit import JointFit
-from experiments.reports.whole_files import whole_file
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import Operator
 from experiments.trials.session import Ending, Session
 from firmware_host.configuration.file_problems import why_not
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError, read_text
+from firmware_host.log.whole_files import whole_file
 
 COPY = "mudskipper.toml"  # of a simulated robot's configuration
 LARGEST_UNCERTAINTY = 0.02  # relative, of a torque constant that is written

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.reports.text_tables import Rows as Rows
-from experiments.reports.whole_files import whole_file
+from firmware_host.log.whole_files import whole_file
 from firmware_host.software_version import software_version
 
 FLAT: Mapping[str, Any] = {"flat": True}  # metadata of a field

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.reports.whole_files import copy_whole
 from firmware_host.log.log_folder import present_path
+from firmware_host.log.whole_files import copy_whole
 from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.log_reading.recovery import recover_log
 

@@ -54,8 +54,9 @@ TICK = RowKind(
 )
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
+COEFFICIENT_UNIT = "N/m^3"
 COEFFICIENT_FIELDS = tuple(
-    Field(f"{name}{part}", "float64", f"{name}.{source}", "N/m^3")
+    Field(f"{name}{part}", "float64", f"{name}.{source}", COEFFICIENT_UNIT)
     for name in COEFFICIENTS
     for part, source in (("", "value"), ("_std_error", "std_error"))
 )

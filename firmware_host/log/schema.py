@@ -54,6 +54,12 @@ class Field:
         return (value,) * self.length if self.length else value
 
     @property
+    def words(self) -> dict[int, str]:
+        """The word of each number where the meaning lists them, as "0 left, 1 right" does; empty for other fields."""
+        pairs = [part.partition(" ") for part in self.meaning.split(", ")]
+        return {int(number): word for number, _, word in pairs} if all(pair[0].isdecimal() for pair in pairs) else {}
+
+    @property
     def sources(self) -> tuple[str, ...]:
         return tuple(self.source.format(name) for name in self.each) or (self.source,)
 

@@ -1,0 +1,60 @@
+"""`mudskipper log export`: writes a log in a form that other programs read."""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from command_line import exit_codes
+from command_line.logs.refusals import UsageError, explain_errors
+from command_line.screen import watched
+from firmware_host.log_reading.lab.export import write_lab_csv
+from firmware_host.log_reading.log_reader import Log, LogError, read_logs
+
+Options = argparse.Namespace
+
+
+@explain_errors
+def export(options: Options) -> int:
+    _require_other_file(options)
+    with watched() as watch:
+        log = read_logs(options.files, watch)
+    write = _write_parquet if options.parquet else _write_csv
+    for path in write(log, options):
+        print(f"written  {path}", file=sys.stderr)
+    return exit_codes.OK
+
+
+def _require_other_file(options: Options) -> None:
+    """Raises UsageError."""
+    out: Path | None = options.out
+    if out is not None and out.is_file() and any(out.samefile(path) for path in options.files if path.exists()):
+        raise UsageError(f"{out} is the log itself; name another file")
+
+
+def _stem(options: Options) -> str:
+    return str(options.files[0].name).removesuffix(".mcap")
+
+
+def _write_csv(log: Log, options: Options) -> list[Path]:
+    if options.out is None:
+        write_lab_csv(log, sys.stdout)
+        return []
+    with Path(options.out).open("w", encoding="utf-8") as out, watched() as watch:
+        write_lab_csv(log, out, watch)
+    return []
+
+
+def _write_parquet(log: Log, options: Options) -> list[Path]:
+    """The present folder is the default: the user may not be permitted to write into the log folder."""
+    from firmware_host.open_data.parquet import write_parquet  # pyarrow is slow to import, and an extra
+
+    folder: Path = options.out or Path()
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder}: --parquet writes three files; name a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        return write_parquet(log, folder, _stem(options))
+    except OSError as problem:  # pyarrow's own text names no file
+        reason = os.strerror(problem.errno) if problem.errno else str(problem)
+        raise LogError(f"{folder}: nothing was written: {reason}") from None

@@ -1,0 +1,55 @@
+"""Exports of a log, as a person types them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from tests.command_line.command_lines import failure, refusal
+from tests.firmware_host.open_data.test_parquet import files_of_at_most
+from tests.folders import ROOT
+from tests.waiting import LONGEST_S
+
+LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
+
+
+def test_parquet_goes_into_the_named_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "tables"
+    assert main(["log", "export", "--parquet", LOG, "--out", str(folder)]) == exit_codes.OK
+    names = {path.name for path in folder.iterdir()}
+    assert names == {f"walk_0_1-{part}.parquet" for part in ("ticks", "strides", "events")}
+
+
+def test_a_full_disk_is_one_message_and_leaves_no_half_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with files_of_at_most(100_000):
+        assert "nothing was written" in failure(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_parquet_into_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").touch()
+    message = refusal(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
+    assert "name a folder" in message
+
+
+@pytest.mark.parametrize("forms", [(), ("--csv", "--parquet")])
+def test_one_form_is_named(forms: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    refusal(capsys, "log", "export", LOG, *forms)
+
+
+def test_without_the_extra_a_message_says_what_to_install(tmp_path: Path) -> None:
+    program = (
+        "import sys; sys.modules['pyarrow'] = None; from command_line.main import main\n"
+        f"print(main(['log', 'export', '--parquet', {LOG!r}]))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True, cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert ended.stdout == f"{exit_codes.UNHEALTHY}\n"
+    assert "extra 'data'" in ended.stderr and "Traceback" not in ended.stderr
