@@ -10,7 +10,7 @@ while the piece has no value. The map drops the pieces that were entered longest
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, floor, isfinite, sqrt
+from math import exp, floor, inf, isfinite, sqrt
 from typing import NamedTuple
 
 from control.records import StrideEstimate
@@ -106,12 +106,17 @@ class MudMap:
         while len(self._pieces) > MOST_PIECES:
             del self._pieces[next(iter(self._pieces))]
 
-    def rows(self) -> tuple[MapRow, ...]:
-        """Return the pieces in the order of their positions."""
+    def rows(self, after_m: float = -inf, most: int = MOST_PIECES) -> tuple[MapRow, ...]:
+        """Return the first pieces whose middle is beyond `after_m`, in the order of their positions."""
+        numbers = sorted(number for number in self._pieces if _middle_m(number) > after_m)
         return tuple(
-            MapRow((number + 0.5) * PIECE_M, *(sums.mapped() if sums else None for sums in self._pieces[number]))
-            for number in sorted(self._pieces)
+            MapRow(_middle_m(number), *(sums.mapped() if sums else None for sums in self._pieces[number]))
+            for number in numbers[:most]
         )
+
+
+def _middle_m(number: int) -> float:
+    return (number + 0.5) * PIECE_M
 
 
 def _added(sums: Sums | None, reading: Reading | None) -> Sums | None:

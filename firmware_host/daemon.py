@@ -180,7 +180,7 @@ def _run_loop(
             tick = wait()
             now_s = tick.now_s
             loop.tick(tick)
-            status.serve(now_s)
+            serve(loop, status, now_s)
             watchdog.update(tick, loop.mode)
             reopen_buses(loop, buses, now_s)
             reopen_pose(loop, pose, now_s)
@@ -191,6 +191,13 @@ def _run_loop(
         if failures is not None:  # an injected failure could keep the drives from going idle
             failures.end_all()
         return end_safely(loop, problem)
+
+
+def serve(loop: Loop, status: StatusSocket, now_s: float) -> None:
+    """Serve clients; the time counts as a part of the tick."""
+    begun_s = time.monotonic()
+    status.serve(now_s)
+    loop.timing.add_serving(time.monotonic() - begun_s)
 
 
 def reopen_buses(loop: Loop, buses: Mapping[str, ReopeningPort], now_s: float) -> None:

@@ -56,12 +56,15 @@ class Client:
         return list(self._client.call("check"))
 
     def strides(self, since: int = 0) -> list[Report]:
-        """Returns the strides closed since that number, a limited number at a time."""
+        """Returns the first 20 strides from that number on; ask again from the next number."""
         return list(self._client.call("strides", since=since))
 
     def map(self) -> list[Report]:
         """Returns the mud along the track since the walk began."""
-        return list(self._client.call("map"))
+        pieces: list[Report] = []
+        while page := self._client.call("map", after_m=pieces[-1]["place_m"] if pieces else None):
+            pieces += page
+        return pieces
 
     def arm(self, force: bool = False) -> None:
         """Energises the joints; `force` overrules the faults that are not mandatory."""

@@ -18,6 +18,7 @@ from firmware_host.operator.reports import check_item
 
 HEARING = "check its power, wiring, node id and cyclic message periods (docs/how-to/odrive.md)"
 SIGNALS = ("position", "current", "heartbeat")
+MESSAGES_PER_LINE = 4  # an answer is made between two ticks
 UNWATCHED = ", but never its temperature: the currents alone guard it"
 
 
@@ -38,12 +39,13 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
     faults = [present.fault for present in now.faults]
     if pose.trouble:  # the pose source's own text says more
         faults = [fault for fault in faults if fault.kind is not FaultKind.POSE_LOST]
+    faults_of: dict[str, list[Fault]] = {}
     for fault in faults:
-        lines.setdefault(fault.check_line, "")
+        faults_of.setdefault(fault.check_line, []).append(fault)
+    lines = lines | {identity: "" for identity in faults_of if identity not in lines}
     unheard = {f"drive.{joint}" for joint, state in zip(JOINTS, now.states, strict=True) if not state.heard}
     items = [
-        _line(identity, text, [fault for fault in faults if fault.check_line == identity], identity in unheard)
-        for identity, text in lines.items()
+        _line(identity, text, faults_of.get(identity, []), identity in unheard) for identity, text in lines.items()
     ]
     items += [check_item("configuration", True, f"warning: {each}", "") for each in loop.configuration.warnings]
     return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
@@ -51,10 +53,10 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
 
 def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
     if unheard:
-        reported_as_well = (fault_message(fault) for fault in faults)
+        reported_as_well = (fault_message(fault) for fault in faults[:MESSAGES_PER_LINE])
         return check_item(identity, False, "; ".join([text, *reported_as_well]), HEARING) | {"mandatory": True}
     blocking = [fault for fault in faults if fault.kind.blocks is not Blocks.NO]
-    reported = blocking or list(faults)
+    reported = (blocking or list(faults))[:MESSAGES_PER_LINE]
     messages = " ".join(fault_message(fault) for fault in reported)
     fixes = "; ".join(dict.fromkeys(what_to_do(fault) for fault in reported))
     text = messages if blocking else f"warning: {messages}" if reported else text

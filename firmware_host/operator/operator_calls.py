@@ -5,8 +5,8 @@ log names the sender of every request that changes something. Methods that set t
 the holder of the lease, if there is one; methods that end a motion are not.
 """
 
-from collections.abc import Callable
-from math import degrees
+from collections.abc import Callable, Sequence
+from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
@@ -14,13 +14,13 @@ from control.faults import Blocks, Fault
 from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.loop import Loop
-from firmware_host.loop_snapshot import LoopSnapshot, take_snapshot
+from firmware_host.loop_snapshot import AgedFault, LoopSnapshot, take_snapshot
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.reports import known, map_report, mud_estimate_report, stride_report
 from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_methods import METHODS, STRIDES_PER_ANSWER
+from firmware_host.operator.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
 from firmware_host.operator.status_socket import Methods
 from firmware_host.software_version import software_version
 
@@ -46,7 +46,7 @@ class OperatorCalls:
             "hello": lambda params, caller: {"name": self._loop.configuration.robot.name, "version": self._version},
             "status": self.status,
             "strides": self.strides,
-            "map": lambda params, caller: map_report(self._loop.learning.estimator.map.rows()),
+            "map": self.map,
             "check": lambda params, caller: arming_checks(self._loop, self._warnings),
             "arm": self._as_holder(lambda params, caller: self._request(caller, Request.ARM, forced=params["force"])),
             "walk": self._as_holder(self.walk),
@@ -63,7 +63,7 @@ class OperatorCalls:
     def status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
         loop, now = self._loop, take_snapshot(self._loop)
         shown = now.fault or next(iter(now.blocking), None)
-        faults = {present.fault: _fault_report(present.fault, present.age_s) for present in now.faults}
+        faults = {present.fault: _fault_report(*present) for present in _gravest(now.faults, shown)}
         return {
             "schema": "status/2",
             "robot": loop.configuration.robot.name,
@@ -73,6 +73,7 @@ class OperatorCalls:
             "moving": now.moving,
             "fault": faults[shown] if shown else None,
             "faults": list(faults.values()),
+            "faults_left_out": len(now.faults) - len(faults),
             "forced": now.forced,
             "notice": now.notice,
             "unlogged_requests": now.unlogged_requests,
@@ -100,11 +101,16 @@ class OperatorCalls:
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """The first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""
-        wanted = [closed for closed in take_snapshot(self._loop).strides if closed.number >= params["since"]]
+        wanted = [closed for closed in self._loop.learning.strides if closed.number >= params["since"]]
         return [
             stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
             for closed in wanted[:STRIDES_PER_ANSWER]
         ]
+
+    def map(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
+        """The first PIECES_PER_ANSWER pieces of the mud's map beyond `after_m`."""
+        after_m = -inf if params["after_m"] is None else params["after_m"]
+        return map_report(self._loop.learning.estimator.map.rows(after_m, PIECES_PER_ANSWER))
 
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
         adaptation, depth_m = self._loop.configuration.adaptation, params["depth_m"]
@@ -184,6 +190,14 @@ def _accepted(refused: str | None) -> str:
     if refused:
         raise RefusedError(refused)
     return "accepted"
+
+
+def _gravest(faults: Sequence[AgedFault], shown: Fault | None) -> Sequence[AgedFault]:
+    """Return as many faults as an answer has room for: the one that is shown, then those with the hardest reactions."""
+    if len(faults) <= FAULTS_PER_ANSWER:
+        return faults
+    ordered = sorted(faults, key=lambda present: (present.fault != shown, -present.fault.kind.reaction))
+    return ordered[:FAULTS_PER_ANSWER]
 
 
 def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:

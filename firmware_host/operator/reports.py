@@ -4,7 +4,7 @@ Units are in the names; None stands for a number that is not known.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import fields
 from math import isfinite
 from typing import Any
 
@@ -14,6 +14,11 @@ from estimation.mud_map import Mapped, MapRow
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
+STRIDE_NAMES = {
+    field.name: JSON_NAMES.get(field.name, field.name)
+    for field in fields(StrideEstimate)
+    if field.name not in COEFFICIENTS
+}
 
 
 def known(value: float) -> float | None:
@@ -28,11 +33,10 @@ def estimate_report(estimate: Estimate | Coefficient | Mapped) -> dict[str, Any]
 
 def stride_report(stride: StrideEstimate) -> dict[str, Any]:
     """Return a stride as `replay --json` and the status socket report it; k in N/m³."""
-    report = {
-        JSON_NAMES.get(name, name): known(value) if isinstance(value, float) else value
-        for name, value in asdict(stride).items()
-        if name not in COEFFICIENTS
-    }
+    report: dict[str, Any] = {}
+    for name, json_name in STRIDE_NAMES.items():
+        value = getattr(stride, name)
+        report[json_name] = known(value) if isinstance(value, float) else value
     return report | _coefficient_reports(stride)
 
 

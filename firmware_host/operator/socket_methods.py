@@ -18,7 +18,8 @@ from firmware_host.operator.rpc import RefusedError
 
 LONGEST_LEASE_S, SHORTEST_LEASE_S = 10.0, 0.1
 MAX_STRIDES = 100000  # of one walk
-STRIDES_PER_ANSWER = 20  # an answer is made between two ticks
+STRIDES_PER_ANSWER = PIECES_PER_ANSWER = 20  # an answer is made between two ticks
+FAULTS_PER_ANSWER = 48  # two lost buses have about as many
 LARGEST_INTEGER = 2**63 - 1
 LONGEST_NAME = 64
 
@@ -121,6 +122,13 @@ ANGLES = tuple(
 SINCE = Parameter(
     "since", Type.INTEGER, "number of the first stride wanted", range=Bounds(0, LARGEST_INTEGER), default=0
 )
+AFTER = Parameter(
+    "after_m",
+    Type.NUMBER,
+    "only pieces beyond this position: the last `place_m` of the answer before; without it, from the beginning",
+    "m",
+    null_is_default=True,
+)
 STRIDES = Parameter(
     "strides", Type.INTEGER, "number of strides; 0 walks until a stop", range=Bounds(0, MAX_STRIDES), default=0
 )
@@ -153,6 +161,7 @@ STATUS_KEYS = {
     "moving": "whether joints are on their way to a pose that was requested",
     "fault": "the worst present fault that is more than a warning, else one that blocks arming, else nothing",
     "faults": "every present fault: name, subject, message, what_to_do, age_s, reaction, blocks_arming",
+    "faults_left_out": f"number of present faults beyond the {FAULTS_PER_ANSWER} with the hardest reactions",
     "forced": "whether the robot was armed by force against a present fault",
     "notice": "why the robot stopped, until it is moved again",
     "unlogged_requests": "number of requests since the start that changed nothing or were repeated",
@@ -165,7 +174,8 @@ STATUS_KEYS = {
     "drives": "every drive, in the order of the joints: signals, their ages in s, error text, firmware and watchdog",
     "strides_closed": "number of strides of single flippers since the start",
     "mud": "the current estimate of the mud's coefficients in N/m³, of both flippers and of each",
-    "loop": "rate in Hz, ticks, missed ticks, and percentiles of wake-up delay and tick duration in µs",
+    "loop": "rate in Hz, ticks, missed ticks, and percentiles of wake-up delay and tick duration in µs;"
+    " a tick lasts until its clients are served",
     "warnings": "what the computer could not provide for real-time operation",
     "bus": "state of every bus, and counts of errors and lost frames",
     "log": "path of the log, rows dropped, and the state of its writer and disk",
@@ -201,7 +211,9 @@ METHODS: dict[str, SocketMethod] = {
     ),
     "map": SocketMethod(
         Level.READ,
-        "Report the mud along the track since the walk began.",
+        "Report the mud along the track since the walk began, in the order of positions,"
+        f" at most {PIECES_PER_ANSWER} pieces in one answer.",
+        (AFTER,),
         answer="a list of maps",
         answer_keys={
             "place_m": "position along the track in m",

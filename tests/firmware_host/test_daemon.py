@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from control.controller import WalkOrder
@@ -11,11 +13,12 @@ from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import SET_AXIS_STATE
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely
+from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
 from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.firmware_host.served_socket import Served
 
 FIRM = Track([(5.0, MUDS["48.5"])])
 
@@ -141,3 +144,15 @@ def test_a_loop_that_misses_most_ticks_does_not_feed_the_watchdog(missed: int, f
     for number in range(NOTIFY_TICKS):
         feed.update(Tick(0.0, 0.0, number, missed), Mode.IDLE)
     assert (notices.sent == ["WATCHDOG=1"]) is fed
+
+
+def test_the_time_in_which_clients_are_served_counts_as_a_part_of_the_tick(
+    robot: Lockstep, short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served = Served(short_folder / "s")
+    monkeypatch.setattr("firmware_host.daemon.time.monotonic", iter((1.0, 1.002)).__next__)
+    serve(robot.loop, served, robot.now_s)
+    monkeypatch.undo()
+    robot.step()
+    assert robot.loop.timing.tick.max_us == pytest.approx(2000.0, abs=1.0)
+    served.close()

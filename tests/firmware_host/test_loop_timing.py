@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from types import FrameType
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -25,6 +29,37 @@ def test_a_duration_beyond_the_buckets_keeps_its_maximum() -> None:
     histogram.add(3.0 * LONGEST_US / 1e6)
     assert histogram.summary()["max"] == pytest.approx(3.0 * LONGEST_US)
     assert histogram.percentile_us(0.5) == pytest.approx(3.0 * LONGEST_US)
+
+
+def test_a_percentile_of_long_durations_is_found_as_soon_as_one_of_short_ones() -> None:
+    """It is computed between two ticks, for every `status`."""
+    assert lines_run_for(0.0198) < 2000 > lines_run_for(0.0001)
+
+
+def lines_run_for(duration_s: float) -> int:
+    histogram, lines = Histogram(), 0
+    histogram.add(duration_s)
+
+    def trace(frame: FrameType, event: str, argument: object) -> Any:
+        nonlocal lines
+        lines += event == "line"
+        return trace
+
+    sys.settrace(trace)
+    try:
+        assert histogram.percentile_us(0.99) == pytest.approx(1e6 * duration_s, abs=1.5)
+    finally:
+        sys.settrace(None)
+    return lines
+
+
+def test_the_serving_of_clients_counts_as_a_part_of_its_tick() -> None:
+    timing = LoopTiming()
+    for number, serving_s in enumerate((0.0, 1.5e-3, 0.0)):
+        timing.update(number * PERIOD_S, 0.0, 0, 1e-4)
+        timing.add_serving(serving_s)
+    assert timing.tick.max_us == pytest.approx(1600.0)
+    assert timing.tick.count == 2  # the last tick is not over yet
 
 
 def test_an_empty_histogram_is_all_zeros() -> None:
