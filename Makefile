@@ -11,7 +11,7 @@ REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command
 # Ends a test that hangs, and prints where it hangs.
 PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --durations=10 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
-.PHONY: help setup demo test test-vm mutants lint docs docs-links man clean
+.PHONY: help setup demo test test-vm mutants dst lint docs docs-links man clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -33,6 +33,9 @@ test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virt
 
 mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each change
 	$(BIN)/python -m tests.drivers.gate_mutants
+
+dst: .venv/test  ## simulate SEEDS=200 random schedules of failures and operators; every promise must hold
+	@$(BIN)/python -m tests.dst.campaign $(or $(SEEDS),200) $(ARGS)
 
 lint: .venv/test .venv/docs  ## run ruff and mypy --strict
 	$(BIN)/ruff check .

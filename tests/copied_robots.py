@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import TypeVar
 
 from drivers.odrive import codec
 from simulation.harness.lockstep import Lockstep
 
 MESSAGES = [each for each in vars(codec).values() if isinstance(each, codec.Message)]  # keys of tables, by identity
 
+Robot = TypeVar("Robot", bound=Lockstep)
 
-def copy_of(robot: Lockstep) -> Lockstep:
+
+def copy_of(robot: Robot) -> Robot:
     """Returns a robot that goes on exactly as this one would; what happens to one does not change the other."""
     shared = [robot.loop.configuration, *MESSAGES]
     return deepcopy(robot, {id(each): each for each in shared})

@@ -64,7 +64,8 @@ class Lockstep:
     """Owns the common time of robot and loop. Disturbances change the mud and the drives.
 
     `plant` and `drives` replace those made from configuration, disturbances and base. `failures` make parts of the
-    loop's side fail: `fail` starts them.
+    loop's side fail: `fail` starts them. The loop misses as many ticks as `late_ticks` says before its next one, and
+    the wall clock is ahead by `wall_offset_s`.
     """
 
     def __init__(
@@ -82,6 +83,8 @@ class Lockstep:
         period_s: float = PERIOD_S,
     ) -> None:
         self.period_s = period_s
+        self.late_ticks = 0
+        self.wall_offset_s = 0.0
         self.buses = {name: MockBus() for name in configuration.bus}
         self.robot = SimulatedRobot(
             plant or plant_of(configuration, disturbances, fixed_base),
@@ -94,7 +97,7 @@ class Lockstep:
         wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
         ports = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
         pose: PoseSource = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
-        rows, wall_clock = recorder or NullRecorder(), self._now_s
+        rows, wall_clock = recorder or NullRecorder(), self._wall_s
         if failures is not None:
             pose, rows = FailingPose(pose, failures), FailingRecorder(rows, failures)
             wall_clock = FailingClock(wall_clock, failures)
@@ -111,8 +114,12 @@ class Lockstep:
     def _now_s(self) -> float:
         return self.now_s
 
+    def _wall_s(self) -> float:
+        return self.now_s + self.wall_offset_s
+
     def step(self) -> None:
-        missed = int(self._stalls.next_s() / self.period_s)
+        missed = int(self._stalls.next_s() / self.period_s) + self.late_ticks
+        self.late_ticks = 0
         self.tick_number += 1 + missed
         self.robot.advance(self.now_s)
         for failure in self.failures.update(self.now_s):

@@ -1,0 +1,142 @@
+"""Robots that break a promise on purpose, to prove that the oracle sees it.
+
+Each is a patch of the product, applied while the context lasts. `python -m tests.dst.broken_promises` reports after how
+many random seeds each is noticed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any
+from unittest import mock
+
+from control import controller, joint_pd
+from control.limits import LimitedTorques
+from control.modes import ENERGISED, Mode, Request
+from control.records import Torques
+from drivers.odrive.drives import OdriveDrives
+from drivers.transmit_gate import TransmitGate
+from firmware_host import loop
+from firmware_host.log.segments import LogSegments
+from firmware_host.loop import Loop
+from tests.dst.drawing import draw_scenario
+from tests.dst.run import run_scenario
+from tests.dst.starts import sound_walk
+
+MOST_SEEDS = 200
+
+Break = Callable[[], AbstractContextManager[Any]]
+
+
+def no_limits() -> AbstractContextManager[Any]:
+    """Loop and gate pass every torque on."""
+
+    def unlimited(wanted_nm: Torques, *others: Any) -> LimitedTorques:
+        return LimitedTorques(wanted_nm, limited=False, finite=True)
+
+    return _both(
+        mock.patch.object(loop, "apply_limits", unlimited),
+        mock.patch.object(TransmitGate, "torque_problem", lambda *arguments: ""),
+    )
+
+
+def damping_pushes() -> AbstractContextManager[Any]:
+    """Damping has the wrong sign."""
+
+    def pushing(*arguments: Any) -> Torques:
+        return joint_pd.damping_torques_nm(*arguments).map(lambda torque_nm: -torque_nm)
+
+    return mock.patch.object(controller, "damping_torques_nm", pushing)
+
+
+def _ignoring(ignored: Request) -> AbstractContextManager[Any]:
+    true_request = Loop.request
+
+    def request(self: Loop, wanted: Request, *arguments: Any, **options: Any) -> str | None:
+        return None if wanted is ignored else true_request(self, wanted, *arguments, **options)
+
+    return mock.patch.object(Loop, "request", request)
+
+
+def disarm_ignored() -> AbstractContextManager[Any]:
+    """A disarm is accepted and forgotten."""
+    return _ignoring(Request.DISARM)
+
+
+def stop_ignored() -> AbstractContextManager[Any]:
+    """A stop is accepted and forgotten."""
+    return _ignoring(Request.STOP)
+
+
+def arms_by_itself() -> AbstractContextManager[Any]:
+    """The loop arms again as soon as nothing prevents it."""
+    true_pop = Loop._pop_request
+
+    def pop(self: Loop) -> Request:
+        if self.mode is Mode.IDLE and not self.faults.blocking():
+            return Request.ARM
+        return true_pop(self)
+
+    return mock.patch.object(Loop, "_pop_request", pop)
+
+
+def silent_without_torque() -> AbstractContextManager[Any]:
+    """Nothing is sent any more in the modes without torque, so the drives keep their last torque."""
+    true_command = Loop._command
+
+    def command(self: Loop, now_s: float) -> None:
+        if self.mode in ENERGISED:
+            true_command(self, now_s)
+
+    silent = mock.patch.object(OdriveDrives, "disarm", lambda *arguments, **options: None)
+    return _both(silent, mock.patch.object(Loop, "_command", command))
+
+
+@contextmanager
+def _both(first: AbstractContextManager[Any], second: AbstractContextManager[Any]) -> Iterator[None]:
+    with first, second:
+        yield
+
+
+def fault_stays() -> AbstractContextManager[Any]:
+    """A fault never ends."""
+    return mock.patch("control.fault_latch.FaultLatch._is_over", lambda *arguments: False)
+
+
+def rows_vanish() -> AbstractContextManager[Any]:
+    """The log's writer loses a row now and then without a word."""
+    true_write = LogSegments.write
+
+    def write(self: LogSegments, rows: Any) -> None:
+        true_write(self, rows[:-1])
+
+    return mock.patch.object(LogSegments, "write", write)
+
+
+BREAKS: dict[str, Break] = {  # by the promise that must notice
+    "LimitedMotors": no_limits,
+    "LittleEnergy": damping_pushes,
+    "DisarmAtOnce": disarm_ignored,
+    "StopInTime": stop_ignored,
+    "ArmedByRequest": arms_by_itself,
+    "NoTorqueWithoutMode": silent_without_torque,
+    "BackToIdle": fault_stays,
+    "WholeLog": rows_vanish,
+}
+
+
+def seeds_until_noticed(promise: str) -> int | None:
+    """Returns how many random seeds show a break, or None where none of MOST_SEEDS does."""
+    for seed in range(MOST_SEEDS):
+        scenario = draw_scenario(seed)
+        sound_walk(scenario.surroundings).robot_at(scenario.start)  # whole until the schedule begins
+        with BREAKS[promise]():
+            if run_scenario(scenario).promise == promise:
+                return seed + 1
+    return None
+
+
+if __name__ == "__main__":
+    for each in BREAKS:
+        print(f"{each}: noticed after {seeds_until_noticed(each)} seeds", flush=True)

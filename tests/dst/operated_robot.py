@@ -1,0 +1,164 @@
+"""A robot in lockstep with the daemon's surroundings: its operator socket, its log, its shutdown and its last resort.
+
+After each tick of the loop the socket serves its clients, as in the daemon. The clients are real connections whose
+credentials the kernel would report; a peer is chosen here in its place.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections import deque
+from contextlib import redirect_stderr, suppress
+from io import StringIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgpack
+
+from firmware_host.daemon import Shutdown, end_safely
+from firmware_host.fault_injection.failure_calls import with_failures
+from firmware_host.operator.connection import Caller
+from firmware_host.operator.operator_calls import Method, OperatorCalls
+from firmware_host.operator.rights import Group, Peer, Rights
+from firmware_host.operator.rpc import REQUEST, RefusedError
+from firmware_host.operator.socket_file import operators_path
+from firmware_host.operator.status_socket import StatusSocket
+from simulation.harness.lockstep import Lockstep
+from tests.dst.harms import Harms
+from tests.dst.scenario import Call, Event, Failure, HangUp, Harm, Terminate
+
+RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
+PEERS = {
+    "pilot": Peer(500, 1000, frozenset({1000, 71})),
+    "second": Peer(501, 1001, frozenset({1001, 71})),
+    "steward": Peer(504, 1001, frozenset({1001, 71})),
+    "viewer": Peer(502, 1002, frozenset({1002, 70})),
+    "guest": Peer(503, 1003, frozenset({1003})),
+}
+WARNINGS: list[str] = []
+
+
+class Executed(NamedTuple):
+    """A call that the daemon has executed or refused."""
+
+    method: str
+    refused: bool
+
+
+class Client:
+    """Owns one connection to the socket. It reads its answers, so that it is not dropped, and ignores them."""
+
+    def __init__(self, path: Path) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.connect(str(path))
+        self._socket.setblocking(False)
+
+    def call(self, method: str, params: dict[str, Any]) -> None:
+        with suppress(OSError):  # the daemon has closed the connection
+            self._socket.send(msgpack.packb([REQUEST, 1, method, params]))
+
+    def read(self) -> None:
+        with suppress(OSError):
+            self._socket.recv(1 << 20)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class OperatedRobot:
+    """Owns the robot, the socket and its clients. `calls` are those that the daemon executed in the last tick."""
+
+    def __init__(self, lockstep: Lockstep, folder: Path) -> None:
+        self.lockstep = lockstep
+        self.loop = lockstep.loop
+        self.harms = Harms(lockstep)
+        self.calls: list[Executed] = []
+        self.bug = ""  # the exception that ended the loop, or a report of one in the socket
+        self.ended = False  # the daemon
+        self._clients: dict[str, Client] = {}
+        self._coming: deque[Peer] = deque()
+        self._shutdown = Shutdown()
+        calls = OperatorCalls(self.loop, WARNINGS, self._clock)
+        methods = with_failures(calls.methods, lockstep.failures, self.loop.events.report, self._clock)
+        noted = {name: self._noted(name, method) for name, method in methods.items()}
+        self._status = StatusSocket(folder / "s", noted, RIGHTS, lambda _: self._coming.popleft(), self._clock)
+        self._status.on_hang_up = self.loop.lease.hang_up
+        self._status.is_protected = lambda caller: caller == self.loop.lease.holder
+        self._status.report_bug = self._report_bug
+
+    @property
+    def now_s(self) -> float:
+        return self.lockstep.now_s
+
+    def _clock(self) -> float:
+        return self.lockstep.now_s
+
+    def apply(self, event: Event) -> None:
+        """Lets an event happen before the next tick."""
+        match event:
+            case Call(client=client, method=method, params=params):
+                self.call(client, method, **params)
+            case HangUp(client=client) if client in self._clients:
+                self._clients.pop(client).close()
+            case Failure(component=component, kind=kind, for_s=for_s):
+                self.lockstep.fail(component, kind, for_s)
+            case Harm():
+                self.harms.begin(event)
+            case Terminate():
+                self._shutdown.request(0, None)
+
+    def call(self, client: str, method: str, **params: Any) -> None:
+        if client not in self._clients:
+            self._coming.append(PEERS[client])
+            path = self._status.path
+            self._clients[client] = Client(
+                operators_path(path) if RIGHTS.operators.gid in PEERS[client].groups else path
+            )
+        self._clients[client].call(method, params)
+
+    def step(self) -> None:
+        """Runs one tick of the robot and of the daemon."""
+        self.harms.update()
+        self.calls.clear()
+        if self.ended:
+            self.lockstep.tick_number += 1
+            self.lockstep.robot.advance(self.now_s)
+            return
+        try:
+            self.ended = self._shutdown.step(self.loop, self.now_s)
+            if not self.ended:
+                self.lockstep.step()
+                self._status.serve(self.now_s)
+        except Exception as problem:  # noqa: BLE001 - as in the daemon
+            self._report_bug(f"{type(problem).__name__}: {problem}")
+            self.ended = True
+            with redirect_stderr(StringIO()):
+                end_safely(self.loop, problem)
+        for client in self._clients.values():
+            client.read()
+
+    def _noted(self, name: str, method: Method) -> Method:
+        """Returns the method, which also notes its calls."""
+
+        def call(params: dict[str, Any], caller: Caller) -> Any:
+            try:
+                answer = method(params, caller)
+            except RefusedError:
+                self.calls.append(Executed(name, refused=True))
+                raise
+            self.calls.append(Executed(name, refused=False))
+            return answer
+
+        return call
+
+    def accepted(self, *methods: str) -> bool:
+        """Returns whether one of the methods was accepted in the last tick."""
+        return any(call.method in methods and not call.refused for call in self.calls)
+
+    def _report_bug(self, message: str) -> None:
+        self.bug = self.bug or message
+
+    def close(self) -> None:
+        for client in self._clients.values():
+            client.close()
+        self._status.close()

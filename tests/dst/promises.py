@@ -1,0 +1,237 @@
+"""The promises of the robot, each checked from the simulated mechanics and the operators' calls.
+
+None of them asks a monitor of the robot whether something is wrong. `update` runs after every tick and yields a text
+for what was broken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import radians
+
+from control.controller import SOFT_STOP_S
+from control.faults import Clears
+from control.modes import ENERGISED, Mode
+from control.records import JOINTS, NEVER_S, Torques
+from simulation.body.plant import END_STOPS_RAD
+from simulation.harness.joint_energy import JointEnergy
+from tests.dst.operated_robot import OperatedRobot
+from tests.dst.reachability import Reachability
+
+ROUNDING_NM = 1e-6
+ON_THE_WAY_TICKS = 3  # from a change of mode until the motor obeys
+CLAMP_S = 0.01  # after a joint was too fast: the current of the drive's clamp decays
+STOP_TICKS = 4  # from an accepted request, beyond the time of the stop itself
+
+
+class Promise:
+    """One promise, and what it remembers of a run."""
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        self.robot = robot
+        self.loop = robot.loop
+        self.reach = reach
+
+    def update(self) -> Iterator[str]:
+        yield from ()
+
+
+class NoTorqueWithoutMode(Promise):
+    """A motor has no torque in a mode without torque, as soon as a command or its watchdog can reach the drive."""
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        self._off_since_s: float | None = None
+        robot.lockstep.robot.observers.append(self._measure)
+        self._late: dict[int, float] = {}
+
+    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+        if self._off_since_s is None:
+            return
+        off_s = self.robot.lockstep.robot.now_s - self._off_since_s
+        for index, torque_nm in enumerate(torques_nm):
+            if abs(torque_nm) > self.reach.cogging_nm and off_s > self.reach.longest_s(index, ON_THE_WAY_TICKS):
+                self._late[index] = torque_nm
+
+    def update(self) -> Iterator[str]:
+        off = self.loop.mode not in ENERGISED or self.robot.ended
+        self._off_since_s = (self._off_since_s or self.robot.now_s) if off else None
+        for index, torque_nm in self._late.items():
+            yield f"{JOINTS[index]} has {torque_nm:.3f} N·m in mode {self.loop.mode.name.lower()}"
+        self._late.clear()
+
+
+class LimitedMotors(Promise):
+    """No motor exceeds the torque limit, except where it brakes, and none exceeds the slew rate."""
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        limits = self.loop.configuration.limits
+        self._largest_nm, self._rate_nm_s = limits.torque_nm, limits.torque_rate_nm_s
+        self._fast_rad_s = limits.velocity_rad_s
+        self._before_nm: list[float] = []
+        self._fast_s = [NEVER_S] * len(JOINTS)
+        self._changed_s = [robot.now_s] * len(JOINTS)
+        self._broken: list[str] = []
+        robot.lockstep.robot.observers.append(self._measure)
+
+    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+        """Compares what the motors were commanded: their true torque over the gain of a harmed motor."""
+        robot = self.robot.lockstep.robot
+        velocities_rad_s = robot.plant.velocities_rad_s
+        self._before_nm = self._before_nm or list(torques_nm)
+        for index, torque_nm in enumerate(torques_nm):
+            gain = self.reach.gain(index)
+            commanded_nm, rounding_nm = torque_nm / gain, ROUNDING_NM + self.reach.cogging_nm / abs(gain)
+            if abs(velocities_rad_s[index]) > self._fast_rad_s:  # the drive's own clamp brakes it
+                self._fast_s[index] = robot.now_s
+            if robot.now_s - self._fast_s[index] > CLAMP_S and not self.reach.is_foreign(index):
+                braking = commanded_nm * velocities_rad_s[index] < 0.0
+                if abs(commanded_nm) > self._largest_nm + rounding_nm and not braking:
+                    self._broken.append(f"{JOINTS[index]} has {commanded_nm:.3f} N·m of {self._largest_nm:g} N·m")
+                self._check_slew(index, commanded_nm, 2.0 * rounding_nm, robot.now_s)
+            if commanded_nm != self._before_nm[index]:
+                self._before_nm[index], self._changed_s[index] = commanded_nm, robot.now_s
+
+    def _check_slew(self, index: int, torque_nm: float, rounding_nm: float, now_s: float) -> None:
+        """A torque may always fall towards zero; it grows by the slew rate since the command before."""
+        before_nm = self._before_nm[index]
+        since_s = now_s - self._changed_s[index] + self.reach.bunched_s(index)
+        grown_nm = abs(torque_nm) - abs(before_nm) if torque_nm * before_nm > 0.0 else abs(torque_nm)
+        if grown_nm > self._rate_nm_s * since_s + rounding_nm:
+            step = f"{before_nm:.3f} to {torque_nm:.3f} N·m"
+            self._broken.append(f"{JOINTS[index]} goes from {step} within {1e3 * since_s:.1f} ms")
+
+    def update(self) -> Iterator[str]:
+        yield from self._broken
+        self._broken = []
+
+
+class StopInTime(Promise):
+    """After `stop` no joint follows a path for longer than the soft stop."""
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        self.since_s: float | None = None
+
+    def update(self) -> Iterator[str]:
+        travels = self.loop.mode in (Mode.WALKING, Mode.STOPPING) or self.loop.controller.moving
+        if self.robot.accepted("walk", "move"):
+            self.since_s = None
+        if self.robot.accepted("stop"):
+            self.since_s = self.since_s or self.robot.now_s
+        elif not travels or self.robot.ended:
+            self.since_s = None
+        if self.since_s is not None:
+            longest_s = SOFT_STOP_S + STOP_TICKS * self.loop.period_s + self.reach.stalled_s
+            if self.robot.now_s - self.since_s > longest_s:
+                yield f"{self.robot.now_s - self.since_s:.2f} s after stop the robot is {self.loop.mode.name.lower()}"
+
+
+class DisarmAtOnce(Promise):
+    """`disarm` ends every mode with torque in the next tick."""
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        self._ticks: int | None = None  # of the loop since the request
+
+    def update(self) -> Iterator[str]:
+        if self._ticks is not None:
+            self._ticks += 1
+            if self.loop.mode in ENERGISED and not self.robot.ended:
+                yield f"{self._ticks} ticks after disarm the robot is in mode {self.loop.mode.name.lower()}"
+            self._ticks = None
+        if self.robot.accepted("disarm"):
+            self._ticks = 0
+
+
+class ArmedByRequest(Promise):
+    """Torque comes on only in the tick after an accepted `arm`."""
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        self._before = self.loop.mode
+        self._requested = False
+        self._energised_s = [0.0] * len(JOINTS)
+
+    def update(self) -> Iterator[str]:
+        if self._before not in ENERGISED and self.loop.mode in ENERGISED and not self._requested:
+            yield f"from {self._before.name.lower()} to {self.loop.mode.name.lower()} without a request to arm"
+        self._before = self.loop.mode
+        self._requested = self.robot.accepted("arm")
+        yield from self._check_drives()
+
+    def _check_drives(self) -> Iterator[str]:
+        off = self.loop.mode not in ENERGISED
+        for index, drive in enumerate(self.robot.lockstep.robot.drives):
+            on = off and drive.energised and not self.reach.is_energised_by_others(index)
+            self._energised_s[index] = self._energised_s[index] + self.loop.period_s if on else 0.0
+            if self._energised_s[index] > self.reach.longest_idling_s(index):
+                yield f"the drive of {JOINTS[index]} stays in closed loop in mode {self.loop.mode.name.lower()}"
+
+
+class WithinStops(Promise):
+    """Our torque does not press a joint against its mechanical stop."""
+
+    LONGEST_S = 0.5  # a stuck encoder is detected within 120 ticks, then braking takes as long as the slew
+    PRESSING_NM = 0.1
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        self._pressed_s = [0.0] * len(JOINTS)
+        robot.lockstep.robot.observers.append(self._measure)
+
+    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+        angles_rad = self.robot.lockstep.robot.plant.angles_rad
+        for index, torque_nm in enumerate(torques_nm):
+            angle_rad, stop_rad = angles_rad[index], END_STOPS_RAD[index % 2]
+            presses = abs(angle_rad) > stop_rad - radians(0.1) and torque_nm * angle_rad > 0.0
+            ours = presses and abs(torque_nm) > self.PRESSING_NM and not self.reach.is_foreign(index)
+            self._pressed_s[index] = self._pressed_s[index] + dt_s if ours else 0.0
+
+    def update(self) -> Iterator[str]:
+        for joint, pressed_s in zip(JOINTS, self._pressed_s, strict=True):
+            if pressed_s > self.LONGEST_S:
+                yield f"{joint} is pressed against its stop for {pressed_s:.2f} s"
+
+
+class LittleEnergy(Promise):
+    """Once the robot only brakes its joints, our torque puts hardly any energy into one."""
+
+    MOST_J = 1.0  # a motor with inverted torque is detected by then
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        self._energy = JointEnergy(robot.lockstep.robot, self.loop.configuration.joint_ranges)
+        self._before = self.loop.mode
+
+    def update(self) -> Iterator[str]:
+        if self._before is not Mode.DAMPING:
+            self._energy.begin()
+        self._before = self.loop.mode
+        for index, joint in enumerate(self._energy.joints):
+            if joint.energy_j > self.MOST_J and not self.reach.is_foreign(index):
+                yield f"{JOINTS[index]} received {joint.energy_j:.2f} J while damping"
+
+
+class NoBug(Promise):
+    """No exception escapes, and nothing happens that only a bug can cause."""
+
+    def update(self) -> Iterator[str]:
+        if self.robot.bug:
+            yield self.robot.bug
+        for fault in self.loop.faults.begun:
+            if fault.kind.clears is Clears.BY_RESTART:
+                yield f"the fault {fault.name}, which only a bug causes"
+
+
+PROMISES: tuple[type[Promise], ...] = (
+    NoTorqueWithoutMode,
+    LimitedMotors,
+    StopInTime,
+    DisarmAtOnce,
+    ArmedByRequest,
+    WithinStops,
+    LittleEnergy,
+    NoBug,
+)

@@ -1,0 +1,91 @@
+"""What no program could do better: which drives a command cannot reach, and whose torque is not ours.
+
+The bounds of the promises follow from it. It knows the schedule, not what the robot believes.
+"""
+
+from __future__ import annotations
+
+from math import cos, radians
+
+from control.records import JOINTS
+from drivers.fault_injection.failures import MOST_DELAY_S, FailureKind
+from tests.dst.harms import FOREIGN
+from tests.dst.operated_robot import OperatedRobot
+
+WATCHDOG_S = 0.1
+AFTERMATH_S = 0.03  # after a failure's end: delayed frames arrive, and lost requests are repeated
+HEARTBEATS_S = 0.25  # until the loop has seen a drive in closed loop and has commanded it idle again
+REPEAT_S = 0.1  # between two requests to go idle
+
+
+class Reachability:
+    """Owns the time at which each joint's commands were last disturbed."""
+
+    def __init__(self, robot: OperatedRobot) -> None:
+        self._robot = robot
+        self._failures = robot.lockstep.failures
+        self._period_s = robot.loop.period_s
+        self._disturbed_s = [float("-inf")] * len(JOINTS)
+        self._foreign_s = [float("-inf")] * len(JOINTS)
+        self._late_s = float("-inf")
+        self._missed = robot.loop.missed_ticks
+        drive = robot.loop.configuration.drive
+        self._paths = [(f"bus.{drive[joint].bus}", joint, f"{joint}.command") for joint in JOINTS]
+        self.cogging_nm = 2.0 * max(each.parameters.cogging_nm for each in robot.lockstep.robot.drives)
+        self.stalled_s = 0.0  # since the start
+
+    def update(self) -> None:
+        """Call this after every tick."""
+        now_s, missed = self._robot.now_s, self._robot.loop.missed_ticks
+        if missed != self._missed:
+            self.stalled_s += (missed - self._missed) * self._period_s
+            self._missed, self._late_s = missed, now_s
+        harms = self._robot.harms
+        for index, joint in enumerate(JOINTS):
+            if self._failures.failing and any(self._cuts(component) for component in self._paths[index]):
+                self._disturbed_s[index] = now_s
+            if any(active.harm.joint == joint and active.harm.name in FOREIGN for active in harms.active):
+                self._foreign_s[index] = now_s
+
+    def _cuts(self, component: str) -> bool:
+        failure = self._failures.of(component)
+        return failure is not None and failure.kind in CUTTING
+
+    def _recently(self, since_s: float, within_s: float) -> bool:
+        return self._robot.lockstep.robot.now_s - since_s < within_s
+
+    def longest_s(self, index: int, ticks: int) -> float:
+        """Returns how long a motor may keep its torque after the loop has taken it away."""
+        if self._recently(self._disturbed_s[index], WATCHDOG_S + AFTERMATH_S) or self._recently(
+            self._late_s, WATCHDOG_S + AFTERMATH_S
+        ):
+            return WATCHDOG_S + MOST_DELAY_S + AFTERMATH_S
+        if self.is_foreign(index):
+            return float("inf")
+        return ticks * self._period_s
+
+    def longest_idling_s(self, index: int) -> float:
+        """Returns how long a drive may stay in closed loop after the loop has commanded it idle."""
+        if self._recently(self._disturbed_s[index], HEARTBEATS_S + REPEAT_S):
+            return float("inf")
+        return HEARTBEATS_S + REPEAT_S
+
+    def bunched_s(self, index: int) -> float:
+        """Returns how much closer together than they were sent commands may arrive."""
+        late = self._recently(self._disturbed_s[index], AFTERMATH_S)
+        return self._period_s + (MOST_DELAY_S if late else 0.0)
+
+    def is_foreign(self, index: int) -> bool:
+        """Returns whether others command the drive's torque."""
+        return self._recently(self._foreign_s[index], AFTERMATH_S)
+
+    def is_energised_by_others(self, index: int) -> bool:
+        return self._recently(self._foreign_s[index], HEARTBEATS_S + REPEAT_S)
+
+    def gain(self, index: int) -> float:
+        """Returns the motor's true torque for a commanded one."""
+        parameters = self._robot.lockstep.robot.drives[index].parameters
+        return (1.0 + parameters.torque_constant_error) * cos(radians(parameters.commutation_error_deg))
+
+
+CUTTING = (FailureKind.OFF, FailureKind.STUCK, FailureKind.SLOW, FailureKind.INTERMITTENT, FailureKind.BUS_OFF)

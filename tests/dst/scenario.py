@@ -1,0 +1,101 @@
+"""One scenario of the deterministic simulation: a world, a configuration, and a schedule of events, as plain data.
+
+Everything that happens follows from this record, to the last bit. Its `repr` is valid Python, so a scenario that broke
+a promise can be pasted into the regression list as it is printed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class Call(NamedTuple):
+    """A client of the operator socket calls a method."""
+
+    at_s: float
+    client: str
+    method: str
+    params: dict[str, Any] = {}
+
+
+class HangUp(NamedTuple):
+    """A client closes its connection; its next call opens another one."""
+
+    at_s: float
+    client: str
+
+
+class Failure(NamedTuple):
+    """A component fails as with `mudskipper fail`."""
+
+    at_s: float
+    component: str
+    kind: str
+    for_s: float
+
+
+class Harm(NamedTuple):
+    """Something physical goes wrong with one joint, its drive or the loop (harms.py)."""
+
+    at_s: float
+    name: str
+    joint: str
+    for_s: float
+
+
+class Terminate(NamedTuple):
+    """The service is stopped with SIGTERM."""
+
+    at_s: float
+
+
+Event = Call | HangUp | Failure | Harm | Terminate
+
+
+class Surroundings(NamedTuple):
+    """The ground, the body, the drives and the configuration, which several scenarios share."""
+
+    seed: int = 0  # of the drives' noise and the mud's history
+    strength_pa: float = 1000.0
+    depth_m: float = 0.03  # of the first stride
+    stone_m: float | None = None  # where along the track a buried stone begins
+    disturbed: bool = False  # the mud clings, remoulds and relaxes as in the authors' logs
+    free_body: bool = False
+    drives: tuple[tuple[str, float], ...] = ()  # fields of SimulatedDriveParameters
+    configuration: tuple[tuple[str, Any], ...] = ()  # keys that differ from the example: ("limits.torque_nm", 0.5)
+
+
+class Scenario(NamedTuple):
+    seed: int  # of the failures' own draws
+    surroundings: Surroundings
+    start: str  # the state of a sound robot at which the schedule begins (starts.py)
+    events: tuple[Event, ...]  # in the order of their times
+    for_s: float  # then everything that failed is whole again, and an operator clears the faults
+
+
+def end_s(event: Event) -> float:
+    """Returns when the event is over."""
+    return event.at_s + event.for_s if isinstance(event, Failure | Harm) else event.at_s
+
+
+def describe(scenario: Scenario) -> str:
+    """Writes a scenario as a schedule for people, one line for each event."""
+    given = scenario.surroundings._asdict().items()
+    surroundings = ", ".join(f"{name} = {value}" for name, value in given if value not in (None, (), False))
+    lines = [f"seed {scenario.seed}: from {scenario.start}, for {scenario.for_s:.3f} s", f"  in {surroundings}"]
+    return "\n".join([*lines, *(f"  {event.at_s:6.3f} s  {_text_of(event)}" for event in scenario.events)])
+
+
+def _text_of(event: Event) -> str:
+    match event:
+        case Call():
+            params = ", ".join(f"{name}={value}" for name, value in event.params.items())
+            return f"{event.client} calls {event.method}({params})"
+        case HangUp():
+            return f"{event.client} hangs up"
+        case Failure():
+            return f"{event.component} {event.kind} for {event.for_s:g} s"
+        case Harm():
+            return f"{event.name} {event.joint} for {event.for_s:g} s"
+        case Terminate():
+            return "SIGTERM"

@@ -1,0 +1,163 @@
+"""Sound robots at the states from which scenarios start, each a copy of one walk in the same surroundings.
+
+Booting, arming and walking into a phase of the gait takes two seconds of simulated time, which every scenario would
+otherwise spend without a failure.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any
+
+from control.controller import WalkOrder
+from control.modes import ENERGISED, Mode, Request
+from control.records import Phase
+from drivers.fault_injection.failures import Failures
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.log.recorder import NullRecorder
+from simulation.harness.lockstep import Lockstep
+from simulation.harness.world import World
+from simulation.mud.clay import Clay
+from simulation.mud.disturbances import LAB, NONE
+from simulation.mud.stones import Stone
+from simulation.mud.track import Track
+from tests.copied_robots import copy_of
+from tests.dst.scenario import Surroundings
+from tests.folders import ROOT
+
+TRACK_M, STONE_LENGTH_M, STONE_TOP_M = 5.0, 0.2, 0.02
+LONGEST_S = 6.0  # from one start to the next
+PHASES = {
+    "insertion": Phase.INSERTION,
+    "stance": Phase.STANCE,
+    "extraction": Phase.EXTRACTION,
+    "swing": Phase.SWING,
+    "recovery": Phase.RECOVERY,
+}
+ROUTE = ("power-on", "idle", "hold", "path", "insertion", "stance", "extraction")  # which every walk passes
+STUCK_PA, STUCK_M = 9000.0, 0.05  # mud and depth in which a walk leads to recovery, and else to swing
+
+
+class Rows(NullRecorder):
+    """A Recording that owns the rows themselves, so that a copied robot has those of the walk before."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[int, bytes]] = []
+
+    def put(self, number: int, row: bytes) -> bool:
+        self.rows.append((number, row))
+        return True
+
+
+class RecordedRobot(Lockstep):
+    """A robot that also owns the rows of its log, and the numbers of its ticks with and without torque."""
+
+    def __init__(self, configuration: Configuration, world: World, seed: int) -> None:
+        self.rows = Rows()
+        self.energised_ticks: list[int] = []
+        self.resting_ticks: list[int] = []
+        super().__init__(
+            configuration,
+            world.track,
+            seed=seed,
+            recorder=self.rows,
+            plant=world.plant(configuration),
+            drives=world.drives(configuration),
+            failures=Failures(configuration.bus, seed),
+        )
+
+    def step(self) -> None:
+        super().step()
+        ticks = self.energised_ticks if self.loop.mode in ENERGISED else self.resting_ticks
+        ticks.append(self.tick_number)
+
+
+@lru_cache(maxsize=1)
+def _example() -> str:
+    return (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
+
+
+def configuration_of(surroundings: Surroundings) -> Configuration:
+    """Raises ConfigurationError where the changed keys contradict each other."""
+    document = tomllib.loads(_example())
+    for key, value in (("failures.allowed", True), *surroundings.configuration):
+        section, _, name = key.rpartition(".")
+        document.setdefault(section, {})[name] = value
+    return parse_configuration(_toml(document))
+
+
+def _toml(document: Mapping[str, Any], above: str = "") -> str:
+    """Writes tables, arrays of tables and plain values, the JSON of which is TOML too."""
+    lines = []
+    for key, value in document.items():
+        if isinstance(value, dict):
+            plain = {name: each for name, each in value.items() if not isinstance(each, dict)}
+            nested = {name: each for name, each in value.items() if isinstance(each, dict)}
+            lines += [f"[{above}{key}]" if plain or not nested else "", _toml(plain), _toml(nested, f"{above}{key}.")]
+        elif isinstance(value, list):
+            lines += [f"[[{above}{key}]]\n{_toml(each)}" for each in value]
+        else:
+            lines.append(f"{key} = {json.dumps(value)}")
+    return "\n".join(lines)
+
+
+def robot_of(surroundings: Surroundings) -> RecordedRobot:
+    """Makes a robot at power-on."""
+    stones = [] if surroundings.stone_m is None else [_stone(surroundings.stone_m)]
+    clay = Clay(f"{surroundings.strength_pa:g} Pa", surroundings.strength_pa)
+    world = World(
+        Track([(TRACK_M, clay)], stones),
+        LAB if surroundings.disturbed else NONE,
+        {"free_body": True} if surroundings.free_body else {},
+        dict(surroundings.drives),
+    )
+    return RecordedRobot(configuration_of(surroundings), world, surroundings.seed)
+
+
+def _stone(start_m: float) -> Stone:
+    return Stone(start_m, start_m + STONE_LENGTH_M, STONE_TOP_M)
+
+
+class SoundWalk:
+    """Owns one robot on its way from power-on into a walk, and copies of it at the starts that it has passed."""
+
+    def __init__(self, surroundings: Surroundings) -> None:
+        self._surroundings = surroundings
+        self._robot = robot_of(surroundings)
+        self._passed = {ROUTE[0]: copy_of(self._robot)}
+
+    def robot_at(self, start: str) -> RecordedRobot:
+        """Returns a copy at this start. Raises RuntimeError where a sound robot does not get there."""
+        route = (*ROUTE, start)
+        for each in route[: route.index(start) + 1]:
+            if each not in self._passed:
+                self._go_to(each)
+                self._passed[each] = copy_of(self._robot)
+        return copy_of(self._passed[start])
+
+    def _go_to(self, start: str) -> None:
+        robot, loop = self._robot, self._robot.loop
+        if start == "idle":
+            self._reach(start, lambda: loop.mode is Mode.IDLE and not loop.faults.blocking())
+        elif start == "hold":
+            loop.request(Request.ARM, robot.now_s)
+            self._reach(start, lambda: loop.mode is Mode.HOLD)
+        elif start == "path":
+            robot.walk(WalkOrder(self._surroundings.depth_m, adaptive=True))
+        else:
+            self._reach(start, lambda: loop.controller.target.phase is PHASES[start])
+
+    def _reach(self, start: str, is_there: Callable[[], bool]) -> None:
+        if not self._robot.run_until(is_there, LONGEST_S):
+            loop = self._robot.loop
+            raise RuntimeError(f"a sound robot did not reach {start}: {loop.mode.name}, {loop.fault}")
+
+
+@lru_cache(maxsize=2)
+def sound_walk(surroundings: Surroundings) -> SoundWalk:
+    """Returns the walk that consecutive scenarios share."""
+    return SoundWalk(surroundings)

@@ -1,0 +1,65 @@
+"""The oracle notices robots that break a promise, and says the same of a seed every time."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.dst.broken_promises import BREAKS
+from tests.dst.drawing import draw_scenario
+from tests.dst.run import run_scenario
+from tests.dst.scenario import Call, Event, Failure, Harm, Scenario, Surroundings
+from tests.dst.shrinking import shrink
+from tests.dst.starts import sound_walk
+
+QUICK = Surroundings(configuration=(("motion.path_speed_rad_s", 3.0), ("motion.fade_in_s", 0.1)))
+SHORT_S = 0.3
+SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events and duration that show each break
+    "LimitedMotors": ("stance", (Harm(0.01, "blocked", "left_sweep", 0.2),), SHORT_S),
+    "LittleEnergy": ("stance", (Failure(0.05, "bus.left", "stuck", 0.02),), 1.0),
+    "DisarmAtOnce": ("stance", (Call(0.05, "guest", "disarm"),), SHORT_S),
+    "StopInTime": ("hold", (Call(0.0, "pilot", "walk"), Call(0.1, "guest", "stop")), SHORT_S),
+    "ArmedByRequest": ("stance", (Call(0.05, "guest", "disarm"),), 0.8),
+    "NoTorqueWithoutMode": ("stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),), SHORT_S),
+    "BackToIdle": ("hold", (Failure(0.05, "left_sweep", "off", 0.05),), SHORT_S),
+    "WholeLog": ("swing", (), SHORT_S),
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def sound_robots() -> None:
+    """Passes the starts of the schedules while the robot is whole."""
+    for start, _, _ in SCHEDULES.values():
+        sound_walk(QUICK).robot_at(start)
+
+
+@pytest.mark.parametrize("promise", SCHEDULES)
+def test_a_broken_promise_is_noticed(promise: str) -> None:
+    scenario = Scenario(1, QUICK, *SCHEDULES[promise])
+    assert run_scenario(scenario).problem == ""
+    with BREAKS[promise]():
+        assert run_scenario(scenario).promise == promise
+
+
+def test_a_seed_gives_the_same_run_every_time() -> None:
+    scenario = draw_scenario(3)
+    first = run_scenario(scenario)
+    sound_walk.cache_clear()
+    assert run_scenario(scenario) == first
+
+
+def test_a_failing_schedule_shrinks_to_the_event_that_matters() -> None:
+    harm = Harm(0.2, "hot motor", "left_sweep", 0.4)
+    events = (Call(0.0, "viewer", "status"), Failure(0.1, "pose", "off", 0.3), harm, Call(0.3, "guest", "stop"))
+    scenario = Scenario(1, Surroundings(seed=7, free_body=True), "stance", events, 1.5)
+    smallest = shrink(scenario, lambda each: any(isinstance(event, Harm) for event in each.events))
+    assert [type(event) for event in smallest.events] == [Harm]
+    assert smallest.surroundings == Surroundings()
+    assert smallest.for_s < 0.5
+
+
+def test_a_printed_scenario_is_python() -> None:
+    names = {kind.__name__: kind for kind in (Call, Failure, Harm, Scenario, Surroundings)}
+    scenario = Scenario(
+        1, Surroundings(), "hold", (Call(0.0, "guest", "stop"), Harm(0.1, "push", "left_sweep", 0.2)), 1.0
+    )
+    assert eval(repr(scenario), names) == scenario
