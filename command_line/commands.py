@@ -5,7 +5,10 @@ import os
 from pathlib import Path
 from typing import TypeAlias
 
+from drivers.can.run_folder import find_run_folder
+
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
+SIMULATED = "robot"  # the name that `mudskipper simulate` has without --bus
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # generic for type checkers alone
 
@@ -17,12 +20,22 @@ def add(commands: Commands, name: str, function: str, text: str) -> argparse.Arg
     return command
 
 
+def default_socket() -> Path:
+    """Returns $MUDSKIPPER_SOCKET, else the service's socket; where no service runs, that of `mudskipper simulate`."""
+    given, service = os.environ.get("MUDSKIPPER_SOCKET"), Path(DEFAULT_SOCKET)
+    if given or service.exists():
+        return Path(given) if given else service
+    folder = find_run_folder()
+    simulated = folder / SIMULATED / service.name if folder else service
+    return simulated if simulated.exists() else service
+
+
 def add_socket(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--socket",
         type=Path,
-        default=Path(os.environ.get("MUDSKIPPER_SOCKET", DEFAULT_SOCKET)),
-        help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET or %(default)s)",
+        default=default_socket(),
+        help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else that of the service or the simulated robot)",
     )
 
 

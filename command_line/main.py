@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from command_line import exit_codes
-from command_line.commands import DEFAULT_CONFIG, Commands, add, add_json, add_socket
+from command_line.commands import DEFAULT_CONFIG, SIMULATED, Commands, add, add_json, add_socket
 from command_line.experiments.experiment_commands import add_experiments
 from command_line.option_types import between, depth_cm, finite, folder, joint_angle, picture, whole
 from command_line.screen import complain
@@ -145,7 +145,7 @@ def _add_simulation(commands: Commands) -> None:
     demo.add_argument("--depth", type=depth_cm, metavar="CM", help="fixed insertion depth (default: adaptive)")
     demo.add_argument("--world", type=Path, metavar="FILE", help="describes the ground (default: three muds)")
     simulate = add(commands, "simulate", "simulate.simulate", "Simulate the robot on a bus until Ctrl-C.")
-    simulate.add_argument("--bus", default="robot", metavar="NAME", help="of the local bus")
+    simulate.add_argument("--bus", default=SIMULATED, metavar="NAME", help="of the local bus")
     simulate.add_argument("--config", type=Path, help="use the buses of this configuration")
     ground = simulate.add_mutually_exclusive_group()
     ground.add_argument("--mud", action="append", metavar="W", help="water content, repeatable: 48.5, 53.1, 45.3")

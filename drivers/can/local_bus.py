@@ -15,7 +15,6 @@ import fcntl
 import os
 import select
 import socket
-import tempfile
 from collections import deque
 from dataclasses import dataclass
 from itertools import count
@@ -26,7 +25,9 @@ import can
 
 from drivers.can.can_port import frame_from, message_from
 from drivers.can.frames import FD_FORMAT, FD_FRAME_LAYOUT, FLAGS_BYTE, FRAME_LAYOUT, decode_frame, encode_frame
+from drivers.can.run_folder import make_own_folder, run_folder
 
+BUSES = "buses"  # in the user's private folder
 FRAME_BYTES, FD_FRAME_BYTES = FRAME_LAYOUT.size, FD_FRAME_LAYOUT.size
 CHUNK_BYTES = 65536
 PATH_MAX_BYTES = 107  # sun_path of unix(7) has 108 with its final zero
@@ -245,22 +246,13 @@ def _end_of_frame(stream: bytes, begin: int) -> int:
 
 
 def make_channel_folder(channel: str | Path) -> Path:
-    """Returns the folder of a channel: an absolute path itself, or a plain name in this user's runtime folder."""
+    """Returns the folder of a channel: an absolute path itself, or a plain name in this user's private folder."""
     folder = Path(channel)
     if not folder.is_absolute():
         if folder.name != str(channel) or folder.name in ("", ".."):
             raise ValueError(f"{str(channel)!r} is neither an absolute path nor a plain name.")
-        runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir())
-        folder = _make_own_folder(runtime / f"mudskipper-bus-{os.geteuid()}") / folder
-    return _make_own_folder(folder)
-
-
-def _make_own_folder(folder: Path) -> Path:
-    folder.mkdir(mode=0o700, exist_ok=True)
-    owner = folder.lstat().st_uid  # lstat: another user may have put a link into a shared folder
-    if owner != os.geteuid():
-        raise PermissionError(f"{folder} belongs to user {owner}, not to user {os.geteuid()} who runs this.")
-    return folder
+        folder = make_own_folder(run_folder() / BUSES) / folder
+    return make_own_folder(folder)
 
 
 def _free_path(folder: Path) -> Path:

@@ -73,7 +73,7 @@ class LogFile:
         self._chunk_bytes = self._safe_bytes = 0
         try:
             lock_file(self._file.fileno(), path)
-            copy_owner(path)
+            copy_owner(self._file.fileno(), path.parent)
             self._write_opening(opening["configuration_text"], opening["metadata"])
             for kind in kinds:
                 schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.definition.encode())

@@ -172,15 +172,22 @@ def make_folder(folder: Path) -> None:
     if not folder.exists():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
-        copy_owner(folder)
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            copy_owner(descriptor, folder.parent)
+        finally:
+            os.close(descriptor)
 
 
-def copy_owner(path: Path) -> None:
-    """Gives a file the owner of its folder: a file that a command makes as root must not lock the daemon out."""
-    owner = path.parent.stat()
+def copy_owner(descriptor: int, folder: Path) -> None:
+    """Gives an open file the owner of its folder: what a command makes as root must not lock the daemon out.
+
+    The file is open and not named by its path, which the folder's owner may have replaced by a link meanwhile.
+    """
+    owner = folder.stat()
     for user, group in ((-1, owner.st_gid), (owner.st_uid, -1)):
         with suppress(OSError):  # only root may change the owner, and not on every disk
-            os.chown(path, user, group)
+            os.fchown(descriptor, user, group)
 
 
 def synchronise_folder(folder: Path) -> None:

@@ -6,9 +6,9 @@ all processes share, signals arrive less punctually than on a robot, so their bo
 """
 
 import json
-import os
-import tempfile
 from pathlib import Path
+
+from drivers.can.run_folder import make_own_folder, run_folder, write_private_file
 
 CONFIGURATION = """\
 # A robot whose drives are simulated on local buses.
@@ -91,23 +91,21 @@ allowed = true
 
 
 def named_folder(name: str) -> Path:
-    """Returns the same folder for every process of this user: short, as the path of a Unix socket must be.
+    """Returns the same private folder for every process of this user: short, as the path of a Unix socket must be.
 
-    Raises ValueError for a name with a path in it.
+    Raises ValueError for a name with a path in it, and OSError where another user could write to the folder.
     """
     if Path(name).name != name or name == "..":
         raise ValueError(f"{name!r} is not a plain name")
-    folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"mudskipper-{os.geteuid()}" / name
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    return folder
+    return make_own_folder(run_folder() / name)
 
 
 def write_local_setup(folder: Path, logs: Path) -> Path:
     """Returns the configuration's path, for `mudskipperd --config` and for the simulated robot."""
     for name in ("left", "right"):
-        (folder / name).mkdir(mode=0o700, exist_ok=True)
+        make_own_folder(folder / name)
     path = folder / "mudskipper.toml"
-    path.write_text(configuration_text(folder, logs.absolute()), encoding="utf-8")
+    write_private_file(path, configuration_text(folder, logs.absolute()))
     return path
 
 

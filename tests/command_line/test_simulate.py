@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from pathlib import Path
 
 import pytest
 
-from command_line import exit_codes
+from command_line import commands, exit_codes
 from command_line.main import main
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness import peer
 from simulation.harness.blocks import RESTING_RAD
-from simulation.harness.local_setup import write_local_setup
+from simulation.harness.local_setup import named_folder, write_local_setup
 
 WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"
 
@@ -135,3 +136,43 @@ def test_the_peer_refuses_a_world_too(short_folder: Path, world: Path, capsys: p
     setup = write_local_setup(short_folder, short_folder)
     assert peer.main(["--config", str(setup), "--world", str(world)]) == exit_codes.CONFIGURATION
     assert capsys.readouterr().err == "segment is missing\n"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are another user's")
+def test_root_does_not_follow_what_another_user_prepared_among_the_temporary_files(
+    tmp_path: Path, short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    precious = tmp_path / "precious"
+    precious.write_text("root's", encoding="utf-8")
+    prepared = short_folder / "mudskipper-0" / "robot"
+    prepared.mkdir(parents=True)
+    (prepared / "mudskipper.toml").symlink_to(precious)
+    for path in (prepared.parent, prepared):
+        os.chown(path, 54321, 54321)
+    monkeypatch.setattr("drivers.can.run_folder._runtime_parents", lambda: [])
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(short_folder))
+    monkeypatch.setattr(peer, "simulate", lambda options: exit_codes.OK)
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate"]) == exit_codes.OK
+    assert precious.read_text(encoding="utf-8") == "root's"
+
+
+def test_a_second_terminal_finds_the_simulated_robot_where_no_service_runs(
+    short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runtime, service = short_folder / "run", short_folder / "service.sock"
+    runtime.mkdir(mode=0o700)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
+    monkeypatch.delenv("MUDSKIPPER_SOCKET", raising=False)
+    monkeypatch.setattr(commands, "DEFAULT_SOCKET", str(service))
+    assert commands.default_socket() == service
+    simulated = named_folder(commands.SIMULATED) / "mudskipper.sock"
+    monkeypatch.setattr(commands, "DEFAULT_SOCKET", str(short_folder / "mudskipper.sock"))
+    simulated.touch()
+    assert commands.default_socket() == simulated
+    (short_folder / "mudskipper.sock").touch()  # the service's
+    assert commands.default_socket() == short_folder / "mudskipper.sock"
+    monkeypatch.setenv("MUDSKIPPER_SOCKET", "/given")
+    assert commands.default_socket() == Path("/given")

@@ -15,7 +15,8 @@ import can
 import pytest
 
 from drivers.can.frames import Frame, encode_frame
-from drivers.can.local_bus import LocalBus, LocalLink, make_channel_folder
+from drivers.can.local_bus import BUSES, LocalBus, LocalLink
+from drivers.can.run_folder import NAME
 from tests.waiting import LONGEST_S
 
 Open = Callable[[], LocalBus]
@@ -263,7 +264,7 @@ def test_python_can_opens_it_by_name_with_filters(tmp_path: Path, monkeypatch: p
         sender.send(can.Message(arbitration_id=0x124, is_extended_id=False))
         sender.send(make_message(1))
         assert drain(receiver) == [1]
-    folder = tmp_path / f"mudskipper-bus-{os.geteuid()}" / "demo"
+    folder = tmp_path / NAME / BUSES / "demo"
     assert folder.stat().st_mode & 0o777 == 0o700
     assert folder.parent.stat().st_mode & 0o777 == 0o700
     assert [path.name for path in folder.iterdir()] == ["lock"]
@@ -315,11 +316,3 @@ def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(os, "geteuid", lambda: 54321)
     with pytest.raises(can.CanInitializationError, match="belongs to user"):
         LocalBus(tmp_path)
-
-
-def test_without_a_runtime_folder_the_channel_lies_with_temporary_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert make_channel_folder("demo") == tmp_path / f"mudskipper-bus-{os.geteuid()}" / "demo"

@@ -20,6 +20,7 @@ from firmware_host.log.log_folder import (
     first_path,
     free_space,
     log_files,
+    make_folder,
     new_run_id,
     present_path,
     preserve,
@@ -153,8 +154,26 @@ def test_what_root_makes_belongs_to_the_owner_of_the_folder(tmp_path: Path) -> N
 
 
 def test_an_owner_that_may_not_be_given_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(path: Path, user: int, group: int) -> None:
+    def refuse(descriptor: int, user: int, group: int) -> None:
         raise PermissionError(1, "Operation not permitted")
 
-    monkeypatch.setattr(os, "chown", refuse)
-    copy_owner(tmp_path)
+    monkeypatch.setattr(os, "fchown", refuse)
+    with (tmp_path / "file").open("w") as file:
+        copy_owner(file.fileno(), tmp_path)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are somebody else's")
+def test_a_link_that_replaces_a_new_folder_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The owner of the log folder may swap the folder that root has just made in it."""
+    logs, target = tmp_path / "logs", tmp_path / "target"
+    logs.mkdir()
+    target.mkdir()
+    os.chown(logs, 12345, 23456)
+
+    def make_and_swap(folder: Path, **_: object) -> None:
+        folder.symlink_to(target)
+
+    monkeypatch.setattr(Path, "mkdir", make_and_swap)
+    with pytest.raises(OSError):
+        make_folder(logs / "done")
+    assert target.stat().st_uid == 0
