@@ -3,24 +3,22 @@
 `take_snapshot` builds it on demand; the status socket, the checks before arming, experiments and tests read it.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
+from control.fault_causes import AgedFault
 from control.faults import Fault
+from control.gait.gait import full_step_m
 from control.limits import LimitedTorques
 from control.modes import Mode
 from control.mud_estimate import MudEstimate
-from control.records import BodyPose, DriveStates, Joints, Phase
+from control.records import BodyPose, DriveStates, FlipperLoad, Joints, Phase
 from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth
 from drivers.pose.pose_port import PoseReport
 from firmware_host.log.recorder import LogReport
 from firmware_host.loop import Loop
 from firmware_host.mud_learning import ClosedStride
-
-
-class AgedFault(NamedTuple):
-    fault: Fault
-    age_s: float  # since it was first detected
 
 
 class BusReport(NamedTuple):
@@ -53,13 +51,18 @@ class LoopSnapshot(NamedTuple):
     notice: str  # why the robot stopped, until it is moved again
     unlogged_requests: int
     lease_holder: str | None
+    lease_until_s: float  # infinite without a holder
     phase: Phase  # commanded while `states` were measured
     stride: int
     depth_m: float  # commanded in this stride
+    next_depth_m: float
+    depth_reason: str  # why the next depth was chosen
+    full_step_m: float  # the body's step in one stride if nothing slips
     states: DriveStates
     drives: Joints[DriveHealth]
     buses: tuple[BusReport, ...]
     frames: FrameCounts
+    loads: Mapping[str, FlipperLoad]  # by flipper
     body: BodyPose
     pose: PoseReport
     sent: LimitedTorques
@@ -86,9 +89,13 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
         notice=loop.events.notice,
         unlogged_requests=loop.events.requests.unlogged,
         lease_holder=str(loop.lease.holder) if loop.lease.held else None,
+        lease_until_s=loop.lease.until_s,
         phase=loop.target.phase,
         stride=loop.target.stride,
         depth_m=loop.stride_depth_m,
+        next_depth_m=loop.controller.gait.next_depth_m,
+        depth_reason=learning.depth_reason,
+        full_step_m=full_step_m(loop.controller.gait.next_parameters, loop.configuration.geometry),
         states=loop.states,
         drives=drives.health,
         buses=tuple(
@@ -96,6 +103,7 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
             for name, port in drives.ports.items()
         ),
         frames=FrameCounts(drives.unknown_frames, drives.malformed_frames, drives.refused_commands),
+        loads={"left": learning.reading.left, "right": learning.reading.right},
         body=loop.body,
         pose=loop.pose.report(),
         sent=loop.sent,

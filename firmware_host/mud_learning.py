@@ -52,12 +52,14 @@ class MudLearning:
         self.reading = MudReading()
         self.strides: list[ClosedStride] = []
         self.strides_closed = 0  # since the start
+        self.depth_reason = ""  # of the next stride
         self._firm_ticks = 0
 
     def reset(self, depth_m: float) -> None:
         """Start a new walk; earlier strides stay stored."""
         self.estimator.reset()
         self.adaptation.reset(depth_m)
+        self.depth_reason = "start"
         self._firm_ticks = 0
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
@@ -84,10 +86,11 @@ class MudLearning:
         """Choose the depth of the next stride, and its gait if the method chooses that too; returns messages."""
         gait, order = controller.gait, controller.order
         if not order.adaptive:
-            gait.next_depth_m = order.depth_m
+            gait.next_depth_m, self.depth_reason = order.depth_m, "fixed"
             return []
         choice = self.adaptation.step(self.estimator.mud_estimate, self.reading.strides, gait.commanded_depth_m)
         parameters = choice.gait or gait.parameters
+        self.depth_reason = _reason_text(choice)
         changes = (choice.depth_m, parameters) != (gait.next_depth_m, gait.next_parameters)
         gait.next_depth_m, gait.next_parameters = choice.depth_m, parameters
         return [_choice_text(choice)] if changes else []
@@ -113,4 +116,8 @@ def _is_wild(estimate: Estimate) -> bool:
 
 def _choice_text(choice: DepthChoice) -> str:
     sweep = f", sweep {choice.gait.sweep_angle_deg:g} degrees" if choice.gait else ""
-    return f"depth {choice.depth_m:.4f} m{sweep}: {choice.reason}{', slips' if choice.slips else ''}"
+    return f"depth {choice.depth_m:.4f} m{sweep}: {_reason_text(choice)}"
+
+
+def _reason_text(choice: DepthChoice) -> str:
+    return f"{choice.reason}{', slips' if choice.slips else ''}"

@@ -188,11 +188,21 @@ def _show_items(options: Options, items: list[dict[str, Any]]) -> int:
         print(json.dumps(items))
     else:
         for item in items:
-            mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
-            overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force'"
-            fix = f"\n       -> {item['fix']}{overruled}" if item["fix"] and not item["ok"] else ""
-            print(f"{mark} {item['id']:24} {item['text']}{fix}")
+            if not item.get("cause"):
+                print(_check_text(item, [each["id"] for each in items if each.get("cause") == item["id"]]))
     return exit_codes.OK if all(item["ok"] for item in items) else exit_codes.UNHEALTHY
+
+
+def _check_text(item: dict[str, Any], following: list[str]) -> str:
+    """Formats one item, and names those that follow from it."""
+    mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
+    lines = [f"{mark} {item['id']:24} {item['text']}"]
+    if following:
+        lines.append(f"       and from the same cause: {', '.join(following)}")
+    if item["fix"] and not item["ok"]:
+        overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force'"
+        lines.append(f"       -> {item['fix']}{overruled}")
+    return "\n".join(lines)
 
 
 def status_text(report: dict[str, Any]) -> str:
@@ -202,9 +212,9 @@ def status_text(report: dict[str, Any]) -> str:
     lines[0] += f", depth {100 * report['depth_m']:.1f} cm, body {number(report['body_x_m'])} m"
     if report["mode"] == "boot":
         lines.append(_boot_line(report["drives"]))
-    lines += [_fault_line(fault) for fault in report["faults"]]
+    lines += [_cause_text(cause) for cause in report["causes"]]
     if report["lease"]:
-        lines.append(f"the lease is held by {report['lease']}")
+        lines.append(f"the lease is held by {report['lease']} for {number(report['lease_left_s'], 1)} s more")
     notices = [report["notice"]] if report["notice"] else []
     if report["forced"]:
         notices.append("armed by 'mudskipper arm --force' against failed checks: see 'mudskipper check'")
@@ -221,11 +231,13 @@ def _boot_line(drives: list[dict[str, Any]]) -> str:
     return coloured(f"not heard yet: {', '.join(unheard) or 'none'}; 'mudskipper check' says what to do", YELLOW)
 
 
-def _fault_line(fault: dict[str, Any]) -> str:
-    colour = YELLOW if fault["reaction"] in MILD else RED
-    against = ", prevents arming" if fault["blocks_arming"] else ""
-    reaction = fault["reaction"].replace("_", " ")
-    return coloured(f"{fault['name']} ({reaction}{against}): {fault['message']}\n    -> {fault['what_to_do']}", colour)
+def _cause_text(cause: dict[str, Any]) -> str:
+    colour = YELLOW if cause["reaction"] in MILD else RED
+    against = ", prevents arming" if cause["blocks_arming"] else ""
+    lines = [f"{cause['name']} ({cause['reaction'].replace('_', ' ')}{against}): {cause['message']}"]
+    if cause["consequences"]:
+        lines.append(f"    and {counted(len(cause['consequences']), 'fault')} as its consequence")
+    return coloured("\n".join([*lines, f"    -> {cause['what_to_do']}"]), colour)
 
 
 def _drives_table(drives: list[dict[str, Any]]) -> str:

@@ -89,6 +89,11 @@ def _arc_m(gait: GaitParameters, geometry: FlipperGeometry) -> float:
     return 2.0 * radians(gait.sweep_angle_deg) * geometry.flipper_length_m
 
 
+def full_step_m(gait: GaitParameters, geometry: FlipperGeometry) -> float:
+    """Return the body's step in one stride if the plates stand still in the mud."""
+    return 2.0 * geometry.flipper_length_m * sin(radians(gait.sweep_angle_deg))
+
+
 def stride_duration_s(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> float:
     return sum(row.duration_s for row in stride_table(gait, geometry, depth_m))
 

@@ -1,16 +1,19 @@
 """The checks before arming, line by line: the list of `mudskipper check` and of a refused `arm`.
 
 A line fails if a present fault of its part blocks arming, and shows the fault's message and advice. A `mandatory` line
-also blocks arming by force.
+also blocks arming by force. A line whose faults all follow from those of another line names it as its
+`cause`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import degrees, isfinite
 from typing import Any
 
+from control.fault_causes import AgedFault, group_by_cause
 from control.faults import Blocks, Fault, FaultKind
 from control.records import JOINTS, DriveState
 from drivers.drive import DriveHealth
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.loop import Loop
 from firmware_host.loop_snapshot import take_snapshot
 from firmware_host.operator.fault_texts import fault_message, what_to_do
@@ -44,11 +47,29 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
         faults_of.setdefault(fault.check_line, []).append(fault)
     lines = lines | {identity: "" for identity in faults_of if identity not in lines}
     unheard = {f"drive.{joint}" for joint, state in zip(JOINTS, now.states, strict=True) if not state.heard}
-    items = [
-        _line(identity, text, faults_of.get(identity, []), identity in unheard) for identity, text in lines.items()
-    ]
+    cause_lines = _cause_lines(now.faults, loop.configuration)
+    items = []
+    for identity, text in lines.items():
+        own = faults_of.get(identity, [])
+        items.append(_line(identity, text, own, identity in unheard) | {"cause": _cause(identity, own, cause_lines)})
     items += [check_item("configuration", True, f"warning: {each}", "") for each in loop.configuration.warnings]
     return items + [check_item("realtime", True, f"warning: {warning}", "") for warning in warnings]
+
+
+def _cause_lines(faults: Sequence[AgedFault], configuration: Configuration) -> dict[Fault, str]:
+    """Return the line of the cause of each fault."""
+    bus_of = {joint: configuration.drive[joint].bus for joint in JOINTS}
+    return {
+        each.fault: cause.root.check_line
+        for cause in group_by_cause(faults, bus_of)
+        for each in (*cause.faults, *cause.consequences)
+    }
+
+
+def _cause(identity: str, faults: Sequence[Fault], cause_lines: Mapping[Fault, str]) -> str:
+    """Return the other line that explains every fault of a line; an empty text if there is none."""
+    causes = {cause_lines[fault] for fault in faults}
+    return causes.pop() if len(causes) == 1 and identity not in causes else ""
 
 
 def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:

@@ -32,6 +32,11 @@ class Lease:
         return self._holder
 
     @property
+    def until_s(self) -> float:
+        """The time until which it is held unless it is renewed; infinite if nobody has taken it."""
+        return self._until_s
+
+    @property
     def held(self) -> bool:
         """Whether the lease is held, as of the last `update`."""
         return self._holder is not None and not self._lost

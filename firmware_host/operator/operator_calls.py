@@ -10,15 +10,23 @@ from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
+from control.fault_causes import AgedFault, group_by_cause
 from control.faults import Blocks, Fault
 from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.loop import Loop
-from firmware_host.loop_snapshot import AgedFault, LoopSnapshot, take_snapshot
+from firmware_host.loop_snapshot import LoopSnapshot, take_snapshot
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.fault_texts import fault_message, what_to_do
-from firmware_host.operator.reports import known, map_report, mud_estimate_report, stride_report
+from firmware_host.operator.reports import (
+    cause_report,
+    known,
+    load_report,
+    map_report,
+    mud_estimate_report,
+    stride_report,
+)
 from firmware_host.operator.rpc import RefusedError
 from firmware_host.operator.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
 from firmware_host.operator.status_socket import Methods
@@ -39,6 +47,11 @@ class OperatorCalls:
         self._warnings = warnings
         self._clock = clock
         self._version = software_version()
+        drives = loop.configuration.drive
+        self._bus_of = {joint: drives[joint].bus for joint in JOINTS}
+        self._drive_settings = {
+            joint: {"bus": drives[joint].bus, "current_limit_a": drives[joint].current_limit_a} for joint in JOINTS
+        }
 
     @property
     def methods(self) -> Methods:
@@ -63,7 +76,8 @@ class OperatorCalls:
     def status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
         loop, now = self._loop, take_snapshot(self._loop)
         shown = now.fault or next(iter(now.blocking), None)
-        faults = {present.fault: _fault_report(*present) for present in _gravest(now.faults, shown)}
+        gravest = _gravest(now.faults, shown)
+        faults = {present.fault: _fault_report(*present) for present in gravest}
         return {
             "schema": "status/2",
             "robot": loop.configuration.robot.name,
@@ -74,18 +88,27 @@ class OperatorCalls:
             "fault": faults[shown] if shown else None,
             "faults": list(faults.values()),
             "faults_left_out": len(now.faults) - len(faults),
+            "causes": [cause_report(cause) for cause in group_by_cause(gravest, self._bus_of)],
             "forced": now.forced,
             "notice": now.notice,
             "unlogged_requests": now.unlogged_requests,
             "lease": now.lease_holder,
+            "lease_left_s": known(now.lease_until_s - self._clock()) if now.lease_holder else None,
             "phase": now.phase.name.lower(),
             "stride": now.stride,
             "depth_m": now.depth_m,
+            "next_depth_m": now.next_depth_m,
+            "depth_reason": now.depth_reason,
+            "full_step_m": now.full_step_m,
             "body_x_m": known(now.body.x_m),
             "pose": now.pose._asdict(),
-            "drives": [_drive_report(now, index, self._clock()) for index in range(len(JOINTS))],
+            "drives": [
+                _drive_report(now, index, self._clock()) | self._drive_settings[joint]
+                for index, joint in enumerate(JOINTS)
+            ],
             "strides_closed": now.strides_closed,
             "mud": mud_estimate_report(now.mud),
+            "loads": {flipper: load_report(load) for flipper, load in now.loads.items()},
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": _bus_report(now),

@@ -1,16 +1,19 @@
-"""Converts estimates of the mud into plain dicts for JSON and MessagePack.
+"""Converts estimates of the mud and causes of faults into plain dicts for JSON and MessagePack.
 
 Units are in the names; None stands for a number that is not known.
 """
 
 from collections.abc import Sequence
 from dataclasses import fields
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
+from control.fault_causes import Cause
+from control.faults import FaultKind
 from control.mud_estimate import Coefficient, MudEstimate
-from control.records import FLIPPERS, Estimate, StrideEstimate
+from control.records import FLIPPERS, Estimate, FlipperLoad, StrideEstimate
 from estimation.mud_map import Mapped, MapRow
+from firmware_host.operator.fault_texts import fault_message, what_to_do
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
@@ -52,6 +55,11 @@ def mud_estimate_report(mud_estimate: MudEstimate) -> dict[str, Any]:
     return _coefficient_reports(mud_estimate) | apart | {"boundary": mud_estimate.boundary}
 
 
+def load_report(load: FlipperLoad) -> dict[str, Any]:
+    """Return the mud's load on one flipper."""
+    return {name: known(value) for name, value in load._asdict().items()}
+
+
 def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
     """Return one row for each piece of the track that a stride has measured."""
     return [{"place_m": row.position_m} | _coefficient_reports(row) for row in rows]
@@ -60,3 +68,35 @@ def map_report(rows: Sequence[MapRow]) -> list[dict[str, Any]]:
 def check_item(identity: str, ok: bool, text: str, fix: str) -> dict[str, Any]:
     """Return one line of `mudskipper check`, with the fix if it is not ok."""
     return {"id": identity, "ok": ok, "text": text, "fix": "" if ok else fix}
+
+
+def cause_report(cause: Cause) -> dict[str, Any]:
+    """Return a cause of faults in one sentence, with the names of the faults that follow from it."""
+    consequences = dict.fromkeys(f"{each.fault.name} {each.fault.subject}".rstrip() for each in cause.consequences)
+    return {
+        "name": cause.root.name,
+        "subjects": [each.fault.subject for each in cause.faults],
+        "message": _cause_message(cause),
+        "what_to_do": what_to_do(cause.root),
+        "age_s": cause.age_s,
+        "reaction": cause.reaction.name.lower(),
+        "blocks_arming": cause.blocks_arming,
+        "consequences": list(consequences),
+    }
+
+
+def _cause_message(cause: Cause) -> str:
+    text = fault_message(cause.root).rstrip(".") + _silence_of_bus(cause)
+    *first, last = [each.fault.subject for each in cause.faults]
+    if not first:
+        return f"{text}."
+    others = [*first[1:], last]
+    return f"{text}; likewise {', '.join(others[:-1])}{' and ' if others[1:] else ''}{last}."
+
+
+def _silence_of_bus(cause: Cause) -> str:
+    """For a bus: since when none of its silent drives was heard."""
+    silent = [dict(each.fault.values) for each in cause.consequences if each.fault.kind is FaultKind.DRIVE_SILENT]
+    ages_s = [float(values.get("age_s", inf)) for values in silent]
+    shown = cause.root.kind.part == "bus" and ages_s and isfinite(min(ages_s))
+    return f"; no frame for {min(ages_s):.1f} s" if shown else ""
