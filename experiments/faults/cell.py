@@ -193,9 +193,11 @@ class Measurement:
     @property
     def _rearmed(self) -> bool:
         """Return whether a drive is in closed loop for longer than the loop needs to see it and stop it."""
-        if (
-            self._disarmed_steps <= FORBIDDEN_TICKS or self._failure_mode.fault == "drive_energised"
-        ):  # that is the injected failure
+        mode = self._failure_mode
+        lost_steps = round(mode.lasts_s / PERIOD_S) if mode.loses_commands else 0  # in which it may hear no command
+        if self._disarmed_steps <= FORBIDDEN_TICKS or self._steps <= lost_steps + FORBIDDEN_TICKS:
+            return False
+        if mode.fault == "drive_energised":  # that is the injected failure
             return False
         return any(drive.energised for drive in self._bench.robot.drives)
 

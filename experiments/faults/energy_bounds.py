@@ -11,7 +11,7 @@ watchdog ends it. No measured energy enters.
 """
 
 from dataclasses import dataclass
-from math import radians
+from math import ceil, radians
 
 from control.faults import FaultKind, Reaction
 from control.gait.gait import stride_duration_s
@@ -46,15 +46,15 @@ class EnergyBounds:
     inertia_kg_m2: float  # I
     raising_rad: float  # the longest path of a soft stop
     stride_rad: float  # the gait's path of a joint in one stride
-    stride_s: float
+    stride_s: float  # of the shortest stride
 
     @property
     def kinetic_j(self) -> float:
         return 0.5 * self.inertia_kg_m2 * self.speed_rad_s**2
 
     def gait_rad(self, duration_s: float) -> float:
-        """Return the longest path that the gait commands in this time; the fast part of a stride may come first."""
-        return self.stride_rad * (1.0 + duration_s / self.stride_s)
+        """Return the longest path that the gait commands in this time: in each stride begun, that of a whole one."""
+        return self.stride_rad * ceil(duration_s / self.stride_s)
 
     def detection_rad(self, ticks: int) -> float:
         duration_s = ticks * PERIOD_S
@@ -93,7 +93,7 @@ def energy_bounds(configuration: Configuration) -> EnergyBounds:
         inertia_kg_m2=max(mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2),
         raising_rad=radians(max(-limits.adduction_min_deg, limits.adduction_max_deg)),
         stride_rad=max(4.0 * front_rad, _adduction_path_rad(configuration.geometry, front_rad)),
-        stride_s=stride_duration_s(gait, configuration.geometry, DEEPEST_M),
+        stride_s=stride_duration_s(gait, configuration.geometry, 0.0),
     )
 
 

@@ -4,13 +4,16 @@ There is at least one mode for each kind in control/faults.py. Further modes are
 bug in each stage of its tick, and no failure at all as the control group.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from control.faults import FAULT_KINDS, FaultKind
 from control.records import JOINTS
+from drivers.fault_injection.failures import EFFECTS, FailureKind
 from experiments.faults.injectors import (
     Injector,
     blocked,
+    commanded_by_another,
     current_reported,
     current_reversed,
     drive_with,
@@ -83,6 +86,11 @@ class FailureMode:
         return self.fault in DAEMON_FAULTS
 
     @property
+    def loses_commands(self) -> bool:
+        """Return whether any command may be lost while the failure lasts, also one that idles a drive."""
+        return self.no_commands and not self.demands_reaction
+
+    @property
     def kind(self) -> FaultKind | None:
         return FAULT_KINDS.get(self.fault)
 
@@ -98,6 +106,44 @@ BUGGY_METHODS = {  # of the loop, by the part of the tick in which the method is
     "recording": "recorder.put",
 }
 BUG_PHASES = ("hold", *GAIT, "recovery")
+DEGRADED = (FailureKind.SLOW, FailureKind.INTERMITTENT, FailureKind.GARBAGE)
+COVERED = (("loop", FailureKind.SLOW), ("clock", FailureKind.GARBAGE))  # by modes of their own
+MOTION_PARTS = ("JOINT", "JOINT.position", "JOINT.current", "JOINT.command", "bus.NAME")  # the path of the control
+UNHEARD_PARTS = ("JOINT", "JOINT.command", "bus.NAME")  # through which commands pass
+COMMUTATION_ERRORS_DEG = {"-1": 180.0, "0": 90.0, "0.1": 84.3, "0.5": 60.0}  # by the factor of the torque
+FOREIGN_NM = 1.0  # as much as the current limit allows, and more than the torque limit
+
+
+def _degraded_modes() -> Iterator[FailureMode]:
+    """Yield a mode for each component that is slow, intermittent or full of garbage."""
+    for part, kinds in EFFECTS.items():
+        for kind in DEGRADED:
+            if kind in kinds and (part, kind) not in COVERED:
+                yield FailureMode(
+                    "degraded",
+                    failing(part.replace("NAME", "BUS"), kind),
+                    1.0,
+                    EVERYWHERE if part in MOTION_PARTS else ("hold", "stance"),
+                    f"{part} {kind}",
+                    no_commands=part in UNHEARD_PARTS,
+                    loses_rows=part == "log",
+                    demands_reaction=False,
+                )
+
+
+def _foreign_modes() -> Iterator[FailureMode]:
+    for every in (2, 10):
+        for path, heard in (("on the bus", True), ("unheard", False)):
+            yield FailureMode(
+                "foreign_torque",
+                commanded_by_another(FOREIGN_NM, every, heard),
+                1.0,
+                MOVING,
+                f"behind every {every}th command, {path}",
+                torque_nm=FOREIGN_NM,
+                demands_reaction=False,
+            )
+
 
 FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("none", nothing, 1.0, PHASES),
@@ -135,7 +181,24 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("joint_not_following", blocked, 3.0, ("hold", *GAIT)),
     FailureMode("encoder_jump", drive_with(encoder_offset_rad=0.6), phases=PHASES),
     FailureMode("encoder_stuck", failing("JOINT.position", "stuck"), 1.0, GAIT, turns=True),
+    FailureMode(
+        "encoder_stuck", failing("JOINT.position", "stuck"), 1.0, PHASES, "in any phase", demands_reaction=False
+    ),
+    FailureMode("encoder_stuck", drive_with(encoder_frozen=True), 1.0, PHASES, "at zero speed", demands_reaction=False),
     FailureMode("torque_missing", current_reversed, phases=MOVING),
+    *(
+        FailureMode(
+            "wrong_motor",
+            drive_with(commutation_error_deg=error_deg),
+            1.0,
+            (*MOVING, "recovery"),
+            f"torque x {factor}",
+            demands_reaction=False,
+        )
+        for factor, error_deg in COMMUTATION_ERRORS_DEG.items()
+    ),
+    *_foreign_modes(),
+    *_degraded_modes(),
     FailureMode("motor_overheating", drive_with(temperature_c=82.0), phases=PHASES),
     FailureMode("motor_hot", drive_with(temperature_c=95.0)),
     FailureMode("winding_overheating", heated(83.0)),

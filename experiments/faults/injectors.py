@@ -13,6 +13,7 @@ from typing import Any
 from control.records import JOINTS
 from experiments.faults.bench import FaultBench
 from simulation.devices.drive import DriveError, Forgery
+from simulation.devices.foreign_master import ForeignMaster
 
 LONGEST_S = 60.0
 BLOCKED_KG_M2 = 1e6  # too much inertia for any torque
@@ -122,6 +123,19 @@ def current_reported(current_a: float) -> Injector:
 def other_master(bench: FaultBench, joint: str) -> None:
     """Command this drive into closed loop without torque, as another program would."""
     bench.send_foreign(joint, bench.drive(joint).forge(Forgery.CLOSE_LOOP))
+
+
+def commanded_by_another(torque_nm: float, every: int, heard: bool) -> Injector:
+    """Let another program command a torque behind every nth command of the loop; `heard`: on the loop's own bus."""
+
+    @contextmanager
+    def inject(bench: FaultBench, joint: str) -> Iterator[None]:
+        masters = bench.robot.foreign_masters
+        masters.append(ForeignMaster(bench.drive(joint), torque_nm, every, heard))
+        yield
+        masters.pop()
+
+    return inject
 
 
 # joints

@@ -46,10 +46,9 @@ class MotorEnergy:
         if mode.kind and mode.kind.reaction in STOPPING:
             ticks = WATCHDOG_TICKS if mode.no_commands else 0
             return bounds.stopping_j(max(detection_ticks(mode.kind), ticks), mode.kind.reaction)
-        if self._walks:
-            return bounds.walking_j(duration_s)
-        raises = any(FAULT_KINDS[name].reaction is Reaction.SOFT_STOP for name in reported)
-        return bounds.kinetic_j + (bounds.torque_nm * bounds.raising_rad if raises else 0.0)
+        on_j = bounds.walking_j(duration_s) if self._walks else bounds.kinetic_j
+        kinds = (FAULT_KINDS[name] for name in reported)
+        return max(on_j, *(bounds.fault_j(kind) for kind in kinds if kind.reaction in STOPPING), 0.0)
 
     @property
     def _pushing_ticks(self) -> int:
