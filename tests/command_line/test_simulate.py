@@ -149,7 +149,7 @@ def test_root_does_not_follow_what_another_user_prepared_among_the_temporary_fil
     (prepared / "mudskipper.toml").symlink_to(precious)
     for path in (prepared.parent, prepared):
         os.chown(path, 54321, 54321)
-    monkeypatch.setattr("drivers.can.run_folder._runtime_parents", lambda: [])
+    monkeypatch.setattr("drivers.can.run_folder._runtime_parents", list)
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
     monkeypatch.setattr("tempfile.tempdir", str(short_folder))

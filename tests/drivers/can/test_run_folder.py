@@ -15,17 +15,9 @@ STRANGER = 54321
 as_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are another user's")
 
 
-@pytest.fixture
-def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    folder = tmp_path / "runtime"
-    folder.mkdir(mode=0o700)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
-    return folder
-
-
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A user without a runtime folder."""
+    """The home folder of a user without a runtime folder."""
     folder, temporary = tmp_path / "home", tmp_path / "tmp"
     folder.mkdir()
     temporary.mkdir()
@@ -34,6 +26,23 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr("tempfile.tempdir", str(temporary))
     monkeypatch.setattr(module, "_runtime_parents", list)
     return folder
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "runtime"
+    folder.mkdir(mode=0o700)
+    monkeypatch.setattr(module, "_runtime_parents", lambda: [folder])
+    return folder
+
+
+def test_the_runtime_folder_of_the_environment_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    with monkeypatch.context() as environment:
+        environment.setenv("XDG_RUNTIME_DIR", "/somewhere")
+        assert module._runtime_parents()[0] == Path("/somewhere")
+        environment.setenv("XDG_RUNTIME_DIR", "relative")
+        assert Path("relative") not in module._runtime_parents()
 
 
 def test_the_folder_lies_in_the_runtime_folder_and_every_process_finds_it(runtime: Path) -> None:
@@ -56,7 +65,7 @@ def test_a_runtime_folder_below_one_of_another_user_is_not_used(
     above = tmp_path / "above"
     (above / "runtime").mkdir(parents=True)
     os.chown(above if level == "above" else above / "runtime", STRANGER, STRANGER)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(above / "runtime"))
+    monkeypatch.setattr(module, "_runtime_parents", lambda: [above / "runtime"])
     assert not run_folder().is_relative_to(above)
 
 
