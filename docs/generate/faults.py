@@ -4,8 +4,11 @@ from collections.abc import Iterator
 
 from control.faults import Blocks, Clears, FaultKind, Reaction
 from control.modes import TRANSITIONS, Mode
+from control.rate import PERIOD_S
 from docs.generate.markdown import code, table
 from drivers.fault_injection.failures import EFFECTS
+from experiments.faults.energy_bounds import STOP_TO_STOP_RAD, STOPPING, energy_bounds
+from experiments.robot.lockstep_robot import simulated_configuration
 from firmware_host.operator.fault_texts import FAULT_TEXTS
 
 REACTIONS = {
@@ -30,19 +33,38 @@ def modes() -> Iterator[str]:
 
 
 def faults() -> Iterator[str]:
+    bounds = energy_bounds(simulated_configuration())
     rows = [
         (
             code(kind),
             FAULT_TEXTS[kind].meaning,
             _name(kind.reaction),
             str(kind.bound_ticks),
+            f"{bounds.fault_j(kind):.1f}" if kind.reaction in STOPPING else "",
             BLOCKS[kind.blocks],
             ENDS[kind.clears],
             FAULT_TEXTS[kind].what_to_do,
         )
         for kind in FaultKind
     ]
-    yield from table(("fault", "meaning", "reaction", "ticks", "prevents arming", "ends", "what to do"), rows)
+    yield from table(
+        ("fault", "meaning", "reaction", "ticks", "energy (J)", "prevents arming", "ends", "what to do"), rows
+    )
+
+
+def energies() -> Iterator[str]:
+    """Yield the terms of the energy bounds with their values for the default configuration."""
+    bounds = energy_bounds(simulated_configuration())
+    rows = [
+        ("τ", "torque limit", f"{bounds.torque_nm:g} N·m"),
+        ("ω", "speed above which a joint is too fast: 1.25 times the velocity limit", f"{bounds.speed_rad_s:g} rad/s"),
+        ("½ I ω²", "energy of a joint at that speed", f"{bounds.kinetic_j:.2f} J"),
+        ("T", "period of the loop", f"{PERIOD_S * 1e3:.2f} ms"),
+        ("stop to stop", "path of a joint between its end stops, at most", f"{STOP_TO_STOP_RAD:.2f} rad"),
+        ("stride", "path of a joint in one stride, at most", f"{bounds.stride_rad:.2f} rad"),
+        ("raise", "path of a soft stop, at most", f"{bounds.raising_rad:.2f} rad"),
+    ]
+    yield from table(("", "meaning", "value"), rows)
 
 
 def failures() -> Iterator[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from control.gait.gait import PROTOCOLS
 from docs.generate.command_line import commands, exit_statuses
-from docs.generate.faults import failures, faults, modes, reactions
+from docs.generate.faults import energies, failures, faults, modes, reactions
 from docs.generate.markdown import code, table
 from firmware_host.configuration.key_reference import Key, configuration_keys, is_required
 from firmware_host.log.rows import ROW_KINDS
@@ -89,6 +89,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "modes": modes,
     "reactions": reactions,
     "faults": faults,
+    "energies": energies,
     "failures": failures,
     "log": topics,
     "socket": methods,
