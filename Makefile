@@ -31,8 +31,8 @@ test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virt
 	@$(BIN)/python -m virtual_machine.installed_robot
 	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
 
-mutants: .venv/test  ## change the transmit gate in 204 places; its tests must notice each change
-	$(BIN)/python -m tests.drivers.gate_mutants
+mutants: .venv/test  ## change gate, limits, modes, latch, monitors and lease in 1000 places; tests must notice each
+	$(BIN)/python -m tests.mutants $(ARGS)
 
 dst: .venv/test  ## simulate SEEDS=200 random schedules of failures and operators; every promise must hold
 	@$(BIN)/python -m tests.dst.campaign $(or $(SEEDS),200) $(ARGS)

@@ -77,9 +77,12 @@ class Lease:
             self.reset()
 
     def release(self, holder: Hashable) -> str | None:
-        """Free the lease; returns why this is refused, or None. Any operator may free a lost lease."""
-        if self.held and holder != self._holder:
-            return f"{self._holder} holds the lease"
+        """Free the lease; returns why this is refused, or None.
+
+        Nobody else frees a lost lease: the loop would then not see that it was lost, and the robot would move on.
+        """
+        if self._holder not in (None, holder):
+            return f"{self._holder} {'has lost' if self._lost else 'holds'} the lease"
         self.reset()
         return None
 

@@ -261,7 +261,7 @@ METHODS: dict[str, SocketMethod] = {
         "Take or renew the lease: if it is not renewed in time, the robot stops. Only its holder moves the robot.",
         (Parameter("for_s", Type.NUMBER, "time within which it is renewed", "s", LEASE_RANGE, required=True),),
     ),
-    "release": SocketMethod(Level.DRIVE, "End one's own lease, or one that was lost."),
+    "release": SocketMethod(Level.DRIVE, "End one's own lease; a lost one ends by itself once torque is off."),
     "reset_timing": SocketMethod(Level.DRIVE, "Start the statistics of the loop's timing again."),
     "fail": SocketMethod(
         Level.DRIVE,

@@ -66,14 +66,30 @@ def test_a_second_program_is_refused_with_the_holder_s_name() -> None:
     assert lease.lost(10.51)  # which was not renewed by that
 
 
-def test_any_program_may_release_a_lost_lease() -> None:
+def test_a_lost_lease_is_freed_by_its_holder_and_by_nobody_else() -> None:
+    """Or a robot whose program has just vanished would move on. A program's own release may be read after its end."""
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     lease.hang_up("anna")
     assert lease.renew("ben", 10.1, HALF_S) is not None
-    assert lease.release("ben") is None
+    assert lease.release("ben") is not None
+    assert lease.lost(10.1)
+    assert lease.release("anna") is None
     assert not lease.lost(1e9)
     assert lease.renew("ben", 10.2, HALF_S) is None
+
+
+def test_a_release_without_a_lease_is_accepted() -> None:
+    assert Lease().release("ben") is None
+
+
+def test_a_lease_that_runs_out_is_lost_from_the_update_on() -> None:
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    lease.update(10.5)
+    assert lease.held and not lease.lost(10.5)
+    lease.update(10.51)
+    assert not lease.held and lease.lost(10.0) and lease.holder == "anna"
 
 
 def test_only_the_holder_moves_the_robot_if_there_is_one() -> None:

@@ -1,0 +1,59 @@
+"""What the searches let happen: several operators, pairs of faults, a drive that does anything, or all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations, pairwise
+
+from control.faults import FaultKind, Reaction
+from tests.exploration.memory import Call, Operator
+from tests.exploration.search import CLEAR, DISARM, Scope
+
+LEASE_S = 2.0  # it survives one tick without renewal
+ANNA, BEN = Operator
+ORDERS = (
+    Call(ANNA, "arm"),
+    Call(ANNA, "arm", (("force", True),)),
+    Call(ANNA, "walk"),
+    Call(ANNA, "move", (("left_sweep_rad", 0.1),)),
+    Call(BEN, "stop"),
+    DISARM,
+    CLEAR,
+)
+LEASES = (
+    Call(ANNA, "arm", (("lease_s", LEASE_S),)),
+    Call(ANNA, "walk", (("lease_s", LEASE_S),)),
+    Call(ANNA, "lease", (("for_s", LEASE_S),)),
+    Call(ANNA, "release"),
+    Call(ANNA, "hang_up"),
+    Call(BEN, "arm"),
+    Call(BEN, "walk"),
+    Call(BEN, "walk", (("take_over", True),)),
+    Call(BEN, "release"),
+    Call(BEN, "end"),
+)
+EVERYTHING = (*ORDERS, *LEASES)
+
+
+def _one_of_each() -> tuple[FaultKind, ...]:
+    """One fault of each combination that modes and latch tell apart."""
+    found = {(kind.reaction, kind.blocks, kind.clears, kind.latches_idle): kind for kind in reversed(FaultKind)}
+    return tuple(sorted(found.values(), key=lambda kind: kind.reaction))
+
+
+ONE_OF_EACH = _one_of_each()
+THAT_ACT = tuple(kind for kind in ONE_OF_EACH if kind.reaction >= Reaction.HOLD)
+
+
+def quick_scopes() -> Iterator[Scope]:
+    """A few seconds."""
+    yield Scope(EVERYTHING)
+    yield Scope(ORDERS, drives=True)
+    yield from (Scope(ORDERS, (kind,)) for kind in ONE_OF_EACH if kind not in THAT_ACT)
+    yield from (Scope(ORDERS, pair) for pair in pairwise(THAT_ACT))
+
+
+def all_scopes() -> Iterator[Scope]:
+    """Every pair of faults with every operator; every fault with a drive that does anything, and every operator."""
+    yield from (Scope(EVERYTHING, pair) for pair in combinations(ONE_OF_EACH, 2))
+    yield from (Scope(EVERYTHING, (kind,), drives=True) for kind in ONE_OF_EACH)
