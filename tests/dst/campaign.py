@@ -19,8 +19,9 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from tests.dst.drawing import SHARED, draw_scenario
 from tests.dst.run import Outcome, run_scenario
@@ -28,7 +29,7 @@ from tests.dst.scenario import Scenario, describe
 from tests.dst.shrinking import shrink
 
 WORKERS = 2
-SHOWN_S = 1.0  # between two lines of progress
+SHOWN_S, SELDOM_S = 1.0, 30.0  # between two lines of progress, on a terminal and in a file
 
 
 @dataclass
@@ -96,7 +97,7 @@ def run_campaign(first: int, last: int, workers: int, until_s: float, progress: 
             for future in finished:
                 campaign.add(future.result())
                 _note_progress(progress, pending.pop(future), future.result())
-            if time.monotonic() - shown_s > SHOWN_S:
+            if time.monotonic() - shown_s > (SHOWN_S if sys.stderr.isatty() else SELDOM_S):
                 shown_s = time.monotonic()
                 _show(campaign, shown_s - begun_s)
     return campaign
@@ -143,7 +144,8 @@ def _show(campaign: Campaign, elapsed_s: float) -> None:
     total = campaign.last - campaign.first
     left_s = elapsed_s * (total - campaign.seeds) / max(1, campaign.seeds)
     text = f"{campaign.seeds} of {total} seeds, {len(campaign.broken)} broken, {left_s / 60.0:.0f} min left"
-    print(f"\r{text:<70}", end="", file=sys.stderr, flush=True)
+    end = "\r" if sys.stderr.isatty() else "\n"
+    print(f"{text:<60}", end=end, file=sys.stderr, flush=True)
 
 
 def span_of(text: str) -> tuple[int, int]:
@@ -167,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     campaign = run_campaign(first, last, options.workers, begun_s + options.for_s, options.progress)
     duration_s = time.monotonic() - begun_s
     if options.json:
-        print(json.dumps(asdict(campaign) | {"duration_s": duration_s}))
+        print(json.dumps(report_of(campaign, duration_s)))
     else:
         if options.only:
             print(describe(draw_scenario(first)))
@@ -175,8 +177,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if campaign.broken else 0
 
 
+def report_of(campaign: Campaign, duration_s: float) -> dict[str, Any]:
+    """Returns the result for programs; `covered` counts the seeds in which each kind of event, mode and fault was."""
+    broken = [{"seed": each.seed, "promise": each.promise, "problem": each.problem} for each in campaign.broken]
+    return {**vars(campaign), "covered": dict(campaign.covered), "broken": broken, "duration_s": duration_s}
+
+
 def print_result(campaign: Campaign, duration_s: float, shrinks: bool) -> None:
-    print(file=sys.stderr)
     for outcome in campaign.broken:
         print(f"seed {outcome.seed} breaks {outcome.promise} at {outcome.at_s:.3f} s: {outcome.problem}")
         if shrinks and outcome.promise != "Harness":

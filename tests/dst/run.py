@@ -21,8 +21,8 @@ from tests.dst.starts import RecordedRobot, sound_walk
 STEWARD = "steward"  # the client that brings the robot to rest and arms it again
 LONGEST_SHUTDOWN_S = 5.5
 LONGEST_CLEARING_S = 3.5  # a drive that restarts is silent for 1 s, then reports again what arming needs
-CLEARING_TICKS = 120  # between two requests to clear
-LONGEST_ARMING_S = 1.0
+CLEARING_TICKS = 120  # between two requests to clear, or to arm
+LONGEST_ARMING_S = 1.5
 RESTING_TICKS = 50  # after the torque is off
 HELD_TICKS = 20
 DISARMED_TICKS = 4
@@ -124,8 +124,13 @@ class Run:
         if self._cools():
             return
         self._robot.call(STEWARD, "release")
-        self._robot.call(STEWARD, "arm", take_over=True)
-        if not self._wait_until(lambda: self._loop.mode is Mode.HOLD, LONGEST_ARMING_S):
+        for tick in range(round(LONGEST_ARMING_S / self._loop.period_s)):
+            if self._loop.mode is Mode.HOLD:
+                break
+            if tick % CLEARING_TICKS == 0:  # a joint may have been moving
+                self._robot.call(STEWARD, "arm", take_over=True)
+            self._step()
+        else:
             names = ", ".join(fault.name for fault in self._loop.faults.present) or "no fault"
             self._break("BackToIdle", f"it does not arm again: {self._loop.mode.name.lower()}, {names}")
         self._run(HELD_TICKS)
