@@ -20,7 +20,8 @@ DARK_PERCENT = 65.0  # from here on letters are white
 def plot_faults(report: FaultsReport, path: Path) -> None:
     """Draw the ticks of the slowest seed, coloured by their fraction of the bound; a red cross is a failed cell.
 
-    The label of a row has the bound of the ticks, and the energy of a motor with its bound.
+    Where no reaction is demanded the energy takes the place of the ticks. The label of a row has the bound of the
+    ticks, and the energy of a motor with its bound.
     """
     rows = report.faults
     phases = [phase for phase in report.settings.phases if any(cell.phase == phase for cell in report.cells)]
@@ -31,7 +32,7 @@ def plot_faults(report: FaultsReport, path: Path) -> None:
     for i, panel in enumerate(panels):
         mesh = _plot_panel(panel, report, rows[i * per_panel : (i + 1) * per_panel], phases)
     bar = figure.colorbar(mesh, ax=list(panels), pad=0.01, shrink=0.6, aspect=40, extend="max")
-    bar.set_label("slowest reaction, % of its bound; the numbers are ticks of 2.63 ms")
+    bar.set_label("% of the bound: slowest reaction in ticks of 2.63 ms; where none is demanded, energy in J")
     ok, cells = report.ok, len(report.cells)
     figure.suptitle(f"From the injection to the reaction: {ok} of {cells} cells within every bound", fontsize="medium")
     figure.savefig(path, dpi=110)
@@ -64,13 +65,21 @@ def _label(row: ModeSummary) -> str:
 
 
 def _write_cell(panel: Axes, x: int, y: int, cells: Sequence[Cell]) -> float:
-    """Write the slowest reaction in ticks. Return it in percent of the bound; 0 without a bound."""
-    ticks, bound = max((cell.reaction_ticks or 0 for cell in cells), default=0), cells[0].bound_ticks
-    percent = 100.0 * ticks / bound if bound else 0.0
-    text = str(ticks) if bound else "·"
+    """Write the slowest reaction in ticks, or the largest energy. Return it in percent of the bound."""
+    text, percent = _reaction(cells) if cells[0].bound_ticks else _energy(cells)
     panel.text(
         x, y, text, ha="center", va="center", fontsize=6.5, color="white" if percent > DARK_PERCENT else "#333333"
     )
     if not all(cell.ok for cell in cells):
         panel.plot(x, y, "x", color="tab:red", markersize=11, markeredgewidth=2.0)
     return percent
+
+
+def _reaction(cells: Sequence[Cell]) -> tuple[str, float]:
+    ticks = max(cell.reaction_ticks or 0 for cell in cells)
+    return str(ticks), 100.0 * ticks / (cells[0].bound_ticks or 1)
+
+
+def _energy(cells: Sequence[Cell]) -> tuple[str, float]:
+    largest = max(cells, key=lambda cell: cell.energy_j - cell.energy_bound_j)
+    return f"{largest.energy_j:.1f}", 100.0 * largest.energy_j / max(largest.energy_bound_j, 1e-9)
