@@ -30,7 +30,6 @@ class ReopeningPort:
         self._due_s: float | None = None  # when to try again
         self._failed_before = self._errors_before = self._lost_before = 0  # of the closed ports
         self._ids: Iterable[int] | None = None  # the ids that the drives listen to
-        self.state = BusState.OFF
         self.failed_sends = self.error_frames = self.lost_frames = 0
         self.last_error = self.last_send_error = ""
         try:

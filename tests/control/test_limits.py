@@ -198,6 +198,32 @@ def test_warm_and_hot_at_one_temperature_switch_off_at_it() -> None:
         assert limited_torque_nm(0.5, 0.0, hot, limits, SPAN, 1.0) == torque
 
 
+# defaults
+
+
+def test_the_default_limits_are_those_of_the_robot() -> None:
+    """The torque of an R60 in two ticks, the speed of an extraction, the joints' range, a motor's temperatures."""
+    assert JointLimits() == JointLimits(
+        torque_nm=0.75,
+        torque_rate_nm_s=150.0,
+        velocity_rad_s=20.0,
+        sweep_min_deg=-60.0,
+        sweep_max_deg=60.0,
+        adduction_min_deg=-75.0,
+        adduction_max_deg=45.0,
+        temperature_warm_c=70.0,
+        temperature_hot_c=90.0,
+        position_margin_deg=10.0,
+    )
+    assert VELOCITY_FADE == 0.2
+
+
+def test_warm_and_hot_less_than_a_kelvin_apart_derate_between_them() -> None:
+    limits = JointLimits(temperature_warm_c=80.0, temperature_hot_c=80.5)
+    halfway = state(temperature_c=80.25)
+    assert limited_torque_nm(9.0, 0.0, halfway, limits, SPAN, 1.0) == pytest.approx(0.375)
+
+
 # not finite
 
 

@@ -203,6 +203,19 @@ def test_a_refusal_names_its_cause() -> None:
     assert refusal(Mode.HOLD, Request.WALK, faulty(Reaction.HOLD)) == Refusal(Mode.HOLD, Request.WALK, held)
 
 
+def test_before_all_drives_are_heard_a_refusal_is_that_of_boot() -> None:
+    assert refusal(Mode.IDLE, Request.ARM, Health()) == Refusal(Mode.BOOT, Request.ARM, ())
+
+
+def test_what_is_not_known_of_the_robot_permits_nothing() -> None:
+    assert not any(Health()) and Health().reaction is Reaction.NONE
+
+
+def test_modes_keep_the_numbers_that_logs_contain() -> None:
+    names = ["BOOT", "IDLE", "ARMING", "HOLD", "WALKING", "STOPPING", "FAULT", "DAMPING"]
+    assert [Mode(number).name for number in range(8)] == names == [mode.name for mode in Mode]
+
+
 @pytest.mark.parametrize("mode", Mode)
 def test_stop_and_disarm_are_never_refused(mode: Mode) -> None:
     for health in HEALTHS:

@@ -14,22 +14,32 @@ from importlib import import_module
 from types import ModuleType
 
 import hypothesis
-import numpy
 import pytest
 
 from tests.folders import ROOT
 from tests.mutants.mutations import mutants_of, parsed, source_of
 from tests.mutants.subjects import SUBJECTS, Subject
 
-LONGEST_S = 60
+LONGEST_S = 60.0  # of processor time, so that other work on the machine kills no mutant
 NICENESS = 10
+PACKAGES = {path.name for path in ROOT.iterdir() if path.is_dir()}
+OWN = ("tests.folders", "tests.mutants")
+
+
+def load_libraries(subject: Subject) -> None:
+    """Import what the tests import, and forget our own modules again: every fork then has the libraries."""
+    for path in subject.tests:
+        import_module(f"tests.{path.removesuffix('.py').replace('/', '.')}")
+    for name in list(sys.modules):
+        if name.split(".")[0] in PACKAGES and not name.startswith(OWN):
+            del sys.modules[name]
 
 
 def is_killed(subject: Subject, tree: ast.Module) -> bool:
     """Whether the tests fail with it; a fork, so that nothing of the mutant stays."""
     child = os.fork()
     if child == 0:
-        signal.alarm(LONGEST_S)
+        signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
         os._exit(_run_tests(subject, tree))
     _, status = os.waitpid(child, 0)
     return status != 0
@@ -82,9 +92,11 @@ def check(subject: Subject) -> bool:
 def main(names: list[str]) -> int:
     os.chdir(ROOT)
     os.nice(NICENESS)
-    assert hypothesis and numpy  # loaded once, for all forks
+    hypothesis.settings.register_profile("mutants", deadline=None, database=None)
+    hypothesis.settings.load_profile("mutants")
     subjects = [subject for subject in SUBJECTS if not names or subject.module in names]
     for subject in subjects:
+        load_libraries(subject)
         if is_killed(subject, parsed(subject.module)):
             print(f"The tests of {subject.module} fail without any change.")
             return 2

@@ -2,7 +2,7 @@
 
 A mutant turns a comparison round or moves its boundary, exchanges `and` with `or`, plus with minus, times with
 division, min with max; changes a constant; takes `not` or a sign away; makes a condition true or false; returns
-nothing; or leaves a statement out. Names, annotations, defaults of records and texts for people are left alone.
+nothing; or leaves a statement out. Names, annotations and texts for people are left alone.
 """
 
 from __future__ import annotations
@@ -99,10 +99,16 @@ def omissions_of(node: ast.AST) -> Iterator[Change]:
     for body in (getattr(node, name, None) for name in ("body", "orelse")):
         if isinstance(body, list):
             for position, statement in enumerate(body):
-                if _is_text(statement):
+                if _is_text(statement) or _ends_anyway(node, statement):
                     continue
                 if isinstance(statement, ast.Assign | ast.AugAssign | ast.Expr | ast.Return | ast.For | ast.If):
                     yield f"without `{ast.unparse(statement).splitlines()[0]}`", _leaver(body, position)
+
+
+def _ends_anyway(node: ast.AST, statement: ast.stmt) -> bool:
+    """Whether a statement returns nothing where its function ends."""
+    last = isinstance(node, ast.FunctionDef) and statement is node.body[-1]
+    return last and isinstance(statement, ast.Return) and (statement.value is None or _is_nothing(statement.value))
 
 
 def _leaver(body: list[ast.stmt], position: int) -> Callable[[], None]:
@@ -110,7 +116,7 @@ def _leaver(body: list[ast.stmt], position: int) -> Callable[[], None]:
 
 
 def _nodes(tree: ast.Module) -> Iterator[ast.AST]:
-    """Of code that runs: no imports, no annotations, no defaults of records, no texts for people."""
+    """Of code that runs: no imports, no annotations, no texts for people."""
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
@@ -120,12 +126,7 @@ def _nodes(tree: ast.Module) -> Iterator[ast.AST]:
         for name, value in ast.iter_fields(node):
             if name in ("annotation", "returns"):
                 continue
-            inner = [each for each in (value if isinstance(value, list) else [value]) if isinstance(each, ast.AST)]
-            waiting += [each for each in inner if not (isinstance(node, ast.ClassDef) and _is_field(each))]
-
-
-def _is_field(node: ast.AST) -> bool:
-    return isinstance(node, ast.AnnAssign)
+            waiting += [each for each in (value if isinstance(value, list) else [value]) if isinstance(each, ast.AST)]
 
 
 def _is_message(node: ast.AST) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import pytest
 
@@ -15,6 +15,15 @@ FRAME = Frame(0x009, bytes(8))
 BUS_OFF = 0x040
 
 
+class ListeningPort(MockPort):
+    """Remembers which ids it was asked to listen to."""
+
+    ids: frozenset[int] | None = None
+
+    def listen_to(self, ids: Iterable[int]) -> None:
+        self.ids = frozenset(ids)
+
+
 class Adapter:
     """Plugged in or not; every port that it was opened as."""
 
@@ -22,14 +31,15 @@ class Adapter:
         self.plugged = plugged
         self.bus = MockBus()
         self.peer = self.bus.open()
-        self.opened: list[MockPort] = []
+        self.opened: list[ListeningPort] = []
         self.tries = 0
 
     def open(self) -> MockPort:
         self.tries += 1
         if not self.plugged:
             raise NotOpenError("there is no such interface")
-        self.opened.append(self.bus.open())
+        self.opened.append(ListeningPort(self.bus))
+        self.bus.ports.append(self.opened[-1])
         return self.opened[-1]
 
     def vanish(self) -> None:
@@ -152,3 +162,112 @@ def test_an_adapter_that_complains_when_it_is_closed_is_opened_all_the_same() ->
     adapter.opened[0].state = BusState.OFF
     run(port, 0.0, 3.0, lambda: len(adapter.opened) == 2)
     assert len(adapter.opened) == 2
+
+
+def test_it_opens_again_exactly_a_retry_time_after_the_bus_went_off_and_says_so() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    assert not port.reopen(100.0)
+    adapter.opened[0].state = BusState.OFF
+    port.receive()
+    assert [port.reopen(now_s) for now_s in (200.0, 200.9, 200.0 + RETRY_S)] == [False, False, True]
+    assert len(adapter.opened) == 2
+
+
+def test_a_try_that_fails_is_no_success_and_is_followed_by_the_next_a_retry_time_later() -> None:
+    adapter = Adapter(plugged=False)
+    port = ReopeningPort(adapter.open, wait=True)
+    assert [port.reopen(now_s) for now_s in (10.0, 10.0 + RETRY_S, 10.9 + RETRY_S)] == [False] * 3
+    assert adapter.tries == 2
+    adapter.plugged = True
+    assert port.reopen(10.0 + 2.0 * RETRY_S)
+
+
+def test_a_bus_that_recovered_has_the_whole_retry_time_again_when_it_goes_off() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    for since_s in (10.0, 20.0):
+        adapter.opened[0].state = BusState.OFF
+        port.receive()
+        assert not port.reopen(since_s) and not port.reopen(since_s + 0.9 * RETRY_S)
+        adapter.opened[0].state = BusState.ACTIVE
+        port.receive()
+        assert not port.reopen(since_s + RETRY_S)
+    assert len(adapter.opened) == 1
+
+
+def test_every_port_listens_to_the_ids_of_the_drives() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    port.listen_to([1, 2])
+    adapter.opened[0].state = BusState.OFF
+    run(port, 0.0, 3.0, lambda: len(adapter.opened) == 2)
+    assert [each.ids for each in adapter.opened] == [frozenset({1, 2})] * 2
+
+
+@pytest.mark.parametrize("ids", [frozenset({3}), None])
+def test_a_port_that_opens_later_listens_to_the_ids_given_before_or_to_all(ids: frozenset[int] | None) -> None:
+    adapter = Adapter(plugged=False)
+    port = ReopeningPort(adapter.open, wait=True)
+    if ids is not None:
+        port.listen_to(ids)
+    adapter.plugged = True
+    run(port, 0.0, 3.0, lambda: bool(adapter.opened))
+    assert [each.ids for each in adapter.opened] == [ids]
+
+
+def test_lost_frames_are_counted_over_all_the_ports_there_were() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    adapter.opened[0].lost_frames, adapter.opened[0].state = 5, BusState.OFF
+    run(port, 0.0, 3.0, lambda: len(adapter.opened) == 2)
+    assert port.lost_frames == 5
+    adapter.opened[1].lost_frames = 2
+    port.receive()
+    assert port.lost_frames == 7
+
+
+def test_a_failed_send_counts_at_once() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    for count in (1, 2):
+        adapter.opened[0].full = True
+        port.send(FRAME)
+        assert (port.failed_sends, port.last_send_error) == (count, "No buffer space available")
+
+
+def test_failed_sends_count_at_once_also_after_a_reopening() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    adapter.vanish()
+    adapter.plugged = True
+    run(port, 0.0, 3.0, lambda: len(adapter.opened) == 2)
+    adapter.opened[1].full = True
+    for count in (4, 5, 6, 7):
+        port.send(FRAME)
+        assert port.failed_sends == count
+
+
+def test_a_reason_is_remembered_until_there_is_another() -> None:
+    adapter = Adapter()
+    port = ReopeningPort(adapter.open, wait=False)
+    reasons = [port.last_error]
+    for reason in ("bus error", "", "bus off"):
+        adapter.opened[0].last_error = reason
+        port.receive()
+        reasons.append(port.last_error)
+    assert reasons == ["", "bus error", "bus error", "bus off"]
+    assert port.last_send_error == ""
+
+
+def test_a_port_that_opens_with_a_trouble_shows_it_at_once() -> None:
+    adapter = Adapter()
+
+    def open_passive() -> MockPort:
+        port = adapter.open()
+        port.state = BusState.PASSIVE if len(adapter.opened) > 1 else BusState.OFF
+        return port
+
+    port = ReopeningPort(open_passive, wait=False)
+    assert [port.reopen(now_s) for now_s in (0.5, 1.5)] == [False, True]
+    assert state_of(port) is BusState.PASSIVE
