@@ -185,6 +185,7 @@ def _add_logs(commands: Commands) -> None:
     preserve = add(actions, "preserve", "logs.log_folder_commands.preserve_log", "Exclude logs from the quota.")
     preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
     preserve.add_argument("--undo", action="store_true", help="include them again")
+    _add_catalogue(actions)
     listing = add(actions, "list", "logs.log_folder_commands.list_logs", "List the logs and the room that is left.")
     listing.add_argument("folder", type=Path, nargs="?", help="of the logs (default: the configured one)")
     recover = add(actions, "recover", "logs.log_folder_commands.recover", "Repair logs whose writer was interrupted.")
@@ -192,6 +193,16 @@ def _add_logs(commands: Commands) -> None:
     for parser in (listing, recover):
         parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
     add_json(info, report, listing, recover)
+
+
+def _add_catalogue(actions: Commands) -> None:
+    index = add(actions, "index", "logs.catalogue_commands.index", "Read all new logs of a folder into its catalogue.")
+    query = add(actions, "query", "logs.catalogue_commands.query", "Answer a SELECT on the catalogue of the logs.")
+    query.add_argument("sql", metavar="SQL", help='such as "select file, strides, speed_m_s from logs"')
+    for parser in (index, query):
+        parser.add_argument("folder", type=Path, nargs="?", metavar="DIR", help="of the logs (default: the configured)")
+        parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
+    add_json(index, query)
 
 
 def _add_export(actions: Commands) -> None:

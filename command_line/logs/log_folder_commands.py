@@ -10,10 +10,11 @@ from mcap.reader import make_reader
 
 from command_line import exit_codes
 from command_line.json_output import print_json
+from command_line.logs.catalogue_commands import catalogued, chosen_folder, configured_folder
 from command_line.logs.refusals import explain_errors
 from command_line.screen import QUIET_S, Progress, complain, size_text
 from experiments.reports.text_tables import number, table
-from firmware_host.configuration.loading import load_configuration
+from firmware_host.catalogue.entry import LogEntry
 from firmware_host.log.log_folder import (
     BROKEN,
     DONE,
@@ -40,10 +41,10 @@ LEGEND = (
 
 @explain_errors
 def list_logs(options: Options) -> int:
-    folder = options.folder or _configured_folder(options.config)
-    if not folder.is_dir():
-        raise LogError(f"{folder}: there is no such folder")
-    logs = [describe(path) for path in [*stored_files(folder), *log_files(folder, PRESERVED)]]
+    folder = chosen_folder(options)
+    entries = catalogued(folder)
+    paths = {*stored_files(folder), *log_files(folder, PRESERVED), *entries}
+    logs = [describe(path, entries.get(path)) for path in sorted(paths, key=lambda path: path.name)]
     space = free_space(folder)
     report = {
         "folder": str(folder),
@@ -59,20 +60,27 @@ def list_logs(options: Options) -> int:
     return exit_codes.OK
 
 
-def _configured_folder(path: Path) -> Path:
-    return Path(load_configuration(path).log.directory)
+def describe(path: Path, entry: LogEntry | None) -> dict[str, Any]:
+    """Describes a log by its entry in the catalogue, or else by the summary at the file's end."""
+    known = _described(entry) if entry else _summarised(path)
+    return {"name": path.name, "place": path.parent.name, "preserved": path.parent.name == PRESERVED} | known
 
 
-def describe(path: Path) -> dict[str, Any]:
-    """Describes a log by the summary at the file's end, without reading its rows."""
+def _described(entry: LogEntry) -> dict[str, Any]:
+    names = (
+        "state", "reason", "bytes", "duration_s", "recovered",
+        "robot", "started", "strides", "distance_m", "speed_m_s", "faults",
+    )  # fmt: skip
+    known = {name: getattr(entry, name) for name in names}
+    return known | {"started": entry.started and f"{entry.started.isoformat()}+00:00", "faults": list(entry.faults)}
+
+
+def _summarised(path: Path) -> dict[str, Any]:
     metadata, duration_s = _summary_of(path)
     return {
-        "name": path.name,
-        "place": path.parent.name,
         "state": _state_of(path, duration_s is not None),
         "bytes": path.stat().st_size if path.exists() else 0,
         "duration_s": duration_s,
-        "preserved": path.parent.name == PRESERVED,
         "recovered": metadata.get("recovered") == "true",
     }
 
@@ -100,20 +108,26 @@ def _summary_of(path: Path) -> tuple[dict[str, str], float | None]:
 
 
 def _listing(report: dict[str, Any]) -> str:
-    rows = [["log", "folder", "size (MB)", "length (s)", ""]]
-    for log in report["logs"]:
-        marks = "recovered" if log["recovered"] else log["state"].removeprefix("whole")
-        size = f"{log['bytes'] / 1e6:.1f}"
-        rows.append([log["name"], log["place"], size, number(log["duration_s"], 1), marks])
+    rows = [["log", "folder", "size (MB)", "length (s)", "strides", "speed (cm/s)", ""]]
+    rows += [_listed(log) for log in report["logs"]]
     sizes = [size_text(report[name]) for name in ("logs_bytes", "free_bytes", "disk_bytes")]
     total = f"{sizes[0]} of logs, {sizes[1]} free of {sizes[2]}"
     unfinished = any(log["state"] != "whole" for log in report["logs"])
     return "\n".join([table(rows), *[LEGEND] * unfinished, total])
 
 
+def _listed(log: dict[str, Any]) -> list[str]:
+    marks = ["recovered"] * log["recovered"] or [log["state"]] * (log["state"] != "whole")
+    marks += [*filter(None, [log.get("reason")]), *log.get("faults", [])]
+    strides, speed_m_s = log.get("strides"), log.get("speed_m_s")
+    speed = number(None if speed_m_s is None else 100.0 * speed_m_s, 1)
+    size = f"{log['bytes'] / 1e6:.1f}"
+    return [log["name"], log["place"], size, number(log["duration_s"], 1), number(strides, 0), speed, ", ".join(marks)]
+
+
 @explain_errors
 def recover(options: Options) -> int:
-    given = options.places or [_configured_folder(options.config)]
+    given = options.places or [configured_folder(options.config)]
     named = {path for path in given if not path.is_dir()}
     paths = [path for each in given for path in ([each] if each in named else unfinished_files(each))]
     recovered, problems = _recover_each(paths, named)

@@ -14,27 +14,9 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from control.bounds import Bounds
+from firmware_host.configuration.file_problems import ConfigurationError as ConfigurationError  # for its users here
 
-LONGEST_MESSAGE = 400  # characters
 LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
-
-
-class ConfigurationError(Exception):
-    """Everything that is wrong with a file, one message each, naming key, value and bound.
-
-    Keys and values may have any length and any characters: control characters are escaped, and a long message loses
-    its middle, since its key is at the beginning and its bound at the end.
-    """
-
-    def __init__(self, problems: list[str]) -> None:
-        self.problems = [_readable(problem) for problem in problems]
-        super().__init__("\n".join(self.problems))
-
-
-def _readable(message: str) -> str:
-    if len(message) > LONGEST_MESSAGE:
-        message = f"{message[: LONGEST_MESSAGE // 2]} [...] {message[-LONGEST_MESSAGE // 2 :]}"
-    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in message)
 
 
 @dataclass(frozen=True)

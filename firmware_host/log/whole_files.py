@@ -9,10 +9,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
+def hidden_path(path: Path) -> Path:
+    return path.with_name(f".{path.name}")
+
+
 @contextmanager
 def whole_files(paths: Sequence[Path]) -> Iterator[list[Path]]:
     """Yield paths with the same endings to write to; rename all where nothing was raised. Raises OSError."""
-    hidden = [path.with_name(f".{path.name}") for path in paths]
+    hidden = [hidden_path(path) for path in paths]
     try:
         yield hidden
         for written, path in zip(hidden, paths, strict=True):

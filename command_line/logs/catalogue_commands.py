@@ -1,0 +1,101 @@
+"""Commands on the catalogue of many logs: index, query; and its use by `log list`."""
+
+import argparse
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from command_line import exit_codes
+from command_line.json_output import print_json
+from command_line.logs.refusals import explain_errors
+from command_line.screen import complain, watched
+from experiments.reports.text_tables import table
+from firmware_host.catalogue.entry import LogEntry
+from firmware_host.log_reading.log_reader import LogError
+
+Options = argparse.Namespace
+LISTING_READS_S = 1.0  # new logs that `log list` reads; it describes the others by the summary at their end
+
+
+def catalogued(folder: Path) -> dict[Path, LogEntry]:
+    """Returns the entries of the closed logs; none, with a message, where the catalogue cannot be used."""
+    try:
+        from firmware_host.catalogue.catalogue import Catalogue  # duckdb is an extra
+    except ModuleNotFoundError:
+        return {}
+    try:
+        catalogue = Catalogue(folder)
+    except LogError as problem:
+        complain(str(problem))
+        return {}
+    _update(catalogue, LISTING_READS_S)
+    return {folder / entry.file: entry for entry in catalogue.entries()}
+
+
+def _update(catalogue: Any, longest_s: float = inf) -> bool:
+    """Returns whether the catalogue is stored; where it is not, this command can use it all the same."""
+    try:
+        with watched() as watch:
+            unread = catalogue.update(watch, longest_s)
+    except OSError as problem:
+        complain(f"the catalogue {catalogue.path} cannot be stored: {problem.strerror or problem}")
+        return False
+    if unread:
+        complain(f"{unread} new logs are not in the catalogue yet: 'mudskipper log index' reads them")
+    return True
+
+
+def configured_folder(path: Path) -> Path:
+    from firmware_host.configuration.loading import load_configuration  # slow to import
+
+    return Path(load_configuration(path).log.directory)
+
+
+def chosen_folder(options: Options) -> Path:
+    """Returns the named folder of logs, or the configured one. Raises LogError where there is no such folder."""
+    folder: Path = options.folder or configured_folder(options.config)
+    if not folder.is_dir():
+        raise LogError(f"{folder}: there is no such folder")
+    return folder
+
+
+@explain_errors
+def index(options: Options) -> int:
+    from firmware_host.catalogue.catalogue import Catalogue
+
+    catalogue = Catalogue(chosen_folder(options))
+    stored = _update(catalogue)
+    states = [entry.state for entry in catalogue.entries()]
+    report = {"catalogue": str(catalogue.path), "logs": len(states), "broken": len(states) - states.count("whole")}
+    if options.json:
+        print_json("log-index", report)
+    else:
+        print(f"{report['catalogue']}: {report['logs']} logs, {report['broken']} of them broken")
+    return exit_codes.OK if stored else exit_codes.UNHEALTHY
+
+
+@explain_errors
+def query(options: Options) -> int:
+    from firmware_host.catalogue.catalogue import Catalogue
+
+    catalogue = Catalogue(chosen_folder(options))
+    _update(catalogue)
+    names, rows = catalogue.query(options.sql)
+    if options.json:
+        print_json("log-query", {"rows": [dict(zip(names, map(_for_json, row), strict=True)) for row in rows]})
+    else:
+        print(table([names, *([_shown(value) for value in row] for row in rows)]))
+    return exit_codes.OK
+
+
+def _for_json(value: Any) -> Any:
+    """Returns numbers, texts, lists and structures as they are, and times and other values of SQL as text."""
+    return value if isinstance(value, str | int | float | list | dict | None) else str(value)
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, list):
+        return ", ".join(map(_shown, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,75 @@
+"""The catalogue of many logs, as a person types it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import duckdb
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from firmware_host.catalogue.catalogue import VERSION, VERSION_KEY, catalogue_path
+from firmware_host.log.log_folder import DONE
+from tests.command_line.command_lines import failure
+from tests.folders import ROOT
+from tests.waiting import LONGEST_S
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / DONE).mkdir()
+    (tmp_path / DONE / "walk.mcap").write_bytes((ROOT / "tests/fixtures/walk_0_1.mcap").read_bytes())
+    (tmp_path / DONE / "text.mcap").write_text("no log", encoding="utf-8")
+    return tmp_path
+
+
+def test_the_index_counts_the_logs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["log", "index", str(folder), "--json"]) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert (report["logs"], report["broken"]) == (2, 1)
+    assert Path(report["catalogue"]).is_file()
+
+
+def test_the_list_knows_strides_and_reasons(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["log", "list", str(folder), "--json"]) == exit_codes.OK
+    logs = {log["name"]: log for log in json.loads(capsys.readouterr().out)["logs"]}
+    assert logs["walk.mcap"]["strides"] == 6 and logs["walk.mcap"]["started"] == "2026-11-22T14:50:21+00:00"
+    assert logs["text.mcap"]["state"] == "broken" and logs["text.mcap"]["reason"]
+
+
+def test_a_query_is_answered_as_text_and_as_json(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    query = "select file, strides, started from logs where state = 'whole'"
+    assert main(["log", "query", query, str(folder)]) == exit_codes.OK
+    assert "done/walk.mcap" in capsys.readouterr().out
+    assert main(["log", "query", query, str(folder), "--json"]) == exit_codes.OK
+    assert json.loads(capsys.readouterr().out)["rows"][0]["strides"] == 6
+
+
+def test_a_wrong_query_is_one_message(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "not understood" in failure(capsys, "log", "query", "selekt", str(folder))
+
+
+def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = catalogue_path(folder)
+    duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
+    assert "update mudskipper" in failure(capsys, "log", "query", "select 1", str(folder))
+    assert main(["log", "list", str(folder)]) == exit_codes.OK
+    printed = capsys.readouterr()
+    assert "walk.mcap" in printed.out and "update mudskipper" in printed.err
+
+
+def test_without_the_extra_logs_are_listed_all_the_same(folder: Path) -> None:
+    program = (
+        "import sys; sys.modules['duckdb'] = None; from command_line.main import main\n"
+        f"print(main(['log', 'list', {str(folder)!r}])); print(main(['log', 'query', 'select 1', {str(folder)!r}]))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True, cwd=ROOT
+    )
+    lines = ended.stdout.splitlines()
+    assert "walk.mcap" in ended.stdout and lines[-2:] == [str(exit_codes.OK), str(exit_codes.UNHEALTHY)]
+    assert "extra 'data'" in ended.stderr
