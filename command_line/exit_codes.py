@@ -6,6 +6,7 @@ USAGE = 2
 NO_DAEMON = 3
 NOT_PERMITTED = 4
 REFUSED = 5
+TORQUE_UNKNOWN = 6
 CONFIGURATION = 78
 TIMED_OUT = 124
 INTERRUPTED = 130
@@ -16,6 +17,7 @@ MEANINGS = {
     NO_DAEMON: "no daemon answers",
     NOT_PERMITTED: "not permitted",
     REFUSED: "the daemon refuses that in its present state",
+    TORQUE_UNKNOWN: "torque unknown: cut motor power",
     CONFIGURATION: "the configuration is wrong",
     TIMED_OUT: "the robot did not get there in time",
     INTERRUPTED: "interrupted, as by Ctrl-C",

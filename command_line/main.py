@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from command_line import exit_codes
 from command_line.commands import DEFAULT_CONFIG, SIMULATED, Commands, add, add_json, add_socket
 from command_line.experiments.experiment_commands import add_experiments
-from command_line.option_types import between, depth_cm, finite, folder, joint_angle, picture, whole
+from command_line.option_types import any_depth_cm, between, depth_cm, finite, folder, joint_angle, picture, whole
 from command_line.screen import complain
 from firmware_host.configuration.file_problems import why_not
 
@@ -24,6 +24,13 @@ EXTRA_OF = {"matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": 
 COUNT = whole(0, 100000)
 SEVERAL_FILES = "log of this project; several files are the segments of one run"
 ANY_LOG = "log of this project, its segments, or a CSV file of the paper's authors"
+
+
+class Parser(argparse.ArgumentParser):
+    """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords | {"allow_abbrev": False})
 
 
 class PrintVersion(argparse.Action):
@@ -48,7 +55,7 @@ class PrintCompletion(argparse.Action):
 
 def build_parser() -> argparse.ArgumentParser:
     statuses = ", ".join(f"{status} {meaning}" for status, meaning in exit_codes.MEANINGS.items())
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="mudskipper",
         description="Operates a robot that crawls over mud on two flippers.",
         epilog=f"Exit status: {statuses}.",
@@ -84,7 +91,11 @@ def _add_operation(commands: Commands) -> None:
         "clear": "Clear a fault and the errors of the drives.",
         "check": "List what prevents the robot from being armed, and what to do about it.",
     }
-    parsers = {name: add(commands, name, f"operation.operation.{name}", text) for name, text in described.items()}
+    modules = dict.fromkeys(("stop", "disarm"), "confirmed_stop")
+    parsers = {
+        name: add(commands, name, f"operation.{modules.get(name, 'operation')}.{name}", text)
+        for name, text in described.items()
+    }
     for parser in parsers.values():
         add_socket(parser)
     add_json(parsers["status"], parsers["check"])
@@ -103,9 +114,9 @@ def _add_operation(commands: Commands) -> None:
 
 def _add_walk_options(walk: argparse.ArgumentParser) -> None:
     depth = walk.add_mutually_exclusive_group()
-    depth.add_argument("--depth", type=depth_cm, metavar="CM", help="insertion depth of every stride")
+    depth.add_argument("--depth", type=any_depth_cm, metavar="CM", help="insertion depth of every stride")
     depth.add_argument("--adaptive", action="store_true", help="choose the depth from the mud once a stride (default)")
-    walk.add_argument("--strides", type=COUNT, default=0, metavar="N", help="stop after N strides (default: go on)")
+    walk.add_argument("--strides", type=whole(1, 100000), default=0, metavar="N", help="stop after N (default: go on)")
     walk.add_argument("--attended", action="store_true", help="stay connected; the robot stops when this command ends")
 
 

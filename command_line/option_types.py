@@ -3,8 +3,10 @@
 import argparse
 from collections.abc import Callable
 from contextlib import suppress
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from pathlib import Path
+
+from control.records import JOINTS
 
 
 def _number(text: str) -> float:
@@ -41,6 +43,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
 finite = _number_where(isfinite, "a number")
 positive = _number_where(lambda value: value > 0.0 and isfinite(value), "more than 0")
 depth_cm = _number_where(lambda value: 0.0 < value <= 20.0, "more than 0 and at most 20 cm")
+any_depth_cm = _number_where(lambda value: 0.0 < value < inf, "more than 0 cm")  # the daemon knows the robot's limit
 _lever_cm = between(1.0, 100.0, "cm")
 
 
@@ -51,6 +54,8 @@ def lever_m(text: str) -> float:
 
 def joint_angle(text: str) -> tuple[str, float]:
     joint, _, angle_deg = text.partition("=")
+    if joint and joint not in JOINTS:
+        raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; there are {', '.join(JOINTS)}")
     with suppress(ValueError):
         if joint and isfinite(float(angle_deg)):
             return joint, float(angle_deg)

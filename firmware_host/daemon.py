@@ -227,7 +227,9 @@ def end_safely(loop: Loop, problem: Exception) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="mudskipperd", description="The robot's real-time controller.")
+    parser = argparse.ArgumentParser(
+        prog="mudskipperd", description="The robot's real-time controller.", allow_abbrev=False
+    )
     parser.add_argument("--config", type=Path, default=Path("/etc/mudskipper/mudskipper.toml"))
     parser.add_argument("--check-config", action="store_true", help="validate the configuration and exit")
     options = parser.parse_args(arguments)

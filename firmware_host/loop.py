@@ -272,7 +272,7 @@ class Loop:
             return "the daemon is ending"
         deepest_m = self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
         if order is not None and not 0.0 < order.depth_m <= deepest_m:
-            return f"depth {order.depth_m:g} m: out of the flippers' reach over the sweep"
+            return f"depth {100.0 * order.depth_m:g} cm: out of the flippers' reach over the sweep"
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         refused = refusal(self.mode, request, health)
         return refusal_text(refused) if refused else None

@@ -15,7 +15,6 @@ from command_line.operation.attended_walk import MILD, attend
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain
 from experiments.reports.text_tables import number, table
 from firmware_host.operator.counted_nouns import counted
-from firmware_host.operator.rpc import FOR_MEMBERS
 from firmware_host.operator.status_client import (
     CallRefusedError,
     DroppedError,
@@ -26,7 +25,6 @@ from firmware_host.operator.status_client import (
 
 Options = argparse.Namespace
 ARMING_S = 5.0
-STOPPING_S = 10.0
 CLEARING_S = 1.5
 POLL_S = 0.05
 MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
@@ -107,15 +105,6 @@ def move(options: Options) -> int:
     return with_daemon(options, act)
 
 
-def stop(options: Options) -> int:
-    modes = ("hold", "idle", "boot", "fault")
-    return with_daemon(options, lambda client: _request(client, "stop", modes, STOPPING_S))
-
-
-def disarm(options: Options) -> int:
-    return with_daemon(options, lambda client: _request(client, "disarm", ("idle", "boot", "fault"), ARMING_S))
-
-
 def clear(options: Options) -> int:
     def act(client: StatusClient) -> int:
         client.call("clear")
@@ -138,14 +127,9 @@ def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
-    """Sends a request and waits until the robot is in one of `modes`, if this user may see the status."""
-    accepted = client.call(method, **params)
-    try:
-        return _await(client, modes, longest_s)
-    except NotPermittedError as problem:
-        group = str(problem).partition(FOR_MEMBERS)[2].partition(". ")[0]
-        print(f"{accepted}; only members of the group {group} can see whether the robot has stopped")
-        return exit_codes.OK
+    """Sends a request and waits until the robot is in one of `modes`."""
+    client.call(method, **params)
+    return _await(client, modes, longest_s)
 
 
 def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> int:

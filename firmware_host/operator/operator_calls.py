@@ -142,8 +142,8 @@ class OperatorCalls:
             return self._request(caller, Request.WALK, order)
         if not 0.0 < depth_m <= adaptation.max_depth_m:
             raise RefusedError(
-                f"depth_m = {depth_m}: must be more than 0 and at most {adaptation.max_depth_m} m"
-                f" ({100.0 * adaptation.max_depth_m:g} cm)"
+                f"depth {100.0 * depth_m:g} cm: must be more than 0 and at most {100.0 * adaptation.max_depth_m:g} cm,"
+                " which is adaptation.max_depth_m in the configuration"
             )
         return self._request(caller, Request.WALK, WalkOrder(float(depth_m), adaptive=False, strides=params["strides"]))
 

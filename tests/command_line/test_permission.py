@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.operation import operation
+from command_line.operation import confirmed_stop, operation
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.operator.status_client import NotPermittedError, StatusClient
 from firmware_host.operator.status_socket import Methods, StatusSocket
@@ -48,13 +48,14 @@ def options(monkeypatch: pytest.MonkeyPatch) -> Namespace:
     )
 
 
-@pytest.mark.parametrize("command", [operation.stop, operation.disarm])
-def test_a_stop_succeeds_where_the_status_is_not_permitted(
+@pytest.mark.parametrize("command", [confirmed_stop.stop, confirmed_stop.disarm])
+def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(
     options: Namespace, capsys: pytest.CaptureFixture[str], command: Any
 ) -> None:
-    assert command(options) == exit_codes.OK
+    assert command(options) == exit_codes.TORQUE_UNKNOWN
     printed = capsys.readouterr()
-    assert printed.out.startswith("accepted") and "mudskipper" in printed.out and not printed.err
+    assert printed.out.startswith("accepted") and "mudskipper" in printed.out
+    assert confirmed_stop.TORQUE_UNKNOWN in printed.err
 
 
 @pytest.mark.parametrize("attended", [False, True])

@@ -13,6 +13,7 @@ import pytest
 
 from command_line import commands, exit_codes
 from command_line.main import main
+from command_line.operation.confirmed_stop import TORQUE_UNKNOWN
 from control.modes import Mode
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reading.log_reader import read_log
@@ -32,6 +33,8 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     assert bench.run("move", "left_sweep=10", "right_sweep=10").stdout == "hold\n"
     assert abs(json.loads(bench.run("status", "--json").stdout)["drives"][0]["angle_rad"] - 0.1745) < 0.03
     assert bench.run("move", "left_sweep=170").returncode == exit_codes.REFUSED
+    too_deep = bench.run("walk", "--depth", "19")
+    assert too_deep.returncode == exit_codes.REFUSED and "19 cm" in too_deep.stderr and "5 cm" in too_deep.stderr
     assert bench.run("walk", "--depth", "3").stdout == "walking\n"
     bench.wait_for(lambda report: report["strides_closed"] >= 2)
     status = json.loads(bench.run("status", "--json").stdout)
@@ -85,6 +88,9 @@ def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_be
     own_bench.wait_for(lambda report: silent <= {fault["subject"] for fault in report["faults"]})
     assert own_bench.wait_for(lambda report: report["mode"] == "fault")["fault"]
     assert own_bench.run("status").returncode == exit_codes.UNHEALTHY
+    for command in ("stop", "disarm"):
+        ended = own_bench.run(command)
+        assert ended.returncode == exit_codes.TORQUE_UNKNOWN and TORQUE_UNKNOWN in ended.stderr
     check = own_bench.run("check", "--json")
     assert check.returncode == exit_codes.UNHEALTHY
     assert {"drive.left_sweep", "drive.right_adduction"} <= {
@@ -110,7 +116,9 @@ def test_without_a_daemon_every_command_says_so(
     experiments = ("experiment flipper --mud 47.6", "experiment walk --mud 47.6")
     for command in ("status", "arm", "walk", "stop", "disarm", "clear", "watch", *experiments):
         assert main([*command.split(), "--socket", str(short_folder / "none")]) == exit_codes.NO_DAEMON, command
-        assert "systemctl start mudskipper" in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert "systemctl start mudskipper" in said
+        assert (TORQUE_UNKNOWN in said) == (command in ("stop", "disarm"))
 
 
 def test_check_without_a_daemon_checks_what_it_can(
@@ -144,6 +152,11 @@ def test_status_loads_no_large_library() -> None:
         ("dance",),
         ("log",),
         ("walk", "--depth", "3", "--adaptive"),
+        ("walk", "--strides", "0"),  # would walk without end
+        ("arm", "--f"),  # would overrule failed checks
+        ("status", "--js"),
+        ("experiment", "walk", "--mu", "47.6"),
+        ("move", "tail=10"),
         ("simulate", "--world", "world.toml", "--mud", "48.5"),
         *(("move", text) for text in ("left_sweep", "left_sweep=", "left_sweep=far", "left_sweep=nan", "=3")),
     ],

@@ -1,0 +1,92 @@
+"""`stop` and `disarm` succeed only where every drive has confirmed; otherwise the operator has to cut the power."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import exit_codes
+from command_line.operation import confirmed_stop, operation
+from command_line.operation.confirmed_stop import TORQUE_UNKNOWN, disarm, stop, unconfirmed_drives
+from control.records import JOINTS
+
+OPTIONS = Namespace(socket=Path("/none"))
+Report = dict[str, Any]
+
+
+def report(mode: str, closed_loop: bool, age_s: float | None = 0.0, changed: Report | None = None) -> Report:
+    """A status in which the left adduction drive may differ."""
+    drives = [{"joint": joint, "closed_loop": closed_loop, "heartbeat_age_s": age_s} for joint in JOINTS]
+    drives[1] |= changed or {}
+    return {"mode": mode, "notice": "", "drives": drives}
+
+
+@pytest.mark.parametrize(
+    ("found", "unconfirmed"),
+    [
+        (report("idle", closed_loop=False), 0),
+        (report("hold", closed_loop=True), 0),
+        (report("fault", closed_loop=False), 0),
+        (report("fault", closed_loop=True), 4),
+        (report("idle", closed_loop=False, age_s=0.4), 4),  # from before the request
+        (report("hold", closed_loop=True, changed={"heartbeat_age_s": 0.4}), 1),
+        (report("boot", closed_loop=False, age_s=None), 4),
+        (report("idle", closed_loop=False, changed={"heartbeat_age_s": None}), 1),
+    ],
+)
+def test_a_drive_confirms_by_a_heartbeat_after_the_request(found: Report, unconfirmed: int) -> None:
+    assert len(unconfirmed_drives(found, since_request_s=0.3)) == unconfirmed
+
+
+class Robot:
+    """A client that answers with these reports; the last one stays."""
+
+    reports: list[Report] = []
+
+    def __init__(self, path: Path) -> None:
+        return
+
+    def call(self, method: str, **params: Any) -> Any:
+        if method != "status":
+            return "accepted"
+        return self.reports.pop(0) if len(self.reports) > 1 else self.reports[0]
+
+    def close(self) -> None:
+        return
+
+
+@pytest.fixture(autouse=True)
+def robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operation, "StatusClient", Robot)
+    for name in ("CONFIRMING_S", "STOPPING_S", "ARMING_S"):
+        monkeypatch.setattr(confirmed_stop, name, 0.15)
+
+
+@pytest.mark.parametrize("command", [stop, disarm])
+@pytest.mark.parametrize("mode", ["idle", "fault"])
+def test_confirmed_idle_drives_are_a_success(command: Any, mode: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Robot.reports = [report("walking", True, -1.0), report(mode, True, -1.0), report(mode, False, -1.0)]
+    assert command(OPTIONS) == exit_codes.OK
+    assert capsys.readouterr() == (f"{mode}\n", "")
+
+
+def test_a_held_pose_is_the_success_of_a_stop_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    Robot.reports = [report("hold", True, -1.0)]
+    assert stop(OPTIONS) == exit_codes.OK
+    assert disarm(OPTIONS) == exit_codes.TIMED_OUT
+    assert TORQUE_UNKNOWN in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [stop, disarm])
+@pytest.mark.parametrize("changed", [{"closed_loop": True}, {"heartbeat_age_s": None}, {"heartbeat_age_s": 3.0}])
+def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
+    command: Any, changed: Report, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Robot.reports = [report("fault", False, -1.0, changed)]
+    assert command(OPTIONS) == exit_codes.TORQUE_UNKNOWN
+    printed = capsys.readouterr()
+    assert printed.out == "fault\n"
+    assert "left_adduction" in printed.err and "right" not in printed.err and TORQUE_UNKNOWN in printed.err
