@@ -20,6 +20,7 @@ from drivers.transmit_gate import TransmitGate
 from firmware_host import loop
 from firmware_host.log.segments import LogSegments
 from firmware_host.loop import Loop
+from firmware_host.loop_events import LoopEvents
 from tests.dst.drawing import draw_scenario
 from tests.dst.run import run_scenario
 from tests.dst.starts import sound_walk
@@ -104,6 +105,21 @@ def fault_stays() -> AbstractContextManager[Any]:
     return mock.patch("control.fault_latch.FaultLatch._is_over", lambda *arguments: False)
 
 
+def encoders_unwatched() -> AbstractContextManager[Any]:
+    """A frozen encoder is never detected."""
+    return mock.patch("control.monitors.encoder_monitor.EncoderMonitor.update", lambda *arguments: None)
+
+
+def unwatched_and_unlimited() -> AbstractContextManager[Any]:
+    """A joint that runs away is driven with any torque."""
+    return _both(no_limits(), encoders_unwatched())
+
+
+def tick_raises() -> AbstractContextManager[Any]:
+    """The loop has a bug that only a stop meets."""
+    return mock.patch.object(LoopEvents, "report_request", side_effect=ZeroDivisionError)
+
+
 def rows_vanish() -> AbstractContextManager[Any]:
     """The log's writer loses a row now and then without a word."""
     true_write = LogSegments.write
@@ -121,6 +137,9 @@ BREAKS: dict[str, Break] = {  # by the promise that must notice
     "StopInTime": stop_ignored,
     "ArmedByRequest": arms_by_itself,
     "NoTorqueWithoutMode": silent_without_torque,
+    "WithinStops": encoders_unwatched,
+    "BoundedEnergy": unwatched_and_unlimited,
+    "NoBug": tick_raises,
     "BackToIdle": fault_stays,
     "WholeLog": rows_vanish,
 }

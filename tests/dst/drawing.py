@@ -17,8 +17,7 @@ from tests.dst.starts import STUCK_M, STUCK_PA
 
 SHARED = 16
 BUSES = ("left", "right")  # of the example configuration
-STARTS = {"power-on": 1, "idle": 2, "hold": 3, "path": 1, "insertion": 3, "stance": 3, "extraction": 3}
-LAST_START = 4  # weight of swing or recovery
+WEIGHTS = {"power-on": 1, "idle": 2, "hold": 3, "path": 1, "insertion": 3, "stance": 3, "extraction": 3, "release": 4}
 FAILURES = {0: 1, 1: 4, 2: 5, 3: 3}  # how many, and how often
 FLAPPING = 0.2
 EARLIEST_S, LATEST_S, AFTER_S = 0.02, 0.4, 0.25
@@ -34,8 +33,7 @@ FAMILIES = tuple(COMPONENTS)
 def draw_scenario(seed: int) -> Scenario:
     surroundings = draw_surroundings(seed // SHARED)
     random = Random(f"scenario {seed}")
-    last = "recovery" if surroundings.strength_pa == STUCK_PA else "swing"
-    start = random.choices((*STARTS, last), (*STARTS.values(), LAST_START))[0]
+    start = random.choices(list(WEIGHTS), list(WEIGHTS.values()))[0]
     failures = sorted(_draw_failures(random), key=lambda event: event.at_s)
     moments_s = [0.0, *(each for event in failures for each in (event.at_s, end_s(event)))]
     calls = list(_draw_calls(random, start, moments_s))

@@ -23,6 +23,7 @@ from firmware_host.operator.rights import Group, Peer, Rights
 from firmware_host.operator.rpc import REQUEST, RefusedError
 from firmware_host.operator.socket_file import operators_path
 from firmware_host.operator.status_socket import StatusSocket
+from simulation.harness.joint_energy import JointEnergy
 from simulation.harness.lockstep import Lockstep
 from tests.dst.harms import Harms
 from tests.dst.scenario import Call, Event, Failure, HangUp, Harm, Terminate
@@ -72,6 +73,8 @@ class OperatedRobot:
         self.lockstep = lockstep
         self.loop = lockstep.loop
         self.harms = Harms(lockstep)
+        self.work = JointEnergy(lockstep.robot, self.loop.configuration.joint_ranges)
+        self.harmed = False  # something has failed since the start
         self.calls: list[Executed] = []
         self.bug = ""  # the exception that ended the loop, or a report of one in the socket
         self.ended = False  # the daemon
@@ -95,6 +98,7 @@ class OperatedRobot:
 
     def apply(self, event: Event) -> None:
         """Lets an event happen before the next tick."""
+        self.harmed = self.harmed or isinstance(event, Failure | Harm)
         match event:
             case Call(client=client, method=method, params=params):
                 self.call(client, method, **params)

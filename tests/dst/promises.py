@@ -7,14 +7,12 @@ for what was broken.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import radians
 
 from control.controller import SOFT_STOP_S
-from control.faults import Clears
-from control.modes import ENERGISED, Mode
+from control.faults import Clears, Reaction
+from control.modes import ENERGISED, HELD, Mode
 from control.records import JOINTS, NEVER_S, Torques
-from simulation.body.plant import END_STOPS_RAD
-from simulation.harness.joint_energy import JointEnergy
+from experiments.faults.energy_bounds import energy_bounds
 from tests.dst.operated_robot import OperatedRobot
 from tests.dst.reachability import Reachability
 
@@ -174,44 +172,84 @@ class WithinStops(Promise):
     """Our torque does not press a joint against its mechanical stop."""
 
     LONGEST_S = 0.5  # a stuck encoder is detected within 120 ticks, then braking takes as long as the slew
-    PRESSING_NM = 0.1
 
     def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
         super().__init__(robot, reach)
         self._pressed_s = [0.0] * len(JOINTS)
-        robot.lockstep.robot.observers.append(self._measure)
-
-    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
-        angles_rad = self.robot.lockstep.robot.plant.angles_rad
-        for index, torque_nm in enumerate(torques_nm):
-            angle_rad, stop_rad = angles_rad[index], END_STOPS_RAD[index % 2]
-            presses = abs(angle_rad) > stop_rad - radians(0.1) and torque_nm * angle_rad > 0.0
-            ours = presses and abs(torque_nm) > self.PRESSING_NM and not self.reach.is_foreign(index)
-            self._pressed_s[index] = self._pressed_s[index] + dt_s if ours else 0.0
+        self._before_s = [0.0] * len(JOINTS)  # in all, one tick ago
 
     def update(self) -> Iterator[str]:
-        for joint, pressed_s in zip(JOINTS, self._pressed_s, strict=True):
-            if pressed_s > self.LONGEST_S:
-                yield f"{joint} is pressed against its stop for {pressed_s:.2f} s"
+        for index, joint in enumerate(self.robot.work.joints):
+            newly_s, self._before_s[index] = joint.pushed_s - self._before_s[index], joint.pushed_s
+            ours = newly_s > 0.0 and not self.reach.is_foreign(index)
+            self._pressed_s[index] = self._pressed_s[index] + newly_s if ours else 0.0
+            if self._pressed_s[index] > self.LONGEST_S:
+                yield f"{JOINTS[index]} is pressed against its stop for {self._pressed_s[index]:.2f} s"
+
+
+class EnergyRise:
+    """Owns the largest rise of each joint's energy since the last reset, at the resolution of ticks."""
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        self._work, self._reach = robot.work, reach
+        self.reset()
+
+    def reset(self) -> None:
+        self._lowest_j = [joint.work_j for joint in self._work.joints]
+
+    def largest_j(self) -> tuple[float, str]:
+        """Returns the largest rise up to now by our torque, and its joint."""
+        rises_j = []
+        for index, joint in enumerate(self._work.joints):
+            foreign = self._reach.is_foreign(index)
+            self._lowest_j[index] = joint.work_j if foreign else min(self._lowest_j[index], joint.work_j)
+            rises_j.append((joint.work_j - self._lowest_j[index], JOINTS[index]))
+        return max(rises_j)
 
 
 class LittleEnergy(Promise):
-    """Once the robot only brakes its joints, our torque puts hardly any energy into one."""
+    """While the robot brakes its joints, our torque puts hardly any energy into one."""
 
     MOST_J = 1.0  # a motor with inverted torque is detected by then
 
     def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
         super().__init__(robot, reach)
-        self._energy = JointEnergy(robot.lockstep.robot, self.loop.configuration.joint_ranges)
-        self._before = self.loop.mode
+        self._rise = EnergyRise(robot, reach)
 
     def update(self) -> Iterator[str]:
-        if self._before is not Mode.DAMPING:
-            self._energy.begin()
-        self._before = self.loop.mode
-        for index, joint in enumerate(self._energy.joints):
-            if joint.energy_j > self.MOST_J and not self.reach.is_foreign(index):
-                yield f"{JOINTS[index]} received {joint.energy_j:.2f} J while damping"
+        if self.loop.mode is not Mode.DAMPING:
+            self._rise.reset()
+            return
+        energy_j, joint = self._rise.largest_j()
+        if energy_j > self.MOST_J:
+            yield f"{joint} received {energy_j:.2f} J while damping"
+
+
+class BoundedEnergy(Promise):
+    """After the first failure our torque puts no more energy into a joint than the published bounds allow.
+
+    They are those of the faults that stopped the robot, and for the time in which it followed a path that of the gait.
+    """
+
+    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
+        super().__init__(robot, reach)
+        self._bounds = energy_bounds(self.loop.configuration)
+        self._rise = EnergyRise(robot, reach)
+        self._held_s = self._stopping_j = 0.0
+
+    def update(self) -> Iterator[str]:
+        if not self.robot.harmed:
+            self._rise.reset()
+            return
+        if self.loop.mode in HELD:
+            self._held_s += self.loop.period_s
+        for fault in self.loop.faults.begun:
+            if fault.kind.reaction >= Reaction.SOFT_STOP:
+                self._stopping_j = max(self._stopping_j, self._bounds.fault_j(fault.kind))
+        most_j = self._bounds.walking_j(self._held_s) + self._stopping_j
+        energy_j, joint = self._rise.largest_j()
+        if energy_j > most_j:
+            yield f"{joint} received {energy_j:.2f} J since the first failure, the bound is {most_j:.2f} J"
 
 
 class NoBug(Promise):
@@ -233,5 +271,6 @@ PROMISES: tuple[type[Promise], ...] = (
     ArmedByRequest,
     WithinStops,
     LittleEnergy,
+    BoundedEnergy,
     NoBug,
 )

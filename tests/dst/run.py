@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 
 from control.faults import FaultKind
 from control.modes import Mode
+from control.records import Phase
 from tests.dst.log_check import log_problems
 from tests.dst.operated_robot import OperatedRobot
 from tests.dst.promises import PROMISES, Promise, StopInTime
@@ -70,6 +71,7 @@ class Run:
                 self._arm_again()
 
     def _run_schedule(self) -> None:
+        self.outcome.covered[f"start {self._scenario.start}"] += 1
         waiting = list(self._scenario.events)
         end_s = self._begun_s + self._scenario.for_s
         while self._robot.now_s < end_s:
@@ -155,6 +157,8 @@ class Run:
         if self._loop.mode is not self._mode:
             self._mode = self._loop.mode
             self.outcome.covered[f"mode {self._mode.name.lower()}"] += 1
+        if self._loop.controller.target.phase is Phase.RECOVERY:
+            self.outcome.covered["phase recovery"] += 1
         for fault in self._loop.faults.begun:
             self.outcome.covered[f"fault {fault.name}"] += 1
         for _ in self._stop.update():

@@ -6,6 +6,7 @@ import pytest
 
 from tests.dst.broken_promises import BREAKS
 from tests.dst.drawing import draw_scenario
+from tests.dst.promises import PROMISES
 from tests.dst.run import run_scenario
 from tests.dst.scenario import Call, Event, Failure, Harm, Scenario, Surroundings
 from tests.dst.shrinking import shrink
@@ -20,8 +21,11 @@ SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events 
     "StopInTime": ("hold", (Call(0.0, "pilot", "walk"), Call(0.1, "guest", "stop")), SHORT_S),
     "ArmedByRequest": ("stance", (Call(0.05, "guest", "disarm"),), 0.8),
     "NoTorqueWithoutMode": ("stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),), SHORT_S),
+    "WithinStops": ("stance", (Failure(0.0, "left_sweep.position", "stuck", 1.5),), 1.5),
+    "BoundedEnergy": ("stance", (Harm(0.0, "inverted motor", "left_sweep", 0.6),), SHORT_S),
+    "NoBug": ("hold", (Call(0.05, "guest", "stop"), Call(0.1, "pilot", "clear")), SHORT_S),
     "BackToIdle": ("hold", (Failure(0.05, "left_sweep", "off", 0.05),), SHORT_S),
-    "WholeLog": ("swing", (), SHORT_S),
+    "WholeLog": ("release", (), SHORT_S),
 }
 
 
@@ -35,9 +39,14 @@ def sound_robots() -> None:
 @pytest.mark.parametrize("promise", SCHEDULES)
 def test_a_broken_promise_is_noticed(promise: str) -> None:
     scenario = Scenario(1, QUICK, *SCHEDULES[promise])
-    assert run_scenario(scenario).problem == ""
+    alone = [each for each in PROMISES if each.__name__ == promise]  # no other promise notices first
+    assert run_scenario(scenario, alone).problem == ""
     with BREAKS[promise]():
-        assert run_scenario(scenario).promise == promise
+        assert run_scenario(scenario, alone).promise == promise
+
+
+def test_every_promise_has_a_robot_that_breaks_it() -> None:
+    assert {each.__name__ for each in PROMISES} <= set(BREAKS) == set(SCHEDULES)
 
 
 def test_a_seed_gives_the_same_run_every_time() -> None:
