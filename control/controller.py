@@ -16,7 +16,7 @@ from control.gait.joint_path import JointPath, still
 from control.gait.recovery import Recovery
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm
-from control.modes import MOVING, Mode
+from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
 from control.records import (
     JOINTS,
@@ -139,6 +139,12 @@ class Controller:
         return self._mode is Mode.HOLD and 0.0 < self.motion.longest_hold_s < self._since_s
 
     @property
+    def followed_targets(self) -> JointTargets | None:
+        """The joint targets of the last step, where the torques follow them."""
+        replaced = self.hold_law is not None and self._mode is Mode.HOLD
+        return self.joint_targets if self._mode in HELD and not replaced else None
+
+    @property
     def moving(self) -> bool:
         """The joints move to a requested pose."""
         return self._move is not None
@@ -215,7 +221,8 @@ class Controller:
         here = measured_angles(states)
         self.cut_short = mode is Mode.HOLD and self._mode is Mode.WALKING
         if mode is Mode.HOLD:
-            self._pose = self._pose if self._mode is Mode.STOPPING else still(here)
+            # flippers that the mud kept from rising stay where they are, or they would pull at it at full torque
+            self._pose = self._pose if self._mode is Mode.STOPPING and self._up else still(here)
         elif mode is Mode.WALKING:
             self._path = self._path_to_start(here)
             self.gait.reset(self.order.depth_m)

@@ -106,6 +106,10 @@ class FaultKind(StrEnum):
     JOINT_MOVING = "joint_moving", "joint", NONE, ALWAYS, WHEN_GONE, 40
     JOINT_CURRENT = "joint_current", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 6
     JOINT_NOT_FOLLOWING = "joint_not_following", "joint", SOFT_STOP, ALWAYS, BY_HAND, 765
+    JOINT_RUNAWAY = "joint_runaway", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 60
+    JOINT_OSCILLATING = "joint_oscillating", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 120
+    FOLLOWING_ERROR = "following_error", "joint", DAMPING, ALWAYS, BY_HAND, 765
+    DAMPING_FAILED = "damping_failed", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 45
     ENCODER_JUMP = "encoder_jump", "joint", DAMPING, ALWAYS, BY_HAND, 3
     ENCODER_STUCK = "encoder_stuck", "joint", DAMPING, ALWAYS, BY_HAND, 120
     TORQUE_MISSING = "torque_missing", "joint", SOFT_STOP, ALWAYS, BY_HAND, 45

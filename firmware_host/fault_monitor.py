@@ -8,11 +8,24 @@ from typing import NamedTuple
 
 from control.controller import ALL_TRUSTED
 from control.faults import Fault, FaultKind
+from control.gait.recovery import is_in_mud
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointFacts, JointMonitor
+from control.monitors.motion_monitor import JointDynamics
 from control.rate import PERIOD_S
-from control.records import JOINTS, NEVER_S, BodyPose, DriveStates, Joints
+from control.records import (
+    JOINTS,
+    NEVER_S,
+    BodyPose,
+    DriveStates,
+    Joints,
+    JointTarget,
+    JointTargets,
+    Phase,
+    same_for_all,
+    same_for_both,
+)
 from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth, Drives
 from firmware_host.configuration.configuration import Configuration
@@ -27,6 +40,8 @@ POSE_FORGOTTEN_S = 10.0  # a pose source that is silent for longer counts as swi
 BROKEN = frozenset(
     {FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK}
 )  # detected in single ticks, but lasting until torque is off
+IN_MUD = frozenset({Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE, Phase.RECOVERY})
+NO_TARGETS: Joints[JointTarget | None] = same_for_all(None)
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
 EXPLAINED = frozenset({FaultKind.DRIVE_ERROR, FaultKind.DRIVE_DISARMED})  # by the drive's own error text
 BUS_FAULTS = {
@@ -48,6 +63,8 @@ class MonitorInput(NamedTuple):
     wall_minus_monotonic_s: float
     log: LogReport
     lost_lease_holder: str  # the program that has lost the lease; empty: none
+    targets: JointTargets | None = None  # of the joints in the tick before; None without stiffness
+    phase: Phase = Phase.REST  # of the gait in the tick before
 
 
 class FaultMonitor:
@@ -66,9 +83,13 @@ class FaultMonitor:
                 configuration.drive[joint].current_limit_a,
                 configuration.drive[joint].torque_constant_nm_a,
                 configuration.drive[joint].heartbeat_period_s,
+                dynamics,
             )
-            for joint, joint_range in zip(JOINTS, configuration.joint_ranges, strict=True)
+            for joint, joint_range, dynamics in zip(
+                JOINTS, configuration.joint_ranges, _joint_dynamics(configuration), strict=True
+            )
         )
+        self._geometry = configuration.geometry
         self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
@@ -146,8 +167,9 @@ class FaultMonitor:
     def _check_joints(self, found: list[Fault], tick: Tick, monitor_input: MonitorInput) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
         dt_s = (1 + tick.missed) * self._period_s
-        for joint, health, state, torque_nm in zip(
-            self.joints, self._drives.health, monitor_input.states, sent_nm, strict=True
+        targets = NO_TARGETS if monitor_input.freeing else monitor_input.targets or NO_TARGETS  # those of a pull lead
+        for joint, health, state, torque_nm, target in zip(
+            self.joints, self._drives.health, monitor_input.states, sent_nm, targets, strict=True
         ):
             facts = JointFacts(
                 now_s=tick.now_s,
@@ -156,8 +178,19 @@ class FaultMonitor:
                 moving=mode in MOVING,
                 torque_nm=torque_nm,
                 may_stand_still=monitor_input.freeing or mode not in HELD,
+                target=target,
+                damping=mode is Mode.DAMPING,
             )
-            found += [_explained(fault, health) for fault in joint.update(facts, state)]
+            for fault in joint.update(facts, state):
+                if fault.kind is not FaultKind.FOLLOWING_ERROR or self._moves_in_air(fault.subject, monitor_input):
+                    found.append(_explained(fault, health))
+
+    def _moves_in_air(self, joint: str, monitor_input: MonitorInput) -> bool:
+        """Return whether no mud may hold a joint back: by the phase of the gait, and by the flipper's own angles."""
+        states = monitor_input.states
+        sweep, lift = states.left if joint.startswith("left") else states.right
+        in_mud = is_in_mud(self._geometry, sweep.angle_rad, lift.angle_rad)
+        return not in_mud and monitor_input.phase not in IN_MUD
 
     def _check_trust(self, found: list[Fault], mode: Mode) -> None:
         """Update the trust in the encoders: a broken one stays untrusted, a silent one only while it is silent."""
@@ -208,6 +241,14 @@ class FaultMonitor:
             found.append(FaultKind.POSE_LOST.fault())
             if now_s - self._pose_stamp_s > POSE_FORGOTTEN_S:
                 self._pose_stamp_s = None
+
+
+def _joint_dynamics(configuration: Configuration) -> Joints[JointDynamics]:
+    arm, gains = configuration.arm, configuration.gains
+    return same_for_both(
+        JointDynamics(arm.sweep_inertia_kg_m2, gains.sweep_stiffness_nm_rad),
+        JointDynamics(arm.adduction_inertia_kg_m2, gains.adduction_stiffness_nm_rad),
+    )
 
 
 def _explained(fault: Fault, health: DriveHealth) -> Fault:

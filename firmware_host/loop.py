@@ -37,8 +37,9 @@ from firmware_host.log.rows import STRIDE_KIND, TICK_KIND, stride_row, tick_row
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
-from firmware_host.operator.fault_texts import fault_message, refusal_text
+from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.lease import Lease
+from firmware_host.refusal_texts import refusal_text
 from firmware_host.ticker import Tick
 
 NOTHING_SENT = LimitedTorques(torques_nm=NO_TORQUE, limited=False, finite=True)
@@ -164,6 +165,8 @@ class Loop:
             wall_minus_monotonic_s=self._wall_clock() - self._clock(),
             log=self.recorder.report(),
             lost_lease_holder=lost_lease_holder,
+            targets=self.controller.followed_targets,
+            phase=self.target.phase,
         )
 
     def _all_in_closed_loop(self) -> bool:

@@ -4,9 +4,11 @@ Between two messages the angle must change by the mean of the two reported veloc
 must follow the integral of the velocity. A slipping magnet or a broken cable violates the first condition, a frozen
 sensor the second: on a wrong angle the position loop would drive the joint to its stop at full torque. A sensor that
 freezes while the joint rests shows in the velocity: a live velocity that is not zero does not repeat to the last bit.
+One that freezes at exactly zero velocity shows in the torque: every joint yields a little to a torque that changes, by
+half a step of a 14-bit encoder at 1000 N·m/rad, ten times the stiffness of the arm in the stiffest mud.
 """
 
-from math import degrees
+from math import degrees, inf
 
 from control.faults import Fault, FaultKind
 from control.records import NEVER_S, UNKNOWN, DriveState
@@ -16,6 +18,8 @@ MOVED_S = 0.02  # drives repeat an old value now and then
 LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path
 RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
+UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, whatever the velocity is
+YIELDING_NM = 0.2  # change of the torque meanwhile: more than dry friction of 0.06 N·m holds in both directions
 
 
 class EncoderMonitor:
@@ -32,9 +36,14 @@ class EncoderMonitor:
 
     def _reset_frozen(self) -> None:
         self._moved_s = self._moved_rad = self._frozen_s = 0.0
+        self._reset_unchanged()
 
-    def update(self, state: DriveState, dt_s: float) -> Fault | None:
+    def _reset_unchanged(self) -> None:
+        self._unchanged_s, self._lowest_nm, self._highest_nm = 0.0, inf, -inf
+
+    def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
         """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""
+        self._torque_nm = torque_nm
         if state.angle_stamp_s == self._stamp_s:
             return None
         gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
@@ -66,6 +75,16 @@ class EncoderMonitor:
         frozen = state.velocity_rad_s == self._velocity_rad_s and abs(state.velocity_rad_s) > RESTS_RAD_S
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
         moved = abs(self._moved_rad) > MOVED_RAD and self._moved_s > MOVED_S
-        if not moved and self._frozen_s <= FROZEN_S:
+        if not moved and self._frozen_s <= FROZEN_S and not self._ignores_torque(state, gap_s):
             return None
         return FaultKind.ENCODER_STUCK.fault(self._joint)
+
+    def _ignores_torque(self, state: DriveState, gap_s: float) -> bool:
+        """Return whether angle and velocity stay the same to the last bit while the torque changes."""
+        if state.velocity_rad_s != self._velocity_rad_s:
+            self._reset_unchanged()
+            return False
+        self._unchanged_s += gap_s
+        self._lowest_nm = min(self._lowest_nm, self._torque_nm)
+        self._highest_nm = max(self._highest_nm, self._torque_nm)
+        return self._unchanged_s > UNCHANGED_S and self._highest_nm - self._lowest_nm > YIELDING_NM

@@ -12,9 +12,10 @@ from control.bounds import Bounds, Meaning
 from control.faults import Fault, FaultKind
 from control.limits import JointLimits, JointRange
 from control.monitors.encoder_monitor import EncoderMonitor
+from control.monitors.motion_monitor import JointDynamics, MotionMonitor
 from control.monitors.stillness import Stillness
 from control.monitors.winding import Winding, WindingParameters
-from control.records import UNKNOWN, DriveState
+from control.records import UNKNOWN, DriveState, JointTarget
 
 MOST_SEEN_S = 0.03  # largest time that one tick adds to a duration: the joint was not observed during a longer gap
 MISSING_HEARTBEATS = 5  # in a row
@@ -70,6 +71,8 @@ class JointFacts(NamedTuple):
     moving: bool  # closed loop is expected of the drive
     torque_nm: float  # sent in the tick before
     may_stand_still: bool  # at any torque: without stiffness, or in a recovery that pulls on purpose
+    target: JointTarget | None = None  # of the tick before; None without stiffness
+    damping: bool = False
 
 
 class JointMonitor:
@@ -83,6 +86,7 @@ class JointMonitor:
         current_limit_a: float,
         torque_constant_nm_a: float,
         heartbeat_period_s: float = 0.1,
+        dynamics: JointDynamics = JointDynamics(),  # noqa: B008 - immutable
     ) -> None:
         self.joint = joint
         self.winding = Winding(winding)
@@ -92,6 +96,7 @@ class JointMonitor:
         self._high_rad = span.max_rad + radians(limits.position_margin_deg)
         self._fast_rad_s = FAST_FRACTION * limits.velocity_rad_s
         self._encoder = EncoderMonitor(joint, bounds.jump_rad)
+        self._motion = MotionMonitor(joint, dynamics, limits.torque_nm)
         self._stillness = Stillness(STILL_RAD)
         self._most_a = CURRENT_FRACTION * current_limit_a
         self._constant_nm_a = torque_constant_nm_a
@@ -107,6 +112,7 @@ class JointMonitor:
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
         self._low_s = self._under_s = self._hot_s = 0.0
         self._encoder.reset()
+        self._motion.reset()
         self._stillness.reset()
 
     def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
@@ -195,9 +201,13 @@ class JointMonitor:
             self._stalled_s = 0.0
         if self._stillness.still_s < REST_S and not facts.energised:
             found.append(self._fault(FaultKind.JOINT_MOVING))
-        encoder_fault = self._encoder.update(state, facts.dt_s)
+        encoder_fault = self._encoder.update(state, facts.dt_s, facts.torque_nm)
         if encoder_fault:
             found.append(encoder_fault)
+        if encoder_fault or not facts.moving:
+            self._motion.reset()
+        else:
+            self._motion.update(found, state, facts.dt_s, facts.torque_nm, facts.target)
 
     def _out_of_range(self, angle_rad: float) -> Fault:
         low, high = degrees(self._low_rad), degrees(self._high_rad)
@@ -222,8 +232,8 @@ class JointMonitor:
         self._missing_s = self._missing_s + facts.dt_s if differs and facts.moving else 0.0
         if self._missing_s > MISSING_S:
             given_nm = state.current_a * self._constant_nm_a
-            kind = FaultKind.TORQUE_MISSING
-            found.append(self._fault(kind, measured_nm=given_nm, commanded_nm=facts.torque_nm))
+            kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]
+            found += [self._fault(kind, measured_nm=given_nm, commanded_nm=facts.torque_nm) for kind in kinds]
 
     # heat
 

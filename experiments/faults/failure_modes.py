@@ -16,10 +16,12 @@ from experiments.faults.injectors import (
     commanded_by_another,
     current_reported,
     current_reversed,
+    damped_against_command,
     drive_with,
     duplicate,
     failing,
     forged,
+    jammed,
     left_closed_loop,
     moved_at_speed,
     never_in_closed_loop,
@@ -28,6 +30,7 @@ from experiments.faults.injectors import (
     overcurrent,
     recovery_given_up,
     restart,
+    stiff,
     watchdog_ran_out,
 )
 from experiments.faults.loop_injectors import (
@@ -178,7 +181,11 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("joint_velocity", moved_at_speed(45.0), REPORTED_S),
     FailureMode("joint_moving", moved_at_speed(2.0), REPORTED_S, ("idle",)),
     FailureMode("joint_current", current_reported(40.0)),
-    FailureMode("joint_not_following", blocked, 3.0, ("hold", *GAIT)),
+    FailureMode("joint_not_following", blocked, 3.0, ("hold",)),
+    FailureMode("joint_runaway", drive_with(commutation_error_deg=180.0), 1.0, GAIT, turns=True),
+    FailureMode("joint_oscillating", stiff, 1.0, ("swing", "stopping")),
+    FailureMode("following_error", jammed, 3.0, ("stance", "swing"), turns=True),
+    FailureMode("damping_failed", damped_against_command, 0.3, MOVING),
     FailureMode("encoder_jump", drive_with(encoder_offset_rad=0.6), phases=PHASES),
     FailureMode("encoder_stuck", failing("JOINT.position", "stuck"), 1.0, GAIT, turns=True),
     FailureMode(
@@ -261,7 +268,9 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "joint_position": ("encoder_jump",),
     "encoder_stuck": ("encoder_jump",),  # when it reports angles again
     "encoder_jump": ("joint_moving",),
-    "joint_velocity": ("encoder_stuck",),  # its angle is held and its speed is not
+    "joint_velocity": ("encoder_stuck", "joint_runaway"),  # its angle is held and its speed is not, nor commanded
+    "joint_oscillating": ("joint_runaway",),
+    "damping_failed": ("encoder_jump", "torque_missing", "joint_moving"),
     "motor_overheating": ("winding_overheating",),
     "motor_hot": ("winding_hot",),
     "loop_lagging": ("loop_overrun",),

@@ -10,6 +10,7 @@ from dataclasses import replace
 from math import copysign
 from typing import Any
 
+from control.modes import Mode
 from control.records import JOINTS
 from experiments.faults.bench import FaultBench
 from simulation.devices.drive import DriveError, Forgery
@@ -17,6 +18,7 @@ from simulation.devices.foreign_master import ForeignMaster
 
 LONGEST_S = 60.0
 BLOCKED_KG_M2 = 1e6  # too much inertia for any torque
+PUSHED_RAD, PUSHES = 0.2, 10  # more than full torque deflects a joint, and less than a following error
 
 Injector = Callable[[FaultBench, str], AbstractContextManager[None]]
 Act = Callable[[FaultBench, str], None]
@@ -177,20 +179,45 @@ def moved_at_speed(velocity_rad_s: float) -> Injector:
 
 
 @contextmanager
-def blocked(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Push a sweep joint beyond the range of the gait and block it; the injection begins when it stands still."""
-    joint = joint.replace("adduction", "sweep")
-    arm, start_rad = bench.arm_of(joint), _angle_rad(bench, joint)
-    there_rad = copysign(0.78, start_rad)
-    while abs(there_rad - _angle_rad(bench, joint)) > 0.02:
-        _move(bench, joint, _angle_rad(bench, joint) + copysign(0.02, there_rad - start_rad))
-        bench.step()
-    before = arm.parameters
-    arm.parameters = replace(before, arm_mass=replace(before.arm_mass, sweep_inertia_kg_m2=BLOCKED_KG_M2))
-    _move(bench, joint, there_rad)
-    bench.step()
+def jammed(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Block a joint where it is."""
+    arm, kind = bench.arm_of(joint), joint.split("_")[1]
+    before, inertia = arm.parameters, f"{kind}_inertia_kg_m2"
+    arm.parameters = replace(before, arm_mass=replace(before.arm_mass, **{inertia: BLOCKED_KG_M2}))
+    _move(bench, joint, _angle_rad(bench, joint))
     yield
     arm.parameters = before
+
+
+@contextmanager
+def blocked(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Push a sweep joint off its pose until the torque is at its limit, and block it there."""
+    joint = joint.replace("adduction", "sweep")
+    for _ in range(PUSHES):
+        _move(bench, joint, _angle_rad(bench, joint) + PUSHED_RAD / PUSHES)
+        bench.step()
+    with jammed(bench, joint):
+        bench.step()
+        yield
+
+
+@contextmanager
+def stiff(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Multiply the stiffness, beyond what the delay of the loop permits."""
+    controller = bench.loop.controller
+    before = controller.gains
+    controller.gains = replace(before, sweep_stiffness_nm_rad=200.0, adduction_stiffness_nm_rad=200.0)
+    yield
+    controller.gains = before
+
+
+@contextmanager
+def damped_against_command(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Let an encoder jump, so that the joints are damped, and report a current against the command from there on."""
+    with drive_with(encoder_offset_rad=0.6)(bench, joint):
+        bench.run_until(lambda: bench.loop.mode is Mode.DAMPING, 0.1)
+        with current_reversed(bench, joint):
+            yield
 
 
 @once

@@ -9,7 +9,6 @@ from math import isfinite
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
-from control.modes import Mode, Refusal, Request
 
 WIRING = "check its power, wiring, node id and message periods (docs/how-to/odrive.md)"
 FIX = "fix the cause, then 'mudskipper clear'"
@@ -17,6 +16,9 @@ COOL = "let it cool; walk less deep or slower"
 REPORT = "this is a bug: keep the log, report it, and restart the daemon"
 WIRES = "check wiring, termination and bit rate; 'ip -s -d link show' shows the error counters"
 BUSY = "end other programs on this computer; 'mudskipper check' shows real-time warnings"
+DISOBEYS = (
+    "check motor phases, encoder and cables, and that no other program commands the drive, then 'mudskipper clear'"
+)
 ENCODER = "check encoder, magnet and cable, then 'mudskipper clear'"
 
 
@@ -142,14 +144,34 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         "The {subject} joint stands still at full torque for {stalled_s:.1f} s.",
         "free the joint, then 'mudskipper clear'",
     ),
+    FaultKind.JOINT_RUNAWAY: FaultText(
+        "A joint gains energy that its motor was not commanded to give.",
+        "The {subject} joint gained {energy_j:.2f} J without a command; the limit is {limit_j:.2f} J.",
+        DISOBEYS,
+    ),
+    FaultKind.JOINT_OSCILLATING: FaultText(
+        "A joint keeps moving away from its commanded path.",
+        "The {subject} joint moved away from its commanded path by {away_rad:.2f} rad in all within 0.3 s.",
+        f"lower the stiffness in [gains], or {DISOBEYS}",
+    ),
+    FaultKind.FOLLOWING_ERROR: FaultText(
+        "A joint in air does not follow its commanded path.",
+        "The {subject} joint is {error_rad:.2f} rad off its commanded path in air; the limit is {limit_rad:.2f} rad.",
+        "free the joint, check motor and encoder, then 'mudskipper clear'",
+    ),
+    FaultKind.DAMPING_FAILED: FaultText(
+        "A motor's current does not fit its damping torque for 0.1 s.",
+        "The {subject} motor gives {measured_nm:.2f} N·m instead of the damping torque of {commanded_nm:.2f} N·m.",
+        DISOBEYS,
+    ),
     FaultKind.ENCODER_JUMP: FaultText(
         "A position jumped farther than a joint can move.",
         "The {subject} encoder jumped by {step_deg:.0f} degrees in {gap_ms:.1f} ms.",
         ENCODER,
     ),
     FaultKind.ENCODER_STUCK: FaultText(
-        "A position stands still while the joint moves.",
-        "The {subject} encoder stands still while the joint moves.",
+        "A position stands still while joint or torque change.",
+        "The {subject} encoder stands still while the joint moves or its torque changes.",
         ENCODER,
     ),
     FaultKind.TORQUE_MISSING: FaultText(
@@ -268,24 +290,3 @@ def fault_advice(fault: Fault) -> str:
     """Return what happened, and what to do."""
     to_do = what_to_do(fault)
     return f"{fault_message(fault)} {to_do[:1].upper()}{to_do[1:]}."
-
-
-IN_MODE: dict[Mode, str] = {
-    Mode.BOOT: "not every drive was heard yet; see 'mudskipper check'",
-    Mode.IDLE: "the drives are idle; 'mudskipper arm' first",
-    Mode.ARMING: "the drives are being armed; try again in a moment",
-    Mode.HOLD: "the robot already holds its pose",
-    Mode.WALKING: "the robot walks; 'mudskipper stop' first",
-    Mode.STOPPING: "the robot is stopping; try again in a moment",
-    Mode.FAULT: "a fault is present; read 'mudskipper status', then 'mudskipper clear'",
-    Mode.DAMPING: "a fault lets the joints sink; wait until they rest",
-}
-
-
-def refusal_text(refusal: Refusal) -> str:
-    """Return why the robot refuses a request in its present mode, and what to do."""
-    if refusal.faults:
-        return " ".join(fault_message(fault) for fault in refusal.faults)
-    if refusal.request is Request.CLEAR and refusal.mode is Mode.HOLD:
-        return "nothing to clear: the robot holds its pose"
-    return IN_MODE[refusal.mode]

@@ -187,10 +187,20 @@ def test_stopping_raises_the_flippers_where_they_are_and_hold_keeps_them_there()
         assert len(poses) < 2000
     assert poses[0] == pytest.approx(POSE, abs=1e-3)
     assert all((pose[0], pose[2]) == pytest.approx((POSE[0], POSE[2])) for pose in poses)
-    assert poses[-1] == pytest.approx(RAISED)
+    assert wanted_pose(controller, Mode.STOPPING, RAISED) == pytest.approx(RAISED)
     sagged = Joints(0.1, -0.1, 0.1, -0.1)
     assert wanted_pose(controller, Mode.HOLD, sagged) == pytest.approx(RAISED)
     assert wanted_pose(controller, Mode.HOLD, sagged) == pytest.approx(RAISED)
+
+
+def test_flippers_that_the_mud_keeps_down_are_held_where_they_are_after_a_stop() -> None:
+    controller = weightless()
+    controller.order = WalkOrder(0.03)
+    path_to_the_gait(controller)
+    wanted_pose(controller, Mode.STOPPING)
+    while not controller.raised:
+        wanted_pose(controller, Mode.STOPPING)
+    assert controller.step(PERIOD_S, Mode.HOLD, states_at(POSE)) == pytest.approx(NO_TORQUE)
 
 
 def test_a_stop_on_the_path_to_the_front_raises_the_flippers_too() -> None:

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from control.monitors.encoder_monitor import FROZEN_S, MOVED_RAD, MOVED_S, EncoderMonitor
+from control.monitors.encoder_monitor import FROZEN_S, MOVED_RAD, MOVED_S, UNCHANGED_S, YIELDING_NM, EncoderMonitor
 from control.rate import PERIOD_S
 from control.records import DriveState
 
@@ -132,3 +132,28 @@ def test_reset_forgets_the_last_message() -> None:
     reported(hanging(0.4, 30), encoder)
     encoder.reset()
     assert reported([(-2.0, 0.0)], encoder) == []
+
+
+def unchanged(torques_nm: list[float], velocity_rad_s: float = 0.0, turning: bool = False) -> int | None:
+    """Return the tick of the fault of an encoder whose messages repeat while these torques are commanded."""
+    encoder = EncoderMonitor("left_sweep", JUMP_RAD)
+    for tick, torque_nm in enumerate(torques_nm):
+        angle_rad = 0.1 + turning * 1e-6 * tick
+        state = DriveState(angle_rad=angle_rad, velocity_rad_s=velocity_rad_s, angle_stamp_s=tick * PERIOD_S)
+        if encoder.update(state, PERIOD_S, torque_nm):
+            return tick
+    return None
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_an_encoder_at_exactly_zero_speed_is_stuck_when_the_torque_changes(sign: float) -> None:
+    ramp = [sign * 0.01 * tick for tick in range(100)]
+    tick = unchanged(ramp)
+    assert tick is not None and max(UNCHANGED_S / PERIOD_S, YIELDING_NM / 0.01) <= tick <= 23
+    assert unchanged(ramp, turning=True) is None
+
+
+def test_a_constant_torque_and_one_that_dry_friction_holds_leave_a_joint_at_rest() -> None:
+    assert unchanged([0.7] * 1000) is None
+    assert unchanged([0.06, -0.06] * 500) is None
+    assert unchanged([0.0] * 2 + [YIELDING_NM + 1e-6] * 30) == pytest.approx(UNCHANGED_S / PERIOD_S, abs=1.1)

@@ -1,0 +1,105 @@
+"""Detects a joint whose motion neither its commanded torque nor its commanded path explains.
+
+A drive that obeys late, weakly, in the wrong direction, or another program, reports currents that look healthy. Its
+joint shows it. Three quantities are small in every healthy motion, in air and in mud:
+
+    runaway      the energy that the joint has and was not given, by the commanded torque τ over its path:
+                     E = ½ I ω² - ∫ τ dθ
+                 Mud and friction only take energy, so E falls; what a joint returns while it is braked it received
+                 before. E rises without end where the torque is inverted or another's. Here it leaks within 0.2 s and
+                 never is below zero: a weight that the motor lowers at the speed of a path stays below the bound.
+    oscillation  the path away from the target: |Δθ| - |Δθ*| + Δ|θ* - θ| is zero for a joint that approaches its
+                 target, lags behind it or stands still, and twice the path of one that moves away. A loop that is not
+                 stable moves away twice in each of its cycles. It leaks within 0.3 s.
+    following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
+                 grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
+                 in air only.
+
+Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
+"""
+
+from typing import NamedTuple
+
+from control.faults import Fault, FaultKind
+from control.records import NEVER_S, UNKNOWN, DriveState, JointTarget
+
+RUNAWAY_RAD = 0.2  # path of full torque whose energy may remain unexplained: twice that of rocking in the stiffest mud
+RUNAWAY_LEAK_S = 0.2  # full torque that lowers a weight at 1 rad/s, the speed of a path, stays within the bound
+RUNAWAY_FLOOR_J = 0.02  # noise of the speed, and a hand, where the torque limit is low
+AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
+AWAY_LEAK_S = 0.3
+FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
+FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
+LONGEST_GAP_S = 0.03  # between two samples
+FASTEST_RAD_S = 1000.0  # more is no measurement
+
+
+class JointDynamics(NamedTuple):
+    """The properties of a joint that relate its motion to its torque."""
+
+    inertia_kg_m2: float = 0.0004
+    stiffness_nm_rad: float = 8.0
+
+
+class MotionMonitor:
+    """Owns the unexplained energy of one joint, its path away from the target, and the sample before."""
+
+    def __init__(self, joint: str, dynamics: JointDynamics, torque_nm: float) -> None:
+        self._joint = joint
+        self._half_inertia = 0.5 * dynamics.inertia_kg_m2
+        self._runaway_j = max(RUNAWAY_RAD * torque_nm, RUNAWAY_FLOOR_J)
+        stiffness_nm_rad = dynamics.stiffness_nm_rad
+        self._following_rad = FOLLOWING_RAD + (torque_nm / stiffness_nm_rad if stiffness_nm_rad else float("inf"))
+        self.reset()
+
+    def reset(self) -> None:
+        self.unexplained_j = self.away_rad = 0.0
+        self._stamp_s, self._angle_rad, self._velocity_rad_s = NEVER_S, UNKNOWN, UNKNOWN
+        self._target_rad = UNKNOWN
+        self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
+
+    def update(
+        self, found: list[Fault], state: DriveState, dt_s: float, torque_nm: float, target: JointTarget | None
+    ) -> None:
+        """Add the faults of a new sample. `torque_nm` was commanded for the last `dt_s`; no target: no stiffness."""
+        self._impulse_nm_s += torque_nm * dt_s
+        self._elapsed_s += dt_s
+        if state.angle_stamp_s == self._stamp_s:
+            return
+        step_rad = state.angle_rad - self._angle_rad
+        measured = abs(state.velocity_rad_s) < FASTEST_RAD_S and abs(step_rad) < FASTEST_RAD_S * self._elapsed_s
+        if measured and self._elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
+            self._add_energy(state.velocity_rad_s, step_rad)
+            self._add_path(step_rad, state.angle_rad, target)
+        self._impulse_nm_s = self._elapsed_s = 0.0
+        self._stamp_s, self._angle_rad = state.angle_stamp_s, state.angle_rad
+        self._velocity_rad_s = state.velocity_rad_s
+        self._target_rad = target.angle_rad if target else UNKNOWN
+        self._report(found, target)
+
+    def _add_energy(self, velocity_rad_s: float, step_rad: float) -> None:
+        kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - self._velocity_rad_s * self._velocity_rad_s)
+        work_j = self._impulse_nm_s / self._elapsed_s * step_rad
+        kept = 1.0 - self._elapsed_s / RUNAWAY_LEAK_S
+        self.unexplained_j = max(0.0, kept * self.unexplained_j + kinetic_j - work_j)
+
+    def _add_path(self, step_rad: float, angle_rad: float, target: JointTarget | None) -> None:
+        self.away_rad *= 1.0 - self._elapsed_s / AWAY_LEAK_S
+        if target is None or self._target_rad != self._target_rad:
+            return
+        error_rad = abs(target.angle_rad - angle_rad) - abs(self._target_rad - self._angle_rad)
+        moved_rad = abs(step_rad) - abs(target.angle_rad - self._target_rad)
+        self.away_rad = max(0.0, self.away_rad + moved_rad + error_rad)
+
+    def _report(self, found: list[Fault], target: JointTarget | None) -> None:
+        if self.unexplained_j > self._runaway_j:
+            kind = FaultKind.JOINT_RUNAWAY
+            found.append(kind.fault(self._joint, energy_j=self.unexplained_j, limit_j=self._runaway_j))
+        if self.away_rad > AWAY_RAD:
+            found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
+        if target is None:
+            return
+        error_rad = abs(target.angle_rad - self._angle_rad)
+        most_rad = self._following_rad + FOLLOWING_S * abs(target.velocity_rad_s)
+        if error_rad > most_rad:
+            found.append(FaultKind.FOLLOWING_ERROR.fault(self._joint, error_rad=error_rad, limit_rad=most_rad))
