@@ -59,15 +59,15 @@ clean:  ## remove the environment and everything that was built
 .venv/setup: pyproject.toml
 	@echo "Installing into .venv (a minute or two) ..."
 	@$(PYTHON) -m venv .venv
-	@$(PIP) --editable ".[plots,serial,data]"
+	@$(PIP) --editable ".[plots,screen,serial,data]"
 	@touch $@
 
 .venv/test: .venv/setup
 	@echo "Installing what the tests need ..."
-	@$(PIP) --editable ".[plots,serial,data,test]"
+	@$(PIP) --editable ".[plots,screen,serial,data,test]"
 	@touch $@
 
 .venv/docs: .venv/setup
 	@echo "Installing what the documentation needs ..."
-	@$(PIP) --editable ".[plots,serial,data,docs]"
+	@$(PIP) --editable ".[plots,screen,serial,data,docs]"
 	@touch $@

@@ -82,7 +82,6 @@ def build_parser() -> argparse.ArgumentParser:
 def _add_operation(commands: Commands) -> None:
     described = {
         "status": "Print the state of the robot.",
-        "watch": "Print the status again and again until Ctrl-C.",
         "arm": "Switch torque on. The robot holds its present pose.",
         "walk": "Walk, with a fixed depth or one that adapts to the mud.",
         "move": "Move joints slowly to other angles while the robot holds its pose.",
@@ -96,12 +95,14 @@ def _add_operation(commands: Commands) -> None:
         name: add(commands, name, f"operation.{modules.get(name, 'operation')}.{name}", text)
         for name, text in described.items()
     }
+    parsers["watch"] = add(commands, "watch", "watch.watch.watch", "Show the robot live, with keys that operate it.")
+    parsers["watch"].add_argument("--lines", action="store_true", help="plain lines, as in a pipe, also on a terminal")
+    parsers["watch"].add_argument(
+        "--period", type=between(0.05, 3600.0, "s"), metavar="S", help="seconds between two (default: 0.1; lines: 1)"
+    )
     for parser in parsers.values():
         add_socket(parser)
     add_json(parsers["status"], parsers["check"])
-    parsers["watch"].add_argument(
-        "--period", type=between(0.05, 3600.0, "s"), default=0.5, metavar="S", help="seconds between two prints"
-    )
     parsers["arm"].add_argument("--force", action="store_true", help="overrule failed checks that are not mandatory")
     parsers["move"].add_argument("angles", type=joint_angle, nargs="+", metavar="JOINT=DEG", help="left_sweep=10 ...")
     parsers["check"].add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="used without a daemon")

@@ -11,6 +11,7 @@ from math import degrees, radians
 from typing import Any
 
 from command_line import exit_codes
+from command_line.drive_state import torque_state
 from command_line.operation.attended_walk import MILD, attend
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain
 from experiments.reports.text_tables import number, table
@@ -57,15 +58,6 @@ def status(options: Options) -> int:
         report = client.call("status")
         print(json.dumps(report) if options.json else status_text(report))
         return exit_codes.UNHEALTHY if report["mode"] in ("fault", "damping") else exit_codes.OK
-
-    return with_daemon(options, show)
-
-
-def watch(options: Options) -> int:
-    def show(client: StatusClient) -> int:
-        while True:
-            print("\033[H\033[J" + status_text(client.call("status")), flush=True)
-            time.sleep(options.period)
 
     return with_daemon(options, show)
 
@@ -239,7 +231,7 @@ def _drives_table(drives: list[dict[str, Any]]) -> str:
                 number(drive["temperature_c"], 0),
                 number(drive["bus_voltage_v"], 1),
                 number(None if age_s is None else 1e3 * age_s, 1),
-                "on" if drive["closed_loop"] else "off",
+                torque_state(drive),
                 drive["errors"] or "-",
             )
         )

@@ -1,0 +1,95 @@
+"""Asks the daemon for its status again and again, in a thread of its own: a daemon that hangs must not stop the keys.
+
+It survives a restart of the daemon: it connects again, as often as it is needed.
+"""
+
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from command_line.watch.history import History
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+
+ANSWER_S = 2.0
+RETRY_S = 0.5
+
+
+class Feed:
+    """Owns the history and the connection; hold `lock` while reading the history."""
+
+    def __init__(self, path: Path, period_s: float) -> None:
+        self.history = History()
+        self.lock = threading.Lock()
+        self._path, self._period_s = path, period_s
+        self._client: StatusClient | None = None
+        self._pid = 0
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="status", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._ending.set()
+        self._thread.join(ANSWER_S)
+        self._close()
+
+    def _run(self) -> None:
+        due_s = time.monotonic()
+        while not self._ending.is_set():
+            heard = self.poll(time.monotonic())
+            due_s = max(due_s + (self._period_s if heard else RETRY_S), time.monotonic())
+            self._ending.wait(due_s - time.monotonic())
+
+    def poll(self, now_s: float) -> bool:
+        """Ask once; returns whether the daemon answered."""
+        try:
+            client = self._client or self._connect()
+            report = client.call("status")
+            strides = self._new_strides(client, report)
+        except (NoDaemonError, NotPermittedError, CallRefusedError) as problem:
+            with self.lock:
+                self.history.problem = str(problem)
+            self._close()
+            return False
+        with self.lock:
+            self.history.add_status(report, now_s)
+            self.history.add_strides(strides)
+        return True
+
+    def _connect(self) -> StatusClient:
+        self._client = StatusClient(self._path, ANSWER_S)
+        if self._client.daemon_pid != self._pid:
+            self._pid = self._client.daemon_pid
+            with self.lock:
+                self.history.forget()
+        return self._client
+
+    def _new_strides(self, client: StatusClient, report: dict[str, Any]) -> list[dict[str, Any]]:
+        """Return the strides that closed since the last poll, as many as one answer holds."""
+        since = self.history.next_stride
+        return client.call("strides", since=since) if report["strides_closed"] > since else []
+
+    def _close(self) -> None:
+        if self._client is not None:
+            with suppress(OSError):
+                self._client.close()
+            self._client = None
+
+
+def send_order(path: Path, method: str, **params: Any) -> str:
+    """Send one order over a connection of its own; returns what became of it, for the operator."""
+    try:
+        client = StatusClient(path, ANSWER_S)
+        try:
+            answer = client.call(method, **params)
+        finally:
+            client.close()
+    except (CallRefusedError, NotPermittedError) as problem:
+        return f"{method} refused: {problem}"
+    except NoDaemonError as problem:
+        unknown = "Torque unknown: cut motor power. " if method in ("stop", "disarm") else ""
+        return f"{unknown}{method} was not delivered: {problem}"
+    return f"{method}: {answer}"

@@ -1,0 +1,75 @@
+"""A simulated robot behind a status socket, both in this process: it answers as the daemon does, in its own time."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from control.controller import WalkOrder
+from control.modes import Mode
+from drivers.fault_injection.failures import Failures
+from firmware_host.configuration.configuration import Configuration, StatusParameters
+from firmware_host.operator.connection import Caller
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.status_socket import StatusSocket
+from firmware_host.user_groups import load_rights
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
+
+NOBODY = Caller(0, Peer(1, 1, frozenset()), Level.DRIVE)
+SLEEP_S = 0.002
+
+
+def resting_robot(configuration: Configuration) -> Lockstep:
+    track = Track([(0.35, MUDS["48.5"]), (5.0, MUDS["53.1"])])
+    return Lockstep(configuration, track, failures=Failures(configuration.bus))
+
+
+def walking_robot(configuration: Configuration) -> Lockstep:
+    robot = resting_robot(configuration)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, adaptive=True))
+    robot.run_for(14.0)
+    return robot
+
+
+class ServedRobot:
+    """Owns the robot and its methods. Ticks pass while it is served, and when a test asks for them."""
+
+    def __init__(self, robot: Lockstep) -> None:
+        self.robot = robot
+        calls = OperatorCalls(self.robot.loop, [], lambda: self.robot.now_s)
+        self.methods: dict[str, Callable[[dict[str, Any], Caller], Any]] = dict(calls.methods)
+
+    def ask(self, method: str, **params: Any) -> Any:
+        return self.methods[method](params, NOBODY)
+
+    @property
+    def mode(self) -> Mode:
+        return self.robot.loop.mode
+
+    @contextmanager
+    def served(self, path: Path) -> Iterator[None]:
+        """Serve the status socket in a thread, and let a tick pass every few milliseconds."""
+        status, ending = StatusSocket(path, self.methods, load_rights(StatusParameters())), threading.Event()
+
+        def serve() -> None:
+            while not ending.is_set():
+                self.robot.step()
+                status.serve(time.monotonic())
+                time.sleep(SLEEP_S)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            yield
+        finally:
+            ending.set()
+            thread.join()
+            status.close()

@@ -1,0 +1,101 @@
+"""`mudskipper watch` as a process: plain lines in a pipe, a screen on a terminal that is left as it was."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from tests.command_line.watch.served_robot import ServedRobot
+from tests.waiting import LONGEST_S
+
+WATCH = [sys.executable, "-m", "command_line.main", "watch"]
+SCREEN, CURSOR = (b"\x1b[?1049h", b"\x1b[?1049l"), (b"\x1b[?25l", b"\x1b[?25h")  # xterm: taken, given back
+
+
+def test_a_pipe_gets_plain_lines_also_over_a_restart(
+    walked: ServedRobot, resting: ServedRobot, short_folder: Path
+) -> None:
+    path = short_folder / "s"
+    command = [*WATCH, "--socket", str(path), "--period", "0.05"]
+    lines: list[str] = []
+
+    def read_until(text: str) -> None:
+        assert watch.stdout is not None
+        while text not in (line := watch.stdout.readline()):
+            assert line, f"ended without {text!r}: {lines}"
+            lines.append(line)
+        lines.append(line)
+
+    with walked.served(path):
+        watch = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        read_until("walking, stride")
+    read_until("torque unknown")
+    with resting.served(path):
+        read_until("idle")
+        watch.send_signal(signal.SIGINT)
+        assert watch.wait(LONGEST_S) == exit_codes.INTERRUPTED
+    assert watch.stdout is not None and watch.stderr is not None
+    assert watch.stderr.read() == "" and "\033" not in "".join(lines) + watch.stdout.read()
+    watch.stdout.close()
+    watch.stderr.close()
+
+
+class Terminal:
+    """A pseudo-terminal with the program in it."""
+
+    def __init__(self, path: Path, terminal_type: str) -> None:
+        self.pid, self._descriptor = pty.fork()
+        if self.pid == 0:
+            environment = os.environ | {"TERM": terminal_type, "LINES": "24", "COLUMNS": "80"}
+            os.execve(WATCH[0], [*WATCH, "--socket", str(path)], environment)
+        self.output = b""
+
+    def read_until(self, text: bytes) -> None:
+        deadline_s = time.monotonic() + LONGEST_S
+        while text not in self.output and time.monotonic() < deadline_s:
+            self._read()
+        assert text in self.output, self.output[-2000:]
+
+    def _read(self) -> bool:
+        try:
+            readable, _, _ = select.select([self._descriptor], [], [], 0.1)
+            data = os.read(self._descriptor, 65536) if readable else b"-"
+        except OSError:  # the program has ended
+            return False
+        self.output += data if readable else b""
+        return bool(data)
+
+    def press(self, key: bytes) -> int:
+        """Press the key that ends the program; returns its exit status."""
+        os.write(self._descriptor, key)
+        while self._read():
+            pass
+        os.close(self._descriptor)
+        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+
+
+@pytest.mark.parametrize(("key", "status"), [(b"q", exit_codes.OK), (b"\x03", exit_codes.INTERRUPTED)])
+def test_a_terminal_is_left_as_it_was(walked: ServedRobot, short_folder: Path, key: bytes, status: int) -> None:
+    with walked.served(short_folder / "s"):
+        terminal = Terminal(short_folder / "s", "xterm-256color")
+        terminal.read_until(b"WALKING")
+        assert terminal.press(key) == status
+    for taken, returned in (SCREEN, CURSOR):
+        assert terminal.output.rindex(returned) > terminal.output.rindex(taken)
+
+
+def test_a_terminal_that_can_do_nothing_gets_plain_lines(walked: ServedRobot, short_folder: Path) -> None:
+    with walked.served(short_folder / "s"):
+        terminal = Terminal(short_folder / "s", "dumb")
+        terminal.read_until(b"walking, stride")
+        terminal.press(b"\x03")
+    assert b"\x1b" not in terminal.output
