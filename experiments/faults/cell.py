@@ -160,6 +160,7 @@ class Measurement:
 
     def _measure_robot(self) -> None:
         cell, bench = self._cell, self._bench
+        self._energy.step()
         torque_nm = max(map(abs, bench.torques_nm()))
         cell.peak_torque_nm = max(cell.peak_torque_nm, torque_nm)
         if torque_nm:
@@ -221,7 +222,7 @@ class Measurement:
         cell.rows_lost = bench.loop_ticks - bench.rows.ticks - self._missing_rows
         if self._steps - self._last_torque_steps > DELAY_TICKS:
             cell.zero_torque_ticks = self._last_torque_steps
-        self._energy.record(cell, self._steps * PERIOD_S)
+        self._energy.record(cell)
         if not self._walks_on:
             cell.travel_rad = self._travel_rad
         if self._failure_mode.ends_loop:

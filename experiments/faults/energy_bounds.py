@@ -75,8 +75,9 @@ class EnergyBounds:
         return self.stopping_j(detection_ticks(kind), kind.reaction)
 
     def walking_j(self, duration_s: float) -> float:
-        """Return the bound of a robot that walks on for this time."""
-        return self.kinetic_j + self.torque_nm * self.gait_rad(duration_s)
+        """Return the bound of a robot that walks on for this time, 0 for one that holds a pose."""
+        path_rad = min(self.speed_rad_s * duration_s, self.gait_rad(duration_s))
+        return self.kinetic_j + self.torque_nm * path_rad
 
 
 def detection_ticks(kind: FaultKind) -> int:

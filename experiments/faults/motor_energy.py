@@ -31,24 +31,29 @@ class MotorEnergy:
         self._bounds = energy_bounds(configuration)
         if mode.torque_nm:
             self._bounds = replace(self._bounds, torque_nm=mode.torque_nm)
-        self._walks = bench.loop.mode in (Mode.WALKING, Mode.STOPPING)
+        self._loop = bench.loop
+        self._walked_s = 0.0
         self._work = JointEnergy(bench.robot, configuration.joint_ranges)
 
-    def record(self, cell: Cell, duration_s: float) -> None:
-        """Write the energy in the `duration_s` since the injection and its bound into the cell."""
-        cell.energy_j, cell.energy_bound_j = self._work.energy_j, self._bound_j(cell.reported, duration_s)
+    def step(self) -> None:
+        if self._loop.mode in (Mode.WALKING, Mode.STOPPING):
+            self._walked_s += PERIOD_S
+
+    def record(self, cell: Cell) -> None:
+        """Write the energy since the injection and its bound into the cell."""
+        cell.energy_j, cell.energy_bound_j = self._work.energy_j, self._bound_j(cell.reported)
         cell.pushed_ticks, cell.pushed_bound_ticks = round(self._work.pushed_s / PERIOD_S), self._pushing_ticks
 
-    def _bound_j(self, reported: Iterable[str], duration_s: float) -> float:
+    def _bound_j(self, reported: Iterable[str]) -> float:
         mode, bounds = self._failure_mode, self._bounds
         if mode.ends_loop:
             return bounds.stopping_j(WATCHDOG_TICKS, Reaction.DRIVES_IDLE)
         if mode.kind and mode.kind.reaction in STOPPING:
             ticks = WATCHDOG_TICKS if mode.no_commands else 0
             return bounds.stopping_j(max(detection_ticks(mode.kind), ticks), mode.kind.reaction)
-        on_j = bounds.walking_j(duration_s) if self._walks else bounds.kinetic_j
         kinds = (FAULT_KINDS[name] for name in reported)
-        return max(on_j, *(bounds.fault_j(kind) for kind in kinds if kind.reaction in STOPPING), 0.0)
+        stopped_j = [bounds.fault_j(kind) for kind in kinds if kind.reaction in STOPPING]
+        return max(bounds.walking_j(self._walked_s), *stopped_j, 0.0)
 
     @property
     def _pushing_ticks(self) -> int:
