@@ -38,6 +38,9 @@ class DriveParameters:
     )
     current_limit_a: Annotated[float, Bounds(0.1, 200.0), Meaning("of the drive")] = 12.0
     heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0), Meaning("as set on the drive")] = 0.1  # its default
+    serial_number: Annotated[
+        str, Meaning("of the drive; the robot is not armed with another one; empty: not compared")
+    ] = ""
 
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         """Yields reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
@@ -72,6 +75,10 @@ class DriveHealth(NamedTuple):
     watchdog_expired: bool = False  # among the active errors, or the reason of the last disarming
     restarts: int = 0  # since the start; only grows
     duplicate_id: bool = False  # two drives seem to send under this id
+    foreign_commands: int = 0  # of other programs to this drive, since the start; only grows
+    setpoint_problem: str = ""  # it follows other torques than the commanded ones: for example which
+    serial_number: str = ""  # empty until the drive has reported it
+    expected_serial_number: str = ""  # as configured
     busy_state: str = ""  # an activity that this program did not ask for, such as a calibration
     active_errors: str = ""
     errors: str = ""  # active errors and the reason of the last disarming

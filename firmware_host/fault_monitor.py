@@ -100,6 +100,7 @@ class FaultMonitor:
         self._lost_frames = {name: port.lost_frames for name, port in self._drives.ports.items()}
         self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
         self._restarts = {health.joint: health.restarts for health in self._drives.health}
+        self._foreign_commands = {health.joint: health.foreign_commands for health in self._drives.health}
         self._refused_commands = self._drives.refused_commands
         self._pose_stamp_s: float | None = None
         self._broken: set[str] = set()  # joints with an invalid encoder, until torque is off
@@ -219,10 +220,23 @@ class FaultMonitor:
             found.append(FaultKind.DRIVE_RESTARTED.fault(joint))
         if health.duplicate_id:
             found.append(FaultKind.DUPLICATE_NODE_ID.fault(joint))
+        self._check_obedience(found, health)
+        if health.serial_number != health.expected_serial_number and health.expected_serial_number:
+            serials = {"serial": health.serial_number or "unknown", "expected": health.expected_serial_number}
+            found.append(FaultKind.WRONG_DRIVE.fault(joint, **serials))
         if not health.firmware_supported:
             version, supported = health.firmware or "unknown", health.supported_firmware
             found.append(FaultKind.DRIVE_VERSION.fault(joint, version=version, supported=supported))
         self._check_watchdog(found, joint, health.watchdog_s)
+
+    def _check_obedience(self, found: list[Fault], health: DriveHealth) -> None:
+        """Check that the drive follows this program's commands only."""
+        commands = health.foreign_commands - self._foreign_commands[health.joint]
+        if commands:
+            self._foreign_commands[health.joint] = health.foreign_commands
+            found.append(FaultKind.FOREIGN_COMMANDS.fault(health.joint, commands=commands))
+        if health.setpoint_problem:
+            found.append(FaultKind.SETPOINT_MISMATCH.fault(health.joint, reason=health.setpoint_problem))
 
     def _check_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
         """Check the drive's watchdog, the only protection if this program dies."""

@@ -5,35 +5,28 @@ it is heard again after a silence of RESTART_SILENCE_S, or reports that it initi
 yet. Its version and watchdog settings are then unknown again. Everything that is read in one tick arrived since the
 tick before, so a stall of this program is not taken for a silence of the drive.
 
-The drive's watchdog is read back by parameter number (SDO). ODrive renumbers its parameters in every build and for each
-kind of board, and publishes the numbers as flat_endpoints.json with the firmware. Without the numbers of this very
-build the watchdog stays unknown, because a number of another build reads some other parameter.
+A command for this drive that arrives here comes from another program, because a port does not receive its own frames.
+Emergency stops are no such commands, and neither are requests to read: anybody may send them.
 """
 
 from collections.abc import Callable, Sequence
 from math import isfinite, isnan, nan, pi
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from control.records import NEVER_S, UNKNOWN, DriveState
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, WatchdogEndpoints
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
+from drivers.odrive.drive_settings import SUPPORTED, DriveSettings
 from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
 from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.setpoint_monitor import SetpointMonitor
 
-SUPPORTED = (0, 6)  # major and minor version of the firmware whose messages the codec knows
 RESTART_SILENCE_S = 0.3  # three heartbeats
-LONGEST_WATCHDOG_S = 3600.0  # a larger number is no time-out
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
 QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)  # in which nothing runs by itself
-
-
-class Version(NamedTuple):
-    major: int
-    minor: int
-    revision: int
 
 
 class Outlet(Protocol):
@@ -51,10 +44,11 @@ class OdriveAxis:
         self.joint = joint
         self.parameters = parameters
         self._outlet = outlet
-        self._endpoints = tuple(endpoints)
+        self.settings = DriveSettings(parameters.serial_number, endpoints)
         self._rad_per_turn = parameters.sign * TURN_RAD
         self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
         self._duplicates = DuplicateNodeMonitor(parameters.heartbeat_period_s)
+        self.setpoints = SetpointMonitor(parameters)
         self.reset()
 
     def reset(self) -> None:
@@ -69,15 +63,11 @@ class OdriveAxis:
         self.disarm_reason = 0
         self.restarts = 0
         self._starting = True  # until the drive has reported a state; a restart meanwhile is not counted again
+        self._foreign_commands = 0
         self._duplicates.reset()
-        self._forget_settings()
-
-    def _forget_settings(self) -> None:
+        self.setpoints.reset()
+        self.settings.forget()
         self._health: DriveHealth | None = None
-        self.version: Version | None = None
-        self.hardware = ""
-        self._watchdog_enabled: bool | None = None
-        self._watchdog_timeout_s = UNKNOWN
 
     def begin_read(self, now_s: float) -> None:
         """Begins a read: the frames that follow arrived between the previous call and `now_s`."""
@@ -94,9 +84,13 @@ class OdriveAxis:
             codec.GET_TEMPERATURE: self._receive_temperature,
             codec.GET_BUS_VOLTAGE_CURRENT: self._receive_bus_voltage,
             codec.GET_VERSION: self._receive_version,
-            codec.TX_SDO: self._receive_setting,
+            codec.TX_SDO: self._receive_parameter,
+            codec.ADDRESS: self._receive_address,
+            codec.RX_SDO: self._receive_foreign_access,
         }
-        return {arbitration_id(self.parameters.node_id, message): receive for message, receive in table.items()}
+        own = {message.command: receive for message, receive in table.items()}
+        foreign = dict.fromkeys(codec.COMMANDS - {codec.ESTOP.command}, self._receive_foreign_command)
+        return {self.parameters.node_id << 5 | command: receive for command, receive in (own | foreign).items()}
 
     def _receive_encoder(self, data: bytes, now_s: float) -> None:
         turns, turns_s = codec.GET_ENCODER_ESTIMATES.decode(data)
@@ -109,7 +103,7 @@ class OdriveAxis:
         self._angle_stamp_s = now_s
 
     def _receive_current(self, data: bytes, now_s: float) -> None:
-        _, measured_a = codec.GET_IQ.decode(data)
+        setpoint_a, measured_a = codec.GET_IQ.decode(data)
         if isnan(measured_a) and not self.closed_loop:  # the drive measures no current while idle
             measured_a = 0.0
         _require_finite(measured_a)
@@ -117,6 +111,10 @@ class OdriveAxis:
             self._on_silence()
         self._current_a = self.parameters.sign * measured_a
         self._current_stamp_s = now_s
+        if self.closed_loop:
+            parameters = self.parameters
+            velocity_rad_s = parameters.sign * self._velocity_rad_s
+            self.setpoints.on_report(setpoint_a * parameters.torque_constant_nm_a, velocity_rad_s)
 
     def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
         self._error_flags, state, _, _ = codec.HEARTBEAT.decode(data)
@@ -128,6 +126,7 @@ class OdriveAxis:
             self._starting = False
         self._duplicates.on_heartbeat(self._read_s, self._read_before_s)
         self.closed_loop = state == AxisState.CLOSED_LOOP
+        self.setpoints.on_heartbeat(self.closed_loop)
         self.busy_state = 0 if state in QUIET_STATES else state
         self._heartbeat_stamp_s = now_s
         self._health = None
@@ -142,7 +141,8 @@ class OdriveAxis:
         if not self._starting:
             self.restarts += 1
         self._starting = True
-        self._forget_settings()
+        self.settings.forget()
+        self._health = None
 
     def _receive_error(self, data: bytes, now_s: float) -> None:
         self._error_flags, self.disarm_reason = codec.GET_ERROR.decode(data)
@@ -157,39 +157,24 @@ class OdriveAxis:
         self._bus_voltage_stamp_s = now_s
 
     def _receive_version(self, data: bytes, now_s: float) -> None:
-        fields = codec.GET_VERSION.decode(data)
-        self.version = Version(*fields[4:7])
-        self.hardware = ".".join(str(field) for field in fields[1:4])
+        self.settings.on_version(data)
         self._health = None
 
-    def _receive_setting(self, data: bytes, now_s: float) -> None:
-        endpoint, value = codec.decode_sdo(data)
-        endpoints = self._watchdog_endpoints
-        if endpoints is None:  # the drive answers another program
-            return
-        if endpoint == endpoints.enable:
-            self._watchdog_enabled = codec.decode_sdo_flag(value)
-        elif endpoint == endpoints.timeout:
-            timeout_s = codec.decode_sdo_float(value)
-            if not 0.0 <= timeout_s <= LONGEST_WATCHDOG_S:
-                raise MalformedMessageError("not a time")
-            self._watchdog_timeout_s = timeout_s
+    def _receive_parameter(self, data: bytes, now_s: float) -> None:
+        self.settings.on_parameter(data)
         self._health = None
 
-    @property
-    def _watchdog_endpoints(self) -> WatchdogEndpoints | None:
-        """The numbers of the drive's own build, once its version is known."""
-        if self.version is None:
-            return None
-        build = (".".join(str(part) for part in self.version), self.hardware)
-        return next((each for each in self._endpoints if (each.firmware, each.hardware) == build), None)
+    def _receive_address(self, data: bytes, now_s: float) -> None:
+        self.settings.on_address(data)
+        self._health = None
 
-    @property
-    def watchdog_s(self) -> float:
-        """The time-out that the drive uses: NaN until it was read back, 0 where the watchdog is off."""
-        if self._watchdog_enabled is None:
-            return nan
-        return self._watchdog_timeout_s if self._watchdog_enabled else 0.0
+    def _receive_foreign_command(self, data: bytes, now_s: float) -> None:
+        self._foreign_commands += 1
+        self._health = None
+
+    def _receive_foreign_access(self, data: bytes, now_s: float) -> None:
+        if data and data[0] != codec.SDO_READ:
+            self._receive_foreign_command(data, now_s)
 
     @property
     def duplicates(self) -> bool:
@@ -216,33 +201,47 @@ class OdriveAxis:
     @property
     def health(self) -> DriveHealth:
         """The drive's report about itself, built again only when it has changed."""
-        if self._health is None or self._health.duplicate_id is not self.duplicates:
-            self._health = self._build_health()
-        return self._health
+        health = self._health
+        if (
+            health is None
+            or health.duplicate_id is not self.duplicates
+            or bool(health.setpoint_problem) is not self.setpoints.found
+        ):
+            self._health = health = self._build_health()
+        return health
 
     def _build_health(self) -> DriveHealth:
-        flags = self._error_flags | self.disarm_reason
+        flags, settings = self._error_flags | self.disarm_reason, self.settings
         return DriveHealth(
             joint=self.joint,
-            firmware=".".join(map(str, self.version)) if self.version else "",
+            firmware=".".join(map(str, settings.version)) if settings.version else "",
             supported_firmware=".".join(map(str, SUPPORTED)),
-            firmware_supported=self.version is not None and self.version[:2] == SUPPORTED,
-            hardware=self.hardware,
-            watchdog_s=self.watchdog_s,
-            watchdog_advice=f"name the parameter numbers of firmware {self.hardware} in [[watchdog_endpoints]]",
+            firmware_supported=settings.supported,
+            hardware=settings.hardware,
+            watchdog_s=settings.watchdog_s,
+            watchdog_advice=f"name the parameter numbers of firmware {settings.hardware} in [[watchdog_endpoints]]",
             watchdog_expired=bool(flags & codec.ERROR_WATCHDOG),
             restarts=self.restarts,
             duplicate_id=self.duplicates,
+            foreign_commands=self._foreign_commands,
+            setpoint_problem=self._setpoint_text() if self.setpoints.found else "",
+            serial_number=settings.serial_number,
+            expected_serial_number=settings.expected_serial_number,
             busy_state=f"axis state {self.busy_state}" if self.busy_state else "",
             active_errors=codec.error_text(self._error_flags),
             errors=codec.error_text(flags),
         )
 
+    def _setpoint_text(self) -> str:
+        followed_nm, commanded_nm = (self.parameters.sign * torque_nm for torque_nm in self.setpoints.example)
+        return f"{followed_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
+
     def send_torque(self, torque_nm: float) -> None:
         if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
             torque_nm = nan
-        data = codec.SET_INPUT_TORQUE.encode(self.parameters.sign * torque_nm)
-        self._outlet.send(Frame(self._torque_id, data))
+        motor_nm = self.parameters.sign * torque_nm
+        self.setpoints.on_command(motor_nm)
+        self._outlet.send(Frame(self._torque_id, codec.SET_INPUT_TORQUE.encode(motor_nm)))
 
     def prepare(self) -> None:
         """Sets torque mode, limits, velocity gain and zero torque.
@@ -271,9 +270,14 @@ class OdriveAxis:
         """Asks for the version by a remote frame."""
         self._outlet.send(Frame(arbitration_id(self.parameters.node_id, codec.GET_VERSION), is_remote=True))
 
+    def request_serial_number(self) -> None:
+        """Asks where one is expected. Firmware 0.5 would take the request for a new node id, so 0.6 must be known."""
+        if self.settings.expected_serial_number and self.settings.supported:
+            self._outlet.send(Frame(arbitration_id(self.parameters.node_id, codec.ADDRESS), is_remote=True))
+
     def request_watchdog(self) -> None:
         """Asks for the watchdog's settings where their numbers in the drive's build are known."""
-        endpoints = self._watchdog_endpoints
+        endpoints = self.settings.watchdog_endpoints
         if endpoints is None:
             return
         for endpoint in (endpoints.enable, endpoints.timeout):

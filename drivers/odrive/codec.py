@@ -10,6 +10,8 @@ from enum import IntEnum
 from struct import Struct, error
 from typing import Any
 
+from drivers.can.frames import DATA_MAX_BYTES
+
 
 class MalformedMessageError(ValueError):
     """A payload has the wrong length, or contains a number that is not finite."""
@@ -39,6 +41,7 @@ ESTOP = Message(0x02, "<")
 GET_ERROR = Message(0x03, "<II")  # active errors, disarm reason
 RX_SDO = Message(0x04, "<BHB")  # opcode, endpoint, reserved; a written value follows
 TX_SDO = Message(0x05, "<BHB")  # the same, and the value in as many bytes as its type has: see `decode_sdo`
+ADDRESS = Message(0x06, "<BIH")  # node id and serial number; 0.6.11 appends a byte
 SET_AXIS_STATE = Message(0x07, "<I")
 GET_ENCODER_ESTIMATES = Message(0x09, "<ff")  # turns, turns/s
 SET_CONTROLLER_MODE = Message(0x0B, "<II")  # control mode, input mode
@@ -58,6 +61,10 @@ class AxisState(IntEnum):
 
 
 LAST_COMMAND = 0x1F
+SERIAL_NUMBER_LOW_BITS = 32
+# Everything that a drive obeys: besides the above, positions and velocities, their limits and gains, reboot, a new
+# angle, and a new firmware. RX_SDO also reads.
+COMMANDS = frozenset((0x02, 0x07, 0x0B, 0x0C, 0x0D, 0x0E, 0x0F, 0x11, 0x12, 0x13, 0x16, 0x18, 0x19, 0x1A, 0x1B, 0x1F))
 TORQUE_CONTROL = 1  # control mode
 PASSTHROUGH = 1  # input mode
 SDO_READ = 0  # opcode; 1 would write
@@ -105,6 +112,18 @@ def error_text(flags: int) -> str:
 
 def arbitration_id(node_id: int, message: Message) -> int:
     return node_id << 5 | message.command
+
+
+def encode_address(node_id: int, serial_number: int) -> bytes:
+    return ADDRESS.encode(
+        node_id, serial_number & (1 << SERIAL_NUMBER_LOW_BITS) - 1, serial_number >> SERIAL_NUMBER_LOW_BITS
+    )
+
+
+def decode_serial_number(data: bytes) -> str:
+    """Returns the serial number of an Address message as ODrive's tools print it: 12 hexadecimal digits."""
+    _, low, high = ADDRESS.decode(data[:7] if len(data) == DATA_MAX_BYTES else data)
+    return f"{high << SERIAL_NUMBER_LOW_BITS | low:012x}"
 
 
 def decode_sdo(data: bytes) -> tuple[int, bytes]:

@@ -23,18 +23,6 @@ SIGNALS: Mapping[int, tuple[str, ...]] = {
     codec.GET_TEMPERATURE.command: ("temperature",),
     codec.GET_BUS_VOLTAGE_CURRENT.command: ("voltage",),
 }
-COMMANDS = frozenset(
-    message.command
-    for message in (
-        codec.ESTOP,
-        codec.SET_AXIS_STATE,
-        codec.SET_CONTROLLER_MODE,
-        codec.SET_INPUT_TORQUE,
-        codec.SET_LIMITS,
-        codec.SET_VEL_GAINS,
-        codec.CLEAR_ERRORS,
-    )
-)
 REPORT_BYTES = 8  # of every cyclic message
 FAST_HZ, SLOW_HZ = 500.0, 10.0  # cyclic messages every 2 and every 100 ms, as docs/how-to/odrive.md sets them
 GATE_DRIVER_FAULT = 0x20
@@ -65,7 +53,7 @@ class Odrive:
         if frame.is_extended or frame.is_error or frame.is_fd:
             return None
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
-        return FrameContent(node_id, command in COMMANDS, SIGNALS.get(command, ()))
+        return FrameContent(node_id, command in codec.COMMANDS, SIGNALS.get(command, ()))
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
         with suppress(MalformedMessageError):

@@ -60,7 +60,8 @@ class OdriveDrives:
         self.unknown_frames = 0  # of other ids, remote or extended, where the port does not keep them away
         self.malformed_frames = 0  # of these drives, with a payload that cannot be decoded
         self._armed_s = self._disarmed_s = NEVER_S
-        self._requested_s = {"version": NEVER_S, "watchdog": NEVER_S}
+        self._requested_s = {"version": NEVER_S, "watchdog": NEVER_S, "serial": NEVER_S}
+        self._lost_before = self._lost
 
     def read(self, now_s: float) -> DriveStates:
         for axis in self.axes:
@@ -103,6 +104,11 @@ class OdriveDrives:
         self.gate.allow_step(elapsed_s)
         for axis, torque_nm in zip(self.axes, torques_nm, strict=True):
             axis.send_torque(torque_nm)
+        lost = self._lost
+        if lost != self._lost_before:
+            self._lost_before = lost
+            for axis in self.axes:
+                axis.setpoints.forget_commands()
 
     def send_torque(self, joint: str, torque_nm: float) -> None:
         self.axes[JOINTS.index(joint)].send_torque(torque_nm)
@@ -146,8 +152,9 @@ class OdriveDrives:
             axis.clear_errors()
 
     def request_settings(self, now_s: float) -> None:
-        self._request(now_s, "version", lambda axis: axis.version is not None, OdriveAxis.request_version)
-        self._request(now_s, "watchdog", lambda axis: isfinite(axis.watchdog_s), OdriveAxis.request_watchdog)
+        self._request(now_s, "version", lambda axis: axis.settings.version is not None, OdriveAxis.request_version)
+        self._request(now_s, "watchdog", lambda axis: isfinite(axis.settings.watchdog_s), OdriveAxis.request_watchdog)
+        self._request(now_s, "serial", lambda axis: axis.settings.identified, OdriveAxis.request_serial_number)
 
     def _request(
         self, now_s: float, setting: str, is_known: Callable[[OdriveAxis], bool], request: Callable[[OdriveAxis], None]

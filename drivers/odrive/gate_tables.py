@@ -32,7 +32,10 @@ def gate_table(drive: OdriveParameters) -> GateTable:
         always={arbitration_id(drive.node_id, message): frozenset({data}) for message, data in always.items()},
         while_open={arbitration_id(drive.node_id, codec.SET_AXIS_STATE): frozenset({closed_loop})},
         checks={arbitration_id(drive.node_id, codec.RX_SDO): _reads_parameter},
-        requests=frozenset({Frame(arbitration_id(drive.node_id, codec.GET_VERSION), is_remote=True)}),
+        requests=frozenset(
+            Frame(arbitration_id(drive.node_id, message), is_remote=True)
+            for message in (codec.GET_VERSION, codec.ADDRESS)
+        ),
     )
 
 

@@ -169,6 +169,14 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("drive_restarted", restart, 2.0),
     FailureMode("drive_version", forged(Forgery.OLD_FIRMWARE), phases=("idle", "stance")),
     FailureMode("duplicate_node_id", duplicate(0.3), 1.6),
+    FailureMode("wrong_drive", forged(Forgery.OTHER_DRIVE), phases=("idle",)),
+    FailureMode("foreign_commands", commanded_by_another(0.3, every=2, heard=True), 1.0),
+    FailureMode(
+        "setpoint_mismatch", commanded_by_another(1.0, every=10, heard=False), 1.0, MOVING, "every tenth command"
+    ),
+    FailureMode(
+        "setpoint_mismatch", commanded_by_another(-0.6, every=2, heard=False), 1.0, MOVING, "every second command"
+    ),
     FailureMode("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",)),
     FailureMode("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance")),
     # buses
@@ -246,7 +254,7 @@ BY_NAME = {mode.name: mode for mode in FAILURE_MODES}
 ABSENT_DRIVE = (  # faults of a drive from which no messages arrive
     "drive_late", "current_stale", "position_stale", "drive_quiet", "drive_silent", "heartbeat_silent",
     "temperature_silent", "voltage_silent", "drive_energised", "drive_error", "drive_restarted", "drive_version",
-    "watchdog_unknown",
+    "watchdog_unknown", "wrong_drive",
 )  # fmt: skip
 IDLE_DRIVE = ("drive_error", "drive_disarmed", "torque_missing")  # faults of a drive that no commands reach
 # Other faults that may be reported with a fault, because they are true as well.
@@ -258,11 +266,12 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "current_stale": ("drive_late",),
     "current_silent": ("drive_late", "current_stale", "torque_missing"),
     "heartbeat_silent": ("drive_energised",),
+    "drive_energised": ("foreign_commands",),  # by which another program closed the loop
     "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": ABSENT_DRIVE,
     # the second drive reports another angle
     "duplicate_node_id": ("encoder_jump", "joint_moving", "drive_disarmed", "joint_position"),
-    "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version"),
+    "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version", "wrong_drive"),
     "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
     "bus_refuses": IDLE_DRIVE,
     "joint_position": ("encoder_jump",),

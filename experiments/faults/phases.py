@@ -46,7 +46,9 @@ def bench_for(phase: str, random: Random, hopeless: bool = False) -> FaultBench:
 
 def _configuration(hopeless: bool) -> Configuration:
     """Use the bounds of a real robot; simulations in real time have wider ones, for the pauses of a busy computer."""
-    configuration = replace(configuration_of(WALKING), faults=FaultBounds())
+    usual = configuration_of(WALKING)
+    drives = {joint: replace(drive, serial_number=f"{drive.node_id:012x}") for joint, drive in usual.drive.items()}
+    configuration = replace(usual, faults=FaultBounds(), drive=drives)
     return replace(configuration, recovery=SHORT_RECOVERY) if hopeless else configuration
 
 

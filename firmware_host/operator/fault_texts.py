@@ -16,12 +16,9 @@ COOL = "let it cool; walk less deep or slower"
 REPORT = "this is a bug: keep the log, report it, and restart the daemon"
 WIRES = "check wiring, termination and bit rate; 'ip -s -d link show' shows the error counters"
 BUSY = "end other programs on this computer; 'mudskipper check' shows real-time warnings"
-DISOBEYS = (
-    "check motor phases, encoder and cables, and that no other program commands the drive, then 'mudskipper clear'"
-)
+DISOBEYS = "check motor phases, encoder and cables; end other programs that command it; then 'mudskipper clear'"
 ENCODER = "check encoder, magnet and cable, then 'mudskipper clear'"
-
-
+OTHERS = "end other programs that command it; look for late or lost commands; then 'mudskipper clear'"
 SAME = ""
 
 
@@ -86,6 +83,17 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         "Two drives on a bus send under one node id.",
         "Two drives send under the node id of the {subject} drive.",
         "give every drive on a bus a node id of its own, one at a time",
+    ),
+    FaultKind.WRONG_DRIVE: FaultText(
+        "A drive has another serial number than configured.",
+        "The {subject} drive's serial number is {serial}, not {expected}.",
+        "connect the right drive, or calibrate this one and write its serial_number into [drive.JOINT]",
+    ),
+    FaultKind.FOREIGN_COMMANDS: FaultText(
+        "Another program commands a drive.", "Another program sent {commands} commands to {subject}.", OTHERS
+    ),
+    FaultKind.SETPOINT_MISMATCH: FaultText(
+        "A drive follows other torques than commanded.", "{subject} follows other torques than commanded.", OTHERS
     ),
     FaultKind.WATCHDOG_UNKNOWN: FaultText(
         "A drive's watchdog settings could not be read back.",

@@ -42,6 +42,7 @@ class SimulatedDriveParameters:
     temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
     bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
     motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
+    serial_number: str = ""
     type: str = "odrive"
 
 
@@ -53,6 +54,7 @@ class Forgery(Enum):
     OLD_FIRMWARE = auto()
     STARTING = auto()
     WATCHDOG_OFF = auto()
+    OTHER_DRIVE = auto()
 
 
 class DriveError(Enum):

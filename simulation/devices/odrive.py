@@ -68,8 +68,7 @@ class SimulatedOdrive:
         self._current_a = self._setpoint_a = 0.0  # the motor's, and the one that it follows
         self._stepped_s = now_s
         self._turns = self._turns_s = self._reported_turns = 0.0
-        self._boots_until_s = NEVER_S
-        self._initializing = False
+        self._boots_until_s, self._initializing = NEVER_S, False
         self._reported: dict[Message, Frame] = {}
         self._late.reset()
         periods = self.parameters
@@ -174,7 +173,7 @@ class SimulatedOdrive:
         return forged_frame(self.parameters.node_id, forgery)
 
     def forge_current(self, current_a: float) -> Frame:
-        return forged_current(self.parameters.node_id, current_a)
+        return forged_current(self.parameters.node_id, self._setpoint_a, current_a)
 
     def forge_torque(self, torque_nm: float) -> Frame:
         return forged_torque(self.parameters.node_id, self.parameters.sign * torque_nm)
@@ -286,6 +285,9 @@ class SimulatedOdrive:
     def _version(self) -> bytes:
         return codec.GET_VERSION.encode(*VERSION_FIELDS)
 
+    def _address(self) -> bytes:
+        return codec.encode_address(self.parameters.node_id, int(self.parameters.serial_number or "0", 16))
+
     _PAYLOADS = {
         codec.GET_ENCODER_ESTIMATES: _encoder,
         codec.GET_IQ: _iq,
@@ -294,4 +296,5 @@ class SimulatedOdrive:
         codec.GET_TEMPERATURE: _temperature,
         codec.GET_BUS_VOLTAGE_CURRENT: _bus_voltage,
         codec.GET_VERSION: _version,
+        codec.ADDRESS: _address,
     }

@@ -16,6 +16,7 @@ FORGERIES: Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]] = {  # messa
     Forgery.OLD_FIRMWARE: (codec.GET_VERSION, OLD_FIRMWARE, b""),
     Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
     Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
+    Forgery.OTHER_DRIVE: (codec.ADDRESS, (0, 0xABCDEF, 0), b""),
 }
 
 
@@ -24,9 +25,9 @@ def forged_frame(node_id: int, forgery: Forgery) -> Frame:
     return Frame(arbitration_id(node_id, message), message.encode(*values) + value)
 
 
-def forged_current(node_id: int, current_a: float) -> Frame:
-    """Reports a current that is also the set-point, as of a drive that follows another torque."""
-    return Frame(arbitration_id(node_id, codec.GET_IQ), codec.GET_IQ.encode(current_a, current_a))
+def forged_current(node_id: int, setpoint_a: float, current_a: float) -> Frame:
+    """Reports another measured current than the motor has."""
+    return Frame(arbitration_id(node_id, codec.GET_IQ), codec.GET_IQ.encode(setpoint_a, current_a))
 
 
 def forged_torque(node_id: int, torque_nm: float) -> Frame:

@@ -28,21 +28,25 @@ channel = {right}
 bus = "left"
 node_id = 0
 sign = 1
+command_delay_s = 0.25
 
 [drive.left_adduction]
 bus = "left"
 node_id = 1
 sign = -1
+command_delay_s = 0.25
 
 [drive.right_sweep]
 bus = "right"
 node_id = 3
 sign = -1
+command_delay_s = 0.25
 
 [drive.right_adduction]
 bus = "right"
 node_id = 2
 sign = 1
+command_delay_s = 0.25
 
 # As a calibration of these joints would show.
 [friction.left_sweep]

@@ -40,6 +40,7 @@ def drives_of(configuration: Configuration, **changes: Any) -> dict[str, Simulat
             sign=drive.sign,
             zero_turn=drive.zero_turn,
             torque_constant_nm_a=drive.torque_constant_nm_a,
+            serial_number=drive.serial_number,
             **changes,
         )
         for joint, drive in configuration.drive.items()

@@ -235,7 +235,8 @@ def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(c
             if configuration.drive[joint].bus == name
             for identifier in axis.receivers
         }
-        assert len(wanted) == 16
+        reports, commands = 9, 16  # of each drive; emergency stops are nobody's alone
+        assert len(wanted) == 2 * (reports + commands)
         assert {word for word in range(0x800) if passes(filters, word)} == wanted
         for identifier in wanted:
             assert not passes(filters, identifier | constants.CAN_RTR_FLAG)

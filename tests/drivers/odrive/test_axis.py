@@ -90,7 +90,7 @@ def test_a_drive_heard_again_after_a_silence_was_restarted(bench: Bench, silence
         bench.read(1.0 + 0.002 * number)
     bench.live(2.0 + silence_s)
     assert bench.axis.restarts == restarts
-    assert (bench.axis.version is None) == bool(restarts)
+    assert (bench.axis.settings.version is None) == bool(restarts)
 
 
 def test_a_stall_of_ours_is_no_silence_of_the_drive(bench: Bench) -> None:
@@ -251,15 +251,15 @@ def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
     assert bench.request_watchdogs(0.0) == []  # its version is not known
     bench.report(GET_VERSION, *PRO)
     bench.read(0.1)
-    assert isnan(bench.axis.watchdog_s)
+    assert isnan(bench.axis.settings.watchdog_s)
     asked = [Frame(0x004, bytes.fromhex("00 db 00 00")), Frame(0x004, bytes.fromhex("00 da 00 00"))]
     assert bench.request_watchdogs(1.0) == asked
     bench.report_setting(218, timeout)
     bench.read(1.1)
-    assert isnan(bench.axis.watchdog_s)
+    assert isnan(bench.axis.settings.watchdog_s)
     bench.report_setting(219, enable)
     bench.read(1.2)
-    assert bench.axis.watchdog_s == pytest.approx(watchdog_s)
+    assert bench.axis.settings.watchdog_s == pytest.approx(watchdog_s)
     assert bench.request_watchdogs(2.0) == []
 
 
@@ -284,7 +284,7 @@ def test_a_build_whose_numbers_are_not_known_is_not_asked_and_counts_as_not_read
     bench.report_setting(218, "cdcccc3d")
     bench.read(0.1)
     assert bench.request_watchdogs(1.0) == []
-    assert isnan(bench.axis.watchdog_s)
+    assert isnan(bench.axis.settings.watchdog_s)
     assert bench.drives.malformed_frames == 0
 
 
@@ -297,7 +297,7 @@ def test_a_setting_that_makes_no_sense_is_malformed_and_stays_unknown(bench: Ben
     bench.report_setting(endpoint, value)
     bench.read(0.2)
     assert bench.drives.malformed_frames == 1
-    assert isnan(bench.axis.watchdog_s)
+    assert isnan(bench.axis.settings.watchdog_s)
 
 
 def test_a_restart_forgets_version_and_watchdog(bench: Bench) -> None:
@@ -305,11 +305,11 @@ def test_a_restart_forgets_version_and_watchdog(bench: Bench) -> None:
     bench.report(GET_VERSION, *PRO)
     bench.report_setting(219, "00")
     bench.read(0.5)
-    assert bench.axis.watchdog_s == 0.0
+    assert bench.axis.settings.watchdog_s == 0.0
     bench.report(HEARTBEAT, 0x1, 1, 0, 0)
     bench.read(0.6)
-    assert bench.axis.version is None
-    assert isnan(bench.axis.watchdog_s)
+    assert bench.axis.settings.version is None
+    assert isnan(bench.axis.settings.watchdog_s)
 
 
 @given(st.lists(st.tuples(st.sampled_from([0x000, 0x001, 0x005, 0x009]), st.binary(max_size=8)), max_size=40))
@@ -318,7 +318,7 @@ def test_the_watchdog_is_unknown_or_a_time_after_any_answer(reported: list[tuple
     for number, (identifier, data) in enumerate(reported):
         bench.far.send(Frame(identifier, data))
         bench.read(0.1 * number)
-        assert isnan(bench.axis.watchdog_s) or 0.0 <= bench.axis.watchdog_s <= 3600.0
+        assert isnan(bench.axis.settings.watchdog_s) or 0.0 <= bench.axis.settings.watchdog_s <= 3600.0
 
 
 @pytest.mark.parametrize("torque_nm", [nan, 1e300, -1e300, float("inf")])
@@ -334,10 +334,9 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
     bench.report_setting(BUILD.enable, "01")
     bench.report_setting(BUILD.timeout, "cdcccc3d")
     bench.read(0.0)
-    assert bench.axis.watchdog_s == pytest.approx(0.1)
+    assert bench.axis.settings.watchdog_s == pytest.approx(0.1)
     for axis in bench.drives.axes[1:]:  # all are known: no question is left over
-        axis.version, axis.hardware = bench.axis.version, bench.axis.hardware
-        axis._watchdog_enabled, axis._watchdog_timeout_s = True, 0.1
+        axis.settings = bench.axis.settings
     asked = []
     for tick in range(round(3.0 * REFRESH_S / PERIOD_S)):
         bench.drives.request_settings(tick * PERIOD_S)
@@ -345,7 +344,7 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
     assert [count for count in asked if count] == [4 + 8] * 3
     bench.report_setting(BUILD.enable, "00")
     bench.read(6.0)
-    assert bench.axis.watchdog_s == 0.0
+    assert bench.axis.settings.watchdog_s == 0.0
 
 
 def test_a_current_that_is_no_number_is_none_in_a_drive_that_lets_none_flow(bench: Bench) -> None:

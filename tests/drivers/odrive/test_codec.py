@@ -14,7 +14,7 @@ from drivers.odrive.codec import ERROR_NAMES, AxisState, MalformedMessageError, 
 
 DBC: Any = cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / "odrive-cansimple-0.6.10.dbc")
 MESSAGES = {name: value for name, value in vars(odrive_codec).items() if isinstance(value, Message)}
-WHOLE = [name for name in MESSAGES if name not in ("RX_SDO", "TX_SDO")]  # in those two a value of any type follows
+WHOLE = [name for name in MESSAGES if name not in ("RX_SDO", "TX_SDO", "ADDRESS")]  # in those more may follow
 GOLDEN: list[tuple[str, tuple[float, ...], int, str]] = [  # of node 3
     ("GET_VERSION", (2, 4, 4, 58, 0, 6, 11, 0), 0x060, "02 04 04 3a 00 06 0b 00"),
     ("HEARTBEAT", (0x01020304, 8, 5, 1), 0x061, "04 03 02 01 08 05 01 00"),
@@ -22,6 +22,7 @@ GOLDEN: list[tuple[str, tuple[float, ...], int, str]] = [  # of node 3
     ("GET_ERROR", (0x01000000, 0x02000000), 0x063, "00 00 00 01 00 00 00 02"),
     ("RX_SDO", (0, 0x01F4, 0), 0x064, "00 f4 01 00"),
     ("TX_SDO", (0, 0x01F4, 0), 0x065, "00 f4 01 00"),
+    ("ADDRESS", (3, 0x33333539, 0x3841), 0x066, "03 39 35 33 33 41 38"),
     ("SET_AXIS_STATE", (8,), 0x067, "08 00 00 00"),
     ("GET_ENCODER_ESTIMATES", (1.5, -2.0), 0x069, "00 00 c0 3f 00 00 00 c0"),
     ("SET_CONTROLLER_MODE", (1, 7), 0x06B, "01 00 00 00 07 00 00 00"),
@@ -79,6 +80,26 @@ def test_the_dbc_finds_the_number_of_a_parameter_where_we_put_it(name: str) -> N
     assert (decoded["Endpoint_ID"], decoded["Value"]) == (0x1234, 0x3DCCCCCD)
     assert theirs.frame_id == (odrive_codec.RX_SDO if name == "RxSdo" else odrive_codec.TX_SDO).command
     assert odrive_codec.decode_sdo(ours) == (0x1234, bytes.fromhex("cd cc cc 3d"))
+
+
+@pytest.mark.parametrize("node_id", [0, 3, 0x3F])
+@given(serial=st.integers(0, 2**48 - 1))
+def test_the_dbc_and_we_decode_the_same_serial_number(node_id: int, serial: int) -> None:
+    encoded = in_dbc("ADDRESS").encode({"Node_ID": node_id, "Serial_Number": serial})
+    assert odrive_codec.decode_serial_number(encoded) == f"{serial:012x}"  # with the connection id of 0.6.11
+    assert odrive_codec.decode_serial_number(encoded[:7]) == f"{serial:012x}"
+
+
+@given(data=st.binary(max_size=16))
+def test_only_seven_or_eight_bytes_are_a_serial_number(data: bytes) -> None:
+    if len(data) not in (7, 8):
+        with pytest.raises(MalformedMessageError):
+            odrive_codec.decode_serial_number(data)
+
+
+def test_the_commands_are_the_messages_that_only_a_master_sends() -> None:
+    to_drive = {theirs.frame_id for theirs in DBC.messages if theirs.senders == ["Master"] and theirs.frame_id < 32}
+    assert to_drive - {odrive_codec.RX_SDO.command} == odrive_codec.COMMANDS
 
 
 @pytest.mark.parametrize("name", WHOLE)

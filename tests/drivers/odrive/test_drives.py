@@ -13,6 +13,9 @@ from control.records import JOINTS, NEVER_S, DriveStates, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.odrive.codec import (
+    ADDRESS,
+    COMMANDS,
+    ESTOP,
     GET_BUS_VOLTAGE_CURRENT,
     GET_ENCODER_ESTIMATES,
     GET_ERROR,
@@ -20,6 +23,7 @@ from drivers.odrive.codec import (
     GET_TEMPERATURE,
     GET_VERSION,
     HEARTBEAT,
+    RX_SDO,
     TX_SDO,
     Message,
     arbitration_id,
@@ -195,9 +199,15 @@ def test_malformed_and_unknown_frames_are_counted_and_change_nothing(
 
 
 def understood(frame: Frame, node_ids: tuple[int, int]) -> bool:
-    """Whether the length is right: eight bytes, and a parameter's value of one to four bytes after its head."""
+    """Whether the length is right: eight bytes, and a parameter's value of one to four bytes after its head.
+
+    Commands for a drive come from another program and are counted, whatever they contain.
+    """
     shortest = {arbitration_id(node, message): 8 for node in node_ids for message in RECEIVED}
     shortest |= {arbitration_id(node, TX_SDO): 5 for node in node_ids}
+    shortest |= {arbitration_id(node, ADDRESS): 7 for node in node_ids}
+    shortest |= {node << 5 | command: 0 for node in node_ids for command in COMMANDS - {ESTOP.command}}
+    shortest |= {arbitration_id(node, RX_SDO): 0 for node in node_ids}
     known = not frame.is_remote and not frame.is_extended and frame.arbitration_id in shortest
     return known and shortest[frame.arbitration_id] <= len(frame.data) <= 8
 
@@ -343,7 +353,7 @@ def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Benc
     }
     bench.far["left"].send(Frame(0x000, bytes.fromhex("02 04 04 3a 00 06 0b 00")))
     bench.drives.read(1.1)
-    assert bench.drives.axes[0].version == (0, 6, 11)
+    assert bench.drives.axes[0].settings.version == (0, 6, 11)
     bench.drives.request_settings(1.0 + 0.99 * REPEAT_UNKNOWN_S)
     assert bench.silent()
     bench.drives.request_settings(1.01 + REPEAT_UNKNOWN_S)
@@ -357,7 +367,7 @@ def test_a_reset_forgets_everything(bench: Bench) -> None:
     bench.drives.reset()
     assert not bench.drives.heard
     assert bench.drives.malformed_frames == 0
-    assert bench.drives.axes[0].version is None
+    assert bench.drives.axes[0].settings.version is None
     assert repr(bench.drives.read(2.0)) == repr(Bench().drives.read(2.0))
 
 

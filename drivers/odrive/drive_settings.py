@@ -1,0 +1,85 @@
+"""What one ODrive reports of itself when it is asked: its firmware, its watchdog, its serial number.
+
+A restart forgets all of it. The watchdog is read back by parameter number (SDO). ODrive renumbers its parameters in
+every build and for each kind of board, and publishes the numbers as flat_endpoints.json with the firmware. Without the
+numbers of this very build the watchdog stays unknown, because a number of another build reads some other parameter.
+"""
+
+from collections.abc import Sequence
+from math import nan
+from typing import NamedTuple
+
+from control.records import UNKNOWN
+from drivers.drive import WatchdogEndpoints
+from drivers.odrive import codec
+from drivers.odrive.codec import MalformedMessageError
+
+SUPPORTED = (0, 6)  # major and minor version of the firmware whose messages the codec knows
+LONGEST_WATCHDOG_S = 3600.0  # a larger number is no time-out
+
+
+class Version(NamedTuple):
+    major: int
+    minor: int
+    revision: int
+
+
+class DriveSettings:
+    """Owns the answers of one drive."""
+
+    def __init__(self, expected_serial_number: str = "", endpoints: Sequence[WatchdogEndpoints] = ()) -> None:
+        self.expected_serial_number = expected_serial_number  # empty: any
+        self._endpoints = tuple(endpoints)
+        self.forget()
+
+    def forget(self) -> None:
+        self.version: Version | None = None
+        self.hardware = ""
+        self.serial_number = ""  # empty until the drive has reported it
+        self._watchdog_enabled: bool | None = None
+        self._watchdog_timeout_s = UNKNOWN
+
+    def on_version(self, data: bytes) -> None:
+        fields = codec.GET_VERSION.decode(data)
+        self.version = Version(*fields[4:7])
+        self.hardware = ".".join(str(field) for field in fields[1:4])
+
+    def on_address(self, data: bytes) -> None:
+        self.serial_number = codec.decode_serial_number(data)
+
+    def on_parameter(self, data: bytes) -> None:
+        endpoint, value = codec.decode_sdo(data)
+        endpoints = self.watchdog_endpoints
+        if endpoints is None:  # the drive answers another program
+            return
+        if endpoint == endpoints.enable:
+            self._watchdog_enabled = codec.decode_sdo_flag(value)
+        elif endpoint == endpoints.timeout:
+            timeout_s = codec.decode_sdo_float(value)
+            if not 0.0 <= timeout_s <= LONGEST_WATCHDOG_S:
+                raise MalformedMessageError("not a time")
+            self._watchdog_timeout_s = timeout_s
+
+    @property
+    def identified(self) -> bool:
+        """Returns whether the serial number is known, or none is expected."""
+        return bool(self.serial_number) or not self.expected_serial_number
+
+    @property
+    def supported(self) -> bool:
+        return self.version is not None and self.version[:2] == SUPPORTED
+
+    @property
+    def watchdog_endpoints(self) -> WatchdogEndpoints | None:
+        """The numbers of the drive's own build, once its version is known."""
+        if self.version is None:
+            return None
+        build = (".".join(str(part) for part in self.version), self.hardware)
+        return next((each for each in self._endpoints if (each.firmware, each.hardware) == build), None)
+
+    @property
+    def watchdog_s(self) -> float:
+        """The time-out that the drive uses: NaN until it was read back, 0 where the watchdog is off."""
+        if self._watchdog_enabled is None:
+            return nan
+        return self._watchdog_timeout_s if self._watchdog_enabled else 0.0

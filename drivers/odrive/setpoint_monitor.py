@@ -1,0 +1,96 @@
+"""Detects a drive that follows other torques than the commanded ones, by the set-point of the current that it reports.
+
+A drive computes its set-point from the newest torque command that it received. So a set-point that lies outside of the
+range of the last few commands belongs to another program's command, or to an old one: commands come late or are lost.
+In health no report differs. A program that commands every tenth time makes 10 % of them differ, one behind every
+command of ours half of them, and commands that are 5 to 20 ms late most of them while the torque changes. The score
+rises by WEIGHT for a report that differs and falls by 1 for one that does not, so a rate below 1 / (1 + WEIGHT) = 4 %
+is never a fault, and 10 % is one after some 80 reports. FOUND is more than five reports alone add.
+
+A set-point of zero is also what a drive reports that left closed loop by itself, before its heartbeat says so. Such
+reports count only when the next heartbeat still says closed loop.
+
+The drive reduces torque near its velocity limit without reporting it. A set-point that this explains does not count.
+"""
+
+from collections import deque
+from math import inf, isfinite, pi
+
+from control.rate import PERIOD_S
+from drivers.odrive.parameters import OdriveParameters
+
+TOLERANCE_NM = 0.05  # a drive with compensation of its cogging adds as much
+TOLERANCE_FRACTION = 0.2  # two conventions of a torque constant differ by 15.5 %: 8.27 / KV and 9.55 / KV
+WEIGHT, FOUND = 24, 125
+TURN_RAD = 2.0 * pi
+SPEED_UP_TURN_S = 0.5  # of a joint at full torque, from one report to the next
+
+
+class SetpointMonitor:
+    """Torques are the motor's. Owns the last commands."""
+
+    def __init__(self, parameters: OdriveParameters) -> None:
+        followed = max(round(parameters.command_delay_s / PERIOD_S), 1)  # any of so many commands
+        self._commands: deque[float] = deque(maxlen=followed)
+        self._clamp_from_rad_s = (parameters.velocity_limit_turn_s - SPEED_UP_TURN_S) * TURN_RAD
+        self._clamp_nm_s_rad = parameters.velocity_gain_nm_s_turn / TURN_RAD
+        self.reset()
+
+    def reset(self) -> None:
+        self.forget_commands()
+        self._score = 0
+        self._absent = 0  # reports without torque since the last heartbeat
+        self.found = False
+        self.example = (0.0, 0.0)  # set-point and command of the last report that differed
+
+    def forget_commands(self) -> None:
+        """Accepts every set-point until enough commands have been sent: some may not have left."""
+        self._newest_nm = inf
+        self._commands.extend((inf, -inf) * (self._commands.maxlen or 1))
+
+    def on_command(self, torque_nm: float) -> None:
+        self._newest_nm = torque_nm
+        self._commands.append(torque_nm)
+
+    def on_report(self, setpoint_nm: float, velocity_rad_s: float) -> None:
+        """Compares a report of a drive in closed loop."""
+        difference_nm = setpoint_nm - self._newest_nm
+        if -TOLERANCE_NM < difference_nm < TOLERANCE_NM or self._may_follow(setpoint_nm, velocity_rad_s):
+            if self._score:
+                self._fall()
+        elif setpoint_nm == 0.0 or not isfinite(setpoint_nm):
+            self._absent += 1
+            self.example = (0.0, self._newest_nm)
+        else:
+            self.example = (setpoint_nm, self._newest_nm)
+            self._rise(1)
+
+    def _may_follow(self, setpoint_nm: float, velocity_rad_s: float) -> bool:
+        """Returns whether the set-point belongs to one of the last commands, or the drive may clamp it."""
+        lowest_nm, highest_nm = min(self._commands), max(self._commands)
+        largest_nm = max(-lowest_nm, highest_nm)
+        tolerance_nm = TOLERANCE_NM + TOLERANCE_FRACTION * largest_nm
+        if setpoint_nm > highest_nm + tolerance_nm:
+            return self._may_clamp(-velocity_rad_s, largest_nm)
+        if setpoint_nm < lowest_nm - tolerance_nm:
+            return self._may_clamp(velocity_rad_s, largest_nm)
+        return True
+
+    def _may_clamp(self, velocity_rad_s: float, torque_nm: float) -> bool:
+        """Returns whether a drive that turns this fast forward may reduce this torque, down to braking."""
+        return (self._clamp_from_rad_s - velocity_rad_s) * self._clamp_nm_s_rad < torque_nm
+
+    def _fall(self) -> None:
+        self._score -= 1
+        self.found = self.found and self._score > 0
+
+    def _rise(self, reports: int) -> None:
+        self._score = min(self._score + WEIGHT * reports, 2 * FOUND)
+        self.found = self.found or self._score >= FOUND
+
+    def on_heartbeat(self, closed_loop: bool) -> None:
+        absent, self._absent = self._absent, 0
+        if not closed_loop:
+            self._score, self.found = 0, False
+        elif absent:
+            self._rise(absent)

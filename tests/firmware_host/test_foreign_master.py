@@ -1,0 +1,159 @@
+"""A second program on the bus: the drives go idle, and its own drives are told from other ones by serial number."""
+
+from dataclasses import replace
+
+import pytest
+
+from control.controller import WalkOrder
+from control.modes import ENERGISED, Mode, Request
+from drivers.can.frames import Frame
+from drivers.fault_injection.failures import Failures
+from drivers.odrive.codec import (
+    ADDRESS,
+    CLEAR_ERRORS,
+    ESTOP,
+    GET_VERSION,
+    RX_SDO,
+    SDO_READ,
+    SET_AXIS_STATE,
+    SET_INPUT_TORQUE,
+    AxisState,
+    Message,
+    arbitration_id,
+)
+from firmware_host.configuration.configuration import Configuration
+from simulation.devices.foreign_master import ForeignMaster
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
+from tests.copied_robots import copy_of
+
+TRACK = Track([(5.0, MUDS["48.5"])])
+SERIAL = "385f324d3037"
+
+
+def present(robot: Lockstep) -> set[str]:
+    return {fault.name for fault in robot.loop.faults.present}
+
+
+def with_serial_number(configuration: Configuration, serial_number: str) -> Configuration:
+    drives = dict(configuration.drive)
+    drives["left_sweep"] = replace(drives["left_sweep"], serial_number=serial_number)
+    return replace(configuration, drive=drives)
+
+
+@pytest.fixture(scope="module")
+def armed(configuration: Configuration) -> Lockstep:
+    robot = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
+    robot.arm()
+    robot.run_for(0.5)
+    return robot
+
+
+@pytest.fixture(scope="module")
+def walking(armed: Lockstep) -> Lockstep:
+    robot = copy_of(armed)
+    robot.walk(WalkOrder(0.03, adaptive=False))
+    robot.run_for(1.0)
+    return robot
+
+
+@pytest.mark.parametrize("every", [1, 2, 10])
+@pytest.mark.parametrize("torque_nm", [0.0, 0.3, 1.0])
+def test_torque_of_another_program_on_the_bus_idles_the_drives_in_two_ticks(
+    armed: Lockstep, torque_nm: float, every: int
+) -> None:
+    robot = copy_of(armed)
+    robot.robot.foreign_masters.append(ForeignMaster(robot.robot.drives[1], torque_nm, every))
+    robot.run_for((every + 2) * robot.period_s)
+    assert "foreign_commands" in present(robot)
+    assert robot.loop.mode is Mode.FAULT
+    robot.run_for(0.2)
+    assert not any(state.closed_loop for state in robot.loop.states)
+    assert robot.loop.request(Request.ARM, robot.now_s)
+
+
+@pytest.mark.parametrize(("every", "longest_ticks"), [(1, 10), (2, 16), (10, 90)])
+def test_torque_of_a_program_that_is_not_heard_idles_the_drives(
+    walking: Lockstep, every: int, longest_ticks: int
+) -> None:
+    robot = copy_of(walking)
+    robot.robot.foreign_masters.append(ForeignMaster(robot.robot.drives[1], 1.0, every, heard=False))
+    assert robot.run_until(lambda: robot.loop.mode not in ENERGISED, longest_ticks * robot.period_s)
+    assert "setpoint_mismatch" in present(robot)
+
+
+@pytest.mark.parametrize("kind", ["slow", "intermittent"])
+def test_commands_that_come_late_or_by_halves_idle_the_drives(walking: Lockstep, kind: str) -> None:
+    robot = copy_of(walking)
+    robot.fail("left_adduction.command", kind, 2.0)
+    assert robot.run_until(lambda: robot.loop.mode not in ENERGISED, 1.0)
+    assert "setpoint_mismatch" in present(robot)
+
+
+def test_a_long_walk_has_no_mismatch(walking: Lockstep) -> None:
+    robot = copy_of(walking)
+    robot.run_for(8.0)
+    assert robot.loop.mode is Mode.WALKING
+    assert robot.loop.faults.present == []
+
+
+COMMANDS: list[tuple[Message, bytes, bool]] = [
+    (SET_INPUT_TORQUE, bytes(4), True),
+    (SET_AXIS_STATE, SET_AXIS_STATE.encode(AxisState.CLOSED_LOOP), True),
+    (CLEAR_ERRORS, b"\0", True),
+    (Message(0x0C, "<fhh"), bytes(8), True),  # a position
+    (Message(0x16, "<B"), b"\0", True),  # a reboot
+    (RX_SDO, RX_SDO.encode(1, 100, 0) + bytes(4), True),
+    (RX_SDO, RX_SDO.encode(SDO_READ, 100, 0), False),
+    (ESTOP, b"", False),  # everybody may stop a drive
+]
+
+
+@pytest.mark.parametrize(("message", "data", "counts"), COMMANDS)
+def test_every_command_counts_but_a_stop_and_a_reading(
+    armed: Lockstep, message: Message, data: bytes, counts: bool
+) -> None:
+    robot = copy_of(armed)
+    robot.buses["left"].open().send(Frame(arbitration_id(1, message), data))
+    robot.step()
+    assert ("foreign_commands" in present(robot)) == counts
+
+
+def test_a_command_to_a_drive_of_nobody_is_no_matter(armed: Lockstep) -> None:
+    robot = copy_of(armed)
+    robot.buses["left"].open().send(Frame(arbitration_id(9, SET_INPUT_TORQUE), bytes(4)))
+    robot.step()
+    assert present(robot) == set()
+
+
+def test_the_right_drive_arms(configuration: Configuration) -> None:
+    robot = Lockstep(with_serial_number(configuration, SERIAL), TRACK)
+    robot.arm()
+    assert robot.loop.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("answers", [True, False])
+def test_another_drive_or_one_that_does_not_answer_does_not_arm(configuration: Configuration, answers: bool) -> None:
+    robot = Lockstep(with_serial_number(configuration, SERIAL), TRACK)
+    drive = robot.robot.drives[0]
+    drive.parameters = replace(drive.parameters, serial_number="000000000001")
+    if not answers:
+        receive = drive.receive
+        drive.receive = lambda frame, now_s: (  # type: ignore[method-assign]
+            [] if frame.is_remote and frame.arbitration_id & 0x1F == ADDRESS.command else receive(frame, now_s)
+        )
+    robot.run_for(2.0)
+    assert present(robot) == {"wrong_drive"}
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True)
+
+
+def test_a_serial_number_is_asked_for_only_of_firmware_that_knows_it(configuration: Configuration) -> None:
+    robot = Lockstep(with_serial_number(configuration, SERIAL), TRACK)
+    port, drive = robot.buses["left"].open(), robot.robot.drives[0]
+    receive = drive.receive
+    drive.receive = lambda frame, now_s: (  # type: ignore[method-assign]
+        [] if frame.is_remote and frame.arbitration_id == GET_VERSION.command else receive(frame, now_s)
+    )
+    robot.run_for(2.0)
+    assert [frame for frame in port.receive() if frame.arbitration_id == ADDRESS.command] == []
