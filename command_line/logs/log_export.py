@@ -19,7 +19,7 @@ def export(options: Options) -> int:
     _require_other_file(options)
     with watched() as watch:
         log = read_logs(options.files, watch)
-    write = _write_parquet if options.parquet else _write_csv
+    write = _write_parquet if options.parquet else _write_ros if options.ros else _write_csv
     for path in write(log, options):
         print(f"written  {path}", file=sys.stderr)
     return exit_codes.OK
@@ -43,6 +43,20 @@ def _write_csv(log: Log, options: Options) -> list[Path]:
     with Path(options.out).open("w", encoding="utf-8") as out, watched() as watch:
         write_lab_csv(log, out, watch)
     return []
+
+
+def _write_ros(log: Log, options: Options) -> list[Path]:
+    from firmware_host.log_reading.replay import configuration_of
+    from firmware_host.open_data.ros_log import write_ros_log
+
+    path: Path = options.out or Path(f"{_stem(options)}-ros.mcap")
+    geometry = configuration_of(options.files[0], log.configuration_text).geometry
+    try:
+        with watched() as watch:
+            write_ros_log(log, geometry, path, watch)
+    except OSError as problem:
+        raise LogError(f"{path}: nothing was written: {problem.strerror or problem}") from None
+    return [path]
 
 
 def _write_parquet(log: Log, options: Options) -> list[Path]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from control.modes import Mode
 from firmware_host.catalogue.entry import FileStamp, LogEntry, MudEntry
+from firmware_host.log.log_file import EXPORTED
 from firmware_host.log.rows import COEFFICIENTS
 from firmware_host.log_reading.log_reader import ADVICE, Log, LogError, log_summary, read_log, segment_of
 from firmware_host.log_reading.tick_array import Ticks
@@ -31,6 +32,8 @@ def read_entry(path: Path, file: str, stamp: FileStamp) -> LogEntry:
         return entry._replace(state="broken", reason=str(problem).removeprefix(f"{path}: "))
     if not (log.metadata or len(log.ticks) or log.strides or log.events):
         return entry._replace(state="no log", reason="mudskipper did not write this file")
+    if EXPORTED in log.metadata:
+        return entry._replace(state="export", reason="'mudskipper log export' made this copy")
     if not log.complete:
         entry = entry._replace(state="broken", reason=f"its end is missing; {ADVICE}")
     return _with_contents(entry, log)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -29,6 +30,22 @@ def test_a_full_disk_is_one_message_and_leaves_no_half_file(tmp_path: Path, caps
     with files_of_at_most(100_000):
         assert "nothing was written" in failure(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_ros_export_is_no_second_log_in_the_catalogue(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["log", "export", "--ros", LOG]) == exit_codes.OK
+    assert main(["log", "query", "select file, state, strides from logs", str(tmp_path), "--json"]) == exit_codes.OK
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert rows == [{"file": "walk_0_1-ros.mcap", "state": "export", "strides": None}]
+
+
+def test_a_ros_export_on_a_full_disk_leaves_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with files_of_at_most(100_000):
+        message = failure(capsys, "log", "export", "--ros", LOG, "--out", str(tmp_path / "walk.mcap"))
+    assert "nothing was written" in message and list(tmp_path.iterdir()) == []
 
 
 def test_parquet_into_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

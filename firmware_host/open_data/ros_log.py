@@ -1,0 +1,124 @@
+"""Writes a log once more, with standard ROS 2 messages next to its own rows.
+
+The standard messages would make every log larger by more than a fifth (docs/how-to/open_data.md has the number), so an
+export adds them, at 95 Hz, and the diagnostics once a second and at each event.
+"""
+
+import heapq
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from control.geometry import FlipperGeometry
+from control.rate import RATE_HZ
+from control.records import FLIPPERS
+from firmware_host.log.log_file import ATTACHMENT, EXPORTED, METADATA
+from firmware_host.log.rows import EVENT, ROW_KINDS, STRIDE, TICK
+from firmware_host.log.schema import CDR_HEADER
+from firmware_host.log.whole_files import whole_file
+from firmware_host.log_reading.log_reader import Log, Watch, unwatched
+from firmware_host.log_reading.tick_array import Ticks, tick_type
+from firmware_host.open_data.ros_definitions import full_definition, schema_name
+from firmware_host.open_data.ros_messages import TOPICS, diagnostics, tick_messages
+
+MESSAGE_HZ = 95.0
+TICKS_A_MESSAGE = max(1, round(RATE_HZ / MESSAGE_HZ))
+DIAGNOSTICS_S = 1.0  # between two of them
+LATEST_NS = (1 << 31) * 1_000_000_000 - 1
+WATCHED_ROWS = 5000
+
+
+class _Message(NamedTuple):
+    stamp_s: float
+    topic: str
+    data: bytes
+
+
+def write_ros_log(log: Log, geometry: FlipperGeometry, path: Path, watch: Watch = unwatched) -> None:
+    """Writes the whole file or nothing. Raises OSError."""
+    offset_ns = int(log.metadata.get("wall_minus_monotonic_ns", "0"))
+    with whole_file(path) as hidden, hidden.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.LZ4)
+        writer.start(profile="ros2", library="mudskipper")
+        writer.add_metadata(METADATA, log.metadata | {EXPORTED: "ros"})
+        writer.add_attachment(0, 0, ATTACHMENT, "application/toml", log.configuration_text.encode())
+        channels = _register(writer)
+        messages = heapq.merge(_own_rows(log), _standard(log, geometry, offset_ns), key=lambda message: message.stamp_s)
+        for number, message in enumerate(messages):
+            if number % WATCHED_ROWS == 0:
+                watch("ticks written", int(np.searchsorted(log.ticks["stamp_s"], message.stamp_s)), len(log.ticks))
+            time_ns = _wall_ns(message.stamp_s, offset_ns)
+            writer.add_message(channels[message.topic], time_ns, message.data, time_ns)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _register(writer: Writer) -> dict[str, int]:
+    """Returns the channel of each topic."""
+    kinds = {kind.topic: (kind.schema_name, kind.definition) for kind in ROW_KINDS}
+    standard = {topic: (schema_name(message), full_definition(message)) for topic, message in TOPICS.items()}
+    schemas = {
+        name: writer.register_schema(name, "ros2msg", text.encode()) for name, text in (kinds | standard).values()
+    }
+    return {
+        topic: writer.register_channel(topic, "cdr", schemas[name]) for topic, (name, _) in (kinds | standard).items()
+    }
+
+
+def _wall_ns(stamp_s: float, offset_ns: int) -> int:
+    """Returns the universal time of a row; a header cannot hold a time after 2038."""
+    since_ns = round(stamp_s * 1e9) if abs(stamp_s) < 1e9 else 0
+    return min(max(0, offset_ns + since_ns), LATEST_NS)
+
+
+def _own_rows(log: Log) -> Iterator[_Message]:
+    stamps_s = log.ticks["stamp_s"].tolist()
+    ticks = (_Message(stamp_s, TICK.topic, row) for stamp_s, row in zip(stamps_s, _encoded(log.ticks), strict=True))
+    strides = (_Message(row["stamp_s"], STRIDE.topic, STRIDE.encode_named(**row)) for row in log.strides)
+    events = (_Message(row["stamp_s"], EVENT.topic, EVENT.encode_named(**row)) for row in log.events)
+    return heapq.merge(ticks, strides, events, key=lambda message: message.stamp_s)
+
+
+def _encoded(ticks: Ticks) -> Iterator[bytes]:
+    rows = np.zeros(len(ticks), tick_type())
+    for name in rows.dtype.names or ():
+        rows[name] = ticks[name]
+    stored, size = rows.tobytes(), rows.dtype.itemsize
+    return (CDR_HEADER + stored[begin + len(CDR_HEADER) : begin + size] for begin in range(0, len(stored), size))
+
+
+def _standard(log: Log, geometry: FlipperGeometry, offset_ns: int) -> Iterator[_Message]:
+    """Yields the messages of every fourth tick; ticks that were thinned at rest are all taken."""
+    last_tick, diagnosed_s = -TICKS_A_MESSAGE, -np.inf
+    news = _News(log)
+    for tick in log.ticks:
+        if tick["tick"] < last_tick + TICKS_A_MESSAGE:
+            continue
+        last_tick, stamp_s = int(tick["tick"]), float(tick["stamp_s"])
+        stamp_ns = _wall_ns(stamp_s, offset_ns)
+        yield from (_Message(stamp_s, *message) for message in tick_messages(stamp_ns, tick, geometry).items())
+        if news.advance(stamp_s) or stamp_s >= diagnosed_s + DIAGNOSTICS_S:
+            diagnosed_s = stamp_s
+            yield _Message(stamp_s, "/diagnostics", diagnostics(stamp_ns, tick, news.strides, news.event))
+
+
+class _News:
+    """Owns the latest stride of each flipper and the latest event."""
+
+    def __init__(self, log: Log) -> None:
+        self.strides: dict[str, dict[str, object]] = {}
+        self.event = ""
+        self._coming = sorted([*log.strides, *log.events], key=lambda row: float(row["stamp_s"]), reverse=True)
+
+    def advance(self, stamp_s: float) -> bool:
+        """Returns whether there was something new until this time."""
+        before = len(self._coming)
+        while self._coming and self._coming[-1]["stamp_s"] <= stamp_s:
+            row = self._coming.pop()
+            if "flipper" in row:
+                self.strides[FLIPPERS[bool(row["flipper"])]] = row
+            else:
+                self.event = str(row["text"])
+        return len(self._coming) < before
