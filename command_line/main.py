@@ -70,6 +70,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
     _add_operation(commands)
     _add_fail(commands)
+    _add_live(commands)
     _add_installation(commands)
     _add_simulation(commands)
     _add_replay(commands)
@@ -129,6 +130,14 @@ def _add_fail(commands: Commands) -> None:
     fail.add_argument("kind", nargs="?", help="off, stuck, garbage, slow, intermittent ..., or ok to end the failure")
     fail.add_argument("--for", type=finite, default=2.0, metavar="S", dest="seconds", help="seconds until it ends")
     fail.add_argument("--list", action="store_true", help="list what can fail, how, and what fails now")
+
+
+def _add_live(commands: Commands) -> None:
+    live = add(commands, "live", "live.live.live", "Pass the robot's rows on to Foxglove, Lichtblick or a browser.")
+    add_socket(live)
+    live.add_argument("--page", action="store_true", help="serve a page for a browser in place of a viewer's WebSocket")
+    live.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)")
+    live.add_argument("--port", type=whole(0, 65535), default=8765, metavar="N", help="0: a free one (default: 8765)")
 
 
 def _add_installation(commands: Commands) -> None:

@@ -7,7 +7,8 @@ its own buffer in the kernel and then loses whole packets; the number of lost ro
 A packet is a sequence of records, each a kind (one byte), a length (four, little-endian) and so many bytes:
 
     0 to 2      rows of the log: tick, stride, event (rows.py)
-    OPENING     JSON, the first record: the kinds with topic, name and ros2msg definition, and the run's metadata
+    OPENING     JSON, the first record: the kinds with topic, name and ros2msg definition, the run's metadata
+                and its configuration
     LOST        JSON, the number of rows that this subscriber has lost here
     REFUSAL     text, the only record for a user without the right to read; the connection then ends
 """
@@ -78,12 +79,14 @@ class RowStream:
         path: Path,
         rights: Rights,
         metadata: dict[str, Any],
+        configuration_text: str = "",
         peer_of: Callable[[socket.socket], Peer] = read_peer,
     ) -> None:
         self.problem = ""
         self._rights, self._peer_of = rights, peer_of
         kinds = [{"topic": k.topic, "schema": k.schema_name, "definition": k.definition} for k in ROW_KINDS]
-        self._opening = record(OPENING, json.dumps({"kinds": kinds, "metadata": metadata}).encode())
+        opening = {"kinds": kinds, "metadata": metadata, "configuration_text": configuration_text}
+        self._opening = record(OPENING, json.dumps(opening).encode())
         self._subscribers: list[Subscriber] = []
         self._file: SocketFile | None = None
         try:

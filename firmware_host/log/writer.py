@@ -93,7 +93,9 @@ def _open_stream(opening: dict[str, Any]) -> RowStream | None:
     wanted = opening.get("stream")
     if wanted is None:
         return None
-    stream = RowStream(Path(wanted["path"]), read_rights(wanted["rights"]), opening["metadata"])
+    stream = RowStream(
+        Path(wanted["path"]), read_rights(wanted["rights"]), opening["metadata"], opening["configuration_text"]
+    )
     if stream.problem:
         print(f"warning: {stream.problem}", file=sys.stderr, flush=True)
     return stream

@@ -38,6 +38,7 @@ class LiveRows:
             raise NoDaemonError(f"no daemon serves rows on {path}: it is not running, or its log is off") from problem
         self.kinds: list[RowKind] = []
         self.metadata: dict[str, Any] = {}
+        self.configuration_text = ""
         self._read_opening(path)
 
     def _read_opening(self, path: Path) -> None:
@@ -48,7 +49,7 @@ class LiveRows:
                 raise NotPermittedError(content.decode())
             if number == OPENING:
                 opening = json.loads(content)
-                self.metadata = opening["metadata"]
+                self.metadata, self.configuration_text = opening["metadata"], opening["configuration_text"]
                 self.kinds = [_kind(own, served) for own, served in zip(ROW_KINDS, opening["kinds"], strict=False)]
         if not self.kinds:
             raise NoDaemonError(f"what answers on {path} is no mudskipper daemon")

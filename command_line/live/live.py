@@ -1,0 +1,91 @@
+"""`mudskipper live`: passes a running robot's rows on to viewers, in a process of its own.
+
+The daemon has no network. This program subscribes to its rows (firmware_host/log_reading/live_rows.py) and serves them
+to Foxglove and Lichtblick by WebSocket, or as a page for a browser with `--page`. It waits for a daemon that is not
+there yet, and for one that restarts.
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NoReturn, Protocol
+
+from command_line import exit_codes
+from command_line.screen import complain
+from firmware_host.log.row_stream import stream_path
+from firmware_host.log_reading.live_rows import LiveRow, LiveRows
+from firmware_host.operator.status_client import NoDaemonError, NotPermittedError
+
+WAIT_S = 1.0  # between two attempts to find the daemon
+READ_S = 0.2
+
+
+class Audience(Protocol):
+    """Takes the rows for its viewers."""
+
+    def begin(self, source: LiveRows) -> None:
+        """A daemon answers; called again after each restart."""
+
+    def take(self, rows: Sequence[LiveRow], lost: int) -> None:
+        """Rows have come; `lost` counts those that this program did not read in time."""
+
+
+def live(options: argparse.Namespace) -> int:
+    try:
+        audience, address = (_open_page if options.page else _open_viewers)(options)
+    except ModuleNotFoundError:
+        complain("viewers need foxglove-sdk: install mudskipper with its extra 'live', or use --page")
+        return exit_codes.UNHEALTHY
+    except OSError as problem:
+        complain(f"{options.host}:{options.port}: {problem.strerror or problem}; choose another --port")
+        return exit_codes.UNHEALTHY
+    print(f"Serving on {address}. Ctrl-C ends.", flush=True)
+    try:
+        pass_on(stream_path(options.socket), audience)
+    except NotPermittedError as problem:
+        complain(str(problem))
+        return exit_codes.NOT_PERMITTED
+    except KeyboardInterrupt:
+        return exit_codes.OK
+
+
+def _open_page(options: argparse.Namespace) -> tuple[Audience, str]:
+    from command_line.live.page_server import PageServer
+
+    page = PageServer(options.host, options.port, options.socket)
+    return page, f"http://{options.host}:{page.port}/"
+
+
+def _open_viewers(options: argparse.Namespace) -> tuple[Audience, str]:
+    from command_line.live.viewer_server import ViewerServer
+
+    viewers = ViewerServer(options.host, options.port)
+    return viewers, f"ws://{options.host}:{viewers.port}; open it in Foxglove or Lichtblick as a Foxglove WebSocket"
+
+
+def pass_on(path: Path, audience: Audience, sleep: Callable[[float], None] = time.sleep) -> NoReturn:
+    """Pass rows on for ever. Raises NotPermittedError."""
+    reported = ""
+    while True:
+        try:
+            source = LiveRows(path)
+        except NoDaemonError as problem:
+            if str(problem) != reported:
+                complain(f"{problem}; waiting for it")
+                reported = str(problem)
+            sleep(WAIT_S)
+            continue
+        reported = ""
+        audience.begin(source)
+        _pass_on_one_run(source, audience)
+
+
+def _pass_on_one_run(source: LiveRows, audience: Audience) -> None:
+    try:
+        while True:
+            audience.take(source.read(READ_S), source.lost)
+    except NoDaemonError:
+        complain("the daemon has ended; waiting for it")
+    finally:
+        source.close()

@@ -1,0 +1,227 @@
+"""Serves one self-contained page with a live view of the robot, and a STOP that goes through the socket's rights.
+
+The page receives server-sent events (HTML standard, section 9.2), ten a second, each with the newest tick and every
+stride and event since the last one. Every viewer has a queue of its own; one that hangs loses its own messages alone.
+A stop is accepted only with a header that no other site's page can send, and only under the address of this server, so
+no page from the internet can reach it through the browser.
+"""
+
+import json
+import queue
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from control.geometry import FlipperGeometry
+from control.modes import Mode
+from control.records import Phase
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.log.rows import STRIDE, TICK
+from firmware_host.log_reading.live_rows import LiveRow, LiveRows
+from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+
+PAGE = Path(__file__).with_name("page.html")
+INTERVAL_S = 0.1  # between two messages
+QUEUED = 20  # messages for one viewer: two seconds
+RECENT_STRIDES = 60  # that a new viewer gets
+STOP_HEADER = "X-Mudskipper"
+LOCAL = ("127.0.0.1", "localhost", "[::1]")
+
+
+class Viewer:
+    """Owns the messages that one browser has not fetched."""
+
+    def __init__(self) -> None:
+        self._messages: queue.Queue[str] = queue.Queue(QUEUED)
+        self.lost = 0
+
+    def put(self, message: dict[str, Any]) -> None:
+        try:
+            self._messages.put_nowait(json.dumps(message | {"lost": message.get("lost", 0) + self.lost}))
+        except queue.Full:
+            self.lost += 1
+
+    def get(self, timeout_s: float) -> str | None:
+        try:
+            return self._messages.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+
+
+class Viewers:
+    """Owns the viewers and what a new one has to know."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._viewers: list[Viewer] = []
+        self._robot: dict[str, Any] = {}
+        self._strides: list[dict[str, Any]] = []
+        self._tick: dict[str, Any] | None = None
+
+    def begin(self, robot: dict[str, Any]) -> None:
+        with self._lock:
+            self._robot, self._strides = robot, []
+            self._send({"robot": robot})
+
+    def add(self) -> Viewer:
+        viewer = Viewer()
+        with self._lock:
+            viewer.put({"robot": self._robot, "tick": self._tick, "strides": self._strides})
+            self._viewers.append(viewer)
+        return viewer
+
+    def remove(self, viewer: Viewer) -> None:
+        with self._lock:
+            self._viewers.remove(viewer)
+
+    def publish(self, message: dict[str, Any]) -> None:
+        with self._lock:
+            self._tick = message["tick"] or self._tick
+            self._strides = [*self._strides, *message["strides"]][-RECENT_STRIDES:]
+            self._send(message)
+
+    def _send(self, message: dict[str, Any]) -> None:
+        for viewer in self._viewers:
+            viewer.put(message)
+
+
+class PageServer:
+    """Owns the HTTP server and the rows of the interval under way. Raises OSError if the port is in use."""
+
+    def __init__(self, host: str, port: int, status_socket: Path) -> None:
+        self._viewers = Viewers()
+        self._server = ThreadingHTTPServer((host, port), _handler(self._viewers, host, status_socket))
+        self._server.daemon_threads = True  # a browser that hangs must not keep this program
+        self.port = int(self._server.server_address[1])
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+        self._reset()
+
+    def _reset(self) -> None:
+        self._tick: dict[str, Any] | None = None
+        self._sent_s = 0.0
+        self._strides: list[dict[str, Any]] = []
+        self._events: list[dict[str, Any]] = []
+
+    def begin(self, source: LiveRows) -> None:
+        self._reset()
+        self._viewers.begin(robot_facts(source.configuration_text))
+
+    def take(self, rows: Sequence[LiveRow], lost: int) -> None:
+        newest = None
+        for row in rows:
+            if row.kind.topic == TICK.topic:
+                newest = row
+            else:
+                kept = self._strides if row.kind.topic == STRIDE.topic else self._events
+                kept.append(finite(row.values))
+        if newest is not None:
+            self._tick = finite(newest.values)
+        if self._tick is not None and self._is_due(self._tick["stamp_s"]):
+            self._viewers.publish({"tick": self._tick, "strides": self._strides, "events": self._events, "lost": lost})
+            self._strides, self._events = [], []
+
+    def _is_due(self, stamp_s: float) -> bool:
+        due = not 0.0 <= stamp_s - self._sent_s < INTERVAL_S
+        self._sent_s = stamp_s if due else self._sent_s
+        return due
+
+    def close(self) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+
+
+def robot_facts(configuration_text: str) -> dict[str, Any]:
+    """Return what the page draws the robot with; the defaults where the configuration is of another version."""
+    name, geometry = "", FlipperGeometry()
+    with suppress(ConfigurationError):
+        configuration = parse_configuration(configuration_text)
+        name, geometry = configuration.robot.name, configuration.geometry
+    return {
+        "name": name,
+        "flipper_length_m": geometry.flipper_length_m,
+        "drop_m": geometry.drop_m,
+        "axis_height_m": geometry.axis_height_m,
+        "plate_width_m": geometry.plate_width_m,
+        "modes": {int(mode): mode.name.lower() for mode in Mode},
+        "phases": {int(phase): phase.name.lower() for phase in Phase},
+    }
+
+
+def finite(values: dict[str, Any]) -> dict[str, Any]:
+    """Replace numbers that JSON does not have by None."""
+    return {name: _finite(value) for name, value in values.items()}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _handler(viewers: Viewers, host: str, status_socket: Path) -> type[BaseHTTPRequestHandler]:
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_GET(self) -> None:
+            if self.path == "/":
+                self._answer(HTTPStatus.OK, PAGE.read_bytes(), "text/html; charset=utf-8")
+            elif self.path == "/rows":
+                self._stream()
+            else:
+                self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
+
+        def do_POST(self) -> None:
+            if self.path != "/stop":
+                self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
+            elif self.headers.get(STOP_HEADER) != "stop" or not self._is_own_address():
+                self._answer(HTTPStatus.FORBIDDEN, b"only the page of this server may stop the robot")
+            else:
+                self._answer(*stop_robot(status_socket))
+
+        def _is_own_address(self) -> bool:
+            asked = self.headers.get("Host", "").rsplit(":", 1)[0]
+            return asked == host or (asked in LOCAL and host in LOCAL)
+
+        def _stream(self) -> None:
+            viewer = viewers.add()
+            self.send_response(HTTPStatus.OK)
+            self.send_header("Content-Type", "text/event-stream")
+            self.send_header("Cache-Control", "no-store")
+            self.send_header("Connection", "close")
+            self.end_headers()
+            with suppress(OSError):  # the browser has gone
+                while True:
+                    message = viewer.get(1.0)
+                    self.wfile.write(f"data: {message}\n\n".encode() if message else b": no rows\n\n")
+            viewers.remove(viewer)
+
+        def _answer(self, status: HTTPStatus, content: bytes, kind: str = "text/plain; charset=utf-8") -> None:
+            self.send_response(status)
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(content)))
+            self.send_header("Content-Security-Policy", "default-src 'self' 'unsafe-inline'; frame-ancestors 'none'")
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, format: str, *args: Any) -> None:
+            """Requests are not printed."""
+
+    return Handler
+
+
+def stop_robot(status_socket: Path) -> tuple[HTTPStatus, bytes]:
+    try:
+        client = StatusClient(status_socket)
+        try:
+            client.call("stop")
+        finally:
+            client.close()
+    except (NoDaemonError, NotPermittedError, CallRefusedError) as problem:
+        return HTTPStatus.CONFLICT, f"not stopped: {problem}. Cut motor power.".encode()
+    return HTTPStatus.OK, b"the robot stops"
