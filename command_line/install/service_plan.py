@@ -25,10 +25,11 @@ SYSUSERS = "etc/sysusers.d/mudskipper.conf"
 LINK_FILE = "etc/systemd/network/80-can.link"
 NETWORK = "etc/systemd/network/80-can.network"
 UNIT = "etc/systemd/system/mudskipper.service"
+LIVE_UNIT = "etc/systemd/system/mudskipper-live.service"  # not enabled by the installation
 CONFIGURATION = "etc/mudskipper/mudskipper.toml"
 SOURCES = {  # name in systemd/ by installed path
     SYSUSERS: "mudskipper.sysusers",
-    **{path: path.rpartition("/")[2] for path in (LINK_FILE, NETWORK, UNIT, CONFIGURATION)},
+    **{path: path.rpartition("/")[2] for path in (LINK_FILE, NETWORK, UNIT, LIVE_UNIT, CONFIGURATION)},
 }
 OWNED = ("etc/mudskipper", "var/lib/mudskipper")  # folders that a purge removes
 
@@ -104,7 +105,8 @@ def source_folder() -> Path:
 def load_sources(prefix: Path) -> dict[str, str]:
     """Returns the text of each file by its installed path. Raises OSError."""
     texts = {path: (source_folder() / name).read_text(encoding="utf-8") for path, name in SOURCES.items()}
-    texts[UNIT] = texts[UNIT].replace(DEFAULT_PREFIX, str(prefix))
+    for unit in (UNIT, LIVE_UNIT):
+        texts[unit] = texts[unit].replace(DEFAULT_PREFIX, str(prefix))
     return texts
 
 

@@ -183,12 +183,13 @@ def expand(name: str) -> set[str]:
     return calls.union(*(expand(word) for word in words if word[0] == "@"))
 
 
-def test_systemd_finds_nothing_wrong_with_the_unit(unit: Settings, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["mudskipper.service", "mudskipper-live.service"])
+def test_systemd_finds_nothing_wrong_with_a_unit(name: str, tmp_path: Path) -> None:
     """`verify` wants the program to be there, so the copy that it reads starts this Python instead."""
-    copy = tmp_path / "mudskipper.service"
+    copy, unit = tmp_path / name, read_settings(name)
     program = Path(tempfile.mkdtemp(prefix="mud-")) / "python"  # a path without spaces, wherever this lies
     program.symlink_to(sys.executable)
-    text = (SYSTEMD / "mudskipper.service").read_text(encoding="utf-8")
+    text = (SYSTEMD / name).read_text(encoding="utf-8")
     copy.write_text(text.replace(unit["ExecStart"][0], str(program)), encoding="utf-8")
     done = systemd_analyze("verify", "--man=no", str(copy))
     assert (done.returncode, done.stderr) == (0, "")
@@ -197,4 +198,12 @@ def test_systemd_finds_nothing_wrong_with_the_unit(unit: Settings, tmp_path: Pat
 def test_the_service_is_exposed_no_more_than_a_well_hardened_one() -> None:
     """1.3 of 10 on systemd's scale; most of what is left is the robot's need of CAN and of real time."""
     done = systemd_analyze("security", "--offline=true", "--threshold=13", str(SYSTEMD / "mudskipper.service"))
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_service_for_viewers_reaches_this_computer_alone_and_has_no_real_time() -> None:
+    live = read_settings("mudskipper-live.service")
+    assert (only(live, "IPAddressDeny"), only(live, "IPAddressAllow")) == ("any", "localhost")
+    assert only(live, "RestrictRealtime") == "yes" and only(live, "DynamicUser") == "yes"
+    done = systemd_analyze("security", "--offline=true", "--threshold=13", str(SYSTEMD / "mudskipper-live.service"))
     assert done.returncode == 0, done.stdout

@@ -227,7 +227,7 @@ def test_a_failure_says_what_was_done_and_the_next_run_does_the_rest(
     said = capsys.readouterr().err
     assert "could not run systemd-sysusers" in said
     assert "Failed to connect to bus" in said
-    assert "done before that: 6 of 11 steps" in said
+    assert "done before that: 7 of 12 steps" in said
     assert "Traceback" not in said
     machine.failing = ""
     assert machine.install() == exit_codes.OK
