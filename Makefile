@@ -11,7 +11,10 @@ REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command
 # Ends a test that hangs, and prints where it hangs.
 PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --durations=10 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
-.PHONY: help setup demo test test-vm mutants dst lint docs docs-links man clean
+# Exact versions with hashes, for installations as root; --upgrade in ARGS takes newer versions.
+LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
+
+.PHONY: help lock setup demo test test-vm mutants dst lint docs docs-links man clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -41,6 +44,11 @@ lint: .venv/test .venv/docs  ## run ruff and mypy --strict
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
+
+lock: .venv/setup  ## write requirements/*.txt for the installation as root, from pyproject.toml; needs the Internet
+	@$(PIP) "uv>=0.5"
+	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen pyproject.toml - --output-file requirements/robot.txt $(ARGS)
+	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra plots --extra data pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
 
 docs: .venv/docs  ## build the documentation into build/docs; a warning is an error
 	@$(SPHINX) -b html docs build/docs

@@ -12,7 +12,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -42,6 +41,9 @@ INITRAMFS = {  # no more than reaches the disk: every megabyte of it costs a sec
     "etc/initramfs-tools/conf.d/small": "MODULES=list\nCOMPRESS=lz4\nFSTYPE=ext4\n",
     "etc/initramfs-tools/modules": "virtio_pci\nvirtio_blk\next4\n",
 }
+REQUIREMENTS = PROJECT / "requirements"
+LOCK = "robot.txt"
+HASHED = ["--require-hashes", "--only-binary=:all:"]
 WHEELS = "/opt/wheels"
 PLATFORMS = ("manylinux_2_28_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64")
 IN_THE_GUEST = (
@@ -81,11 +83,6 @@ def run(command: Sequence[str | Path]) -> None:
         raise BuildError(f"{output}\n{command[0]} failed with status {done.returncode}: the last lines above say why.")
 
 
-def _requirements() -> list[str]:
-    document = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
-    return [*document["project"]["dependencies"], *document["build-system"]["requires"]]
-
-
 def fingerprint(*texts: bytes) -> str:
     digest = hashlib.sha256()
     for text in texts:
@@ -95,7 +92,9 @@ def fingerprint(*texts: bytes) -> str:
 
 def base_system() -> Path:
     """Returns the archive with these packages and dependencies, and builds it where it does not exist."""
-    key = fingerprint(" ".join([*_debian_command(), *INITRAMFS.values(), *PLATFORMS]).encode())
+    key = fingerprint(
+        " ".join([*_debian_command(), *INITRAMFS.values(), *PLATFORMS]).encode(), (REQUIREMENTS / LOCK).read_bytes()
+    )
     archive = STORE / f"base-{key}.tar"
     if not archive.exists():
         shutil.rmtree(STORE, ignore_errors=True)
@@ -111,9 +110,9 @@ def base_system() -> Path:
 
 def _fetch_wheels() -> None:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(STORE / "wheels")]
-    command += ["--only-binary=:all:", "--implementation=cp", f"--python-version={GUEST_PYTHON}"]
+    command += [*HASHED, "--implementation=cp", f"--python-version={GUEST_PYTHON}"]
     command += [f"--platform={platform}" for platform in PLATFORMS]
-    run([*command, *_requirements()])
+    run([*command, "-r", REQUIREMENTS / LOCK])
 
 
 def _write_initramfs_settings() -> None:
@@ -129,6 +128,7 @@ def _debian_command() -> list[str]:
     command += [f"--essential-hook=copy-in {STORE / 'settings' / 'etc'} /"]  # before the kernel makes its initramfs
     command += [f"--customize-hook=copy-in {STORE / 'wheels'} /opt"]
     command += [f"--customize-hook={IN_THE_GUEST} python3 -m venv /opt/mudskipper/venv"]
-    quoted = " ".join(f"'{requirement}'" for requirement in _requirements())
-    command += [f"--customize-hook={IN_THE_GUEST} /opt/mudskipper/venv/bin/pip install {quoted}"]
+    command += [f"--customize-hook=copy-in {REQUIREMENTS} /opt"]
+    locked = f"{' '.join(HASHED)} -r /opt/requirements/{LOCK}"
+    command += [f"--customize-hook={IN_THE_GUEST} /opt/mudskipper/venv/bin/pip install {locked}"]
     return [*command, SUITE]
