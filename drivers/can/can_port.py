@@ -8,7 +8,6 @@ watchdogs with an old command after this process has died.
 """
 
 import logging
-import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
@@ -16,16 +15,19 @@ from typing import Any, Protocol
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from drivers.can.frames import Frame
+from control.records import NEVER_S
+from drivers.can.frames import Frame, without_stamps
 from drivers.can.port_health import MOST_FRAMES_PER_READ as MOST_FRAMES_PER_READ
 from drivers.can.port_health import BusState as BusState  # re-exported for users of a port
 from drivers.can.port_health import PortHealth
 from drivers.can.slcan_serial import SlcanSerial
 from drivers.can.socketcan_port import SocketcanPort
+from drivers.can.stamp_clock import StampClock
 
 # slcan raises them for an unplugged adapter or a malformed line; socketcan asserts that a frame has a time stamp.
 PORT_ERRORS = (can.CanError, OSError, ValueError, IndexError, AssertionError)
 MOST_FAILURES_PER_READ = 32
+ECHOING_INTERFACES = ("udp_multicast",)
 
 
 class CanPort(Protocol):
@@ -53,9 +55,10 @@ class CanPort(Protocol):
 class PythonCanPort(PortHealth):
     """Sends and receives through any python-can interface."""
 
-    def __init__(self, bus: can.BusABC) -> None:
+    def __init__(self, bus: can.BusABC, clock: StampClock | None = None) -> None:
         super().__init__()
         self._bus = bus
+        self._clock = clock or StampClock()
 
     def listen_to(self, ids: Iterable[int]) -> None:
         """Does nothing, because python-can would build a Message first and compare it then."""
@@ -63,7 +66,7 @@ class PythonCanPort(PortHealth):
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
         failures = 0
-        clock_s = time.monotonic() - time.time()  # python-can stamps with the wall clock
+        clock_s = self._clock.offset_s()  # python-can stamps with the wall clock
         for _ in range(MOST_FRAMES_PER_READ):
             try:
                 message = self._bus.recv(0.0)
@@ -82,7 +85,7 @@ class PythonCanPort(PortHealth):
                 frames.append(frame_from(message, clock_s))
                 if self.state is BusState.OFF:
                     self.on_frame(message.is_rx)
-        return frames
+        return frames if self._clock.offset_s() > NEVER_S else without_stamps(frames)
 
     def _drained(self) -> bool:
         """Returns whether a `recv` without a frame means that none has arrived."""
@@ -150,9 +153,15 @@ def message_from(frame: Frame) -> can.Message:
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> CanPort:
-    """Opens an interface; raises python-can's own errors where it does not open: see firmware_host/buses.py."""
+    """Opens an interface; raises python-can's own errors where it does not open: see firmware_host/buses.py.
+
+    The configuration files and environment variables of python-can are ignored: they would add a user's own options to
+    the bus, and reading them leaves garbage in cycles, which a process without a garbage collector never frees.
+    """
+    if interface in ECHOING_INTERFACES or options.get("receive_own_messages"):
+        raise ValueError("it would receive its own frames, which look like another program's commands")
     logging.getLogger("can").setLevel(logging.WARNING)  # at level debug it would format every frame
-    bus = can.Bus(interface=interface, channel=channel, **options)  # type: ignore[arg-type]
+    bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **options)  # type: ignore[arg-type]
     if isinstance(bus, SocketcanBus):
         return SocketcanPort(bus)
     return SlcanPort(bus) if interface == "slcan" else PythonCanPort(bus)

@@ -85,3 +85,7 @@ def _decode_fd(data: bytes) -> Frame:
         is_fd=True,
         bit_rate_switch=flags & FD_BIT_RATE_SWITCH != 0,
     )
+
+
+def without_stamps(frames: list[Frame]) -> list[Frame]:
+    return [frame._replace(stamp_s=NEVER_S) for frame in frames]

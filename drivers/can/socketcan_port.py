@@ -13,7 +13,6 @@ frames on the bus are neither received nor counted: `candump` shows them.
 
 import socket
 import struct
-import time
 from collections.abc import Iterable
 
 from can.interfaces.socketcan import SocketcanBus
@@ -31,8 +30,10 @@ from drivers.can.frames import (
     Frame,
     decode_frame,
     encode_frame,
+    without_stamps,
 )
 from drivers.can.port_health import MOST_FRAMES_PER_READ, BusState, PortHealth
+from drivers.can.stamp_clock import StampClock
 
 SO_TIMESTAMPNS, SO_RXQ_OVFL = 35, 40  # asm-generic/socket.h
 STAMP, COUNT = struct.Struct("@ll"), struct.Struct("@I")  # in native layout: struct timespec, __u32
@@ -48,8 +49,9 @@ ALL_EXTENDED_BITS = EXTENDED_MASK | REMOTE_FLAG
 class SocketcanPort(PortHealth):
     """Sends and receives on the socket. Owns its mode, and the kernel's last count of lost frames."""
 
-    def __init__(self, bus: SocketcanBus) -> None:
+    def __init__(self, bus: SocketcanBus, clock: StampClock | None = None) -> None:
         super().__init__()
+        self._clock = clock or StampClock()
         self._bus = bus
         self._socket = bus.socket
         self._socket.setblocking(False)
@@ -69,7 +71,7 @@ class SocketcanPort(PortHealth):
     def receive(self) -> list[Frame]:
         frames: list[Frame] = []
         read = self._socket.recvmsg
-        clock_s = time.monotonic() - time.time()  # the kernel stamps with the wall clock
+        clock_s = self._clock.offset_s()  # the kernel stamps with the wall clock
         for _ in range(MOST_FRAMES_PER_READ):
             try:
                 encoded, ancillary, marks, _ = read(READ_BYTES, ANCILLARY_BYTES)
@@ -83,7 +85,7 @@ class SocketcanPort(PortHealth):
                 frames.append(frame)
                 if self.state is BusState.OFF:  # MSG_DONTROUTE marks frames of other processes on this computer
                     self.on_frame(not marks & socket.MSG_DONTROUTE)
-        return frames
+        return frames if self._clock.offset_s() > NEVER_S else without_stamps(frames)
 
     def _on_frame(self, encoded: bytes, ancillary: list[tuple[int, int, bytes]], clock_s: float) -> Frame | None:
         """Returns the frame, or None for an error frame and for bytes that are no frame."""
