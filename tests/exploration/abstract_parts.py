@@ -24,6 +24,7 @@ class AbstractController(Controller):
     def __init__(self) -> None:
         self.order, self.target = WalkOrder(0.03), RESTING
         self.recovery = SimpleNamespace(attempt=0, events="")  # type: ignore[assignment]
+        self.joint_targets = None
         self.done = False
         self.restore(Memory())
 

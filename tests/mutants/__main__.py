@@ -58,7 +58,7 @@ def _run_tests(subject: Subject, tree: ast.Module) -> int:
         exec(compile(tree, module.__file__, "exec"), module.__dict__)  # a mutant of our own file
     except (AttributeError, IndexError, KeyError, NameError, TypeError, ValueError):
         return 1
-    options = ["-x", "-q", "-p", "no:cacheprovider", "--hypothesis-seed=1", "-k", subject.selected]
+    options = ["-x", "-q", "-p", "no:cacheprovider", "--noconftest", "-k", subject.selected]
     return int(pytest.main([*options, *(str(ROOT / "tests" / path) for path in subject.tests)]))
 
 
@@ -92,7 +92,7 @@ def check(subject: Subject) -> bool:
 def main(names: list[str]) -> int:
     os.chdir(ROOT)
     os.nice(NICENESS)
-    hypothesis.settings.register_profile("mutants", deadline=None, database=None)
+    hypothesis.settings.register_profile("mutants", deadline=None, derandomize=True)
     hypothesis.settings.load_profile("mutants")
     subjects = [subject for subject in SUBJECTS if not names or subject.module in names]
     for subject in subjects:

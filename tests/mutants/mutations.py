@@ -124,7 +124,7 @@ def _nodes(tree: ast.Module) -> Iterator[ast.AST]:
             continue
         yield node
         for name, value in ast.iter_fields(node):
-            if name in ("annotation", "returns"):
+            if name in ("annotation", "returns", "decorator_list"):
                 continue
             waiting += [each for each in (value if isinstance(value, list) else [value]) if isinstance(each, ast.AST)]
 
@@ -152,6 +152,7 @@ def parsed(module: str) -> ast.Module:
 
 def mutants_of(module: str) -> Iterator[Mutant]:
     original = parsed(module)
+    parents = {child: node for node in ast.walk(original) for child in ast.iter_child_nodes(node)}
     for number, node in enumerate(_nodes(original)):
         for kind in (changes_of, omissions_of):
             for position, (text, _) in enumerate(kind(node)):
@@ -159,6 +160,7 @@ def mutants_of(module: str) -> Iterator[Mutant]:
                 copied = list(_nodes(tree))[number]
                 _, change = list(kind(copied))[position]
                 change()
-                source = ast.unparse(node).splitlines()[0][:90]
+                shown = parents[node] if isinstance(node, ast.Constant) else node
+                source = ast.unparse(shown).splitlines()[0][:90]
                 line = getattr(node, "lineno", 0)
                 yield Mutant(line, f"{text} in `{source}`", ast.fix_missing_locations(tree))

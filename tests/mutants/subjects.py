@@ -12,14 +12,60 @@ class Subject(NamedTuple):
     equivalent: dict[str, str] = {}  # the text of a mutant that behaves the same, and why
 
 
+A_TEXT = "a text of the diagram"
+CONTINUOUS = "the fade has the same value there from both sides"
+NOT_FINITE = "a difference with NaN is NaN as much as a sum"
+SPEED = "the rest then computes the same from nothing"
 SUBJECTS = (
     Subject("drivers.transmit_gate", ("drivers/test_transmit_gate.py",), EVERY_MUTANT),
     Subject("drivers.odrive.gate_tables", ("drivers/test_transmit_gate.py",), EVERY_MUTANT),
-    Subject("drivers.can.reopening_port", ("drivers/can/test_reopening_port.py",)),
-    Subject("control.limits", ("control/test_limits.py",)),
-    Subject("control.modes", ("control/test_modes.py",)),
-    Subject("control.fault_latch", ("control/test_fault_latch.py",)),
-    Subject("control.monitors.joint_monitor", ("control/monitors/test_joint_monitor.py",)),
+    Subject(
+        "drivers.can.reopening_port",
+        ("drivers/can/test_reopening_port.py",),
+        equivalent={
+            "always in `if self._failed_before + port.failed_sends != self.failed_sends:`": (
+                "the same counters are only read more often"
+            ),
+        },
+    ),
+    Subject(
+        "control.limits",
+        ("control/test_limits.py",),
+        equivalent={
+            "to Sub in `a + b + c + d`": NOT_FINITE,
+            "to Sub in `a + b + c`": NOT_FINITE,
+            "to Sub in `a + b`": NOT_FINITE,
+            "True to False in `strict=True`": "four joints have four values by their type",
+            "GtE to Gt in `velocity_rad_s >= limit_rad_s`": CONTINUOUS,
+            "LtE to Lt in `velocity_rad_s <= (1.0 - VELOCITY_FADE) * limit_rad_s`": CONTINUOUS,
+        },
+    ),
+    Subject(
+        "control.modes",
+        ("control/test_modes.py",),
+        equivalent={
+            "'raised' to 'XXraised' in `_is('raised', lambda health: health.raised)`": A_TEXT,
+            "'walk' to 'XXwalk' in `Cause('walk', lambda request, health:"
+            " request is Request.WALK and health.reaction < Reacti`": A_TEXT,
+            "'_' to 'XX_' in `reaction.name.lower().replace('_', ' ')`": A_TEXT,
+            "5 to 6 in `CLEAR = 5`": "a request's number is never read, and no log contains it",
+        },
+    ),
+    Subject(
+        "control.fault_latch",
+        ("control/test_fault_latch.py",),
+        equivalent={
+            "without `if not present and (not self._present):` in"
+            " `def update(self, present: Sequence[Fault], energised: bool, clearing: bool=False, ticks: i`": SPEED,
+            "never in `if not present and (not self._present):`": SPEED,
+            "without `return` in `if not present and (not self._present):`": SPEED,
+            "0 to 1 in `self._tick = 0`": "only differences of ticks count",
+        },
+    ),
+    Subject(
+        "control.monitors.joint_monitor",
+        ("control/monitors/test_joint_bounds.py", "control/monitors/test_joint_monitor.py"),
+    ),
     Subject("control.monitors.encoder_monitor", ("control/monitors/test_encoder_monitor.py",)),
     Subject("firmware_host.operator.lease", ("firmware_host/operator/test_lease.py",)),
 )
