@@ -166,7 +166,8 @@ class AbstractDrives(OdriveDrives):
         return Joints(one, other, one, other)
 
     def send(self, torques_nm: Torques, elapsed_s: float) -> None:
-        super().send(torques_nm[:2], elapsed_s)  # type: ignore[arg-type]
+        for axis, torque_nm in zip(self.both, torques_nm[:2], strict=True):
+            axis.send_torque(torque_nm)
 
     @property
     def health(self) -> Joints[DriveHealth]:

@@ -8,7 +8,7 @@ from typing import Any
 from control.controller import ALL_TRUSTED, DAMPING_S, RESTING, SOFT_STOP_S, Controller, WalkOrder
 from control.faults import Fault, FaultKind
 from control.modes import ENERGISED, MOVING, Mode
-from control.records import DriveStates, Joints, Torques, same_for_all
+from control.records import DriveStates, Joints, JointTargets, Torques, same_for_all
 from firmware_host.fault_monitor import ARMING_S, FaultMonitor, MonitorInput
 from firmware_host.ticker import Tick
 from tests.exploration.abstract_drives import PERIOD_S, SILENT_HEARTBEATS
@@ -24,7 +24,6 @@ class AbstractController(Controller):
     def __init__(self) -> None:
         self.order, self.target = WalkOrder(0.03), RESTING
         self.recovery = SimpleNamespace(attempt=0, events="")  # type: ignore[assignment]
-        self.joint_targets = None
         self.done = False
         self.restore(Memory())
 
@@ -47,6 +46,10 @@ class AbstractController(Controller):
     @property
     def rested(self) -> bool:
         return self._mode is Mode.HOLD and self._since_s > LONGEST_HOLD_S
+
+    @property
+    def followed_targets(self) -> JointTargets | None:
+        return None
 
     @property
     def moving(self) -> bool:
