@@ -21,6 +21,7 @@ from firmware_host.configuration.file_problems import why_not
 
 METHODS = ("default", "paper")  # of estimation
 EXTRA_OF = {"matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data"}  # by module
+VIEWERS = ("foxglove", "plotjuggler", "rerun")
 COUNT = whole(0, 100000)
 SEVERAL_FILES = "log of this project; several files are the segments of one run"
 ANY_LOG = "log of this project, its segments, or a CSV file of the paper's authors"
@@ -207,6 +208,11 @@ def _add_logs(commands: Commands) -> None:
     preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
     preserve.add_argument("--undo", action="store_true", help="include them again")
     _add_catalogue(actions)
+    opening = add(actions, "open", "viewers.open_log.open_log", "Open a log in a viewer, with the project's layout.")
+    opening.add_argument("file", type=Path)
+    opening.add_argument(
+        "--with", choices=VIEWERS, required=True, dest="viewer", help="foxglove: Lichtblick or Foxglove"
+    )
     listing = add(actions, "list", "logs.log_folder_commands.list_logs", "List the logs and the room that is left.")
     listing.add_argument("folder", type=Path, nargs="?", help="of the logs (default: the configured one)")
     recover = add(actions, "recover", "logs.log_folder_commands.recover", "Repair logs whose writer was interrupted.")

@@ -1,0 +1,125 @@
+"""Every path in a layout is a field of our logs, or of an export's standard messages, that a viewer can show."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from command_line.viewers import rerun_blueprint
+from command_line.viewers.open_log import LAYOUTS
+from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.schema import TEXT
+from firmware_host.open_data.ros_definitions import DEFINITIONS
+from firmware_host.open_data.ros_messages import TOPICS
+from tests.folders import ROOT
+
+FIELDS = {kind.topic: {field.name: field for field in kind.fields} for kind in ROW_KINDS}
+FOXGLOVE = re.compile(r"(?P<topic>/\w+)(?:\{(?P<filter>\w+)==\d+\})?\.(?P<field>\w+)(?:\[(?P<index>\d+)\])?")
+PLOTJUGGLER = re.compile(r"(?P<topic>/\w+)/(?P<field>\w+)(?:\[(?P<index>\d+)\])?")
+
+
+def layout_of_foxglove() -> dict[str, Any]:
+    layout: dict[str, Any] = json.loads((LAYOUTS / "foxglove.json").read_text(encoding="utf-8"))
+    return layout
+
+
+def paths_of_foxglove() -> list[str]:
+    panels = layout_of_foxglove()["configById"].values()
+    paths = [path["value"] for panel in panels for path in panel.get("paths", [])]
+    return paths + [panel["topicPath"] for panel in panels if "topicPath" in panel]
+
+
+def paths_of_plotjuggler() -> list[str]:
+    tree = ElementTree.parse(LAYOUTS / "plotjuggler.xml")
+    return [curve.attrib["name"] for curve in tree.iter("curve")]
+
+
+def problem_of(path: str, grammar: re.Pattern[str], numeric: bool) -> str:
+    """Says what is wrong with a path; empty for one that shows a value."""
+    found = grammar.fullmatch(path)
+    if not found or found["topic"] not in FIELDS:
+        return f"{path}: no topic of ours"
+    fields = FIELDS[found["topic"]]
+    wanted = [found["field"], *filter(None, [found.groupdict().get("filter")])]
+    if not fields.keys() >= set(wanted):
+        return f"{path}: no such field"
+    field = fields[found["field"]]
+    index = None if found["index"] is None else int(found["index"])
+    if (index is None) != (field.length == 0) or (index is not None and index >= field.length):
+        return f"{path}: {field.length} values"
+    return f"{path}: text" if numeric and field.kind == TEXT else ""
+
+
+def test_foxglove_shows_fields_of_the_log() -> None:
+    paths = paths_of_foxglove()
+    assert len(paths) > 30
+    assert [problem for path in paths if (problem := problem_of(path, FOXGLOVE, numeric=path != "/event.text"))] == []
+
+
+def test_plotjuggler_shows_fields_of_the_log() -> None:
+    paths = paths_of_plotjuggler()
+    assert len(paths) > 20
+    assert [problem for path in paths if (problem := problem_of(path, PLOTJUGGLER, numeric=True))] == []
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/tick.angle_rad", "/tick.angle_rad[4]", "/tick.angle", "/tock.mode", "/stride{side==0}.k_p", "/tick.mode[0]"],
+)
+def test_a_wrong_path_is_noticed(path: str) -> None:
+    assert problem_of(path, FOXGLOVE, numeric=True)
+
+
+def panels_in(layout: Any) -> Iterator[str]:
+    if isinstance(layout, str):
+        yield layout
+    else:
+        yield from panels_in(layout["first"])
+        yield from panels_in(layout["second"])
+
+
+def test_every_panel_of_foxglove_is_placed_and_described() -> None:
+    layout = layout_of_foxglove()
+    tabs = layout["configById"][layout["layout"]]["tabs"]
+    placed = {panel for tab in tabs for panel in panels_in(tab["layout"])}
+    assert placed | {layout["layout"]} == layout["configById"].keys()
+
+
+def test_the_standard_topics_of_foxglove_are_exported() -> None:
+    panels = layout_of_foxglove()["configById"]
+    assert {*panels["3D!robot"]["topics"], panels["DiagnosticSummary!state"]["topicToRender"]} <= TOPICS.keys()
+
+
+def test_rerun_shows_what_an_export_contains() -> None:
+    for topic, name in rerun_blueprint.SCALARS.values():
+        assert f" {name}\n" in DEFINITIONS[TOPICS[topic]]
+    for number in rerun_blueprint.FORCES:
+        kind = TOPICS[number.topic]
+        assert kind == number.message
+        for name in number.path.split("."):
+            lines = [line.partition(" ") for line in DEFINITIONS[kind].splitlines()]
+            kind = {field: of for of, _, field in lines}[name]
+        assert kind == "float64"
+    own = {kind.topic for kind in ROW_KINDS}
+    assert {*rerun_blueprint.SPATIAL, *rerun_blueprint.TABLES.values()} <= TOPICS.keys() | own
+
+
+def test_plotjuggler_and_foxglove_can_decode_our_definitions() -> None:
+    """The grammar of ROS 2 has no field that this project invented."""
+    for kind in ROW_KINDS:
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(kind.definition, kind.schema_name))
+        assert [name for name, _ in store.fielddefs[kind.schema_name][1]] == [field.name for field in kind.fields]
+
+
+def test_layouts_are_installed() -> None:
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert '"command_line.viewers" = ["layouts/*"]' in project
+    assert {path.name for path in Path(LAYOUTS).iterdir()} == {"foxglove.json", "plotjuggler.xml"}

@@ -1,0 +1,66 @@
+"""`log open` starts an installed viewer with the layout, and says otherwise what is missing."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import VIEWERS, main
+from command_line.viewers import open_log
+from tests.command_line.command_lines import failure
+from tests.folders import ROOT
+
+LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """The commands of viewers that were started; none of them runs."""
+    commands: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "Popen", lambda command, **_: commands.append(command))
+    return commands
+
+
+def install(monkeypatch: pytest.MonkeyPatch, *programs: str) -> None:
+    monkeypatch.setattr(open_log, "which", lambda name: f"/opt/{name}" if name in programs else None)
+
+
+def test_an_installed_viewer_gets_log_and_layout(monkeypatch: pytest.MonkeyPatch, started: list[list[str]]) -> None:
+    install(monkeypatch, "plotjuggler", "lichtblick")
+    assert main(["log", "open", LOG, "--with", "plotjuggler"]) == exit_codes.OK
+    assert main(["log", "open", LOG, "--with", "foxglove"]) == exit_codes.OK
+    juggler, lichtblick = started
+    assert juggler[0] == "/opt/plotjuggler" and LOG in juggler and Path(juggler[-1]).is_file()
+    assert lichtblick == ["/opt/lichtblick", LOG]
+
+
+@pytest.mark.parametrize("viewer", VIEWERS)
+def test_a_missing_viewer_is_named(
+    viewer: str, monkeypatch: pytest.MonkeyPatch, started: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(monkeypatch)
+    assert main(["log", "open", LOG, "--with", viewer]) == exit_codes.UNHEALTHY
+    assert "installed here" in capsys.readouterr().err
+    assert not started
+
+
+def test_a_log_without_standard_messages_is_said(
+    monkeypatch: pytest.MonkeyPatch, started: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(monkeypatch, "foxglove")
+    main(["log", "open", LOG, "--with", "foxglove"])
+    assert "log export --ros" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("contents", [None, b"", b"no log"])
+def test_what_viewers_cannot_open_is_one_message(
+    contents: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str], started: list[list[str]]
+) -> None:
+    path = tmp_path / "cut.mcap"
+    if contents is not None:
+        path.write_bytes(contents)
+    assert str(path) in failure(capsys, "log", "open", str(path), "--with", "plotjuggler")
+    assert not started
