@@ -34,7 +34,7 @@ test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virt
 	@$(BIN)/python -m virtual_machine.installed_robot
 	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
 
-mutants: .venv/test  ## change gate, limits, modes, latch, monitors and lease in 1000 places; tests must notice each
+mutants: .venv/test  ## change what keeps the robot safe in 1200 places; its tests must notice each change
 	$(BIN)/python -m tests.mutants $(ARGS)
 
 dst: .venv/test  ## simulate SEEDS=200 random schedules of failures and operators; every promise must hold

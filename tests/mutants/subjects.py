@@ -66,6 +66,9 @@ SUBJECTS = (
         "control.monitors.joint_monitor",
         ("control/monitors/test_joint_bounds.py", "control/monitors/test_joint_monitor.py"),
     ),
-    Subject("control.monitors.encoder_monitor", ("control/monitors/test_encoder_monitor.py",)),
+    Subject(
+        "control.monitors.encoder_monitor",
+        ("control/monitors/test_encoder_bounds.py", "control/monitors/test_encoder_monitor.py"),
+    ),
     Subject("firmware_host.operator.lease", ("firmware_host/operator/test_lease.py",)),
 )

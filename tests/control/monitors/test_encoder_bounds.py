@@ -74,6 +74,44 @@ def test_rest_is_slower_than_a_nanoradian_per_second() -> None:
     assert "encoder_stuck" in frozen(0.02, [-2e-9] * 20)
 
 
+def pushed(gap_s: float, torques_nm: Iterable[float], velocity_rad_s: float = 0.0) -> list[bool]:
+    """Whether each sample of an angle that never changes, under these torques, is a fault."""
+    encoder = EncoderMonitor("left_sweep", JUMP_RAD)
+    return [
+        encoder.update(DriveState(0.3, velocity_rad_s, number * gap_s), PERIOD_S, torque_nm) is not None
+        for number, torque_nm in enumerate(torques_nm)
+    ]
+
+
+def test_a_resting_joint_yields_within_fifty_milliseconds_to_a_torque_that_changes_by_two_tenths() -> None:
+    for sign in (-1.0, 1.0):
+        assert pushed(0.0249, [0.0, 0.0, sign * 0.21, 0.0, 0.0]) == [False, False, False, True, True]
+        assert pushed(0.0251, [0.0, 0.0, sign * 0.21, 0.0]) == [False, False, True, True]
+        assert not any(pushed(0.02, [0.0] * 3 + [sign * 0.19] * 100))
+
+
+def test_the_torque_counts_from_the_first_repeated_sample_on() -> None:
+    """That of the sample before may have moved the joint to where it is."""
+    assert not any(pushed(0.02, [0.7] + [0.0] * 100))
+    assert any(pushed(0.02, [0.7, 0.7] + [0.0] * 100))
+
+
+def test_a_velocity_that_lives_begins_the_wait_for_a_torque_again() -> None:
+    encoder = EncoderMonitor("left_sweep", JUMP_RAD)
+    torques_nm = {0: 0.7, 1: 0.0}
+    for number in range(400):
+        velocity_rad_s = 1e-12 * (number // 3 % 2)  # each is repeated twice
+        state = DriveState(0.3, velocity_rad_s, 0.02 * number)
+        assert encoder.update(state, PERIOD_S, torques_nm[number % 2]) is None
+
+
+def test_the_torque_of_a_message_that_is_seen_again_is_not_counted() -> None:
+    encoder = EncoderMonitor("left_sweep", JUMP_RAD)
+    for number in range(100):
+        for torque_nm in (0.0, 0.7):
+            assert encoder.update(DriveState(0.3, 0.0, 0.02 * number), PERIOD_S, torque_nm) is None
+
+
 def test_two_velocities_tell_the_path_over_thirty_milliseconds_and_no_longer() -> None:
     assert found([(0.0, 0.0, 0.0), (0.03, 1.0, 0.0)]) == ["", "encoder_jump"]
     assert found([(0.0, 0.0, 0.0), (nextafter(0.03, 1.0), 1.0, 0.0)]) == ["", ""]
