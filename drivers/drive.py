@@ -169,6 +169,9 @@ class DriveType(Protocol):
     def read_frame(self, frame: Frame) -> FrameContent | None:
         """Returns the content of a frame by its id; None for frames of another kind than the protocol uses."""
 
+    def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
+        """Returns frames that other programs may send while torque is on, by name: they must not feed a watchdog."""
+
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
         """Returns the payload of a frame that reports errors, with these error flags added and the drive set to `idle`.
 

@@ -11,7 +11,7 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import DriveParameters, FrameContent, WatchdogEndpoints
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, MalformedMessageError
+from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
 from drivers.odrive.drives import OdriveDrives
 from drivers.odrive.parameters import OdriveParameters
 
@@ -26,6 +26,7 @@ SIGNALS: Mapping[int, tuple[str, ...]] = {
 REPORT_BYTES = 8  # of every cyclic message
 FAST_HZ, SLOW_HZ = 500.0, 10.0  # cyclic messages every 2 and every 100 ms, as docs/how-to/odrive.md sets them
 GATE_DRIVER_FAULT = 0x20
+UNUSED_NODE = 62  # the last one: ids are given from 0 on
 
 
 class Odrive:
@@ -54,6 +55,16 @@ class Odrive:
             return None
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
         return FrameContent(node_id, command in codec.COMMANDS, SIGNALS.get(command, ()))
+
+    def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
+        """Firmware 0.5 counts every frame to a drive as its controller's."""
+        return {
+            "requests of the position": Frame(arbitration_id(node_id, codec.GET_ENCODER_ESTIMATES), is_remote=True),
+            "requests of the version": Frame(arbitration_id(node_id, codec.GET_VERSION), is_remote=True),
+            "heartbeats of another drive": Frame(
+                arbitration_id(UNUSED_NODE, codec.HEARTBEAT), codec.HEARTBEAT.encode(0, AxisState.IDLE, 0, 0)
+            ),
+        }
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
         with suppress(MalformedMessageError):

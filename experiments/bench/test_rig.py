@@ -13,6 +13,8 @@ from control.faults import Fault, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
 from control.records import JOINTS, DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
+from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
 from experiments.bench.lateness import Lateness
 from experiments.bench.operator import BenchOperator
 from experiments.bench.rig import Rig
@@ -82,9 +84,11 @@ class TestRig:
         """Run the loop while the operator is asked, so that no frame waits and the drives stay idle."""
         self.run_for(POLL_S)
 
-    def tick_silently(self) -> Sample:
-        """Read the drives for one tick and send nothing."""
+    def tick_silently(self, others: Sequence[tuple[CanPort, Frame]] = ()) -> Sample:
+        """Read the drives for one tick and send nothing but the frames of `others`, as another program would."""
         tick = self.rig.wait()
+        for port, frame in others:
+            port.send(frame)
         states = self.drives.read(tick.now_s)
         if self._torque_on():
             self._update_lateness(tick, states)

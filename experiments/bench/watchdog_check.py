@@ -1,13 +1,20 @@
-"""Checks that the drives switch off by themselves when commands stop.
+"""Checks that the drives switch off by themselves when commands stop, also while other frames arrive.
 
 The flippers lie, and the adduction motors press them down a little, so that a current flows and nothing moves. Then the
 program sends nothing more. A heartbeat reports idle with a delay of up to one period; the current is exact to a tick.
+
+Then the same again among frames of each kind that another program may send at any time. A watchdog that they feed keeps
+the torque of a dead controller for as long as anything on the bus asks for telemetry.
 """
 
+from collections.abc import Sequence
 from math import nan
 
 from control.rate import PERIOD_S
 from control.records import DriveStates, Joints, Torques
+from drivers.can.can_port import CanPort
+from drivers.can.frames import Frame
+from drivers.drive_types import type_of
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, TestRig, first_lasting
 
@@ -25,13 +32,16 @@ def press(held: Torques, states: DriveStates) -> Torques:
     return Joints(0.0, -PRESSING_NM, 0.0, -PRESSING_NM)
 
 
-def let_watchdogs_trip(test_rig: TestRig) -> tuple[list[Sample], list[Sample]]:
+Others = Sequence[tuple[CanPort, Frame]]  # frames of another program in every tick, and their ports
+
+
+def let_watchdogs_trip(test_rig: TestRig, others: Others = ()) -> tuple[list[Sample], list[Sample]]:
     """Return the samples with torque, and those after the last command."""
     test_rig.arm(press)
     pressed = test_rig.run_for(PRESSING_S)
     silence: list[Sample] = []
     for _ in range(round((test_rig.configuration.faults.longest_watchdog_s + PATIENCE_S) / PERIOD_S)):
-        silence.append(test_rig.tick_silently())
+        silence.append(test_rig.tick_silently(others))
         if not any(state.closed_loop for sample in silence[-GONE_TICKS:] for state in sample.states):
             break
     test_rig.drives.disarm(test_rig.rig.now_s, at_once=True)
@@ -40,18 +50,47 @@ def let_watchdogs_trip(test_rig: TestRig) -> tuple[list[Sample], list[Sample]]:
 
 def check_watchdog_times(test_rig: TestRig) -> Readings:
     pressed, silence = let_watchdogs_trip(test_rig)
-    last_s = pressed[-1].tick.now_s
     late_s = LATE_TICKS * PERIOD_S
     for index, health in enumerate(test_rig.drives.health):
         timeout_s, joint = health.watchdog_s, health.joint
         advice = f"set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
-        idle_s = next((s.tick.now_s - last_s for s in silence if not s.states[index].closed_loop), nan)
+        idle_s = _idle_s(pressed, silence, index)
         latest_s = timeout_s + late_s + test_rig.configuration.drive[joint].heartbeat_period_s
         yield Reading(f"{joint}: idle after the last command", idle_s, "s", timeout_s - late_s, latest_s, advice)
         if "adduction" in joint:
             gone_s = _gone_s(pressed, silence, index)
             yield Reading(f"{joint}: no current after it", gone_s, "s", timeout_s - late_s, timeout_s + late_s, advice)
     yield from _reasons(test_rig)
+
+
+def check_what_feeds_watchdogs(test_rig: TestRig) -> Readings:
+    drive_type = type_of(test_rig.configuration.drive.values())
+    for kind in drive_type.harmless_frames(0):
+        others = [
+            (test_rig.drives.ports[drive.bus], drive_type.harmless_frames(drive.node_id)[kind])
+            for drive in test_rig.configuration.drive.values()
+        ]
+        yield from _readings_among(test_rig, kind, others)
+
+
+def _readings_among(test_rig: TestRig, kind: str, others: Others) -> Readings:
+    pressed, silence = let_watchdogs_trip(test_rig, others)
+    late_s = LATE_TICKS * PERIOD_S
+    for index, health in enumerate(test_rig.drives.health):
+        joint, timeout_s = health.joint, health.watchdog_s
+        idle_s = _idle_s(pressed, silence, index)
+        latest_s = timeout_s + late_s + test_rig.configuration.drive[joint].heartbeat_period_s
+        advice = f"{kind} feed its watchdog: no program may send them while torque is on; update its firmware"
+        yield Reading(f"{joint}: idle among {kind}", idle_s, "s", timeout_s - late_s, latest_s, advice)
+    for _ in range(round(REPORTING_S / PERIOD_S)):
+        test_rig.tick()
+    test_rig.clear_fault()
+
+
+def _idle_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
+    """Return the time from the last command to the first heartbeat without torque; NaN where none came."""
+    last_s = pressed[-1].tick.now_s
+    return next((sample.tick.now_s - last_s for sample in silence if not sample.states[index].closed_loop), nan)
 
 
 def _gone_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:

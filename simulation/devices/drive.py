@@ -30,6 +30,7 @@ class SimulatedDriveParameters:
     encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
     encoder_frozen: bool = False  # the last angle for ever, and exactly zero velocity: a magnet that came off
     watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
+    any_frame_feeds: bool = False  # its watchdog, as in firmware 0.5
     encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
     current_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
     heartbeat_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1

@@ -96,6 +96,8 @@ class SimulatedOdrive:
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & 0x1F
         if frame.is_extended or node_id != self.parameters.node_id or now_s < self._boots_until_s:
             return []
+        if self.parameters.any_frame_feeds:
+            self._fed_s = now_s
         if frame.is_remote:
             return [self._frame(message) for message in self._PAYLOADS if message.command == command]
         if command == codec.RX_SDO.command:

@@ -194,6 +194,13 @@ WRONG = (
         "watchdogs",
     ),
     Wrong(
+        "watchdog fed by any frame",
+        lambda c: with_drive(c, "right_adduction", any_frame_feeds=True),
+        "watchdogs",
+        "right_adduction: idle among requests of the position",
+        "watchdogs",
+    ),
+    Wrong(
         "soft gains",
         lambda c: SimulatedRig(
             replace(c, gains=replace(c.gains, sweep_stiffness_nm_rad=0.5, sweep_damping_nm_s_rad=0.01))
