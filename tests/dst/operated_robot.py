@@ -120,10 +120,13 @@ class OperatedRobot:
             )
         self._clients[client].call(method, params)
 
-    def step(self) -> None:
-        """Runs one tick of the robot and of the daemon."""
+    def begin_tick(self) -> None:
+        """Ends what is over before the next tick."""
         self.harms.update()
         self.calls.clear()
+
+    def step(self) -> None:
+        """Runs one tick of the robot and of the daemon."""
         if self.ended:
             self.lockstep.tick_number += 1
             self.lockstep.robot.advance(self.now_s)

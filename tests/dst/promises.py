@@ -19,6 +19,7 @@ from tests.dst.reachability import Reachability
 ROUNDING_NM = 1e-6
 ON_THE_WAY_TICKS = 3  # from a change of mode until the motor obeys
 CLAMP_S = 0.01  # after a joint was too fast: the current of the drive's clamp decays
+WEAKEST = 0.2  # gain of a motor
 STOP_TICKS = 4  # from an accepted request, beyond the time of the stop itself
 
 
@@ -67,29 +68,38 @@ class LimitedMotors(Promise):
         limits = self.loop.configuration.limits
         self._largest_nm, self._rate_nm_s = limits.torque_nm, limits.torque_rate_nm_s
         self._fast_rad_s = limits.velocity_rad_s
-        self._before_nm: list[float] = []
+        self._least_nm = WEAKEST * self._largest_nm  # less is within the limit, whatever the motor's gain is
+        self._torques_nm: Torques | None = None  # one step of the mechanics ago
+        drives = robot.lockstep.robot.drives
+        self._before_nm = [drive.torque_nm(robot.lockstep.robot.now_s) for drive in drives]  # as commanded
         self._fast_s = [NEVER_S] * len(JOINTS)
         self._changed_s = [robot.now_s] * len(JOINTS)
         self._broken: list[str] = []
         robot.lockstep.robot.observers.append(self._measure)
 
     def _measure(self, dt_s: float, torques_nm: Torques) -> None:
-        """Compares what the motors were commanded: their true torque over the gain of a harmed motor."""
+        """Looks at the motors whose torque changed or is large."""
         robot = self.robot.lockstep.robot
-        velocities_rad_s = robot.plant.velocities_rad_s
-        self._before_nm = self._before_nm or list(torques_nm)
+        self._torques_nm = self._torques_nm or torques_nm
         for index, torque_nm in enumerate(torques_nm):
-            gain = self.reach.gain(index)
-            commanded_nm, rounding_nm = torque_nm / gain, ROUNDING_NM + self.reach.cogging_nm / abs(gain)
-            if abs(velocities_rad_s[index]) > self._fast_rad_s:  # the drive's own clamp brakes it
+            speed_rad_s = robot.plant.velocities_rad_s[index] if torque_nm else 0.0
+            if abs(speed_rad_s) > self._fast_rad_s:  # the drive's own clamp brakes it
                 self._fast_s[index] = robot.now_s
-            if robot.now_s - self._fast_s[index] > CLAMP_S and not self.reach.is_foreign(index):
-                braking = commanded_nm * velocities_rad_s[index] < 0.0
-                if abs(commanded_nm) > self._largest_nm + rounding_nm and not braking:
-                    self._broken.append(f"{JOINTS[index]} has {commanded_nm:.3f} N·m of {self._largest_nm:g} N·m")
-                self._check_slew(index, commanded_nm, 2.0 * rounding_nm, robot.now_s)
-            if commanded_nm != self._before_nm[index]:
-                self._before_nm[index], self._changed_s[index] = commanded_nm, robot.now_s
+            if torque_nm != self._torques_nm[index] or abs(torque_nm) > self._least_nm:
+                self._check(index, torque_nm, speed_rad_s, robot.now_s)
+        self._torques_nm = torques_nm
+
+    def _check(self, index: int, torque_nm: float, speed_rad_s: float, now_s: float) -> None:
+        """Compares what a motor was commanded: its true torque over the gain of a harmed motor."""
+        gain = self.reach.gains[index]
+        commanded_nm, rounding_nm = torque_nm / gain, ROUNDING_NM + self.reach.cogging_nm / abs(gain)
+        if now_s - self._fast_s[index] > CLAMP_S and not self.reach.is_foreign(index):
+            braking = commanded_nm * speed_rad_s < 0.0
+            if abs(commanded_nm) > self._largest_nm + rounding_nm and not braking:
+                self._broken.append(f"{JOINTS[index]} has {commanded_nm:.3f} N·m of {self._largest_nm:g} N·m")
+            self._check_slew(index, commanded_nm, 2.0 * rounding_nm, now_s)
+        if commanded_nm != self._before_nm[index]:
+            self._before_nm[index], self._changed_s[index] = commanded_nm, now_s
 
     def _check_slew(self, index: int, torque_nm: float, rounding_nm: float, now_s: float) -> None:
         """A torque may always fall towards zero; it grows by the slew rate since the command before."""

@@ -9,6 +9,7 @@ from math import cos, radians
 
 from control.records import JOINTS
 from drivers.fault_injection.failures import MOST_DELAY_S, FailureKind
+from simulation.devices.drive import SimulatedDriveParameters
 from tests.dst.harms import FOREIGN
 from tests.dst.operated_robot import OperatedRobot
 
@@ -33,14 +34,16 @@ class Reachability:
         self._paths = [(f"bus.{drive[joint].bus}", joint, f"{joint}.command") for joint in JOINTS]
         self.cogging_nm = 2.0 * max(each.parameters.cogging_nm for each in robot.lockstep.robot.drives)
         self.stalled_s = 0.0  # since the start
+        self.update()
 
     def update(self) -> None:
-        """Call this after every tick."""
+        """Call this before and after every tick."""
         now_s, missed = self._robot.now_s, self._robot.loop.missed_ticks
         if missed != self._missed:
             self.stalled_s += (missed - self._missed) * self._period_s
             self._missed, self._late_s = missed, now_s
         harms = self._robot.harms
+        self.gains = [_gain(drive.parameters) for drive in self._robot.lockstep.robot.drives]
         for index, joint in enumerate(JOINTS):
             if self._failures.failing and any(self._cuts(component) for component in self._paths[index]):
                 self._disturbed_s[index] = now_s
@@ -82,10 +85,10 @@ class Reachability:
     def is_energised_by_others(self, index: int) -> bool:
         return self._recently(self._foreign_s[index], HEARTBEATS_S + REPEAT_S)
 
-    def gain(self, index: int) -> float:
-        """Returns the motor's true torque for a commanded one."""
-        parameters = self._robot.lockstep.robot.drives[index].parameters
-        return (1.0 + parameters.torque_constant_error) * cos(radians(parameters.commutation_error_deg))
+
+def _gain(parameters: SimulatedDriveParameters) -> float:
+    """Returns the motor's true torque for a commanded one."""
+    return (1.0 + parameters.torque_constant_error) * cos(radians(parameters.commutation_error_deg))
 
 
 CUTTING = (FailureKind.OFF, FailureKind.STUCK, FailureKind.SLOW, FailureKind.INTERMITTENT, FailureKind.BUS_OFF)

@@ -151,6 +151,8 @@ class Run:
             self._step()
 
     def _step(self) -> None:
+        self._robot.begin_tick()
+        self._reach.update()
         self._robot.step()
         self._reach.update()
         self.outcome.ticks += 1
