@@ -17,6 +17,7 @@ from experiments.pictures.stride_choice import choose_strides
 from experiments.reports.report_page import PAGE, Figure, Section, to_json, write_report
 from experiments.reports.text_tables import number
 from firmware_host.log.whole_files import copy_whole
+from firmware_host.log_reading.fault_history import read_causes
 from firmware_host.log_reading.lab.summary import finding_reports
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
@@ -67,12 +68,13 @@ def _read_report(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Sect
         "summary": log_summary(ours) if ours else {},
         "strides": [stride_report(stride) for stride in replayed.strides],
         "map": map_report(replayed.map),
+        "faults": [cause._asdict() for cause in read_causes(ours.events, ours.configuration_text)] if ours else [],
         "events": ours.events if ours else [],
         "findings": finding_reports(files[0], replayed.findings),
     }
     sections = [*_walk_sections(files, watch), _strides_section(replayed)]
     if ours:
-        return report, [_summary_section(ours), *sections, _events_section(ours)], replayed
+        return report, [_summary_section(ours), _faults_section(ours), *sections, _events_section(ours)], replayed
     return report, [_findings_section(replayed), *sections], replayed
 
 
@@ -144,6 +146,25 @@ def _stride_row(stride: dict[str, Any], begin_s: float) -> list[str]:
 
 def _in_cm(value_m: float | None) -> str:
     return number(None if value_m is None else 100.0 * value_m, 1)
+
+
+def _faults_section(log: Log) -> Section:
+    causes = read_causes(log.events, log.configuration_text)
+    if not causes:
+        return Section("Faults", "None.")
+    head = ["first at (s)", "times", "cause", "parts", "consequences", "what to do"]
+    rows = [
+        [
+            f"{cause.first_s - begin_s(log):.2f}",
+            str(cause.times),
+            cause.message,
+            ", ".join(cause.subjects),
+            ", ".join(cause.consequences),
+            cause.what_to_do,
+        ]
+        for cause in causes
+    ]
+    return Section("Faults", f"{SINCE} Faults of one cause are one row.", rows=[head, *rows])
 
 
 def _events_section(log: Log) -> Section:
