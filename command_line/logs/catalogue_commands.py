@@ -32,11 +32,11 @@ def catalogued(folder: Path) -> dict[Path, LogEntry]:
     return {folder / entry.file: entry for entry in catalogue.entries()}
 
 
-def _update(catalogue: Any, longest_s: float = inf) -> bool:
+def _update(catalogue: Any, longest_s: float = inf, broken_again: bool = False) -> bool:
     """Returns whether the catalogue is stored; where it is not, this command can use it all the same."""
     try:
         with watched() as watch:
-            unread = catalogue.update(watch, longest_s)
+            unread = catalogue.update(watch, longest_s, broken_again)
     except OSError as problem:
         complain(f"the catalogue {catalogue.path} cannot be stored: {problem.strerror or problem}")
         return False
@@ -64,9 +64,9 @@ def index(options: Options) -> int:
     from firmware_host.catalogue.catalogue import Catalogue
 
     catalogue = Catalogue(chosen_folder(options))
-    stored = _update(catalogue)
+    stored = _update(catalogue, broken_again=True)
     states = [entry.state for entry in catalogue.entries()]
-    report = {"catalogue": str(catalogue.path), "logs": len(states), "broken": len(states) - states.count("whole")}
+    report = {"catalogue": str(catalogue.path), "logs": len(states), "broken": states.count("broken")}
     if options.json:
         print_json("log-index", report)
     else:

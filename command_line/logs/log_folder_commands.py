@@ -112,7 +112,7 @@ def _listing(report: dict[str, Any]) -> str:
     rows += [_listed(log) for log in report["logs"]]
     sizes = [size_text(report[name]) for name in ("logs_bytes", "free_bytes", "disk_bytes")]
     total = f"{sizes[0]} of logs, {sizes[1]} free of {sizes[2]}"
-    unfinished = any(log["state"] != "whole" for log in report["logs"])
+    unfinished = any(log["state"] not in ("whole", "export") for log in report["logs"])
     return "\n".join([table(rows), *[LEGEND] * unfinished, total])
 
 

@@ -11,7 +11,7 @@ module needs the extra `data`.
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from hashlib import sha256
 from math import inf
@@ -31,7 +31,7 @@ from firmware_host.catalogue.entry import (
 )
 from firmware_host.log.log_folder import ACTIVE, ENDING
 from firmware_host.log.whole_files import hidden_path, whole_file
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_reader import LogError, Watch
 
 NAME = "catalogue.parquet"
 VERSION = 1  # of COLUMNS; an older catalogue is made again
@@ -106,14 +106,15 @@ class Catalogue:
     def entries(self) -> list[LogEntry]:
         return [entry_of_row(row) for row in self._connection.execute("SELECT * FROM logs ORDER BY file").fetchall()]
 
-    def update(self, watch: Callable[[str, int, int], None], longest_s: float = inf) -> int:
+    def update(self, watch: Watch, longest_s: float = inf, broken_again: bool = False) -> int:
         """Reads new and changed logs for at most `longest_s`, and stores the table where it changed.
 
+        `broken_again` also reads the logs again that could not be read: rights or this program may have changed.
         Returns the number of logs that are still to be read. Raises OSError where the table cannot be stored. An
         interruption costs no log that was read before.
         """
         before = self.entries()
-        known = {stamp_of_entry(entry): entry for entry in before}
+        known = {stamp_of_entry(entry): entry for entry in before if entry.state == "whole" or not broken_again}
         present = list(_stamped(closed_logs(self._folder)))
         new = [(path, stamp) for path, stamp in present if stamp not in known]
         deadline_s, read = time.monotonic() + longest_s, 0

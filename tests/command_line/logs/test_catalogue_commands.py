@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
@@ -39,6 +41,20 @@ def test_the_list_knows_strides_and_reasons(folder: Path, capsys: pytest.Capture
     logs = {log["name"]: log for log in json.loads(capsys.readouterr().out)["logs"]}
     assert logs["walk.mcap"]["strides"] == 6 and logs["walk.mcap"]["started"] == "2026-11-22T14:50:21+00:00"
     assert logs["text.mcap"]["state"] == "broken" and logs["text.mcap"]["reason"]
+
+
+def test_a_listing_opens_no_log_that_the_catalogue_knows(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert main(["log", "index", str(folder)]) == exit_codes.OK
+    opened: list[Path] = []
+    plain = io.open
+
+    def noted(path: Any, *arguments: Any, **named: Any) -> Any:
+        opened.extend([Path(path)] if str(path).endswith(".mcap") else [])
+        return plain(path, *arguments, **named)
+
+    monkeypatch.setattr(io, "open", noted)  # which Path.open and Path.read_bytes call
+    assert main(["log", "list", str(folder)]) == exit_codes.OK
+    assert opened == []
 
 
 def test_a_query_is_answered_as_text_and_as_json(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

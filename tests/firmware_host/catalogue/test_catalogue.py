@@ -97,6 +97,14 @@ def test_a_broken_log_is_an_entry_with_its_reason(folder: Path) -> None:
     assert "MCAP" in entries[f"{DONE}/text.mcap"].reason and str(folder) not in entries[f"{DONE}/text.mcap"].reason
 
 
+def test_broken_logs_are_read_again_on_demand(folder: Path, readings: list[str]) -> None:
+    (folder / DONE / "text.mcap").write_text("no log", encoding="utf-8")
+    updated(folder)
+    readings.clear()
+    assert Catalogue(folder).update(unwatched, broken_again=True) == 0
+    assert readings == ["text.mcap"]
+
+
 def test_a_catalogue_of_a_newer_version_is_refused_and_left(folder: Path) -> None:
     path = catalogue_path(folder)
     duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
