@@ -48,7 +48,7 @@ lint: .venv/test .venv/docs  ## run ruff and mypy --strict
 lock: .venv/setup  ## write requirements/*.txt for the installation as root, from pyproject.toml; needs the Internet
 	@$(PIP) "uv>=0.5"
 	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen pyproject.toml - --output-file requirements/robot.txt $(ARGS)
-	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra plots --extra data pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
+	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra live --extra plots --extra data pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
 
 docs: .venv/docs  ## build the documentation into build/docs; a warning is an error
 	@$(SPHINX) -b html docs build/docs

@@ -16,7 +16,11 @@ from packaging.version import Version
 from tests.folders import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-EXTRAS = {"robot.txt": ("serial", "screen"), "robot_with_extras.txt": ("serial", "screen", "plots", "data")}
+FOR_DEVELOPERS = {"test", "docs"}
+EXTRAS = {
+    "robot.txt": {"serial", "screen"},
+    "robot_with_extras.txt": PROJECT["project"]["optional-dependencies"].keys() - FOR_DEVELOPERS,
+}
 PYTHONS = ("3.11", "3.12", "3.13")
 ADVICE = "run 'make lock'"
 
