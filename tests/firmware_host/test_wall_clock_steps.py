@@ -1,5 +1,7 @@
 """A wall clock that is stepped ends nothing: frames are stamped with it, as the kernel does."""
 
+from collections.abc import Callable, Iterable
+
 import pytest
 
 from control.controller import WalkOrder
@@ -48,6 +50,10 @@ class KernelStampedPort:
         return [frame._replace(stamp_s=self._wall.at(frame.stamp_s) + offset_s) for frame in self._port.receive()]
 
 
+def stamped(frames: Callable[[float], Iterable[Frame]]) -> Callable[[float], Iterable[Frame]]:
+    return lambda now_s: [frame._replace(stamp_s=now_s) for frame in frames(now_s)]
+
+
 @pytest.fixture(scope="module")
 def walking(configuration: Configuration) -> Lockstep:
     robot = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]))
@@ -65,8 +71,10 @@ def test_a_walk_goes_on_while_the_wall_clock_is_stepped(walking: Lockstep, step_
     for index, (port, receivers) in enumerate(drives._receivers):
         assert isinstance(port, MockPort)
         drives._receivers[index] = (KernelStampedPort(port, wall), receivers)  # type: ignore[assignment]
+    for drive in robot.robot.drives:
+        drive.cyclic_frames = stamped(drive.cyclic_frames)  # type: ignore[method-assign]
     robot.run_for(0.1)
-    wall.at_s, wall.step_s = robot.now_s + 0.001, step_s
+    wall.at_s, wall.step_s = robot.now_s + 0.999 * robot.period_s, step_s  # after the frames of the next read
     worst = Reaction.NONE
     for _ in range(300):
         robot.step()
