@@ -1,12 +1,14 @@
-"""Opens the CAN buses that the configuration names."""
+"""Opens the CAN buses that the configuration names, and takes the role that only one program may have on each."""
 
 import errno
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from functools import partial
 from typing import TypeVar
 
 import can
 
+from drivers.can.bus_lock import BusLock, BusRole, BusTakenError
 from drivers.can.can_port import CanPort, open_port
 from drivers.can.reopening_port import NotOpenError, ReopeningPort
 from firmware_host.configuration.configuration import BusParameters
@@ -42,6 +44,18 @@ def _error_number(problem: BaseException | None) -> int:
             return int(number)
         problem = problem.__cause__ or problem.__context__
     return 0
+
+
+def lock_buses(buses: Mapping[str, BusParameters], role: BusRole) -> ExitStack:
+    """Take a role on every bus, before a frame is sent; raises BusError where another program has it."""
+    names = {(bus.interface, bus.channel): name for name, bus in reversed(buses.items())}
+    with ExitStack() as locks:
+        for (interface, channel), name in names.items():
+            try:
+                locks.callback(BusLock(role, interface, channel).close)
+            except (BusTakenError, OSError) as problem:
+                raise BusError(f"bus.{name} ({interface} {channel}) does not open: {problem}") from problem
+        return locks.pop_all()
 
 
 def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, CanPort]:

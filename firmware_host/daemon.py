@@ -19,6 +19,7 @@ from pathlib import Path
 
 from control.modes import ENERGISED, Mode, Request
 from control.rate import RATE_HZ
+from drivers.can.bus_lock import BusRole
 from drivers.can.reopening_port import ReopeningPort
 from drivers.drive import Drives
 from drivers.drive_types import make_drives
@@ -26,7 +27,7 @@ from drivers.fault_injection.failing_port import failing_ports
 from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import Failures
 from drivers.pose.pose_port import OpenedPose, PoseSource, PoseSourceError
-from firmware_host.buses import BusError, reopening_ports
+from firmware_host.buses import BusError, lock_buses, reopening_ports
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
@@ -125,6 +126,7 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         # The socket comes first, since it detects another daemon.
         status = StatusSocket(Path(configuration.status.socket), {}, rights)
         stack.callback(status.close)
+        stack.enter_context(lock_buses(configuration.bus, BusRole.COMMANDS))
         failures = failures_of(configuration)
         buses = reopening_ports(configuration.bus, configuration.loop.wait_for_bus)
         ports = failing_ports(buses, configuration.drive, failures)

@@ -12,20 +12,21 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from control.rate import PERIOD_S
 from control.records import JOINTS
+from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import NoPose
 from experiments.robot.bench_robot import BenchError
-from firmware_host.buses import BusError, open_ports
+from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.log.recorder import NullRecorder
@@ -54,10 +55,13 @@ class HardwareRig:
     def __init__(self, configuration: Configuration) -> None:
         refuse_beside_daemon(Path(configuration.status.socket))
         self.configuration = configuration
-        try:
-            ports = open_ports(configuration.bus)
-        except BusError as problem:
-            raise BenchError(f"{problem}.") from problem
+        with ExitStack() as stack:
+            try:
+                stack.enter_context(lock_buses(configuration.bus, BusRole.COMMANDS))
+                ports = open_ports(configuration.bus)
+            except BusError as problem:
+                raise BenchError(f"{problem}.") from problem
+            self._locks = stack.pop_all()
         self.overheard = listen(ports, time.monotonic(), _wait_briefly)
         drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         self.loop = Loop(configuration, drives, NoPose(), NullRecorder())
@@ -76,6 +80,7 @@ class HardwareRig:
 
     def close(self) -> None:
         self.loop.drives.close()
+        self._locks.close()
         os.sched_setaffinity(0, self._processors)
         gc.unfreeze()
         gc.enable()

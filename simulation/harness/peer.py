@@ -15,7 +15,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from control.records import JOINTS
-from firmware_host.buses import BusError, open_ports
+from drivers.can.bus_lock import BusRole
+from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -38,6 +39,7 @@ PR_SET_PDEATHSIG = 1
 class Peer:
     def __init__(self, configuration: Configuration, world: World, seed: int) -> None:
         self.ticker = Ticker(STEP_S)
+        self._locks = lock_buses(configuration.bus, BusRole.DRIVES)
         self._ports = open_ports(configuration.bus)
         self.robot = SimulatedRobot(
             world.plant(configuration),
@@ -70,6 +72,7 @@ class Peer:
         self._pose.close()
         for port in self._ports.values():
             port.close()
+        self._locks.close()
 
 
 def track_of(waters: Sequence[str], length_m: float = COMPARTMENT_M) -> Track:

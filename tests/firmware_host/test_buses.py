@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import gc
+import os
 import signal
 import subprocess
 import sys
@@ -13,14 +15,16 @@ import can
 import pytest
 
 from control.modes import Mode, Request
+from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
 from drivers.odrive.drives import OdriveDrives
 from firmware_host import buses
-from firmware_host.buses import BusError, open_bus, open_ports, reopening_ports
+from firmware_host.buses import BusError, lock_buses, open_bus, open_ports, reopening_ports
 from firmware_host.configuration.configuration import BusParameters, Configuration
+from firmware_host.configuration.loading import load_configuration
 from firmware_host.daemon import reopen_buses
 from firmware_host.operator.fault_texts import fault_message
 from firmware_host.operator.status_client import NoDaemonError, StatusClient
@@ -221,6 +225,45 @@ def test_a_daemon_without_its_bus_waits_if_configured_and_else_exits_with_1(
     else:
         assert daemon.returncode == 1
         assert said.startswith("mudskipperd: bus.left (socketcan ")
+
+
+@pytest.mark.parametrize(
+    ("module", "role"), [("firmware_host.daemon", BusRole.COMMANDS), ("simulation.harness.peer", BusRole.DRIVES)]
+)
+def test_a_second_program_on_a_bus_is_refused_before_it_sends_a_frame(
+    short_folder: Path, tmp_path: Path, module: str, role: BusRole
+) -> None:
+    path = write_local_setup(short_folder, tmp_path / "logs")
+    buses = load_configuration(path).bus
+    ears = open_ports(buses)
+    with lock_buses({"right": buses["right"]}, role):
+        command = [sys.executable, "-m", module, "--config", str(path)]
+        second = subprocess.run(command, stderr=subprocess.PIPE, text=True, timeout=LONGEST_S, check=False)
+    assert second.returncode == 1
+    assert f"bus.right (mudskipper_local {short_folder}/right) does not open: process {os.getpid()}" in second.stderr
+    assert not any(port.receive() for port in ears.values())
+    for port in ears.values():
+        port.close()
+
+
+def test_an_absent_bus_costs_no_memory_in_ten_hours() -> None:
+    """As in the daemon, no garbage is collected meanwhile."""
+    ports = reopening_ports({"left": BusParameters("socketcan", "nocan9")}, wait=True)
+
+    def live(begin_s: int, end_s: int) -> int:
+        for now_s in range(begin_s, end_s):
+            assert not ports["left"].reopen(float(now_s))
+        return len(gc.get_objects())
+
+    gc.collect()
+    gc.disable()
+    try:
+        before = live(0, 100)
+        after = live(100, 10 * 3600)
+    finally:
+        gc.enable()
+    assert after - before < 100
+    assert gc.collect() < 100
 
 
 def wait_for_status(path: Path, daemon: subprocess.Popen[str]) -> dict[str, Any]:
