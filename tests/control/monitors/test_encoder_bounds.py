@@ -37,6 +37,7 @@ def noisy(velocity_rad_s: float, count: int) -> list[float]:
 def test_an_angle_may_stay_while_the_velocity_moves_thirty_milliradians() -> None:
     for velocity_rad_s, expected in ((1.4, ""), (1.6, "encoder_stuck"), (-1.4, ""), (-1.6, "encoder_stuck")):
         assert frozen(0.021, noisy(velocity_rad_s, 2)) == [expected if abs(velocity_rad_s) * 0.021 > 0.03 else ""]
+    assert frozen(0.0625, [0.5, 0.48]) == [""]  # exactly its path
     assert frozen(0.01, noisy(0.99, 4)) == ["", "", ""]
     assert frozen(0.01, noisy(1.01, 4)) == ["", "", "encoder_stuck"]
 
@@ -44,6 +45,7 @@ def test_an_angle_may_stay_while_the_velocity_moves_thirty_milliradians() -> Non
 def test_a_fast_angle_may_be_repeated_for_twenty_milliseconds() -> None:
     assert frozen(0.0099, noisy(20.0, 4)) == ["", "", "encoder_stuck"]
     assert frozen(0.0101, noisy(20.0, 3)) == ["", "encoder_stuck"]
+    assert frozen(0.02, noisy(20.0, 2)) == [""]  # exactly its time
 
 
 def test_motion_to_and_fro_is_no_travel() -> None:
@@ -53,6 +55,7 @@ def test_motion_to_and_fro_is_no_travel() -> None:
 def test_a_velocity_may_repeat_to_the_last_bit_for_a_tenth_of_a_second() -> None:
     assert frozen(0.0249, [0.01] * 6) == ["", "", "", "", "encoder_stuck"]
     assert frozen(0.0251, [0.01] * 5) == ["", "", "", "encoder_stuck"]
+    assert frozen(0.1, [0.01] * 2) == [""]  # exactly its time
 
 
 def test_a_velocity_that_changes_in_its_last_bit_begins_the_wait_again() -> None:
@@ -87,7 +90,8 @@ def test_a_resting_joint_yields_within_fifty_milliseconds_to_a_torque_that_chang
     for sign in (-1.0, 1.0):
         assert pushed(0.0249, [0.0, 0.0, sign * 0.21, 0.0, 0.0]) == [False, False, False, True, True]
         assert pushed(0.0251, [0.0, 0.0, sign * 0.21, 0.0]) == [False, False, True, True]
-        assert not any(pushed(0.02, [0.0] * 3 + [sign * 0.19] * 100))
+        assert not any(pushed(0.025, [0.0, 0.0, sign * 0.21]))  # exactly its time
+        assert not any(pushed(0.02, [0.0] * 3 + [sign * 0.2] * 100))
 
 
 def test_the_torque_counts_from_the_first_repeated_sample_on() -> None:
@@ -115,6 +119,11 @@ def test_the_torque_of_a_message_that_is_seen_again_is_not_counted() -> None:
 def test_two_velocities_tell_the_path_over_thirty_milliseconds_and_no_longer() -> None:
     assert found([(0.0, 0.0, 0.0), (0.03, 1.0, 0.0)]) == ["", "encoder_jump"]
     assert found([(0.0, 0.0, 0.0), (nextafter(0.03, 1.0), 1.0, 0.0)]) == ["", ""]
+
+
+def test_a_jump_is_more_than_the_noise_of_an_encoder() -> None:
+    assert found([(0.0, 0.0, 0.0), (0.002, 0.05, 0.0)]) == ["", ""]
+    assert found([(0.0, 0.0, 0.0), (0.002, nextafter(0.05, 1.0), 0.0)]) == ["", "encoder_jump"]
 
 
 def test_the_path_is_that_of_the_mean_of_the_two_velocities() -> None:
