@@ -86,7 +86,7 @@ def run_campaign(first: int, last: int, workers: int, until_s: float, progress: 
     shown_s = begun_s
     with ProcessPoolExecutor(workers, initializer=_ignore_interrupts) as pool, _Interrupt() as interrupt:
         while True:
-            while len(pending) < 2 * workers and not interrupt.came and time.monotonic() < until_s:
+            while len(pending) < workers and not interrupt.came and time.monotonic() < until_s:
                 block = next(waiting, None)
                 if block is None:
                     break
