@@ -48,7 +48,9 @@ def _error_number(problem: BaseException | None) -> int:
 
 def lock_buses(buses: Mapping[str, BusParameters], role: BusRole) -> ExitStack:
     """Take a role on every bus, before a frame is sent; raises BusError where another program has it."""
-    names = {(bus.interface, bus.channel): name for name, bus in reversed(buses.items())}
+    names: dict[tuple[str, str], str] = {}  # two sections may share one channel
+    for name, bus in buses.items():
+        names.setdefault((bus.interface, bus.channel), name)
     with ExitStack() as locks:
         for (interface, channel), name in names.items():
             try:
