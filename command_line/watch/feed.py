@@ -77,19 +77,3 @@ class Feed:
             with suppress(OSError):
                 self._client.close()
             self._client = None
-
-
-def send_order(path: Path, method: str, **params: Any) -> str:
-    """Send one order over a connection of its own; returns what became of it, for the operator."""
-    try:
-        client = StatusClient(path, ANSWER_S)
-        try:
-            answer = client.call(method, **params)
-        finally:
-            client.close()
-    except (CallRefusedError, NotPermittedError) as problem:
-        return f"{method} refused: {problem}"
-    except NoDaemonError as problem:
-        unknown = "Torque unknown: cut motor power. " if method in ("stop", "disarm") else ""
-        return f"{unknown}{method} was not delivered: {problem}"
-    return f"{method}: {answer}"

@@ -21,7 +21,7 @@ from command_line.watch.feed import Feed
 from command_line.watch.lines import STYLES, Line
 from command_line.watch.screen_lines import Footer, screen_lines
 
-MESSAGE_S = 8.0  # how long the answer to a key is shown
+MESSAGE_S = 15.0  # how long the answer to a key is shown
 AT_ONCE = {"space": "stop", "d": "disarm"}
 ASKED = {
     "a": ("arm", "Arm the robot? It holds its pose with torque."),

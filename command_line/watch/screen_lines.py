@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from command_line.operation.confirmed_stop import TORQUE_UNKNOWN
 from command_line.watch.header_panel import header
 from command_line.watch.history import History
 from command_line.watch.lines import Line, aged, fit
@@ -44,7 +45,7 @@ class Footer:
         if self.question:
             return ((f"{self.question} ", "busy"), (" y", "title"), (": yes, any other key: no", ""))
         if self.message:
-            return ((self.message, "warn"),)
+            return ((self.message, "alarm" if self.message.startswith(TORQUE_UNKNOWN) else "warn"),)
         return tuple(piece for key, text in KEYS for piece in ((f"{key} ", "title"), (f"{text}  ", "dim")))
 
 

@@ -9,7 +9,8 @@ from importlib.util import find_spec
 from command_line import exit_codes
 from command_line.operation.operation import with_daemon
 from command_line.screen import complain
-from command_line.watch.feed import Feed, send_order
+from command_line.watch.feed import Feed
+from command_line.watch.orders import send_order
 from command_line.watch.plain_lines import print_lines
 from firmware_host.operator.status_client import StatusClient
 

@@ -12,8 +12,9 @@ import pytest
 from textual.pilot import Pilot
 
 from command_line import exit_codes
-from command_line.watch.feed import Feed, send_order
+from command_line.watch.feed import Feed
 from command_line.watch.lines import plain_text
+from command_line.watch.orders import send_order
 from command_line.watch.screen_app import WatchApp
 from control.modes import ENERGISED, Mode
 from tests.command_line.watch.served_robot import ServedRobot
@@ -70,6 +71,20 @@ def test_stop_and_disarm_act_at_once(
     async def script(app: WatchApp, pilot: Pilot[int]) -> None:
         await pilot.press(*before, key)
         await until(app, pilot, lambda: walked.mode in modes)
+        await until(app, pilot, lambda: "every drive has confirmed it" in shown(app))
+
+    with walked.served(short_folder / "s"):
+        drive(short_folder / "s", script)
+
+
+def test_a_disarm_that_a_drive_cannot_confirm_leaves_the_torque_unknown(
+    walked: ServedRobot, short_folder: Path
+) -> None:
+    async def script(app: WatchApp, pilot: Pilot[int]) -> None:
+        walked.robot.fail("left_sweep", "off", 60.0)
+        await until(app, pilot, lambda: "unknown" in shown(app))
+        await pilot.press("d")
+        await until(app, pilot, lambda: "cut motor power" in shown(app).splitlines()[-1])
 
     with walked.served(short_folder / "s"):
         drive(short_folder / "s", script)
