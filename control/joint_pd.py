@@ -4,10 +4,11 @@ The drives run in torque mode, so only this law and its limits move the robot.
 """
 
 from dataclasses import dataclass
-from math import cos, sin
+from math import atan2, cos, inf, pi, radians, sin, sqrt
 from typing import Annotated
 
 from control.bounds import Bounds, Meaning
+from control.rate import PERIOD_S
 from control.records import (
     DriveState,
     DriveStates,
@@ -19,11 +20,13 @@ from control.records import (
 )
 
 GRAVITY_M_S2 = 9.81
+LOOP_DELAY_S = 0.002 + PERIOD_S / 2.0  # the age of a position, and half of the tick for which a torque is held
+LEAST_MARGIN_RAD = radians(5.0)  # with that delay; the defaults have 19 and 22 degrees
 
 
 @dataclass(frozen=True)
 class JointGains:
-    """At 380 Hz with samples up to 2 ms old, damping over arm inertia should stay under about 150 1/s."""
+    """The configuration refuses gains that leave less than LEAST_MARGIN_RAD of phase margin."""
 
     sweep_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0), Meaning("PD stiffness of the sweep joints")] = 8.0
     sweep_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0), Meaning("PD damping of the sweep joints")] = 0.06
@@ -51,6 +54,37 @@ class ArmMass:
         moment_nm = self.arm_mass_kg * GRAVITY_M_S2 * self.center_of_mass_m
         sweep_nm = moment_nm * sin(sweep_rad) * sin(adduction_rad)
         return sweep_nm, -moment_nm * cos(sweep_rad) * cos(adduction_rad)
+
+
+def phase_margin_rad(stiffness_nm_rad: float, damping_nm_s_rad: float, inertia_kg_m2: float) -> float:
+    """Return the phase margin of one joint in air, without friction, with the delay T of the loop.
+
+    The open loop is L(iω) = (k + iωd) e^(-iωT) / (-I ω²). Its magnitude is 1 at
+
+        ω² = a²/2 + √(a⁴/4 + b²)        a = d/I, b = k/I
+
+    and there its phase is atan(ωd/k) - ωT above -180°. From zero margin on the joint oscillates at its full torque.
+    """
+    a, b = damping_nm_s_rad / inertia_kg_m2, stiffness_nm_rad / inertia_kg_m2
+    crossover_rad_s = sqrt(a * a / 2.0 + sqrt(a**4 / 4.0 + b * b))
+    if crossover_rad_s == 0.0:  # without gains there is no loop
+        return inf
+    return atan2(crossover_rad_s * damping_nm_s_rad, stiffness_nm_rad) - crossover_rad_s * LOOP_DELAY_S
+
+
+def largest_damping_nm_s_rad(inertia_kg_m2: float) -> float:
+    """Return the damping that has the least margin without stiffness, where ω = d/I."""
+    return (pi / 2.0 - LEAST_MARGIN_RAD) / LOOP_DELAY_S * inertia_kg_m2
+
+
+def largest_stiffness_nm_rad(damping_nm_s_rad: float, inertia_kg_m2: float) -> float:
+    """Return the stiffness that has the least margin with this damping, by bisection: more stiffness has less."""
+    low, high = 0.0, inertia_kg_m2 / LOOP_DELAY_S**2  # which turns the phase by one radian without damping
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        enough = phase_margin_rad(middle, damping_nm_s_rad, inertia_kg_m2) >= LEAST_MARGIN_RAD
+        low, high = (middle, high) if enough else (low, middle)
+    return low
 
 
 def pd_torque_nm(target: JointTarget, state: DriveState, stiffness_nm_rad: float, damping_nm_s_rad: float) -> float:

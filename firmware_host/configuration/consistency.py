@@ -11,6 +11,13 @@ from math import ceil, degrees, floor, radians
 from operator import attrgetter
 
 from control.depth.gait_choice import gait_candidates
+from control.joint_pd import (
+    LEAST_MARGIN_RAD,
+    LOOP_DELAY_S,
+    largest_damping_nm_s_rad,
+    largest_stiffness_nm_rad,
+    phase_margin_rad,
+)
 from control.records import JOINTS
 from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
 from firmware_host.configuration.configuration import Configuration, PoseParameters
@@ -40,6 +47,7 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
     if configuration.adaptation.method == "gait":
         yield from _sweep_problems(configuration)
     yield from _lead_problems(configuration)
+    yield from _gain_problems(configuration)
     yield from _order_problems(configuration)
     yield from _winding_problems(configuration)
 
@@ -96,6 +104,27 @@ def _lead_problems(configuration: Configuration) -> Iterator[str]:
                 f"gains.{key} = {getattr(gains, key)}: must be at least {ceil(100.0 * needed_nm_rad) / 100.0:.2f},"
                 f" or a recovery.lead_deg = {lead_deg:g} does not reach limits.torque_nm = {torque_nm}"
             )
+
+
+def _gain_problems(configuration: Configuration) -> Iterator[str]:
+    """Checks that the PD of each joint is stable with its inertia and the delay of the loop."""
+    gains, arm = configuration.gains, configuration.arm
+    for kind in ("sweep", "adduction"):
+        stiffness_nm_rad, damping_nm_s_rad, inertia_kg_m2 = (
+            getattr(gains, f"{kind}_stiffness_nm_rad"),
+            getattr(gains, f"{kind}_damping_nm_s_rad"),
+            getattr(arm, f"{kind}_inertia_kg_m2"),
+        )
+        if phase_margin_rad(stiffness_nm_rad, damping_nm_s_rad, inertia_kg_m2) >= LEAST_MARGIN_RAD:
+            continue
+        damping, stiffness = f"gains.{kind}_damping_nm_s_rad = {damping_nm_s_rad}", f"gains.{kind}_stiffness_nm_rad"
+        reason = f"arm.{kind}_inertia_kg_m2 = {inertia_kg_m2:g} and the delay of {LOOP_DELAY_S * 1e3:.1f} ms"
+        most_nm_s_rad = largest_damping_nm_s_rad(inertia_kg_m2)
+        if damping_nm_s_rad > most_nm_s_rad:
+            yield f"{damping}: must be at most {floor(1e4 * most_nm_s_rad) / 1e4:g} for {reason}"
+        else:
+            most_nm_rad = floor(100.0 * largest_stiffness_nm_rad(damping_nm_s_rad, inertia_kg_m2)) / 100.0
+            yield f"{stiffness} = {stiffness_nm_rad}: must be at most {most_nm_rad:g} for {damping}, {reason}"
 
 
 def _order_problems(configuration: Configuration) -> Iterator[str]:

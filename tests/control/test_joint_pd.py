@@ -1,6 +1,7 @@
 """The PD law's signs, and its gravity term against the numeric gradient of potential energy."""
 
-from math import nan, pi
+from collections import deque
+from math import inf, nan, pi
 
 import numpy as np
 import pytest
@@ -8,7 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.gait.joint_path import still
-from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm, pd_torque_nm
+from control.joint_pd import (
+    LEAST_MARGIN_RAD,
+    LOOP_DELAY_S,
+    ArmMass,
+    JointGains,
+    damping_torques_nm,
+    joint_torques_nm,
+    largest_damping_nm_s_rad,
+    largest_stiffness_nm_rad,
+    pd_torque_nm,
+    phase_margin_rad,
+)
 from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
 from tests.control.synthetic_states import states_at
 
@@ -125,3 +137,33 @@ def test_a_damped_joint_does_not_feel_where_it_is() -> None:
 def test_the_speed_of_an_encoder_that_is_not_trusted_may_be_anything() -> None:
     torques = damping_torques_nm(turning((nan, 1e300, 2.0, nan)), JointGains(), Joints(False, False, True, False), 0.4)
     assert torques == pytest.approx((0.0, 0.0, -0.12, 0.0))
+
+
+@pytest.mark.parametrize("damping_nm_s_rad", [0.03, 0.06, 0.12])
+def test_the_phase_margin_says_where_a_delayed_joint_begins_to_oscillate(damping_nm_s_rad: float) -> None:
+    """A joint in small steps, with the torque of the motion a delay ago, grows or decays on both sides of the bound."""
+    inertia_kg_m2, step_s = 0.0004, LOOP_DELAY_S / 200
+    low, high = 0.0, 100.0
+    while high - low > 1e-6:
+        middle = (low + high) / 2.0
+        stable = phase_margin_rad(middle, damping_nm_s_rad, inertia_kg_m2) > 0.0
+        low, high = (middle, high) if stable else (low, middle)
+
+    def grows(stiffness_nm_rad: float) -> bool:
+        angle_rad, velocity_rad_s, late, peaks = 0.01, 0.0, deque([0.0] * 200), [0.0, 0.0]
+        for step in range(60000):
+            late.append(-stiffness_nm_rad * angle_rad - damping_nm_s_rad * velocity_rad_s)
+            velocity_rad_s += step_s * late.popleft() / inertia_kg_m2
+            angle_rad += step_s * velocity_rad_s
+            peaks[step >= 30000] = max(peaks[step >= 30000], abs(angle_rad))
+        return peaks[1] > peaks[0]
+
+    assert not grows(0.9 * low) and grows(1.1 * low)
+
+
+@pytest.mark.parametrize("damping_nm_s_rad", [0.03, 0.06, 0.12])
+def test_the_largest_gains_leave_the_least_margin(damping_nm_s_rad: float) -> None:
+    stiffness_nm_rad = largest_stiffness_nm_rad(damping_nm_s_rad, 0.0004)
+    assert phase_margin_rad(stiffness_nm_rad, damping_nm_s_rad, 0.0004) == pytest.approx(LEAST_MARGIN_RAD)
+    assert phase_margin_rad(0.0, largest_damping_nm_s_rad(0.0004), 0.0004) == pytest.approx(LEAST_MARGIN_RAD)
+    assert phase_margin_rad(0.0, 0.0, 0.0004) == inf

@@ -104,8 +104,14 @@ class Repeater:
 
 def hold_down(rig: SimulatedRig) -> None:
     """Hold a flipper down while the robot raises its flippers at the end of a walk."""
-    if hasattr(rig, "loop") and rig.loop.mode is Mode.STOPPING:
-        rig.robot.plant.arms[0].adduction_rad = -0.4
+    if not hasattr(rig, "loop"):
+        return
+    arm, stopping = rig.robot.plant.arms[0], rig.loop.mode is Mode.STOPPING
+    if stopping:
+        arm.adduction_rad, arm.adduction_velocity_rad_s = -0.4, 0.0
+    inertia_kg_m2 = 1e6 if stopping else rig.loop.configuration.arm.adduction_inertia_kg_m2  # no torque moves it
+    held = replace(arm.parameters.arm_mass, adduction_inertia_kg_m2=inertia_kg_m2)
+    arm.parameters = replace(arm.parameters, arm_mass=held)
 
 
 class DriveRestart:

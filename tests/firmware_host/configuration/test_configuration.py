@@ -158,6 +158,31 @@ def test_a_recovery_s_lead_that_does_not_reach_the_full_torque_is_refused(exampl
     parse_configuration(f"{changed(example_text, 'attempts', '0')}\n[gains]\n{key} = 0.0\n")
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "most"),
+    [
+        ("sweep_stiffness_nm_rad", 50.0, 12.61),
+        ("adduction_stiffness_nm_rad", 200.0, 17.23),
+        ("sweep_damping_nm_s_rad", 0.2, 0.1789),
+        ("adduction_damping_nm_s_rad", 5.0, 0.2684),
+    ],
+)
+def test_gains_with_which_a_joint_oscillates_are_refused(
+    example_text: str, key: str, value: float, most: float
+) -> None:
+    (reported,) = problems_of(f"{example_text}\n[gains]\n{key} = {value}\n")
+    assert reported.startswith(f"gains.{key} = {value}: must be at most {most:g} for ")
+    if key.endswith("stiffness_nm_rad"):
+        parse_configuration(f"{example_text}\n[gains]\n{key} = {most}\n")
+
+
+def test_a_heavier_arm_allows_more_stiffness(example_text: str) -> None:
+    gains = "[gains]\nsweep_stiffness_nm_rad = 20.0\nsweep_damping_nm_s_rad = 0.12\n"
+    assert problems_of(f"{example_text}\n{gains}")
+    heavy = example_text.replace("[arm]", "[arm]\nsweep_inertia_kg_m2 = 0.0008")
+    parse_configuration(f"{heavy}\n{gains}")
+
+
 def test_a_motor_force_beyond_the_torque_limit_is_refused(example_text: str) -> None:
     """0.75 N·m at 0.12 m are 6.25 N."""
     parse_configuration(changed(example_text, "motor_force_n", "6.25"))
