@@ -135,14 +135,14 @@ def _degraded_modes() -> Iterator[FailureMode]:
 
 
 def _foreign_modes() -> Iterator[FailureMode]:
-    for every in (2, 10):
+    for every, ordinal in ((2, "second"), (10, "tenth")):
         for path, heard in (("on the bus", True), ("unheard", False)):
             yield FailureMode(
                 "foreign_torque",
                 commanded_by_another(FOREIGN_NM, every, heard),
                 1.0,
                 MOVING,
-                f"behind every {every}th command, {path}",
+                f"after every {ordinal} command, {path}",
                 torque_nm=FOREIGN_NM,
                 demands_reaction=False,
             )
@@ -175,7 +175,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
         "setpoint_mismatch", commanded_by_another(1.0, every=10, heard=False), 1.0, MOVING, "every tenth command"
     ),
     FailureMode(
-        "setpoint_mismatch", commanded_by_another(-0.6, every=2, heard=False), 1.0, MOVING, "every second command"
+        "setpoint_mismatch", commanded_by_another(-0.4, every=2, heard=False), 1.0, MOVING, "every second command"
     ),
     FailureMode("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",)),
     FailureMode("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance")),
@@ -271,6 +271,7 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "drive_restarted": ABSENT_DRIVE,
     # the second drive reports another angle
     "duplicate_node_id": ("encoder_jump", "joint_moving", "drive_disarmed", "joint_position"),
+    "setpoint_mismatch": ("joint_runaway",),  # in that torque's direction
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version", "wrong_drive"),
     "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
     "bus_refuses": IDLE_DRIVE,
