@@ -10,6 +10,7 @@ module needs the extra `data`.
 """
 
 import os
+import re
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -36,6 +37,7 @@ from firmware_host.log_reading.log_reader import LogError, Watch
 NAME = "catalogue.parquet"
 VERSION = 1  # of COLUMNS; an older catalogue is made again
 VERSION_KEY = "mudskipper_catalogue"
+ERROR_NUMBER = re.compile(r'"errno":"(\d+)"')  # of the operating system, in DuckDB's message
 
 
 class CatalogueError(LogError):
@@ -150,7 +152,8 @@ class Catalogue:
         try:
             self._connection.execute(f"COPY logs TO {_quoted(str(path))} ({options})")
         except duckdb.Error as problem:
-            raise OSError(_first_line(problem)) from None
+            found = ERROR_NUMBER.search(str(problem))
+            raise OSError(os.strerror(int(found[1])) if found else _first_line(problem)) from None
 
     def query(self, text: str) -> Answer:
         """Answers one SELECT on the table `logs`, which can change nothing and read no file. Raises CatalogueError."""

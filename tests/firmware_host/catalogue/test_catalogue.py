@@ -15,6 +15,7 @@ from firmware_host.catalogue.entry import COLUMNS, LogEntry
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED, preserve
 from firmware_host.log_reading.log_reader import unwatched
+from tests.firmware_host.open_data.test_parquet import files_of_at_most
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.folders import ROOT
 
@@ -138,6 +139,16 @@ def test_a_catalogue_that_cannot_be_stored_can_be_queried(folder: Path, monkeypa
     with pytest.raises(OSError, match="/proc/mudskipper"):
         catalogue.update(unwatched)
     assert catalogue.query("SELECT count(*) FROM logs").rows == [(2,)]
+
+
+def test_a_full_disk_leaves_the_catalogue_before(folder: Path) -> None:
+    updated(folder)
+    before = catalogue_path(folder).read_bytes()
+    make_log(folder, "new.mcap")
+    with files_of_at_most(100), pytest.raises(OSError, match="^File too large$"):
+        Catalogue(folder).update(unwatched)
+    assert catalogue_path(folder).read_bytes() == before
+    assert f"{DONE}/new.mcap" in updated(folder)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
