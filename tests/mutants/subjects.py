@@ -69,6 +69,10 @@ SUBJECTS = (
     Subject(
         "control.monitors.encoder_monitor",
         ("control/monitors/test_encoder_bounds.py", "control/monitors/test_encoder_monitor.py"),
+        equivalent={
+            "0.0 to 1.0 in `self, state: DriveState, dt_s: float, torque_nm: float=0.0`": "a torque that never changes",
+            "without `self._reset_frozen()` in `def reset(self) -> None:`": "the first message does the same",
+        },
     ),
     Subject("firmware_host.operator.lease", ("firmware_host/operator/test_lease.py",)),
 )

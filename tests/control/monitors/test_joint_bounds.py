@@ -232,3 +232,41 @@ def test_a_current_that_is_gone_is_reported_next_to_a_milder_fault_only() -> Non
     ):
         measured = state(angle_stamp_s=NOW_S - position_s, current_stamp_s=NOW_S - silent_s)
         assert found(make_monitor(), measured) == expected
+
+
+def test_a_heat_fault_reports_the_temperature_of_the_sensor_or_of_the_winding_that_shows_it() -> None:
+    """A sensor that is nearly too hot does not hide a winding that is."""
+    for measured_c, name, expected_c in (
+        (25.0, "winding_hot", 99.0),
+        (85.0, "winding_hot", 99.0),
+        (96.0, "motor_hot", 96.0),
+    ):
+        monitor = make_monitor()
+        for _ in range(60):
+            monitor.winding.temperature_c = 99.0
+            faults = monitor.update(facts(), state(temperature_c=measured_c))
+        assert [fault.name for fault in faults] == [name]
+        assert dict(faults[0].values)["temperature_c"] == pytest.approx(expected_c, abs=0.01)
+
+
+def test_every_fault_reports_the_values_that_it_was_found_by() -> None:
+    def values(name: str, measured: DriveState, **changes: Any) -> dict[str, float | str]:
+        monitor = make_monitor()
+        faults = [fault for _ in range(800) for fault in monitor.update(facts(**changes), measured)]
+        return dict(next(fault for fault in faults if fault.name == name).values)
+
+    assert values("torque_missing", state(current_a=2.0), torque_nm=0.7) == {
+        "measured_nm": pytest.approx(0.166),
+        "commanded_nm": 0.7,
+    }
+    assert values("joint_current", state(current_a=-16.0)) == {"current_a": 16.0, "limit_a": 15.0}
+    assert values("joint_velocity", state(velocity_rad_s=-30.0)) == {"velocity_rad_s": 30.0, "limit_rad_s": 20.0}
+    stalled = values("joint_not_following", state(current_a=9.0), torque_nm=0.75)
+    assert stalled == {"stalled_s": pytest.approx(2.0, abs=0.01)}
+    assert values("voltage_under", state(bus_voltage_v=17.0)) == {"voltage_v": 17.0, "least_v": 18.0}
+    assert values("voltage_low", state(bus_voltage_v=19.0)) == {"voltage_v": 19.0}
+    assert values("joint_position", state(angle_rad=2.0)) == {
+        "angle_deg": pytest.approx(114.59, abs=0.01),
+        "low_deg": pytest.approx(-70.0),
+        "high_deg": pytest.approx(70.0),
+    }
