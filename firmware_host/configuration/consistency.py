@@ -90,6 +90,8 @@ def _drive_problems(configuration: Configuration) -> Iterator[str]:
         duplicate = joint_at.setdefault((drive.bus, drive.node_id), joint)
         if duplicate != joint:
             yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {drive.bus!r}"
+        if not re.fullmatch("([0-9a-f]{12})?", drive.serial_number):
+            yield f"drive.{joint}.serial_number = {drive.serial_number!r}: must be 12 hexadecimal digits in lower case"
         for value, problem in drive.torque_problems(configuration.limits.torque_nm):  # it would clamp without a report
             yield f"drive.{joint}.{value}: {problem}"
 

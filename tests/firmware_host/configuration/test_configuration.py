@@ -254,3 +254,21 @@ def test_a_group_that_does_not_exist_is_refused_before_anything_is_made(
     assert ended.returncode == EXIT_CONFIGURATION
     assert ended.stderr.startswith("mudskipperd: status.read_group = 'no such': there is no such group")
     assert ended.stderr.count("\n") == 1 and not socket.parent.exists()
+
+
+@pytest.mark.parametrize(
+    ("serial_number", "accepted"),
+    [("385f324d3037", True), ("", True), ("385F324D3037", False), ("0x385f324d3037", False), ("385f324d303", False)],
+)
+def test_a_serial_number_is_written_as_the_drive_reports_it(
+    example_text: str, tmp_path: Path, serial_number: str, accepted: bool
+) -> None:
+    path = tmp_path / "mudskipper.toml"
+    pinned = f'[drive.left_sweep]\nserial_number = "{serial_number}"'
+    path.write_text(example_text.replace("[drive.left_sweep]", pinned), encoding="utf-8")
+    if accepted:
+        assert load_configuration(path).drive["left_sweep"].serial_number == serial_number
+    else:
+        with pytest.raises(ConfigurationError) as caught:
+            load_configuration(path)
+        assert "drive.left_sweep.serial_number" in caught.value.problems[0]
