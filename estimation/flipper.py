@@ -59,7 +59,7 @@ class FlipperEstimator(StrideEstimator):
         self._air = AirSwing()
         self._free_m = -FREE_FRACTION * geometry.clearance_m
         self._tare = Tare()
-        self._insertions, self._extractions = ScatterMemory(), ScatterMemory()
+        self._extractions = ScatterMemory()
         self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
         super().__init__(flipper, geometry, drive, motion_between)
 
@@ -68,7 +68,6 @@ class FlipperEstimator(StrideEstimator):
         self._air.reset()
         self._surfaces.reset()
         self._own_surfaces.reset()
-        self._insertions.reset()
         self._extractions.reset()
         self._travel_m = UNKNOWN
         super().reset()
@@ -142,7 +141,7 @@ class FlipperEstimator(StrideEstimator):
         corrected_n = self._tare.correct(-level_n, level_error_n)
         below = level_free(batches, -corrected_n * length_m)
         own = self._own_surfaces.update(found, 0.0)
-        self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n, self._insertions)
+        self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
 
     @property
     def surface_m(self) -> float:

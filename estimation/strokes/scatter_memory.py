@@ -1,4 +1,4 @@
-"""The scatter of a flipper's strokes: the residual variance pooled over a trial.
+"""The scatter of a flipper's extractions: the residual variance pooled over a trial.
 
 A stroke of five batches leaves three degrees of freedom after the line that counts as deviation from the law, so its
 own variance is uncertain by a factor of two and Student's factor is 1.6. The strokes of one kind share motor, sampling

@@ -36,13 +36,9 @@ UNOBSERVABLE = f"vertical lever under {100.0 * MIN_VERTICAL_LEVER_M:g} cm: not o
 
 
 def fit_insertion(
-    geometry: FlipperGeometry,
-    batches: Sequence[Batch],
-    surface: Surface,
-    zero_error_n: float,
-    scatter: ScatterMemory,
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float
 ) -> Estimate:
-    return _fit(geometry, batches, surface, zero_error_n, scatter, 1.0, inf)
+    return _fit(geometry, batches, surface, zero_error_n, None, 1.0, inf)
 
 
 def fit_extraction(
@@ -53,7 +49,7 @@ def fit_extraction(
     scatter: ScatterMemory,
     start_m: float,
 ) -> Estimate:
-    """Fit k_e; `start_m` is the depth from which the flipper rises."""
+    """Fit k_e; `start_m` is the depth from which the flipper rises; the scatter of its short strokes is pooled."""
     deepest_m = surface.depth_m + (1.0 - REVERSAL_FRACTION) * (start_m - surface.depth_m)
     return _fit(geometry, batches, surface, zero_error_n, scatter, -1.0, deepest_m)
 
@@ -97,7 +93,7 @@ def _fit(
     batches: Sequence[Batch],
     surface: Surface,
     zero_error_n: float,
-    scatter: ScatterMemory,
+    scatter: ScatterMemory | None,
     sign: float,
     deepest_m: float,
 ) -> Estimate:
@@ -112,7 +108,7 @@ def _fit(
         _slope_per_surface(fit, pieces.moments, pieces.torques, pieces.depths_m) * surface.std_error_m,
         1.5 * zero_error_n / (edge_m2 * max(pieces.depths_m)),
     )
-    return evaluated(scatter.pooled(fit), systematic, pieces.samples)
+    return evaluated(scatter.pooled(fit) if scatter else fit, systematic, pieces.samples)
 
 
 def _pieces(

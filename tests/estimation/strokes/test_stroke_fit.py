@@ -90,7 +90,7 @@ def up(
 
 
 def insertion(batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0) -> Estimate:
-    return fit_insertion(GEOMETRY, batches, surface, zero_error_n, ScatterMemory())
+    return fit_insertion(GEOMETRY, batches, surface, zero_error_n)
 
 
 def extraction(
