@@ -48,6 +48,7 @@ from experiments.faults.loop_injectors import (
     writer_reports,
 )
 from experiments.faults.phases import EVERYWHERE, GAIT, PHASES
+from experiments.faults.stepped_clock import wall_clock_stepped
 from simulation.devices.drive import Forgery
 
 NO_SPACE = "Nothing can be written to the log: No space left on device."
@@ -114,6 +115,7 @@ COVERED = (("loop", FailureKind.SLOW), ("clock", FailureKind.GARBAGE))  # by mod
 MOTION_PARTS = ("JOINT", "JOINT.position", "JOINT.current", "JOINT.command", "bus.NAME")  # the path of the control
 UNHEARD_PARTS = ("JOINT", "JOINT.command", "bus.NAME")  # through which commands pass
 COMMUTATION_ERRORS_DEG = {"-1": 180.0, "0": 90.0, "0.1": 84.3, "0.5": 60.0}  # by the factor of the torque
+CLOCK_STEPS_S = (0.01, 0.1, 2.0)  # small ones, of the clock that stamps the frames
 FOREIGN_NM = 1.0  # as much as the current limit allows, and more than the torque limit
 
 
@@ -150,6 +152,10 @@ def _foreign_modes() -> Iterator[FailureMode]:
 
 FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("none", nothing, 1.0, PHASES),
+    *(
+        FailureMode("none", wall_clock_stepped(step_s), 0.3, ("hold", *GAIT), f"wall clock {step_s:+g} s")
+        for step_s in CLOCK_STEPS_S
+    ),
     # signals of a drive
     FailureMode("drive_late", failing("JOINT", "off"), REPORTED_S, no_commands=True),
     FailureMode("drive_quiet", failing("JOINT", "off"), REPORTED_S, PHASES, no_commands=True),

@@ -16,6 +16,7 @@ import experiments.faults.cell
 from control.faults import FaultKind
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
+from drivers.can import stamp_clock
 from drivers.fault_injection.failures import EFFECTS, FailureKind
 from experiments.faults.bench import FaultBench
 from experiments.faults.cell import FORBIDDEN_TICKS, run_cell
@@ -95,6 +96,13 @@ def test_a_cell_follows_from_its_name_phase_and_seed() -> None:
 def test_an_unknown_fault_or_phase_is_refused(faults: tuple[str, ...], phases: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="must be one of"):
         Plan(faults, phases)
+
+
+def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "none, wall clock +0.01 s"
+    assert run_cell(name, "stance", 1).ok
+    monkeypatch.setattr(stamp_clock, "STEP_S", 10.0)
+    assert not run_cell(name, "stance", 1).ok
 
 
 # the evaluation
