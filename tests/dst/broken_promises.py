@@ -12,6 +12,7 @@ from typing import Any
 from unittest import mock
 
 from control import controller, joint_pd
+from control.faults import FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode, Request
 from control.records import Torques
@@ -115,6 +116,12 @@ def unwatched_and_unlimited() -> AbstractContextManager[Any]:
     return _both(no_limits(), encoders_unwatched())
 
 
+def encoders_slandered() -> AbstractContextManager[Any]:
+    """A monitor reports a fault of a sound encoder."""
+    fault = FaultKind.ENCODER_JUMP.fault("left_sweep")
+    return mock.patch("control.monitors.encoder_monitor.EncoderMonitor.update", lambda *arguments: fault)
+
+
 def tick_raises() -> AbstractContextManager[Any]:
     """The loop has a bug that only a stop meets."""
     return mock.patch.object(LoopEvents, "report_request", side_effect=ZeroDivisionError)
@@ -139,6 +146,7 @@ BREAKS: dict[str, Break] = {  # by the promise that must notice
     "NoTorqueWithoutMode": silent_without_torque,
     "WithinStops": encoders_unwatched,
     "BoundedEnergy": unwatched_and_unlimited,
+    "NoFalseAlarm": encoders_slandered,
     "NoBug": tick_raises,
     "BackToIdle": fault_stays,
     "WholeLog": rows_vanish,

@@ -1,7 +1,7 @@
 """The promises of the robot, each checked from the simulated mechanics and the operators' calls.
 
-None of them asks a monitor of the robot whether something is wrong. `update` runs after every tick and yields a text
-for what was broken.
+None asks a monitor of the robot whether something is wrong, only whether it is silent when nothing is. `update` runs
+after every tick and yields a text for what was broken.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from control.controller import SOFT_STOP_S
-from control.faults import Clears, Reaction
+from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode
 from control.records import JOINTS, NEVER_S, Torques
 from experiments.faults.energy_bounds import energy_bounds
@@ -262,6 +262,19 @@ class BoundedEnergy(Promise):
             yield f"{joint} received {energy_j:.2f} J since the first failure, the bound is {most_j:.2f} J"
 
 
+class NoFalseAlarm(Promise):
+    """Nothing stops a robot with which nothing is wrong, except its mud and its operators."""
+
+    EXPECTED = frozenset({FaultKind.LEASE_LOST, FaultKind.FLIPPER_STUCK, FaultKind.JOINT_NOT_FOLLOWING})
+
+    def update(self) -> Iterator[str]:
+        if self.robot.harmed:
+            return
+        for fault in self.loop.faults.begun:
+            if fault.kind.reaction >= Reaction.HOLD and fault.kind not in self.EXPECTED:
+                yield f"{fault.name} {fault.subject} without a failure"
+
+
 class NoBug(Promise):
     """No exception escapes, and nothing happens that only a bug can cause."""
 
@@ -282,5 +295,6 @@ PROMISES: tuple[type[Promise], ...] = (
     WithinStops,
     LittleEnergy,
     BoundedEnergy,
+    NoFalseAlarm,
     NoBug,
 )

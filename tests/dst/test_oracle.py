@@ -23,6 +23,7 @@ SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events 
     "NoTorqueWithoutMode": ("stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),), SHORT_S),
     "WithinStops": ("stance", (Failure(0.0, "left_sweep.position", "stuck", 1.5),), 1.5),
     "BoundedEnergy": ("stance", (Harm(0.0, "inverted motor", "left_sweep", 0.6),), SHORT_S),
+    "NoFalseAlarm": ("stance", (), SHORT_S),
     "NoBug": ("hold", (Call(0.05, "guest", "stop"), Call(0.1, "pilot", "clear")), SHORT_S),
     "BackToIdle": ("hold", (Failure(0.05, "left_sweep", "off", 0.05),), SHORT_S),
     "WholeLog": ("release", (), SHORT_S),
