@@ -95,6 +95,7 @@ def test_a_torque_that_returns_for_one_tick_begins_the_wait_again() -> None:
 def test_a_joint_may_stand_at_full_torque_for_two_seconds() -> None:
     assert ticks_until("joint_not_following", state(current_a=9.0), torque_nm=0.75) == 761
     assert ticks_until("joint_not_following", state(current_a=9.0), torque_nm=0.95 * 0.75) == 761
+    assert ticks_until("joint_not_following", state(current_a=9.0), torque_nm=0.75, dt_s=0.015625) == 129
 
 
 def test_without_a_torque_limit_no_joint_has_to_follow() -> None:
@@ -105,6 +106,8 @@ def test_without_a_torque_limit_no_joint_has_to_follow() -> None:
 def test_a_supply_may_be_low_for_two_messages() -> None:
     assert ticks_until("voltage_low", state(bus_voltage_v=19.9)) == 58  # 0.15 s
     assert ticks_until("voltage_under", state(bus_voltage_v=17.9)) == 58
+    for voltage_v, name in ((19.9, "voltage_low"), (17.9, "voltage_under")):
+        assert ticks_until(name, state(bus_voltage_v=voltage_v), dt_s=0.03) == 6  # exactly its time is no fault
 
 
 def test_a_supply_that_is_good_for_one_tick_begins_the_wait_again() -> None:
@@ -131,6 +134,7 @@ def test_a_supply_at_its_bound_is_good() -> None:
 def test_a_sensor_may_be_too_hot_for_two_messages() -> None:
     assert ticks_until("motor_overheating", state(temperature_c=80.0)) == 58
     assert ticks_until("motor_hot", state(temperature_c=90.0)) == 58
+    assert ticks_until("motor_overheating", state(temperature_c=80.0), dt_s=0.075) == 3  # exactly its time is no fault
 
 
 def test_five_heartbeats_may_be_missing() -> None:
@@ -176,15 +180,15 @@ def test_one_tick_counts_for_thirty_milliseconds_at_most() -> None:
     missing = 0.5 / 2.0
     assert ticks_until("torque_missing", state(), torque_nm=missing, dt_s=0.03) == 4
     assert ticks_until("torque_missing", state(), torque_nm=missing, dt_s=10.0) == 4
-    assert ticks_until("torque_missing", state(), torque_nm=missing, dt_s=0.02) == 6
+    assert ticks_until("torque_missing", state(), torque_nm=missing, dt_s=0.02) == 6  # exactly its time is no fault
 
 
 # an old current, and one that is no measurement
 
 
-def winding_c(measured: DriveState, torque_nm: float = 0.0) -> float:
+def winding_c(measured: DriveState, torque_nm: float = 0.0, bounds: FaultBounds = BOUNDS) -> float:
     """The winding's temperature after a minute."""
-    monitor = make_monitor()
+    monitor = make_monitor(bounds)
     for _ in range(60):
         monitor.update(facts(dt_s=1.0, torque_nm=torque_nm), measured._replace(temperature_c=0.0))
     return monitor.winding.temperature_c
@@ -192,11 +196,12 @@ def winding_c(measured: DriveState, torque_nm: float = 0.0) -> float:
 
 def test_an_old_current_heats_no_longer_and_the_commanded_torque_does_instead() -> None:
     """A drive that is gone keeps its last current for ever."""
-    old_s = NOW_S - BOUNDS.silence_s
-    for stamp_s, heats in ((old_s, True), (nextafter(old_s, -inf) - 1e-6, False)):
+    bounds = FaultBounds(silence_s=0.03125)  # without a rounding
+    old_s = NOW_S - bounds.silence_s
+    for stamp_s, heats in ((old_s, True), (nextafter(old_s, -inf), False)):
         current = state(current_a=10.0, current_stamp_s=stamp_s)
-        assert (winding_c(current) > WINDING.room_c + 20.0) == heats
-    gone = state(current_a=10.0, current_stamp_s=old_s - 0.1)
+        assert (winding_c(current, bounds=bounds) > WINDING.room_c + 20.0) == heats
+    gone = state(current_a=10.0, current_stamp_s=NOW_S - 1.0)
     driven = state(current_a=0.5 / TORQUE_CONSTANT_NM_A)
     assert winding_c(gone, torque_nm=0.5) == pytest.approx(winding_c(driven))
     assert winding_c(gone) == pytest.approx(WINDING.room_c)
