@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from command_line.watch.history import History
+from command_line.watch.row_feed import RowFeed, updated
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 ANSWER_S = 2.0
 RETRY_S = 0.5
+STATUS_S = 0.4  # between two while rows come: fewer than one tick in a hundred answers then
 
 
 class Feed:
@@ -24,6 +26,8 @@ class Feed:
         self.lock = threading.Lock()
         self._path, self._period_s = path, period_s
         self._client: StatusClient | None = None
+        self.rows = RowFeed(path)
+        self._asked_s = float("-inf")
         self._pid = 0
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="status", daemon=True)
@@ -33,7 +37,8 @@ class Feed:
 
     def stop(self) -> None:
         self._ending.set()
-        self._thread.join(ANSWER_S)
+        if self._thread.is_alive():
+            self._thread.join(ANSWER_S)
         self._close()
 
     def _run(self) -> None:
@@ -44,7 +49,17 @@ class Feed:
             self._ending.wait(due_s - time.monotonic())
 
     def poll(self, now_s: float) -> bool:
-        """Ask once; returns whether the daemon answered."""
+        """Take the newest row, or ask for the status; returns whether the daemon is there."""
+        tick = self.rows.newest()
+        if tick is not None and now_s < self._asked_s + STATUS_S:
+            report = updated(self.history.status, tick)
+            if report["mode"] == self.history.status["mode"]:  # else the reason is wanted at once
+                with self.lock:
+                    self.history.add_status(report, now_s)
+                return True
+        return self._ask(now_s)
+
+    def _ask(self, now_s: float) -> bool:
         try:
             client = self._client or self._connect()
             report = client.call("status")
@@ -57,6 +72,7 @@ class Feed:
         with self.lock:
             self.history.add_status(report, now_s)
             self.history.add_strides(strides)
+        self._asked_s = now_s
         return True
 
     def _connect(self) -> StatusClient:
@@ -65,6 +81,8 @@ class Feed:
             self._pid = self._client.daemon_pid
             with self.lock:
                 self.history.forget()
+        self.rows.close()
+        self.rows.open()
         return self._client
 
     def _new_strides(self, client: StatusClient, report: dict[str, Any]) -> list[dict[str, Any]]:
@@ -73,6 +91,7 @@ class Feed:
         return client.call("strides", since=since) if report["strides_closed"] > since else []
 
     def _close(self) -> None:
+        self.rows.close()
         if self._client is not None:
             with suppress(OSError):
                 self._client.close()

@@ -67,7 +67,11 @@ def _alarm(history: History, width: int) -> list[Line]:
 
 def _quiet(history: History, width: int) -> list[Line]:
     report = history.status
+    unheard = [drive["joint"] for drive in report["drives"] if drive["heartbeat_age_s"] is None]
     forced = "armed by force: see 'mudskipper check'" if report["forced"] else ""
     notices = [report["notice"], forced, report["pose"]["trouble"], *report["warnings"]]
-    texts: list[Piece] = [(f"{report['robot']}: no fault", "good")]
+    first: Piece = (f"{report['robot']}: no fault", "good")
+    if unheard:
+        first = (f"{report['robot']}: not heard yet: {', '.join(unheard)}; 'mudskipper check' says what to do", "warn")
+    texts = [first]
     return _message(_mode(history), [*texts, *((notice, "warn") for notice in notices if notice)], width)
