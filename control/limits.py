@@ -72,7 +72,7 @@ def limited_torque_nm(
 
 def _cool_fraction(temperature_c: float, limits: JointLimits) -> float:
     """Return 1 for a cool motor, falling to 0 for a hot one. A drive without thermistor reports NaN or 0: cool."""
-    if not temperature_c > limits.temperature_warm_c:
+    if not temperature_c >= limits.temperature_warm_c:
         return 1.0
     span_c = max(limits.temperature_hot_c - limits.temperature_warm_c, 1e-9)
     return max(0.0, (limits.temperature_hot_c - temperature_c) / span_c)

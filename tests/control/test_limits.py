@@ -193,7 +193,7 @@ def test_a_drive_without_thermistor_counts_as_cool() -> None:
 
 def test_warm_and_hot_at_one_temperature_switch_off_at_it() -> None:
     limits = JointLimits(temperature_warm_c=80.0, temperature_hot_c=80.0)
-    for temperature, torque in ((nextafter(80.0, 0.0), 0.5), (nextafter(80.0, 90.0), 0.0), (81.0, 0.0)):
+    for temperature, torque in ((nextafter(80.0, 0.0), 0.5), (80.0, 0.0), (nextafter(80.0, 90.0), 0.0), (81.0, 0.0)):
         hot = state(temperature_c=temperature)
         assert limited_torque_nm(0.5, 0.0, hot, limits, SPAN, 1.0) == torque
 

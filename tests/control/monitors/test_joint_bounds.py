@@ -137,6 +137,13 @@ def test_a_sensor_may_be_too_hot_for_two_messages() -> None:
     assert ticks_until("motor_overheating", state(temperature_c=80.0), dt_s=0.075) == 3  # exactly its time is no fault
 
 
+def test_a_sensor_that_is_cool_for_one_tick_begins_the_wait_again() -> None:
+    monitor = make_monitor()
+    for _ in range(5):
+        assert not any(found(monitor, state(temperature_c=85.0)) for _ in range(57))
+        assert not found(monitor, state(temperature_c=25.0))
+
+
 def test_five_heartbeats_may_be_missing() -> None:
     for age_s, expected in ((0.5, set()), (0.501, {"heartbeat_silent"})):
         assert found(make_monitor(), state(heartbeat_stamp_s=NOW_S - age_s)) == expected
