@@ -83,6 +83,8 @@ def test_a_torque_may_be_missing_for_a_tenth_of_a_second_and_by_three_tenths_of_
     assert ticks_until("torque_missing", state(), torque_nm=0.226) == 39
     monitor = make_monitor()
     assert all("torque_missing" not in found(monitor, state(), torque_nm=0.224) for _ in range(200))
+    exact = make_monitor(limits=JointLimits(torque_nm=1.0))
+    assert all("torque_missing" not in found(exact, state(), torque_nm=0.3) for _ in range(200))
 
 
 def test_a_torque_that_returns_for_one_tick_begins_the_wait_again() -> None:
