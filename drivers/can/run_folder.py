@@ -15,7 +15,6 @@ files are written without following a link.
 import errno
 import os
 import stat
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -94,6 +93,8 @@ def _linked_folder(link: Path) -> Path:
     with suppress(OSError):
         return _private(Path(os.readlink(link)))
     link.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    import tempfile  # slow to import, and every command looks for the folder
+
     folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))
     link.unlink(missing_ok=True)
     link.symlink_to(folder)
