@@ -100,6 +100,20 @@ def test_a_joint_may_stand_at_full_torque_for_two_seconds() -> None:
     assert ticks_until("joint_not_following", state(current_a=9.0), torque_nm=0.75, dt_s=0.015625) == 129
 
 
+def test_a_joint_that_is_not_pushed_for_one_tick_begins_the_wait_again() -> None:
+    monitor, held = make_monitor(), state(current_a=9.0)
+    for _ in range(2):
+        assert not any("joint_not_following" in found(monitor, held, torque_nm=0.75) for _ in range(700))
+        found(monitor, held, torque_nm=0.7)
+
+
+def test_a_current_that_is_calm_for_one_tick_may_be_too_large_for_two_again() -> None:
+    monitor = make_monitor()
+    for _ in range(5):
+        assert not found(monitor, state())
+        assert not any("joint_current" in found(monitor, state(current_a=16.0)) for _ in range(2))
+
+
 def test_without_a_torque_limit_no_joint_has_to_follow() -> None:
     monitor = make_monitor(limits=JointLimits(torque_nm=0.0))
     assert not any("joint_not_following" in found(monitor, state()) for _ in range(1000))
