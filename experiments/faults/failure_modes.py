@@ -276,11 +276,11 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": ABSENT_DRIVE,
     # the second drive reports another angle
-    "duplicate_node_id": ("encoder_jump", "joint_moving", "drive_disarmed", "joint_position"),
+    "duplicate_node_id": ("encoder_jump", "joint_moving", "drive_disarmed", "joint_position", "encoder_stuck"),
     "setpoint_mismatch": ("joint_runaway",),  # in that torque's direction
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version", "wrong_drive"),
     "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
-    "bus_refuses": IDLE_DRIVE,
+    "bus_refuses": (*IDLE_DRIVE, "joint_runaway"),  # at the last torque
     "joint_position": ("encoder_jump",),
     "encoder_stuck": ("encoder_jump",),  # when it reports angles again
     "encoder_jump": ("joint_moving",),
@@ -289,7 +289,7 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "damping_failed": ("encoder_jump", "torque_missing", "joint_moving"),
     "motor_overheating": ("winding_overheating",),
     "motor_hot": ("winding_hot",),
-    "loop_lagging": ("loop_overrun",),
+    "loop_lagging": ("loop_overrun", "joint_oscillating"),  # the last torque takes a joint away from its target
     "loop_stalled": ("loop_lagging",),
     "loop_crawling": ("loop_stalled", "loop_lagging"),
     "daemon_hung": (*IDLE_DRIVE, "loop_stalled", "loop_crawling", "loop_lagging", "arming_failed"),
