@@ -35,6 +35,7 @@ class EncoderMonitor:
         self._reset_frozen()
 
     def _reset_frozen(self) -> None:
+        self._repeated = False  # the newest angle, since the sums below began
         self._moved_s = self._moved_rad = self._frozen_s = 0.0
         self._reset_unchanged()
 
@@ -48,10 +49,12 @@ class EncoderMonitor:
             return None
         gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
         if state.angle_rad == self._angle_rad:
+            self._repeated = True
             fault = self._check_frozen(state, gap_s)
         else:
             fault = self._check_jump(state, gap_s, dt_s)
-            self._reset_frozen()
+            if self._repeated:
+                self._reset_frozen()
         self._angle_rad, self._velocity_rad_s, self._stamp_s = (
             state.angle_rad, state.velocity_rad_s, state.angle_stamp_s
         )  # fmt: skip

@@ -193,7 +193,7 @@ class JointMonitor:
         if not self._low_rad <= angle_rad <= self._high_rad:
             found.append(self._out_of_range(angle_rad))
         self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
-        if self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
+        if self._fast_s and self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
             limit_rad_s = self._limits.velocity_rad_s
             kind = FaultKind.JOINT_VELOCITY
             found.append(self._fault(kind, velocity_rad_s=velocity_rad_s, limit_rad_s=limit_rad_s))

@@ -66,30 +66,32 @@ class MotionMonitor:
         self._elapsed_s += dt_s
         if state.angle_stamp_s == self._stamp_s:
             return
-        step_rad = state.angle_rad - self._angle_rad
-        measured = abs(state.velocity_rad_s) < FASTEST_RAD_S and abs(step_rad) < FASTEST_RAD_S * self._elapsed_s
-        if measured and self._elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
-            self._add_energy(state.velocity_rad_s, step_rad)
-            self._add_path(step_rad, state.angle_rad, target)
+        angle_rad, velocity_rad_s, elapsed_s = state.angle_rad, state.velocity_rad_s, self._elapsed_s
+        step_rad, farthest_rad = angle_rad - self._angle_rad, FASTEST_RAD_S * elapsed_s
+        measured = -FASTEST_RAD_S < velocity_rad_s < FASTEST_RAD_S and -farthest_rad < step_rad < farthest_rad
+        if measured and elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
+            self._add(elapsed_s, step_rad, velocity_rad_s, target)
         self._impulse_nm_s = self._elapsed_s = 0.0
-        self._stamp_s, self._angle_rad = state.angle_stamp_s, state.angle_rad
-        self._velocity_rad_s = state.velocity_rad_s
-        self._target_rad = target.angle_rad if target else UNKNOWN
-        self._report(found, target)
+        self._stamp_s, self._angle_rad, self._velocity_rad_s = state.angle_stamp_s, angle_rad, velocity_rad_s
+        self._target_rad = UNKNOWN if target is None else target.angle_rad
+        following = target is None or abs(target.angle_rad - angle_rad) <= self._following_rad
+        if not (following and self.unexplained_j <= self._runaway_j and self.away_rad <= AWAY_RAD):
+            self._report(found, target)
 
-    def _add_energy(self, velocity_rad_s: float, step_rad: float) -> None:
-        kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - self._velocity_rad_s * self._velocity_rad_s)
-        work_j = self._impulse_nm_s / self._elapsed_s * step_rad
-        kept = 1.0 - self._elapsed_s / RUNAWAY_LEAK_S
-        self.unexplained_j = max(0.0, kept * self.unexplained_j + kinetic_j - work_j)
-
-    def _add_path(self, step_rad: float, angle_rad: float, target: JointTarget | None) -> None:
-        self.away_rad *= 1.0 - self._elapsed_s / AWAY_LEAK_S
-        if target is None or self._target_rad != self._target_rad:
+    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target: JointTarget | None) -> None:
+        """Add a sample to the energy, and to the path away where the joint had a target and still has one."""
+        before_rad_s, target_rad = self._velocity_rad_s, self._target_rad
+        kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
+        work_j = self._impulse_nm_s / elapsed_s * step_rad
+        unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
+        self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
+        self.away_rad *= 1.0 - elapsed_s / AWAY_LEAK_S
+        if target is None or target_rad != target_rad:
             return
-        error_rad = abs(target.angle_rad - angle_rad) - abs(self._target_rad - self._angle_rad)
-        moved_rad = abs(step_rad) - abs(target.angle_rad - self._target_rad)
-        self.away_rad = max(0.0, self.away_rad + moved_rad + error_rad)
+        angle_rad = self._angle_rad
+        error_rad = abs(target.angle_rad - (angle_rad + step_rad)) - abs(target_rad - angle_rad)
+        away_rad = self.away_rad + (abs(step_rad) - abs(target.angle_rad - target_rad)) + error_rad
+        self.away_rad = away_rad if away_rad > 0.0 else 0.0
 
     def _report(self, found: list[Fault], target: JointTarget | None) -> None:
         if self.unexplained_j > self._runaway_j:
