@@ -114,9 +114,11 @@ class FaultMonitor:
 
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
         """The states with the estimated winding temperatures, if one is warm enough to matter for the limits."""
-        if all(joint.winding.temperature_c <= self._warm_c for joint in self.joints) and not any(
-            state.temperature_c > self._warm_c for state in states
-        ):
+        warm_c = self._warm_c
+        for joint, state in zip(self.joints, states, strict=True):
+            if state.temperature_c > warm_c or not joint.winding.temperature_c <= warm_c:
+                break
+        else:
             return states
         return Joints(
             *(
@@ -192,6 +194,9 @@ class FaultMonitor:
         """Update the trust in the encoders: a broken one stays untrusted, a silent one only while it is silent."""
         if mode not in ENERGISED:
             self._broken.clear()
+        if not (found or self._broken):
+            self.trusted = ALL_TRUSTED
+            return
         self._broken.update(fault.subject for fault in found if fault.kind in BROKEN)
         blind = self._broken.union(fault.subject for fault in found if fault.kind in BLIND)
         self.trusted = Joints(*(joint not in blind for joint in JOINTS)) if blind else ALL_TRUSTED
