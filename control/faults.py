@@ -111,7 +111,7 @@ class FaultKind(StrEnum):
     JOINT_NOT_FOLLOWING = "joint_not_following", "joint", SOFT_STOP, ALWAYS, BY_HAND, 765
     JOINT_RUNAWAY = "joint_runaway", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 60
     JOINT_OSCILLATING = "joint_oscillating", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 120
-    FOLLOWING_ERROR = "following_error", "joint", DAMPING, ALWAYS, BY_HAND, 765
+    FOLLOWING_ERROR = "following_error", "joint", DAMPING, ALWAYS, BY_HAND, 1900
     DAMPING_FAILED = "damping_failed", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 45
     ENCODER_JUMP = "encoder_jump", "joint", DAMPING, ALWAYS, BY_HAND, 3
     ENCODER_STUCK = "encoder_stuck", "joint", DAMPING, ALWAYS, BY_HAND, 120

@@ -40,6 +40,7 @@ POSE_FORGOTTEN_S = 10.0  # a pose source that is silent for longer counts as swi
 BROKEN = frozenset(
     {FaultKind.ENCODER_JUMP, FaultKind.ENCODER_STUCK}
 )  # detected in single ticks, but lasting until torque is off
+CATCH_UP_S = 0.3  # a sweep that the mud held at the far end of a stance needs 0.15 s for its 1 rad
 IN_MUD = frozenset({Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE, Phase.RECOVERY})
 NO_TARGETS: Joints[JointTarget | None] = same_for_all(None)
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
@@ -65,6 +66,7 @@ class MonitorInput(NamedTuple):
     lost_lease_holder: str  # the program that has lost the lease; empty: none
     targets: JointTargets | None = None  # of the joints in the tick before; None without stiffness
     phase: Phase = Phase.REST  # of the gait in the tick before
+    stride: int = -1  # of the walk in the tick before
 
 
 class FaultMonitor:
@@ -102,6 +104,8 @@ class FaultMonitor:
         self._restarts = {health.joint: health.restarts for health in self._drives.health}
         self._foreign_commands = {health.joint: health.foreign_commands for health in self._drives.health}
         self._refused_commands = self._drives.refused_commands
+        self._held_back_s = dict.fromkeys(JOINTS, NEVER_S)  # by the mud
+        self._lagging_strides = dict.fromkeys(JOINTS, (-9, -9))  # the last two in which a joint lagged in its swing
         self._sound: dict[str, DriveHealth | None] = dict.fromkeys(JOINTS)  # the last report in which nothing was wrong
         self._pose_stamp_s: float | None = None
         self._broken: set[str] = set()  # joints with an invalid encoder, until torque is off
@@ -180,8 +184,23 @@ class FaultMonitor:
             # without keywords, which take twice as long: four of these are made in every tick
             facts = JointFacts(tick.now_s, dt_s, energised, moving, torque_nm, may_stand_still, target, damping)
             for fault in joint.update(facts, state):
-                if fault.kind is not FaultKind.FOLLOWING_ERROR or self._moves_in_air(fault.subject, monitor_input):
-                    found.append(_explained(fault, health))
+                if fault.kind is FaultKind.FOLLOWING_ERROR and self._is_held_back(fault.subject, tick, monitor_input):
+                    continue
+                found.append(_explained(fault, health))
+
+    def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:
+        """Return whether mud may hold a joint that lags behind, or held it until CATCH_UP_S ago.
+
+        A body that sinks swings its flippers through the mud, so in a walk one swing is no proof, but two in a row are.
+        """
+        if not self._moves_in_air(joint, monitor_input):
+            self._held_back_s[joint] = tick.now_s
+        if tick.now_s - self._held_back_s[joint] < CATCH_UP_S:
+            return True
+        before, last = self._lagging_strides[joint]
+        if monitor_input.stride != last:
+            self._lagging_strides[joint] = before, last = last, monitor_input.stride
+        return monitor_input.stride >= 0 and before != last - 1
 
     def _moves_in_air(self, joint: str, monitor_input: MonitorInput) -> bool:
         """Return whether no mud may hold a joint back: by the phase of the gait, and by the flipper's own angles."""

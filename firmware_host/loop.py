@@ -167,6 +167,7 @@ class Loop:
             lost_lease_holder=lost_lease_holder,
             targets=self.controller.followed_targets,
             phase=self.target.phase,
+            stride=self.target.stride,
         )
 
     def _all_in_closed_loop(self) -> bool:

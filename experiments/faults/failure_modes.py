@@ -198,7 +198,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("joint_not_following", blocked, 3.0, ("hold",)),
     FailureMode("joint_runaway", drive_with(commutation_error_deg=180.0), 1.0, GAIT, turns=True),
     FailureMode("joint_oscillating", stiff, 1.0, ("swing", "stopping")),
-    FailureMode("following_error", jammed, 3.0, ("stance", "swing"), turns=True),
+    FailureMode("following_error", jammed, 6.0, ("stance", "swing"), turns=True),
     FailureMode("damping_failed", damped_against_command, 0.3, MOVING),
     FailureMode("encoder_jump", drive_with(encoder_offset_rad=0.6), phases=PHASES),
     FailureMode("encoder_stuck", failing("JOINT.position", "stuck"), 1.0, GAIT, turns=True),

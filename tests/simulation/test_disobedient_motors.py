@@ -56,7 +56,7 @@ def test_a_motor_that_does_not_obey_puts_little_energy_into_its_joint(
 ) -> None:
     bench = made(phase)
     with measured(bench, inject, joint) as energy:
-        assert bench.run_until(lambda: fault in faults_of(bench), 2.0)
+        assert bench.run_until(lambda: fault in faults_of(bench), 5.0)
         assert bench.run_until(lambda: bench.loop.mode not in ENERGISED, 3.2)
         bench.run_for(0.5)
     assert getattr(energy.joints, joint).energy_j < energy_j

@@ -48,7 +48,7 @@ def by_rosbags(path: Path) -> dict[str, list[tuple[int, Any]]]:
     return found
 
 
-@pytest.mark.parametrize("message", set(TOPICS.values()))
+@pytest.mark.parametrize("message", sorted(set(TOPICS.values())))
 def test_definitions_are_those_of_ros(message: str) -> None:
     expected, _ = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(schema_name(message), ros_version=2)
     parts = [sorted(text.strip().split("\n" + "=" * 80 + "\n")) for text in (full_definition(message), expected)]
