@@ -298,3 +298,21 @@ def test_every_fault_reports_the_values_that_it_was_found_by() -> None:
         "low_deg": pytest.approx(-70.0),
         "high_deg": pytest.approx(70.0),
     }
+
+
+def test_the_energy_of_a_joint_begins_again_once_torque_is_on() -> None:
+    """A joint that was turned by hand without torque stands elsewhere when the torque comes back."""
+    monitor = make_monitor()
+    now_s, angle_rad, turned_s = NOW_S, 0.1, 30 * PERIOD_S
+
+    def tick(speed_rad_s: float, moving: bool) -> set[str]:
+        nonlocal now_s, angle_rad
+        now_s, angle_rad = now_s + PERIOD_S, angle_rad + speed_rad_s * PERIOD_S
+        stamps = {"angle_stamp_s": now_s, "current_stamp_s": now_s, "heartbeat_stamp_s": now_s}
+        measured = state(angle_rad=angle_rad, velocity_rad_s=speed_rad_s, temperature_stamp_s=now_s, **stamps)
+        return found(monitor, measured, now_s=now_s, moving=moving, torque_nm=-0.2)
+
+    tick(0.0, moving=True)
+    for _ in range(round(turned_s / PERIOD_S)):
+        tick(10.0, moving=False)
+    assert angle_rad > 0.8 and not tick(0.0, moving=True) & {"joint_runaway", "joint_oscillating"}
