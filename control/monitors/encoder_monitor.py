@@ -37,9 +37,10 @@ class EncoderMonitor:
     def _reset_frozen(self) -> None:
         self._repeated = False  # the newest angle, since the sums below began
         self._moved_s = self._moved_rad = self._frozen_s = 0.0
-        self._reset_unchanged()
+        self.forget_torque()
 
-    def _reset_unchanged(self) -> None:
+    def forget_torque(self) -> None:
+        """Begin the wait for a reaction to torque again: without torque a joint may rest exactly where it is."""
         self._unchanged_s, self._lowest_nm, self._highest_nm = 0.0, inf, -inf
 
     def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
@@ -85,7 +86,7 @@ class EncoderMonitor:
     def _ignores_torque(self, state: DriveState, gap_s: float) -> bool:
         """Return whether angle and velocity stay the same to the last bit while the torque changes."""
         if state.velocity_rad_s != self._velocity_rad_s:
-            self._reset_unchanged()
+            self.forget_torque()
             return False
         self._unchanged_s += gap_s
         self._lowest_nm = min(self._lowest_nm, self._torque_nm)

@@ -199,8 +199,10 @@ class JointMonitor:
             found.append(self._fault(kind, velocity_rad_s=velocity_rad_s, limit_rad_s=limit_rad_s))
         if not self._stillness.update(angle_rad, facts.dt_s):
             self._stalled_s = 0.0
-        if self._stillness.still_s < REST_S and not facts.energised:
-            found.append(self._fault(FaultKind.JOINT_MOVING))
+        if not facts.energised:
+            self._encoder.forget_torque()
+            if self._stillness.still_s < REST_S:
+                found.append(self._fault(FaultKind.JOINT_MOVING))
         encoder_fault = self._encoder.update(state, facts.dt_s, facts.torque_nm)
         if encoder_fault:
             found.append(encoder_fault)

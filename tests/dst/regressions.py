@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tests.dst.scenario import Call, Harm, Scenario, Surroundings
+from tests.dst.scenario import Call, Failure, Harm, Scenario, Surroundings
 
 
 class Regression(NamedTuple):
@@ -16,6 +16,13 @@ class Regression(NamedTuple):
 
 
 QUICK = Surroundings(configuration=(("motion.path_speed_rad_s", 3.0), ("motion.fade_in_s", 0.1)))
+REST = (
+    ("motion.fade_in_s", 0.1),
+    ("gait.swing_duration_s", 0.4),
+    ("gait.insertion_speed_m_s", 0.2),
+    ("recovery.attempts", 1),
+    ("recovery.attempt_s", 0.3),
+)
 
 REGRESSIONS = (
     Regression(
@@ -53,6 +60,20 @@ REGRESSIONS = (
             start="stance",
             events=(Harm(at_s=0.0, name="frozen encoder", joint="left_sweep", for_s=1.5),),
             for_s=1.5,
+        ),
+    ),
+    Regression(
+        "a joint that comes to rest exactly as its torque goes off counts as a stuck encoder until it is moved",
+        Scenario(
+            seed=616,
+            surroundings=Surroundings(disturbed=True, configuration=(("motion.path_speed_rad_s", 1.9), *REST)),
+            start="idle",
+            events=(
+                Call(at_s=0.0, client="pilot", method="arm"),
+                Failure(at_s=0.196, component="loop", kind="slow", for_s=0.052),
+                Failure(at_s=0.198, component="right_adduction.command", kind="off", for_s=0.096),
+            ),
+            for_s=0.344,
         ),
     ),
 )

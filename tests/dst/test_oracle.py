@@ -21,7 +21,7 @@ SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events 
     "StopInTime": ("hold", (Call(0.0, "pilot", "walk"), Call(0.1, "guest", "stop")), SHORT_S),
     "ArmedByRequest": ("stance", (Call(0.05, "guest", "disarm"),), 0.8),
     "NoTorqueWithoutMode": ("stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),), SHORT_S),
-    "WithinStops": ("stance", (Failure(0.0, "left_sweep.position", "stuck", 1.5),), 1.5),
+    "WithinStops": ("stance", (Harm(0.0, "inverted motor", "left_sweep", 1.2),), 1.2),
     "BoundedEnergy": ("stance", (Harm(0.0, "inverted motor", "left_sweep", 0.6),), SHORT_S),
     "NoFalseAlarm": ("stance", (), SHORT_S),
     "NoBug": ("hold", (Call(0.05, "guest", "stop"), Call(0.1, "pilot", "clear")), SHORT_S),

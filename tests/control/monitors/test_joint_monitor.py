@@ -597,3 +597,15 @@ def test_a_current_that_follows_within_ticks_is_not_missed() -> None:
         state = fresh(now_s, current_a=before_nm / 0.083, velocity_rad_s=1.0, angle_rad=0.1 + 1e-3 * (tick % 2))
         assert "torque_missing" not in seen(watch, state, now_s, torque_nm=sent_nm)
         before_nm = sent_nm
+
+
+def test_a_joint_that_rests_exactly_where_its_torque_left_it_has_a_sound_encoder() -> None:
+    """Its torque fell while it was at rest; without torque nothing has to move any more."""
+    watch = make_watch()
+
+    def stuck(tick: int, torque_nm: float, energised: bool) -> bool:
+        now_s = START_S + tick * PERIOD_S
+        return "encoder_stuck" in seen(watch, fresh(now_s), now_s, torque_nm=torque_nm, energised=energised)
+
+    assert not any(stuck(tick, 0.7 if tick < 10 else 0.0, energised=True) for tick in range(12))
+    assert not any(stuck(tick, 0.0, energised=False) for tick in range(12, 200))
