@@ -33,16 +33,9 @@ from simulation.mud.track import Track
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
     """Returns simulated drives with the configuration's ids, signs, zeros and torque constants."""
+    fields = ("type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "serial_number")
     return {
-        joint: SimulatedDriveParameters(
-            type=drive.type,
-            node_id=drive.node_id,
-            sign=drive.sign,
-            zero_turn=drive.zero_turn,
-            torque_constant_nm_a=drive.torque_constant_nm_a,
-            serial_number=drive.serial_number,
-            **changes,
-        )
+        joint: SimulatedDriveParameters(**({name: getattr(drive, name) for name in fields} | changes))
         for joint, drive in configuration.drive.items()
     }
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.controller import WalkOrder
+from control.faults import FaultKind
 from control.gait.gait import SINGLE_FLIPPER
 from control.geometry import FlipperGeometry
 from control.modes import Mode
@@ -442,10 +443,10 @@ def patient(configuration: Configuration) -> Configuration:
 
 
 def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
-    """A loop that is closed over seldom messages swings by itself, at 10 ms by 10 rad/s."""
+    """The disturbances of the authors' logs do not make the loop swing by itself."""
     spreads = []
     configuration = patient(configuration)
-    for disturbances in (NONE, LAB, replace(LAB, sample_period_s=0.010)):
+    for disturbances in (NONE, LAB):
         lockstep = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), disturbances=disturbances)
         lockstep.arm()
         lockstep.walk(WalkOrder(0.03, adaptive=False))
@@ -456,9 +457,21 @@ def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
             lockstep.step()
             rates_rad_s.append(lockstep.robot.plant.velocities_rad_s[1])
         spreads.append(pstdev(rates_rad_s))
-    none, lab, seldom = spreads
+    none, lab = spreads
     assert lab < none + 0.5
-    assert seldom > 3.0
+
+
+def test_a_loop_over_seldom_messages_swings_by_itself_and_is_stopped(configuration: Configuration) -> None:
+    """At 10 ms the joints swing by 10 rad/s, in air and without any mud."""
+    seldom = replace(LAB, sample_period_s=0.010)
+    lockstep = Lockstep(patient(configuration), Track([(5.0, MUDS["48.5"])]), disturbances=seldom)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03, adaptive=False))
+    assert lockstep.run_until(lambda: lockstep.loop.mode in (Mode.DAMPING, Mode.FAULT), 5.0)
+    assert {fault.kind for fault in lockstep.loop.faults.present} & {
+        FaultKind.JOINT_OSCILLATING,
+        FaultKind.JOINT_RUNAWAY,
+    }
 
 
 def test_the_current_is_as_noisy_as_stated(configuration: Configuration) -> None:
