@@ -24,11 +24,11 @@ Start = Callable[[str], subprocess.Popen[str]]
 
 
 @pytest.fixture
-def open_bus(tmp_path: Path) -> Iterator[Open]:
+def open_bus(short_folder: Path) -> Iterator[Open]:
     opened: list[LocalBus] = []
 
     def open_one() -> LocalBus:
-        opened.append(LocalBus(tmp_path))
+        opened.append(LocalBus(short_folder))
         return opened[-1]
 
     yield open_one
@@ -37,10 +37,10 @@ def open_bus(tmp_path: Path) -> Iterator[Open]:
 
 
 @pytest.fixture
-def start_node(tmp_path: Path) -> Iterator[Start]:
+def start_node(short_folder: Path) -> Iterator[Start]:
     """Run a node in a process of its own, up to the line that it prints; `bus` is its name there."""
     started: list[subprocess.Popen[str]] = []
-    opening = f"import sys\nfrom drivers.can.local_bus import LocalBus\nbus = LocalBus({str(tmp_path)!r})\n"
+    opening = f"import sys\nfrom drivers.can.local_bus import LocalBus\nbus = LocalBus({str(short_folder)!r})\n"
 
     def start(code: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-c", opening + code]
@@ -100,9 +100,9 @@ def test_a_node_that_only_sends_notices_a_late_joiner(open_bus: Open) -> None:
     assert drain(late) == [2]
 
 
-def test_nodes_that_join_at_once_are_all_connected(tmp_path: Path) -> None:
+def test_nodes_that_join_at_once_are_all_connected(short_folder: Path) -> None:
     buses: list[LocalBus] = []
-    threads = [threading.Thread(target=lambda: buses.append(LocalBus(tmp_path))) for _ in range(12)]
+    threads = [threading.Thread(target=lambda: buses.append(LocalBus(short_folder))) for _ in range(12)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -124,24 +124,24 @@ def test_what_a_node_sent_before_it_left_still_arrives(open_bus: Open) -> None:
     assert stayer.lost_frames == 0
 
 
-def test_a_node_may_leave_and_come_back(open_bus: Open, tmp_path: Path) -> None:
+def test_a_node_may_leave_and_come_back(open_bus: Open, short_folder: Path) -> None:
     stayer = open_bus()
     for number in range(20):
-        with LocalBus(tmp_path) as visitor:
+        with LocalBus(short_folder) as visitor:
             stayer.send(make_message(number))
             assert drain(visitor) == [number]
     assert drain(stayer) == []
-    assert len(list(tmp_path.glob("*.node"))) == 1
+    assert len(list(short_folder.glob("*.node"))) == 1
 
 
 def test_a_killed_node_does_no_harm_and_its_socket_is_cleaned(
-    open_bus: Open, start_node: Start, tmp_path: Path
+    open_bus: Open, start_node: Start, short_folder: Path
 ) -> None:
     sender, receiver = open_bus(), open_bus()
     victim = start_node(IDLE_NODE)
     sender.send(make_message(1))
     kill(victim)
-    stale = list(tmp_path.glob(f"{victim.pid}-*.node"))
+    stale = list(short_folder.glob(f"{victim.pid}-*.node"))
     sender.send(make_message(2))
     late = open_bus()
     sender.send(make_message(3))
@@ -152,10 +152,10 @@ def test_a_killed_node_does_no_harm_and_its_socket_is_cleaned(
     assert not stale[0].exists()
 
 
-def test_a_file_that_is_no_socket_is_left_alone(open_bus: Open, tmp_path: Path) -> None:
-    (tmp_path / "notes.node").write_text("mine")
+def test_a_file_that_is_no_socket_is_left_alone(open_bus: Open, short_folder: Path) -> None:
+    (short_folder / "notes.node").write_text("mine")
     open_bus()
-    assert (tmp_path / "notes.node").read_text() == "mine"
+    assert (short_folder / "notes.node").read_text() == "mine"
 
 
 def test_a_stopped_node_never_blocks_the_sender(open_bus: Open, start_node: Start) -> None:
@@ -210,12 +210,12 @@ sys.stdin.read()"""
 
 
 @pytest.mark.parametrize("size", [1, 5, 16, 17, 31])
-def test_frames_cut_anywhere_by_the_stream_are_put_together(tmp_path: Path, size: int) -> None:
+def test_frames_cut_anywhere_by_the_stream_are_put_together(short_folder: Path, size: int) -> None:
     frames = [encode_frame(Frame(number, bytes([number]), is_fd=number % 3 == 2)) for number in range(20)]
     stream = b"".join(frames)
-    link = LocalLink(tmp_path)
+    link = LocalLink(short_folder)
     with socket.socket(socket.AF_UNIX) as raw:
-        raw.connect(str(next(tmp_path.glob("*.node"))))
+        raw.connect(str(next(short_folder.glob("*.node"))))
         received = []
         for start in range(0, len(stream), size):
             raw.sendall(stream[start : start + size])
@@ -226,8 +226,8 @@ def test_frames_cut_anywhere_by_the_stream_are_put_together(tmp_path: Path, size
     link.close()
 
 
-def test_garbage_is_reported_as_a_can_error(open_bus: Open, tmp_path: Path) -> None:
-    bus, link = open_bus(), LocalLink(tmp_path)
+def test_garbage_is_reported_as_a_can_error(open_bus: Open, short_folder: Path) -> None:
+    bus, link = open_bus(), LocalLink(short_folder)
     link.send(b"\xff" * 5 + bytes(11))
     with pytest.raises(can.CanOperationError, match="255"):
         bus.recv(0.1)
@@ -254,8 +254,8 @@ def test_every_kind_of_frame_survives(open_bus: Open, message: can.Message) -> N
     assert before_s <= received.timestamp <= time.time()
 
 
-def test_python_can_opens_it_by_name_with_filters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+def test_python_can_opens_it_by_name_with_filters(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
     wanted = [can.typechecking.CanFilter(can_id=0x123, can_mask=0x7FF)]
     with (
         can.Bus(interface="mudskipper_local", channel="demo", can_filters=wanted) as receiver,
@@ -264,7 +264,7 @@ def test_python_can_opens_it_by_name_with_filters(tmp_path: Path, monkeypatch: p
         sender.send(can.Message(arbitration_id=0x124, is_extended_id=False))
         sender.send(make_message(1))
         assert drain(receiver) == [1]
-    folder = tmp_path / NAME / BUSES / "demo"
+    folder = short_folder / NAME / BUSES / "demo"
     assert folder.stat().st_mode & 0o777 == 0o700
     assert folder.parent.stat().st_mode & 0o777 == 0o700
     assert [path.name for path in folder.iterdir()] == ["lock"]
@@ -289,30 +289,30 @@ def test_select_sees_frames_that_were_read_but_not_yet_taken(open_bus: Open) -> 
     assert select.select([receiver], [], [], 0)[0] == []
 
 
-def test_shutting_down_twice_is_fine_and_leaves_no_descriptor_open(tmp_path: Path) -> None:
-    with LocalBus(tmp_path) as bus:  # python-can itself opens a few things at first
+def test_shutting_down_twice_is_fine_and_leaves_no_descriptor_open(short_folder: Path) -> None:
+    with LocalBus(short_folder) as bus:  # python-can itself opens a few things at first
         pass
     before = sorted(os.listdir("/proc/self/fd"))
-    first, second = LocalBus(tmp_path), LocalBus(tmp_path)
+    first, second = LocalBus(short_folder), LocalBus(short_folder)
     first.send(make_message(1))
     assert drain(second) == [1]
     for bus in (first, second, first, second):
         bus.shutdown()
     assert sorted(os.listdir("/proc/self/fd")) == before
-    assert [path.name for path in tmp_path.iterdir()] == ["lock"]
+    assert [path.name for path in short_folder.iterdir()] == ["lock"]
 
 
-def test_a_wrong_channel_and_own_messages_are_refused(tmp_path: Path) -> None:
+def test_a_wrong_channel_and_own_messages_are_refused(short_folder: Path) -> None:
     for channel in ("", ".", "..", "a/b", "../demo", "demo/"):
         with pytest.raises(can.CanInitializationError, match="plain name"):
             LocalBus(channel)
     with pytest.raises(can.CanInitializationError, match="107 bytes"):
-        LocalBus(tmp_path / ("x" * 100))
+        LocalBus(short_folder / ("x" * 100))
     with pytest.raises(can.CanInitializationError, match="own messages"):
-        LocalBus(tmp_path, receive_own_messages=True)
+        LocalBus(short_folder, receive_own_messages=True)
 
 
-def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_of_another_user_is_refused(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 54321)
     with pytest.raises(can.CanInitializationError, match="belongs to user"):
-        LocalBus(tmp_path)
+        LocalBus(short_folder)
