@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,14 @@ CONSTANT = ("drive", "right_sweep", "torque_constant_nm_a")
 FRICTION = ("friction", "right_sweep", "coulomb_nm")
 
 
+def table_text(text: str, name: str) -> str:
+    """Returns the header and the keys of a table that ends with an empty line, whatever its keys are."""
+    header = f"[{name}]\n"
+    _, found, below = text.partition(header)
+    assert found
+    return header + below.partition("\n\n")[0] + "\n"
+
+
 def test_a_value_is_changed_and_nothing_else(example_text: str) -> None:
     after = changed_text(example_text, {CONSTANT: 0.0721})
     changed = [pair for pair in zip(example_text.splitlines(), after.splitlines(), strict=True) if pair[0] != pair[1]]
@@ -25,16 +34,16 @@ def test_a_value_is_changed_and_nothing_else(example_text: str) -> None:
 
 
 def test_a_new_key_is_in_its_own_table_above_the_comments_of_the_next_one() -> None:
-    lines = changed_text(LOCAL, {("drive", "right_adduction", "torque_constant_nm_a"): 0.072}).splitlines()
-    place = lines.index("torque_constant_nm_a = 0.072")
-    assert lines[place - 1] == "sign = 1" and lines[place + 1 : place + 3] == [
-        "", "# As a calibration of these joints would show.",
-    ]  # fmt: skip
+    after = changed_text(LOCAL, {("drive", "right_adduction", "torque_constant_nm_a"): 0.072})
+    table = table_text(LOCAL, "drive.right_adduction")
+    below = "\n# As a calibration of these joints would show.\n"
+    assert table + below in LOCAL
+    assert after == LOCAL.replace(table + below, table + "torque_constant_nm_a = 0.072\n" + below)
 
 
 @pytest.mark.parametrize("text", [LOCAL, "example"])
 def test_a_new_table_is_made_where_there_is_none(text: str, example_text: str) -> None:
-    before = example_text if text == "example" else text.replace("[friction.right_sweep]\nviscous_nm_s = 0.002\n", "")
+    before = example_text if text == "example" else text.replace(table_text(text, "friction.right_sweep"), "")
     after = changed_text(before, {CONSTANT: 0.0721, FRICTION: 0.012})
     assert parse_configuration(after).friction["right_sweep"].coulomb_nm == 0.012
     kept = [line for line in before.splitlines() if line and line not in after.splitlines()]
@@ -44,8 +53,9 @@ def test_a_new_table_is_made_where_there_is_none(text: str, example_text: str) -
 
 
 def test_tables_may_be_written_in_any_way() -> None:
-    inline = LOCAL.replace('[drive.right_sweep]\nbus = "right"\nnode_id = 3\nsign = -1\n', "")
-    inline = 'drive.right_sweep = { bus = "right", node_id = 3, sign = -1 }\n' + inline.replace("[robot]", "\n[robot]")
+    table = table_text(LOCAL, "drive.right_sweep")
+    inline = f"drive.right_sweep = {{ {', '.join(table.splitlines()[1:])} }}\n\n{LOCAL.replace(table, '')}"
+    assert tomllib.loads(inline) == tomllib.loads(LOCAL)
     after = changed_text(inline, {CONSTANT: 0.0721})
     assert parse_configuration(after).drive["right_sweep"].torque_constant_nm_a == 0.0721
 
