@@ -16,6 +16,8 @@ from virtual_machine.installed_robot import GUIDE, installation
 
 SYSTEMD = ROOT / "systemd"
 BUSES = {"vcan0", "vcan1"}
+SOURCE = "/opt/mudskipper/src"  # of the project, on a robot
+LOCK_FILE = "requirements/robot.txt"
 
 
 @pytest.fixture
@@ -53,8 +55,30 @@ def test_the_network_files_make_them_and_bring_them_up() -> None:
     assert "RequiredForOnline=no" in network
 
 
+def guide_commands(heading: str) -> list[str]:
+    guide = (ROOT / GUIDE).read_text(encoding="utf-8")
+    block = re.search(rf"^{heading}$.*?^```sh\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
+    assert block is not None
+    return [line.split("  #")[0].strip() for line in block[1].splitlines()]
+
+
 def test_the_virtual_machine_is_installed_by_the_guide_s_commands() -> None:
     script = installation()
-    for part in ("pip install /opt/mudskipper/src", "mudskipper install", "80-vcan.network", "sed -i"):
-        assert part in script
-    assert "git clone" not in script  # the working tree is copied instead
+    commands = guide_commands("## On the robot") + guide_commands("## Without CAN hardware")
+    left_out = [command for command in commands if f"\n{{ {command}" not in script]
+    assert [" ".join(command.split()[:2]) for command in left_out] == [
+        *("apt install", "git clone"),  # the base system has the packages, and the working tree is copied instead
+        *("mudskipper doctor", "systemctl status", "mudskipper simulate"),  # need a system that runs
+    ]
+    places = [script.index(f"\n{{ {command}") for command in commands if command not in left_out]
+    assert places == sorted(places)
+
+
+def test_the_virtual_machine_installs_the_locked_requirements_and_nothing_else() -> None:
+    pip_calls = [
+        shlex.split(call) for call in re.findall(r"^\{ \S*/pip (install .*?);? \}", installation(), re.MULTILINE)
+    ]
+    locked, project = pip_calls
+    assert {"--require-hashes", "--only-binary=:all:"} < {*locked}
+    assert locked[locked.index("-r") + 1 :] == [f"{SOURCE}/{LOCK_FILE}"] and (ROOT / LOCK_FILE).is_file()
+    assert {"--no-deps", "--no-index", "--no-build-isolation"} < {*project} and project[-1] == SOURCE
