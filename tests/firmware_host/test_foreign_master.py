@@ -1,4 +1,4 @@
-"""A second program on the bus: the drives go idle, and its own drives are told from other ones by serial number."""
+"""A second program on the bus: the drives go idle, and a serial number distinguishes its drives from others."""
 
 from dataclasses import replace
 

@@ -21,7 +21,7 @@ from control.records import DriveState, JointTarget
 TORQUE_NM = 0.75
 DYNAMICS = JointDynamics(inertia_kg_m2=0.0004, stiffness_nm_rad=8.0)
 DAMPING_NM_S = 0.06
-STEPS = 100  # of the mechanics in a tick: their own error must be small beside the bounds
+STEPS = 100  # of the mechanics in a tick: their own error must be small compared with the bounds
 Law = Callable[[float, float, float], float]  # (time, angle, velocity) -> torque
 
 

@@ -1,4 +1,4 @@
-"""Rows reach every subscriber; a slow one loses its own rows alone and is told how many."""
+"""Rows reach every subscriber; a slow one loses its own rows alone and learns how many."""
 
 import os
 import time
