@@ -263,14 +263,21 @@ class BoundedEnergy(Promise):
 
 
 class NoFalseAlarm(Promise):
-    """Nothing stops a robot with which nothing is wrong, except its mud and its operators."""
+    """Nothing stops a robot with which nothing is wrong, except its mud and its operators.
+
+    An operator who disarms it in the middle of an extraction lets the flipper coast out of the mud, up to its stop,
+    where its speed jumps.
+    """
 
     EXPECTED = frozenset({FaultKind.LEASE_LOST, FaultKind.FLIPPER_STUCK, FaultKind.JOINT_NOT_FOLLOWING})
+    COASTING = frozenset({FaultKind.JOINT_POSITION, FaultKind.JOINT_VELOCITY, FaultKind.ENCODER_JUMP})
 
     def update(self) -> Iterator[str]:
         if self.robot.harmed:
             return
         for fault in self.loop.faults.begun:
+            if fault.kind in self.COASTING and self.loop.mode not in ENERGISED:
+                continue
             if fault.kind.reaction >= Reaction.HOLD and fault.kind not in self.EXPECTED:
                 yield f"{fault.name} {fault.subject} without a failure"
 

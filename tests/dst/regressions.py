@@ -76,4 +76,14 @@ REGRESSIONS = (
             for_s=0.344,
         ),
     ),
+    Regression(
+        "a flipper that a disarm lets coast out of the mud counted as a false alarm",
+        Scenario(
+            seed=1323,
+            surroundings=Surroundings(strength_pa=3437, free_body=True),
+            start="release",
+            events=(Call(at_s=0.009, client="guest", method="disarm"),),
+            for_s=0.059,
+        ),
+    ),
 )
