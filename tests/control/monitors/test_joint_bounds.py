@@ -316,3 +316,17 @@ def test_the_energy_of_a_joint_begins_again_once_torque_is_on() -> None:
     for _ in range(round(turned_s / PERIOD_S)):
         tick(10.0, moving=False)
     assert angle_rad > 0.8 and not tick(0.0, moving=True) & {"joint_runaway", "joint_oscillating"}
+
+
+@pytest.mark.parametrize(("moving", "expected"), [(True, True), (False, False)])
+def test_a_joint_that_speeds_up_against_its_torque_is_a_runaway_while_closed_loop_is_expected(
+    moving: bool, expected: bool
+) -> None:
+    monitor, angle_rad, faults = make_monitor(), -0.3, set()
+    for number in range(40):
+        speed_rad_s, now_s = 0.5 * number, NOW_S + number * PERIOD_S
+        angle_rad += speed_rad_s * PERIOD_S
+        stamps = {"angle_stamp_s": now_s, "current_stamp_s": now_s, "heartbeat_stamp_s": now_s}
+        measured = state(angle_rad=angle_rad, velocity_rad_s=speed_rad_s, temperature_stamp_s=now_s, **stamps)
+        faults |= found(monitor, measured, now_s=now_s, moving=moving, torque_nm=-0.2)
+    assert ("joint_runaway" in faults) is expected
