@@ -25,12 +25,13 @@ from typing import Any, NamedTuple, Protocol
 
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import present_path
-from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_RECORD
+from firmware_host.log.row_records import HEADER, pack_record
+from firmware_host.log.rows import EVENT, EVENT_KIND
 
 PIPE_BYTES = 1 << 20  # 2,560 ticks, ten to a page: almost seven seconds at 380 Hz
 STAMP = struct.Struct("<4xd")  # every row of this version: four bytes of encapsulation, then its stamp
 REPORT_BYTES = 256  # left free for the report of a loss, which is sent together with a row
-LARGEST_ROW = select.PIPE_BUF - ROW_RECORD.size - REPORT_BYTES
+LARGEST_ROW = select.PIPE_BUF - HEADER.size - REPORT_BYTES
 LONGEST_TEXT = LARGEST_ROW - len(EVENT.encode(0.0, ""))  # bytes
 REPORT_CALLS = 95  # calls of `report` between two reads of its pipe: four reads a second at 380 Hz
 REPORT_OVERDUE_S = 3.0  # without a report: the writer waits for its disk
@@ -125,7 +126,7 @@ class Recorder:
 
     def _send_opening(self, opening: dict[str, Any]) -> None:
         row = json.dumps(opening).encode()
-        unsent = memoryview(ROW_RECORD.pack(0, len(row)) + row)
+        unsent = memoryview(pack_record(0, row))
         try:
             while unsent:
                 unsent = unsent[os.write(self._pipe, unsent) :]
@@ -136,7 +137,7 @@ class Recorder:
         """Sends one row without waiting; returns False where it was lost."""
         if len(row) > LARGEST_ROW:
             row = _shorten(row)
-        record = ROW_RECORD.pack(number, len(row)) + row
+        record = pack_record(number, row)
         if self._write(self._loss_report() + record if self._unreported else record):
             self._unreported = 0
             return True
@@ -161,7 +162,7 @@ class Recorder:
         """Is sent together with the next row: alone it would fit into gaps that are too small for a row."""
         text = f"rows missing here: {self._unreported}, the log's writer did not keep up"
         row = EVENT.encode(self._loss_stamp_s, text)
-        return ROW_RECORD.pack(EVENT_KIND, len(row)) + row
+        return pack_record(EVENT_KIND, row)
 
     def report(self) -> LogReport:
         """Returns the newest report; cheap enough for every tick, since it seldom reads the pipe."""

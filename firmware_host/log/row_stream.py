@@ -4,7 +4,7 @@ The loop knows nothing of it: it hands its rows to the writer, and the writer pa
 boundaries of packets (SOCK_SEQPACKET), so a packet is sent whole or not at all. A subscriber that does not read fills
 its own buffer in the kernel and then loses whole packets; the number of lost rows is sent to it before the next row.
 
-A packet is a sequence of records, each a kind (one byte), a length (four, little-endian) and so many bytes:
+A packet is a sequence of records (row_records.py) of these kinds:
 
     0 to 2      rows of the log: tick, stride, event (rows.py)
     OPENING     JSON, the first record: the kinds with topic, name and ros2msg definition, the run's metadata
@@ -20,7 +20,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from firmware_host.log.rows import ROW_KINDS, ROW_RECORD
+from firmware_host.log.row_records import Record, pack_record
+from firmware_host.log.rows import ROW_KINDS
 from firmware_host.operator.rights import Group, Level, Peer, Rights, read_peer
 from firmware_host.operator.socket_file import AlreadyServedError, SocketFile
 
@@ -41,10 +42,6 @@ def read_rights(values: Sequence[Any]) -> Rights:
     return Rights(Group(*readers), Group(*operators), own_uid, anyone_may_stop)
 
 
-def record(kind: int, content: bytes) -> bytes:
-    return ROW_RECORD.pack(kind, len(content)) + content
-
-
 class Subscriber:
     """Owns one connection and the count of its lost rows."""
 
@@ -56,7 +53,7 @@ class Subscriber:
 
     def send(self, packet: bytes, rows: int) -> bool:
         """Send a packet of so many rows, or count them as lost; return whether the subscriber is still there."""
-        report = record(LOST, json.dumps({"rows": self._lost}).encode()) if self._lost else b""
+        report = pack_record(LOST, json.dumps({"rows": self._lost}).encode()) if self._lost else b""
         try:
             self._connection.send(report + packet)
         except BlockingIOError:
@@ -86,7 +83,7 @@ class RowStream:
         self._rights, self._peer_of = rights, peer_of
         kinds = [{"topic": k.topic, "schema": k.schema_name, "definition": k.definition} for k in ROW_KINDS]
         opening = {"kinds": kinds, "metadata": metadata, "configuration_text": configuration_text}
-        self._opening = record(OPENING, json.dumps(opening).encode())
+        self._opening = pack_record(OPENING, json.dumps(opening).encode())
         self._subscribers: list[Subscriber] = []
         self._file: SocketFile | None = None
         try:
@@ -94,7 +91,7 @@ class RowStream:
         except (OSError, AlreadyServedError) as problem:
             self.problem = f"rows are not served on {path}: {problem}"
 
-    def publish(self, rows: Sequence[tuple[int, bytes]]) -> None:
+    def publish(self, rows: Sequence[Record]) -> None:
         """Accept those who wait, and send the rows to every subscriber; call this regularly, without rows too."""
         self._accept()
         if not self._subscribers:
@@ -122,7 +119,7 @@ class RowStream:
             level = self._rights.level(self._peer_of(connection))
             refusal = None if level >= Level.READ else self._rights.refusal("status", level)
         subscriber = Subscriber(connection)
-        admitted = subscriber.send(record(REFUSAL, refusal.encode()) if refusal else self._opening, 0)
+        admitted = subscriber.send(pack_record(REFUSAL, refusal.encode()) if refusal else self._opening, 0)
         if admitted and refusal is None:
             self._subscribers.append(subscriber)
         else:
@@ -136,12 +133,12 @@ class RowStream:
             self._file.close()
 
 
-def packets(rows: Sequence[tuple[int, bytes]]) -> list[tuple[bytes, int]]:
+def packets(rows: Sequence[Record]) -> list[tuple[bytes, int]]:
     """Return the rows as packets of at most PACKET_BYTES, each with its number of rows."""
     made: list[tuple[bytes, int]] = []
     packet, count = b"", 0
     for kind, row in rows:
-        piece = record(kind, row)
+        piece = pack_record(kind, row)
         if packet and len(packet) + len(piece) > PACKET_BYTES:
             made.append((packet, count))
             packet, count = b"", 0

@@ -5,7 +5,6 @@ define.
 Wide types come first, so that a row needs no padding between its fields.
 """
 
-import struct
 from collections.abc import Callable
 from enum import IntEnum
 
@@ -13,7 +12,6 @@ from control.modes import Mode
 from control.records import FLIPPERS, JOINTS, Phase, StrideEstimate
 from firmware_host.log.schema import TEXT, Field, RowKind
 
-ROW_RECORD = struct.Struct("<BI")  # between processes: number of the row's kind, its length; then the row
 MESSAGES = "mudskipper_msgs/msg"
 JOINT_ORDER = "left sweep, left adduction, right sweep, right adduction"
 

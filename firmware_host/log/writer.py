@@ -23,8 +23,9 @@ from typing import Any
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import FreeSpace, free_space
 from firmware_host.log.recorder import PIPE_BYTES, STAMP, LogReport
+from firmware_host.log.row_records import Record, split_records
 from firmware_host.log.row_stream import RowStream, read_rights
-from firmware_host.log.rows import ROW_KINDS, ROW_RECORD
+from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments
 
 GATHER_S = 0.05  # asleep between batches, so that not every row wakes the writer, which would slow the loop
@@ -33,7 +34,7 @@ REPORT_INTERVAL_S = 1.0
 RECENT_REPORTS = 10  # for which a slow write is remembered
 LONGEST_MESSAGE = 1000  # bytes in a report, which has to fit into the pipe at once
 
-Rows = list[tuple[int, bytes]]  # number of the row's kind, encoded row
+Rows = list[Record]  # number of the row's kind, encoded row
 
 
 class Reporter:
@@ -118,23 +119,9 @@ def _read_batches(pipe: int) -> Iterator[Rows]:
         piece = os.read(pipe, PIPE_BYTES)
         if not piece:
             return
-        rows, unread = _split(unread + piece)
+        rows, unread = split_records(unread + piece)
         yield rows
         time.sleep(GATHER_S)
-
-
-def _split(unread: bytes) -> tuple[Rows, bytes]:
-    """Returns the whole rows and the bytes after them."""
-    rows: Rows = []
-    start = 0
-    while start + ROW_RECORD.size <= len(unread):
-        number, length = ROW_RECORD.unpack_from(unread, start)
-        end = start + ROW_RECORD.size + length
-        if end > len(unread):
-            break
-        rows.append((number, unread[start + ROW_RECORD.size : end]))
-        start = end
-    return rows, unread[start:]
 
 
 def _yield_to_the_loop() -> None:

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from firmware_host.log.row_records import split_records
 from firmware_host.log.row_stream import BUFFER_BYTES, LOST, OPENING, REFUSAL
-from firmware_host.log.rows import ROW_KINDS, ROW_RECORD
+from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from firmware_host.operator.status_client import NoDaemonError, NotPermittedError
 
@@ -44,7 +45,7 @@ class LiveRows:
     def _read_opening(self, path: Path) -> None:
         if not select.select([self._socket], [], [], OPENING_S)[0]:
             raise NoDaemonError(f"{path} accepts no more subscribers; end another viewer")
-        for number, content in _records(self._socket.recv(BUFFER_BYTES)):
+        for number, content in split_records(self._socket.recv(BUFFER_BYTES))[0]:
             if number == REFUSAL:
                 raise NotPermittedError(content.decode())
             if number == OPENING:
@@ -70,7 +71,7 @@ class LiveRows:
         return list(self._rows(packet))
 
     def _rows(self, packet: bytes) -> Iterator[LiveRow]:
-        for number, content in _records(packet):
+        for number, content in split_records(packet)[0]:
             if number == LOST:
                 self.lost += int(json.loads(content)["rows"])
             elif number < len(self.kinds):
@@ -85,11 +86,3 @@ def _kind(own: RowKind, served: dict[str, str]) -> RowKind:
         return read_definition(own, served["definition"])
     except LayoutError as problem:
         raise NoDaemonError(f"the daemon is of another version: {problem}") from problem
-
-
-def _records(packet: bytes) -> Iterator[tuple[int, bytes]]:
-    start = 0
-    while start + ROW_RECORD.size <= len(packet):
-        number, length = ROW_RECORD.unpack_from(packet, start)
-        start += ROW_RECORD.size + length
-        yield number, packet[start - length : start]

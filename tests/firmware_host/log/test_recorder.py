@@ -30,7 +30,8 @@ from firmware_host.log.recorder import (
     LogReport,
     Recorder,
 )
-from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS, ROW_RECORD, STRIDE, TICK, TICK_KIND
+from firmware_host.log.row_records import pack_record
+from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS, STRIDE, TICK, TICK_KIND
 from firmware_host.log.schema import RowKind
 from firmware_host.log_reading.log_reader import read_log
 from tests.waiting import LONGEST_S, wait_until
@@ -339,7 +340,7 @@ def test_what_is_no_report_neither_ends_the_loop_nor_changes_what_is_known(
     assert "1 malformed reports" in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("sent", [b"", ROW_RECORD.pack(0, 100) + b"{"], ids=["nothing", "half an opening"])
+@pytest.mark.parametrize("sent", [b"", pack_record(0, b"{" * 100)[:6]], ids=["nothing", "half an opening"])
 def test_a_writer_that_hears_nothing_makes_no_file(tmp_path: Path, sent: bytes) -> None:
     path = tmp_path / "run.mcap"
     command = [sys.executable, "-m", "firmware_host.log.writer", str(path)]
@@ -351,7 +352,7 @@ def test_a_row_cut_off_with_its_sender_is_left_out(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     opening = {"configuration_text": "", "metadata": {}, "wall_minus_monotonic_ns": 0}
     records = [(0, json.dumps(opening).encode()), (TICK_KIND, make_tick(1.0)), (TICK_KIND, make_tick(2.0))]
-    sent = b"".join(ROW_RECORD.pack(kind, len(payload)) + payload for kind, payload in records)
+    sent = b"".join(pack_record(kind, payload) for kind, payload in records)
     command = [sys.executable, "-m", "firmware_host.log.writer", str(path)]
     subprocess.run(command, input=sent[:-1], timeout=LONGEST_S, check=True)
     assert read_log(path).ticks["stamp_s"].tolist() == [1.0]
