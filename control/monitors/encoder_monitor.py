@@ -45,13 +45,12 @@ class EncoderMonitor:
 
     def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
         """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""
-        self._torque_nm = torque_nm
         if state.angle_stamp_s == self._stamp_s:
             return None
         gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
         if state.angle_rad == self._angle_rad:
             self._repeated = True
-            fault = self._check_frozen(state, gap_s)
+            fault = self._check_frozen(state, gap_s, torque_nm)
         else:
             fault = self._check_jump(state, gap_s, dt_s)
             if self._repeated:
@@ -72,23 +71,23 @@ class EncoderMonitor:
             return None
         return FaultKind.ENCODER_JUMP.fault(self._joint, step_deg=degrees(abs(step_rad)), gap_ms=gap_s * 1e3)
 
-    def _check_frozen(self, state: DriveState, gap_s: float) -> Fault | None:
+    def _check_frozen(self, state: DriveState, gap_s: float, torque_nm: float) -> Fault | None:
         """Return a fault if the angle is frozen. The integral is signed: a velocity at rest is noise about zero."""
         self._moved_s += gap_s
         self._moved_rad += state.velocity_rad_s * gap_s
         frozen = state.velocity_rad_s == self._velocity_rad_s and abs(state.velocity_rad_s) > RESTS_RAD_S
         self._frozen_s = self._frozen_s + gap_s if frozen else 0.0
         moved = abs(self._moved_rad) > MOVED_RAD and self._moved_s > MOVED_S
-        if not moved and self._frozen_s <= FROZEN_S and not self._ignores_torque(state, gap_s):
+        if not moved and self._frozen_s <= FROZEN_S and not self._ignores_torque(state, gap_s, torque_nm):
             return None
         return FaultKind.ENCODER_STUCK.fault(self._joint)
 
-    def _ignores_torque(self, state: DriveState, gap_s: float) -> bool:
+    def _ignores_torque(self, state: DriveState, gap_s: float, torque_nm: float) -> bool:
         """Return whether angle and velocity stay the same to the last bit while the torque changes."""
         if state.velocity_rad_s != self._velocity_rad_s:
             self.forget_torque()
             return False
         self._unchanged_s += gap_s
-        self._lowest_nm = min(self._lowest_nm, self._torque_nm)
-        self._highest_nm = max(self._highest_nm, self._torque_nm)
+        self._lowest_nm = min(self._lowest_nm, torque_nm)
+        self._highest_nm = max(self._highest_nm, torque_nm)
         return self._unchanged_s > UNCHANGED_S and self._highest_nm - self._lowest_nm > YIELDING_NM
