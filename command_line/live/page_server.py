@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.rows import STRIDE, TICK
 from firmware_host.log_reading.live_rows import LiveRow, LiveRows
+from firmware_host.operator.reports import known
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 PAGE = Path(__file__).with_name("page.html")
@@ -96,8 +96,7 @@ class PageServer:
 
     def __init__(self, host: str, port: int, status_socket: Path) -> None:
         self._viewers = Viewers()
-        self._server = ThreadingHTTPServer((host, port), _handler(self._viewers, host, status_socket))
-        self._server.daemon_threads = True  # a browser that hangs must not keep this program
+        self._server = _Server(host, port, self._viewers, status_socket)
         self.port = int(self._server.server_address[1])
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
         self._reset()
@@ -147,7 +146,6 @@ def robot_facts(configuration_text: str) -> dict[str, Any]:
         "flipper_length_m": geometry.flipper_length_m,
         "drop_m": geometry.drop_m,
         "axis_height_m": geometry.axis_height_m,
-        "plate_width_m": geometry.plate_width_m,
         "modes": {int(mode): mode.name.lower() for mode in Mode},
         "phases": {int(phase): phase.name.lower() for phase in Phase},
     }
@@ -161,58 +159,68 @@ def finite(values: dict[str, Any]) -> dict[str, Any]:
 def _finite(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not isfinite(value) else value
+    return known(value) if isinstance(value, float) else value
 
 
-def _handler(viewers: Viewers, host: str, status_socket: Path) -> type[BaseHTTPRequestHandler]:
-    class Handler(BaseHTTPRequestHandler):
-        protocol_version = "HTTP/1.1"
+class _Server(ThreadingHTTPServer):
+    """What the handlers of all requests share."""
 
-        def do_GET(self) -> None:
-            if self.path == "/":
-                self._answer(HTTPStatus.OK, PAGE.read_bytes(), "text/html; charset=utf-8")
-            elif self.path == "/rows":
-                self._stream()
-            else:
-                self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
+    daemon_threads = True  # a browser that hangs must not keep this program
 
-        def do_POST(self) -> None:
-            if self.path != "/stop":
-                self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
-            elif self.headers.get(STOP_HEADER) != "stop" or not self._is_own_address():
-                self._answer(HTTPStatus.FORBIDDEN, b"only the page of this server may stop the robot")
-            else:
-                self._answer(*stop_robot(status_socket))
+    def __init__(self, host: str, port: int, viewers: Viewers, status_socket: Path) -> None:
+        self.host, self.viewers, self.status_socket = host, viewers, status_socket
+        super().__init__((host, port), _Handler)
 
-        def _is_own_address(self) -> bool:
-            asked = self.headers.get("Host", "").rsplit(":", 1)[0]
-            return asked == host or (asked in LOCAL and host in LOCAL)
 
-        def _stream(self) -> None:
-            viewer = viewers.add()
-            self.send_response(HTTPStatus.OK)
-            self.send_header("Content-Type", "text/event-stream")
-            self.send_header("Cache-Control", "no-store")
-            self.send_header("Connection", "close")
-            self.end_headers()
-            with suppress(OSError):  # the browser has gone
-                while True:
-                    message = viewer.get(1.0)
-                    self.wfile.write(f"data: {message}\n\n".encode() if message else b": no rows\n\n")
-            viewers.remove(viewer)
+class _Handler(BaseHTTPRequestHandler):
+    """Answers one connection."""
 
-        def _answer(self, status: HTTPStatus, content: bytes, kind: str = "text/plain; charset=utf-8") -> None:
-            self.send_response(status)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(content)))
-            self.send_header("Content-Security-Policy", "default-src 'self' 'unsafe-inline'; frame-ancestors 'none'")
-            self.end_headers()
-            self.wfile.write(content)
+    protocol_version = "HTTP/1.1"
+    server: _Server
 
-        def log_message(self, format: str, *args: Any) -> None:
-            """Requests are not printed."""
+    def do_GET(self) -> None:
+        if self.path == "/":
+            self._answer(HTTPStatus.OK, PAGE.read_bytes(), "text/html; charset=utf-8")
+        elif self.path == "/rows":
+            self._stream()
+        else:
+            self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
 
-    return Handler
+    def do_POST(self) -> None:
+        if self.path != "/stop":
+            self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
+        elif self.headers.get(STOP_HEADER) != "stop" or not self._is_own_address():
+            self._answer(HTTPStatus.FORBIDDEN, b"only the page of this server may stop the robot")
+        else:
+            self._answer(*stop_robot(self.server.status_socket))
+
+    def _is_own_address(self) -> bool:
+        host, asked = self.server.host, self.headers.get("Host", "").rsplit(":", 1)[0]
+        return asked == host or (asked in LOCAL and host in LOCAL)
+
+    def _stream(self) -> None:
+        viewer = self.server.viewers.add()
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", "text/event-stream")
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("Connection", "close")
+        self.end_headers()
+        with suppress(OSError):  # the browser has gone
+            while True:
+                message = viewer.get(1.0)
+                self.wfile.write(f"data: {message}\n\n".encode() if message else b": no rows\n\n")
+        self.server.viewers.remove(viewer)
+
+    def _answer(self, status: HTTPStatus, content: bytes, kind: str = "text/plain; charset=utf-8") -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Content-Security-Policy", "default-src 'self' 'unsafe-inline'; frame-ancestors 'none'")
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are not printed."""
 
 
 def stop_robot(status_socket: Path) -> tuple[HTTPStatus, bytes]:
