@@ -17,6 +17,7 @@ from control.modes import (
     next_mode,
     refusal,
 )
+from tests.mode_hardness import HARDNESS, MILDEST
 
 FLAGS = (False, True)
 OF_REACTION = {kind.reaction: kind.fault("left_sweep") for kind in FaultKind}
@@ -30,15 +31,6 @@ HEALTHS = [
 EVERYTHING = list(product(Mode, Request, HEALTHS))
 REQUESTS = [request for request in Request if request is not Request.NONE]
 WELL = Health(drives_heard=True, closed_loop=True)
-HARDNESS = {Mode.WALKING: 0, Mode.HOLD: 1, Mode.STOPPING: 2, Mode.DAMPING: 3, Mode.FAULT: 4, Mode.IDLE: 4}
-MILDEST = {
-    Reaction.NONE: 0,
-    Reaction.WARN: 0,
-    Reaction.HOLD: 1,
-    Reaction.SOFT_STOP: 2,
-    Reaction.DAMPING: 3,
-    Reaction.DRIVES_IDLE: 4,
-}
 
 
 def faulty(reaction: Reaction, health: Health = WELL) -> Health:

@@ -15,16 +15,8 @@ from control.modes import ENERGISED, MOVING, Mode, Request
 from tests.exploration.abstract_drives import PERIOD_S
 from tests.exploration.abstract_robot import AbstractRobot
 from tests.exploration.memory import CALL_S, NOW_S, Call, Memory, Operator
+from tests.mode_hardness import HARDNESS, MILDEST
 
-HARDNESS = {Mode.WALKING: 0, Mode.HOLD: 1, Mode.STOPPING: 2, Mode.DAMPING: 3, Mode.FAULT: 4, Mode.IDLE: 4}
-MILDEST = {
-    Reaction.NONE: 0,
-    Reaction.WARN: 0,
-    Reaction.HOLD: 1,
-    Reaction.SOFT_STOP: 2,
-    Reaction.DAMPING: 3,
-    Reaction.DRIVES_IDLE: 4,
-}
 LONGEST_TICKS = {
     Mode.STOPPING: round(SOFT_STOP_S / PERIOD_S) + 1,
     Mode.DAMPING: round(DAMPING_S / PERIOD_S) + 1,

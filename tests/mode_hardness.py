@@ -1,0 +1,16 @@
+"""How hard each mode stops the robot, and the mildest mode that each reaction permits, as the documentation says it."""
+
+from __future__ import annotations
+
+from control.faults import Reaction
+from control.modes import Mode
+
+HARDNESS = {Mode.WALKING: 0, Mode.HOLD: 1, Mode.STOPPING: 2, Mode.DAMPING: 3, Mode.FAULT: 4, Mode.IDLE: 4}
+MILDEST = {
+    Reaction.NONE: 0,
+    Reaction.WARN: 0,
+    Reaction.HOLD: 1,
+    Reaction.SOFT_STOP: 2,
+    Reaction.DAMPING: 3,
+    Reaction.DRIVES_IDLE: 4,
+}
