@@ -2,45 +2,29 @@
 
 from __future__ import annotations
 
-from math import inf, nextafter, radians
+from math import inf, nextafter
 from typing import Any
 
 import pytest
 
-from control.limits import JointLimits, JointRange
-from control.monitors.joint_monitor import FaultBounds, JointFacts, JointMonitor
-from control.monitors.winding import WindingParameters
+from control.limits import JointLimits
+from control.monitors.joint_monitor import FaultBounds, JointMonitor
 from control.rate import PERIOD_S
 from control.records import NEVER_S, DriveState
-
-NOW_S = 1000.0
-LIMITS, BOUNDS, WINDING = JointLimits(), FaultBounds(), WindingParameters()
-CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A = 12.0, 0.083
-SPAN = JointRange(radians(-60.0), radians(60.0))
-
-
-def make_monitor(bounds: FaultBounds = BOUNDS, limits: JointLimits = LIMITS) -> JointMonitor:
-    return JointMonitor("left_sweep", limits, SPAN, bounds, WINDING, CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A)
+from tests.control.monitors.monitored_joint import (
+    BOUNDS,
+    CURRENT_LIMIT_A,
+    HEALTHY,
+    NOW_S,
+    TORQUE_CONSTANT_NM_A,
+    WINDING,
+    facts,
+    make_monitor,
+)
 
 
 def state(**changes: Any) -> DriveState:
-    healthy = DriveState(
-        angle_rad=0.1,
-        velocity_rad_s=0.0,
-        angle_stamp_s=NOW_S,
-        current_a=0.0,
-        current_stamp_s=NOW_S,
-        closed_loop=True,
-        heartbeat_stamp_s=NOW_S,
-        temperature_c=25.0,
-        temperature_stamp_s=NOW_S,
-        bus_voltage_v=24.0,
-    )
-    return healthy._replace(**changes)
-
-
-def facts(**changes: Any) -> JointFacts:
-    return JointFacts(NOW_S, PERIOD_S, True, True, 0.0, False)._replace(**changes)
+    return HEALTHY._replace(**changes)
 
 
 def found(monitor: JointMonitor, measured: DriveState, **changes: Any) -> set[str]:

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.faults import FAULT_KINDS, FaultKind, Reaction
-from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import (
     CURRENT_TICKS,
     MISSING_FRACTION,
@@ -18,34 +17,25 @@ from control.monitors.joint_monitor import (
     SLOW_SILENCE_S,
     TWO_MESSAGES_S,
     FaultBounds,
-    JointFacts,
     JointMonitor,
 )
-from control.monitors.winding import WindingParameters
 from control.rate import PERIOD_S
 from control.records import NEVER_S, DriveState
 from firmware_host.operator.fault_texts import exact_message
+from tests.control.monitors.monitored_joint import (
+    BOUNDS,
+    CURRENT_LIMIT_A,
+    HEALTHY,
+    JOINT,
+    LIMITS,
+    NOW_S,
+    facts,
+    make_monitor,
+)
 
-JOINT = "left_sweep"
 MESSAGE_S = 0.002
-START_S = 1000.0
-LIMITS, BOUNDS = JointLimits(), FaultBounds()
-SPAN = JointRange(radians(-60.0), radians(60.0))
-CURRENT_LIMIT_A = 12.0
 FAST_TICKS = round(FaultBounds().fast_s * 380.0)
 TWO_MESSAGES = round(TWO_MESSAGES_S * 380.0)
-HEALTHY = DriveState(
-    angle_rad=0.1,
-    velocity_rad_s=0.0,
-    angle_stamp_s=START_S,
-    current_a=0.0,
-    current_stamp_s=START_S,
-    closed_loop=True,
-    heartbeat_stamp_s=START_S,
-    temperature_c=25.0,
-    temperature_stamp_s=START_S,
-    bus_voltage_v=24.0,
-)
 BEYOND = 1e-6
 SEVERITY = [
     "drive_late",
@@ -58,15 +48,7 @@ SEVERITY = [
 ]
 
 
-def make_watch() -> JointMonitor:
-    return JointMonitor(JOINT, LIMITS, SPAN, BOUNDS, WindingParameters(), CURRENT_LIMIT_A, 0.083)
-
-
-def facts(now_s: float = START_S, **changes: Any) -> JointFacts:
-    return JointFacts(now_s, PERIOD_S, True, True, 0.0, False)._replace(**changes)
-
-
-def seen(watch: JointMonitor, state: DriveState, now_s: float = START_S, **changes: Any) -> dict[str, str]:
+def seen(watch: JointMonitor, state: DriveState, now_s: float = NOW_S, **changes: Any) -> dict[str, str]:
     """Sentences by name."""
     found = watch.update(facts(now_s, **changes), state)
     assert all(fault.subject == JOINT for fault in found)
@@ -75,12 +57,12 @@ def seen(watch: JointMonitor, state: DriveState, now_s: float = START_S, **chang
 
 def names(state: DriveState, **changes: Any) -> set[str]:
     """What a fresh watch says of one sample."""
-    return set(seen(make_watch(), state, **changes))
+    return set(seen(make_monitor(), state, **changes))
 
 
 def lasting(state: DriveState, watch: JointMonitor | None = None) -> set[str]:
     """What is said of one that stays so for two slow messages; before that nothing is."""
-    watch = watch or make_watch()
+    watch = watch or make_monitor()
     before = [seen(watch, state) for _ in range(TWO_MESSAGES)]
     assert not any(before[:-1])
     return set(seen(watch, state)) | set(seen(watch, state))
@@ -95,10 +77,10 @@ def fresh(now_s: float, **changes: Any) -> DriveState:
 
 
 def ticks_until(name: str, state_at: Callable[[float], DriveState], longest: int = 1000, **changes: Any) -> int:
-    """From the first tick after START_S, at which the cause began, to the first with the fault."""
-    watch = make_watch()
+    """From the first tick after NOW_S, at which the cause began, to the first with the fault."""
+    watch = make_monitor()
     for tick in range(-20, longest):
-        now_s = START_S + tick * PERIOD_S
+        now_s = NOW_S + tick * PERIOD_S
         state = state_at(now_s) if tick > 0 else fresh(now_s)
         if name in seen(watch, state, now_s, **changes):
             return tick
@@ -108,7 +90,7 @@ def ticks_until(name: str, state_at: Callable[[float], DriveState], longest: int
 def last_message_s(now_s: float, ended_s: float, period_s: float, offset_s: float) -> float:
     """The stamp of a cyclic message that ended."""
     until_s = min(now_s, ended_s)
-    return START_S + offset_s + (until_s - START_S - offset_s) // period_s * period_s
+    return NOW_S + offset_s + (until_s - NOW_S - offset_s) // period_s * period_s
 
 
 def test_a_healthy_drive_shows_no_fault() -> None:
@@ -137,7 +119,7 @@ def test_a_signal_counts_as_gone_from_its_bound_on(
     stamps: tuple[str, ...], bound_s: float, before: str | None, after: str
 ) -> None:
     def reported(age_s: float) -> set[str]:
-        stamped: dict[str, Any] = dict.fromkeys(stamps, START_S - age_s)
+        stamped: dict[str, Any] = dict.fromkeys(stamps, NOW_S - age_s)
         return names(HEALTHY._replace(**stamped))
 
     assert reported(bound_s - BEYOND) == ({before} - {None})
@@ -152,7 +134,7 @@ def test_the_more_severe_of_two_silences_is_reported_and_more_silence_is_never_m
     position_s: float, current_s: float
 ) -> None:
     def reported(position_age_s: float, current_age_s: float) -> int:
-        found = names(HEALTHY._replace(angle_stamp_s=START_S - position_age_s, current_stamp_s=START_S - current_age_s))
+        found = names(HEALTHY._replace(angle_stamp_s=NOW_S - position_age_s, current_stamp_s=NOW_S - current_age_s))
         assert len(found - {"current_silent"}) <= 1
         return max((SEVERITY.index(name) for name in found), default=-1)
 
@@ -181,7 +163,7 @@ def test_silence_is_noticed_within_its_ticks_wherever_between_two_messages_it_be
     name: str, stamps: tuple[str, ...], offset_s: float
 ) -> None:
     def state_at(now_s: float) -> DriveState:
-        return fresh(now_s, **dict.fromkeys(stamps, last_message_s(now_s, START_S, MESSAGE_S, offset_s)))
+        return fresh(now_s, **dict.fromkeys(stamps, last_message_s(now_s, NOW_S, MESSAGE_S, offset_s)))
 
     earliest = {"drive_late": 2, "drive_quiet": 3, "position_stale": 3, "current_stale": 3}.get(name, 9)
     assert earliest <= ticks_until(name, state_at) <= FAULT_KINDS[name].bound_ticks
@@ -193,28 +175,28 @@ def test_silence_is_noticed_within_its_ticks_wherever_between_two_messages_it_be
 @pytest.mark.parametrize("offset_s", [0.0, 0.05, 0.099])
 def test_slow_signals_that_end_are_noticed_within_their_ticks(name: str, stamp: str, offset_s: float) -> None:
     def state_at(now_s: float) -> DriveState:
-        return fresh(now_s, **{stamp: last_message_s(now_s, START_S, 0.1, offset_s)})
+        return fresh(now_s, **{stamp: last_message_s(now_s, NOW_S, 0.1, offset_s)})
 
     assert FAULT_KINDS[name].bound_ticks - 42 <= ticks_until(name, state_at) <= FAULT_KINDS[name].bound_ticks
 
 
 def test_messages_every_two_milliseconds_are_never_late_at_any_phase_to_the_ticks() -> None:
     for offset in range(20):
-        watch = make_watch()
+        watch = make_monitor()
         for tick in range(1, 400):
-            now_s = START_S + tick * PERIOD_S
+            now_s = NOW_S + tick * PERIOD_S
             stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
             assert not seen(watch, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s)
 
 
 def test_one_message_that_is_lost_is_at_most_late() -> None:
     for offset in range(20):
-        watch = make_watch()
+        watch = make_monitor()
         found: set[str] = set()
         for tick in range(1, 40):
-            now_s = START_S + tick * PERIOD_S
+            now_s = NOW_S + tick * PERIOD_S
             stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
-            if START_S + 0.05 <= stamp_s < START_S + 0.05 + MESSAGE_S:
+            if NOW_S + 0.05 <= stamp_s < NOW_S + 0.05 + MESSAGE_S:
                 stamp_s -= MESSAGE_S
             found |= set(seen(watch, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s))
         assert found <= {"drive_late"}
@@ -225,16 +207,16 @@ def test_a_drive_that_never_reported_its_temperature_has_no_temperature_fault() 
 
 
 def test_silence_is_reported_with_signal_joint_and_time() -> None:
-    late = seen(make_watch(), HEALTHY._replace(current_stamp_s=START_S - 0.0201))
+    late = seen(make_monitor(), HEALTHY._replace(current_stamp_s=NOW_S - 0.0201))
     assert late == {"current_stale": "No current came from the left_sweep drive for 20 ms."}
-    gone = seen(make_watch(), HEALTHY._replace(angle_stamp_s=NEVER_S, current_stamp_s=NEVER_S))
+    gone = seen(make_monitor(), HEALTHY._replace(angle_stamp_s=NEVER_S, current_stamp_s=NEVER_S))
     assert gone == {"drive_silent": "No message came from the left_sweep drive at all."}
-    tick = seen(make_watch(), HEALTHY._replace(heartbeat_stamp_s=NEVER_S))
+    tick = seen(make_monitor(), HEALTHY._replace(heartbeat_stamp_s=NEVER_S))
     assert tick == {"heartbeat_silent": "No heartbeat came from the left_sweep drive at all."}
 
 
 def test_what_is_late_is_named_by_the_older_of_the_two() -> None:
-    message = seen(make_watch(), HEALTHY._replace(angle_stamp_s=START_S - 0.006, current_stamp_s=START_S - 0.007))
+    message = seen(make_monitor(), HEALTHY._replace(angle_stamp_s=NOW_S - 0.006, current_stamp_s=NOW_S - 0.007))
     assert message == {"drive_late": "No current came from the left_sweep drive for 7 ms."}
 
 
@@ -243,7 +225,7 @@ def test_what_is_late_is_named_by_the_older_of_the_two() -> None:
 
 @pytest.mark.parametrize("flags", [1, 0x10, 0x4000000])
 def test_any_error_flag_is_a_fault(flags: int) -> None:
-    message = seen(make_watch(), HEALTHY._replace(error_flags=flags))
+    message = seen(make_monitor(), HEALTHY._replace(error_flags=flags))
     assert message == {"drive_error": f"The left_sweep drive reports error 0x{flags:x}."}
 
 
@@ -254,14 +236,14 @@ def test_a_drive_out_of_closed_loop_is_a_fault_only_where_it_is_expected_there()
 
 
 def test_an_unrequested_closed_loop_is_a_fault_after_the_time_to_obey() -> None:
-    watch = make_watch()
+    watch = make_monitor()
     unasked = [tick for tick in range(200) if "drive_energised" in seen(watch, HEALTHY, energised=False, moving=False)]
     assert unasked[0] == pytest.approx(0.2 / PERIOD_S, abs=1)
     assert unasked[0] + 38 + 2 <= FaultKind.DRIVE_ENERGISED.bound_ticks  # a heartbeat tells of it
 
 
 def test_the_time_to_obey_begins_again_with_every_obedience() -> None:
-    watch = make_watch()
+    watch = make_monitor()
     for tick in range(400):
         reported = seen(watch, HEALTHY._replace(closed_loop=tick % 70 > 0), energised=False, moving=False)
         assert "drive_energised" not in reported
@@ -285,7 +267,7 @@ def test_a_joint_may_be_past_its_range_by_the_margin_and_no_further(edge: float,
 
 
 def test_out_of_range_is_reported_in_degrees_with_the_range() -> None:
-    (message,) = seen(make_watch(), HEALTHY._replace(angle_rad=radians(80.0))).values()
+    (message,) = seen(make_monitor(), HEALTHY._replace(angle_rad=radians(80.0))).values()
     assert message == "The left_sweep joint is at 80.0 degrees, outside of -70 to 70."
 
 
@@ -299,7 +281,7 @@ def test_a_joint_is_too_fast_from_a_quarter_over_its_limit_on(sign: float) -> No
     bound = 1.25 * LIMITS.velocity_rad_s
 
     def ticks_at(velocity_rad_s: float) -> list[set[str]]:
-        watch = make_watch()
+        watch = make_monitor()
         return [set(seen(watch, HEALTHY._replace(velocity_rad_s=sign * velocity_rad_s))) for _ in range(10)]
 
     assert ticks_at(bound) == [set()] * 10
@@ -309,16 +291,16 @@ def test_a_joint_is_too_fast_from_a_quarter_over_its_limit_on(sign: float) -> No
 
 
 def test_two_fast_samples_again_and_again_are_no_fault() -> None:
-    watch = make_watch()
+    watch = make_monitor()
     for tick in range(100):
         assert not seen(watch, HEALTHY._replace(velocity_rad_s=100.0 if tick % 3 else 0.0))
 
 
 def moving_ticks(speed_rad_s: float, noise_rad_s: float = 0.0, energised: bool = False) -> int:
     """Of 200, in which a joint with this speed is told to move."""
-    watch, random, count = make_watch(), Random(1), 0
+    watch, random, count = make_monitor(), Random(1), 0
     for tick in range(200):
-        now_s = START_S + tick * PERIOD_S
+        now_s = NOW_S + tick * PERIOD_S
         reported_rad_s = speed_rad_s + random.gauss(0.0, noise_rad_s)
         state = fresh(now_s, angle_rad=speed_rad_s * tick * PERIOD_S, velocity_rad_s=reported_rad_s, closed_loop=False)
         count += "joint_moving" in seen(watch, state, now_s, energised=energised, moving=False)
@@ -336,44 +318,44 @@ def test_a_joint_at_rest_whose_speed_is_noise_may_be_armed() -> None:
 
 
 def samples(watch: JointMonitor, steps: Iterable[tuple[float, float]]) -> list[set[str]]:
-    """Of angles that arrive at times after START_S, one in each tick."""
-    return [set(seen(watch, fresh(START_S + time_s, angle_rad=angle), START_S + time_s)) for time_s, angle in steps]
+    """Of angles that arrive at times after NOW_S, one in each tick."""
+    return [set(seen(watch, fresh(NOW_S + time_s, angle_rad=angle), NOW_S + time_s)) for time_s, angle in steps]
 
 
 def test_an_encoder_jumps_beyond_what_its_speed_explains() -> None:
     for step_rad, expected in ((0.05 - BEYOND, set()), (0.05 + BEYOND, {"encoder_jump"})):
         for sign in (1.0, -1.0):
-            assert samples(make_watch(), [(0.0, 0.0), (0.002, sign * step_rad)]) == [set(), expected]
+            assert samples(make_monitor(), [(0.0, 0.0), (0.002, sign * step_rad)]) == [set(), expected]
 
 
 def test_a_jump_is_reported_once_and_the_new_angle_then_counts() -> None:
-    found = samples(make_watch(), [(0.002 * tick, 0.5 * (tick >= 5)) for tick in range(10)])
+    found = samples(make_monitor(), [(0.002 * tick, 0.5 * (tick >= 5)) for tick in range(10)])
     assert found == [set()] * 5 + [{"encoder_jump"}] + [set()] * 4
 
 
 def test_the_first_sample_is_never_a_jump() -> None:
-    watch = make_watch()
+    watch = make_monitor()
     assert samples(watch, [(0.0, 1.0)]) == [set()]
     watch.reset()
     assert samples(watch, [(0.0, -1.0)]) == [set()]
 
 
 def test_the_same_message_seen_twice_is_no_jump_and_no_step() -> None:
-    watch = make_watch()
+    watch = make_monitor()
     samples(watch, [(0.0, 0.0)])
     for tick in range(1, 3):
-        assert not seen(watch, HEALTHY._replace(angle_rad=0.0), START_S + tick * 0.002)
+        assert not seen(watch, HEALTHY._replace(angle_rad=0.0), NOW_S + tick * 0.002)
 
 
 def test_a_stamp_before_the_one_before_makes_no_jump() -> None:
     """A frame that came without a time is stamped when it is read, which may be after the next one's own time."""
-    assert samples(make_watch(), [(0.05, 0.1), (0.01, 0.1), (0.012, 0.11)]) == [set(), set(), set()]
+    assert samples(make_monitor(), [(0.05, 0.1), (0.01, 0.1), (0.012, 0.11)]) == [set(), set(), set()]
 
 
 def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
-    watch, speed_rad_s = make_watch(), LIMITS.velocity_rad_s
+    watch, speed_rad_s = make_monitor(), LIMITS.velocity_rad_s
     for tick in range(30):
-        now_s = START_S + tick * PERIOD_S
+        now_s = NOW_S + tick * PERIOD_S
         angle_rad = -0.9 + speed_rad_s * tick * PERIOD_S
         assert not seen(watch, fresh(now_s, angle_rad=angle_rad, velocity_rad_s=speed_rad_s), now_s)
 
@@ -382,7 +364,7 @@ def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
 
 
 def stalled_ticks(torque_nm: float, velocity_rad_s: float, excused: bool = False, ticks: int = 900) -> int | None:
-    watch = make_watch()
+    watch = make_monitor()
     for tick in range(1, ticks):
         state = HEALTHY._replace(velocity_rad_s=velocity_rad_s, angle_rad=0.1 + velocity_rad_s * tick * PERIOD_S)
         if "joint_not_following" in seen(watch, state, torque_nm=torque_nm, may_stand_still=excused):
@@ -412,17 +394,17 @@ def test_everything_else_follows_or_is_excused(torque_nm: float, velocity_rad_s:
 
 
 def test_a_move_begins_the_wait_again_and_the_noise_of_a_speed_does_not() -> None:
-    watch, random = make_watch(), Random(1)
+    watch, random = make_monitor(), Random(1)
     for tick in range(2000):
         state = HEALTHY._replace(angle_rad=0.05 * (tick // 700))
         assert "joint_not_following" not in seen(watch, state, torque_nm=LIMITS.torque_nm)
-    watch = make_watch()
+    watch = make_monitor()
     noisy = [HEALTHY._replace(velocity_rad_s=random.gauss(0.0, 0.3)) for _ in range(800)]
     assert any("joint_not_following" in seen(watch, state, torque_nm=LIMITS.torque_nm) for state in noisy)
 
 
 def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
-    watch = make_watch()
+    watch = make_monitor()
     found = [
         tick
         for tick in range(1, 200)
@@ -433,7 +415,7 @@ def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
 
 def test_one_sample_after_a_long_stall_is_no_proof_of_what_lasted() -> None:
     """A daemon that hung for seconds looks once."""
-    watch = make_watch()
+    watch = make_monitor()
     stalled = seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=3.0)
     assert set(stalled).isdisjoint({"joint_not_following", "torque_missing", "joint_velocity"})
 
@@ -446,7 +428,7 @@ def test_a_joint_at_rest_is_not_too_fast_after_missed_ticks(missed: int) -> None
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_motor_takes_too_much_from_a_quarter_over_its_limit_on(sign: float) -> None:
     def ticks_at(current_a: float) -> list[bool]:
-        watch = make_watch()
+        watch = make_monitor()
         state = HEALTHY._replace(current_a=sign * current_a)
         return ["joint_current" in seen(watch, state) for _ in range(6)]
 
@@ -479,7 +461,7 @@ def test_a_sensor_is_nearly_too_hot_half_way_to_its_bound_and_then_too_hot(
 
 
 def warm_watch(winding_c: float) -> JointMonitor:
-    watch = make_watch()
+    watch = make_monitor()
     watch.winding.temperature_c = winding_c
     return watch
 
@@ -508,7 +490,7 @@ def test_where_both_are_as_hot_the_sensor_is_trusted() -> None:
 
 def test_one_absurd_temperature_is_over_in_minutes() -> None:
     for absurd in (inf, 1e38):
-        watch = make_watch()
+        watch = make_monitor()
         for _ in range(TWO_MESSAGES + 2):
             reported = seen(watch, HEALTHY._replace(temperature_c=absurd))
         assert set(reported) == {"motor_hot"}
@@ -537,9 +519,9 @@ drive_states = st.builds(
 def test_no_value_makes_it_fail_and_every_fault_has_a_sentence(
     states: list[DriveState], energised: bool, moving: bool, torque_nm: float
 ) -> None:
-    watch = make_watch()
+    watch = make_monitor()
     for tick, state in enumerate(states):
-        now_s = START_S + tick * PERIOD_S
+        now_s = NOW_S + tick * PERIOD_S
         for name, message in seen(watch, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm).items():
             assert name in FAULT_KINDS
             assert message.startswith(("The left_sweep ", "No ")) and message.endswith((".", "C", "s."))
@@ -549,12 +531,12 @@ def test_no_value_makes_it_fail_and_every_fault_has_a_sentence(
 @given(st.lists(drive_states, min_size=1, max_size=4))
 def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[DriveState]) -> None:
     """All but heat and the jump back."""
-    watch = make_watch()
+    watch = make_monitor()
     for tick, state in enumerate(states):
-        seen(watch, state, START_S + tick * PERIOD_S)
+        seen(watch, state, NOW_S + tick * PERIOD_S)
     found: set[str] = set()
     for tick in range(len(states), len(states) + 5):
-        now_s = START_S + tick * PERIOD_S
+        now_s = NOW_S + tick * PERIOD_S
         found = set(seen(watch, fresh(now_s), now_s))
     assert found <= {"winding_hot", "winding_overheating"}
 
@@ -563,10 +545,10 @@ def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[Dr
 
 
 def missing_ticks(sent_nm: float, current_a: float, moving: bool = True) -> int | None:
-    watch = make_watch()
+    watch = make_monitor()
     for tick in range(1, 200):
-        state = fresh(START_S + tick * PERIOD_S, current_a=current_a)
-        if "torque_missing" in seen(watch, state, START_S + tick * PERIOD_S, torque_nm=sent_nm, moving=moving):
+        state = fresh(NOW_S + tick * PERIOD_S, current_a=current_a)
+        if "torque_missing" in seen(watch, state, NOW_S + tick * PERIOD_S, torque_nm=sent_nm, moving=moving):
             return tick
     return None
 
@@ -591,9 +573,9 @@ def test_no_torque_is_missed_of_a_drive_that_is_not_in_closed_loop() -> None:
 
 def test_a_current_that_follows_within_ticks_is_not_missed() -> None:
     """The current told in a tick answers the torque of the tick before."""
-    watch, before_nm = make_watch(), 0.0
+    watch, before_nm = make_monitor(), 0.0
     for tick in range(400):
-        now_s, sent_nm = START_S + tick * PERIOD_S, 0.7 if tick // 30 % 2 else -0.7
+        now_s, sent_nm = NOW_S + tick * PERIOD_S, 0.7 if tick // 30 % 2 else -0.7
         state = fresh(now_s, current_a=before_nm / 0.083, velocity_rad_s=1.0, angle_rad=0.1 + 1e-3 * (tick % 2))
         assert "torque_missing" not in seen(watch, state, now_s, torque_nm=sent_nm)
         before_nm = sent_nm
@@ -601,10 +583,10 @@ def test_a_current_that_follows_within_ticks_is_not_missed() -> None:
 
 def test_a_joint_that_rests_exactly_where_its_torque_left_it_has_a_sound_encoder() -> None:
     """Its torque fell while it was at rest; without torque nothing has to move any more."""
-    watch = make_watch()
+    watch = make_monitor()
 
     def stuck(tick: int, torque_nm: float, energised: bool) -> bool:
-        now_s = START_S + tick * PERIOD_S
+        now_s = NOW_S + tick * PERIOD_S
         return "encoder_stuck" in seen(watch, fresh(now_s), now_s, torque_nm=torque_nm, energised=energised)
 
     assert not any(stuck(tick, 0.7 if tick < 10 else 0.0, energised=True) for tick in range(12))

@@ -1,0 +1,38 @@
+"""A healthy joint, its monitor and one tick of it, for the tests of a joint's faults."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Any
+
+from control.limits import JointLimits, JointRange
+from control.monitors.joint_monitor import FaultBounds, JointFacts, JointMonitor
+from control.monitors.winding import WindingParameters
+from control.rate import PERIOD_S
+from control.records import DriveState
+
+JOINT = "left_sweep"
+NOW_S = 1000.0
+LIMITS, BOUNDS, WINDING = JointLimits(), FaultBounds(), WindingParameters()
+CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A = 12.0, 0.083
+SPAN = JointRange(radians(-60.0), radians(60.0))
+HEALTHY = DriveState(
+    angle_rad=0.1,
+    velocity_rad_s=0.0,
+    angle_stamp_s=NOW_S,
+    current_a=0.0,
+    current_stamp_s=NOW_S,
+    closed_loop=True,
+    heartbeat_stamp_s=NOW_S,
+    temperature_c=25.0,
+    temperature_stamp_s=NOW_S,
+    bus_voltage_v=24.0,
+)
+
+
+def make_monitor(bounds: FaultBounds = BOUNDS, limits: JointLimits = LIMITS) -> JointMonitor:
+    return JointMonitor(JOINT, limits, SPAN, bounds, WINDING, CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A)
+
+
+def facts(now_s: float = NOW_S, **changes: Any) -> JointFacts:
+    return JointFacts(now_s, PERIOD_S, True, True, 0.0, False)._replace(**changes)
