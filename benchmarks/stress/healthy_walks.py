@@ -26,7 +26,7 @@ from simulation.mud.disturbances import LAB, NONE, drive_changes
 from simulation.mud.track import RandomStrength, Track
 
 WALK_S = 60.0
-STRENGTHS_PA = (400.0, 4000.0)  # softer mud bears no robot, firmer mud holds a flipper that is deep in it
+STRENGTHS_PA = (400.0, 4000.0)  # softer mud supports no robot, firmer mud holds a flipper that is deep in it
 DEPTHS_M = (0.02, 0.025, 0.03, 0.035)
 MOVE_RAD = 0.2
 BY_THE_MUD, BY_SINKING = ("flipper_stuck", "joint_not_following"), "following_error"

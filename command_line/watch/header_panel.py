@@ -38,7 +38,7 @@ def _mode(history: History) -> tuple[Piece, Piece]:
 
 
 def _message(badge: tuple[Piece, ...], texts: list[Piece], width: int) -> list[Line]:
-    """Put the first text behind the badge, and each further one on a new line; the first may take two lines."""
+    """Put the first text after the badge, and each further one on a new line; the first may take two lines."""
     (first, style), *others = texts
     lines = wrapped(first, style, width, length(badge))
     lines[0] = (*badge, *lines[0])

@@ -47,7 +47,7 @@ def side_by_side(left: Line, right: Line, width: int) -> Line:
 
 
 def wrapped(text: str, style: str, width: int, indent: int = 0, longest: int = 2) -> list[Line]:
-    """Break a text into at most `longest` lines, the first of them behind an indent that is not written."""
+    """Break a text into at most `longest` lines, the first of them after an indent that is not written."""
     rows = textwrap.wrap(text, max(width, 8), initial_indent=" " * indent, max_lines=longest, placeholder=" …")
     if not rows:
         return []

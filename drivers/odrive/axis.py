@@ -6,7 +6,7 @@ yet. Its version and watchdog settings are then unknown again. Everything that i
 tick before, so a stall of this program is not taken for a silence of the drive.
 
 A command for this drive that arrives here comes from another program, because a port does not receive its own frames.
-Emergency stops are no such commands, and neither are requests to read: anybody may send them.
+Emergency stops are no such commands, and neither are requests to read: any program may send them.
 """
 
 from collections.abc import Callable, Sequence

@@ -2,7 +2,7 @@
 
 A drive computes its set-point from the newest torque command that it received. So a set-point that lies outside of the
 range of the last few commands belongs to another program's command, or to an old one: commands come late or are lost.
-In health no report differs. A program that commands every tenth time makes 10 % of them differ, one behind every
+In health no report differs. A program that commands every tenth time makes 10 % of them differ, one after every
 command of ours half of them, and commands that are 5 to 20 ms late most of them while the torque changes. The score
 rises by WEIGHT for a report that differs and falls by 1 for one that does not, so a rate below 1 / (1 + WEIGHT) = 4 %
 is never a fault, and 10 % is one after some 80 reports. FOUND is more than five reports alone add.

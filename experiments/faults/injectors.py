@@ -128,7 +128,7 @@ def other_master(bench: FaultBench, joint: str) -> None:
 
 
 def commanded_by_another(torque_nm: float, every: int, heard: bool) -> Injector:
-    """Let another program command a torque behind every nth command of the loop; `heard`: on the loop's own bus."""
+    """Let another program command a torque after every nth command of the loop; `heard`: on the loop's own bus."""
 
     @contextmanager
     def inject(bench: FaultBench, joint: str) -> Iterator[None]:

@@ -1,6 +1,6 @@
 """The catalogue of all closed logs below a folder: a DuckDB table, stored as one Parquet file.
 
-A log enters the catalogue when somebody lists, queries or indexes the folder for the first time after the log was
+A log enters the catalogue when a user lists, queries or indexes the folder for the first time after the log was
 closed, not when its writer closes it. So the writer on the robot loads no database, a log that was copied, recovered,
 preserved or deleted by hand is noticed as well, and the catalogue can be removed at any time. A file's name, size and
 time of change decide whether it has to be read again.

@@ -33,7 +33,7 @@ class Lease:
 
     @property
     def until_s(self) -> float:
-        """The time until which it is held unless it is renewed; infinite if nobody has taken it."""
+        """The time until which it is held unless it is renewed; infinite if no program has taken it."""
         return self._until_s
 
     @property
@@ -79,7 +79,7 @@ class Lease:
     def release(self, holder: Hashable) -> str | None:
         """Free the lease; returns why this is refused, or None.
 
-        Nobody else frees a lost lease: the loop would then not see that it was lost, and the robot would move on.
+        No other program frees a lost lease: the loop would then not see that it was lost, and the robot would move on.
         """
         if self._holder not in (None, holder):
             return f"{self._holder} {'has lost' if self._lost else 'holds'} the lease"

@@ -1,6 +1,6 @@
 """Simulates another program that commands one of the robot's drives: a second bus master.
 
-It sends its torque right behind every n-th torque command of the loop, so that the drive follows it until the next one.
+It sends its torque right after every n-th torque command of the loop, so that the drive follows it until the next one.
 `SimulatedRobot.foreign_masters` lists those on its buses.
 """
 

@@ -22,7 +22,7 @@ class Obedience(Enum):
     """What becomes of the commands to a drive in one tick."""
 
     ALL = 0
-    NONE = 1  # they are lost, and nobody notices
+    NONE = 1  # they are lost unnoticed
     REFUSED = 2  # the port cannot send them, and counts them
     FIRST_REFUSED = 3
 

@@ -232,7 +232,7 @@ def test_a_winding_heats_for_the_whole_time_that_a_gap_lasted() -> None:
     assert long.winding.temperature_c > WINDING.room_c + 0.5
 
 
-# silence of the current behind a silence of the position
+# silence of the current hidden by a silence of the position
 
 
 def test_a_current_that_is_gone_is_reported_next_to_a_milder_fault_only() -> None:
