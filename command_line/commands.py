@@ -9,6 +9,7 @@ from drivers.can.run_folder import find_run_folder
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
 SIMULATED = "robot"  # the name that `mudskipper simulate` has without --bus
+AXES = ("x", "y", "z")  # of motion capture
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # generic for type checkers alone
 
@@ -36,6 +37,16 @@ def add_socket(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=default_socket(),
         help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else that of the service or the simulated robot)",
+    )
+
+
+def add_vertical(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+    parser.add_argument(
+        "--vertical",
+        choices=AXES,
+        default=default,
+        metavar="AXIS",
+        help="axis of a CSV log's motion capture that points up: x, y or z (default: y)",
     )
 
 

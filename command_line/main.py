@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from command_line import exit_codes
-from command_line.commands import DEFAULT_CONFIG, SIMULATED, Commands, add, add_json, add_socket
+from command_line.commands import DEFAULT_CONFIG, SIMULATED, Commands, add, add_json, add_socket, add_vertical
 from command_line.experiments.experiment_commands import add_experiments
 from command_line.option_types import any_depth_cm, between, depth_cm, finite, folder, joint_angle, picture, whole
 from command_line.screen import complain
@@ -182,6 +182,7 @@ def _add_replay(commands: Commands) -> None:
     add_json(replay)
     replay.add_argument("--config", type=Path, help="use this configuration (default: the one in the log)")
     replay.add_argument("--method", choices=METHODS, help="estimate by this method (default: the configured one)")
+    add_vertical(replay)
 
 
 def _add_pictures(commands: Commands) -> None:
@@ -193,6 +194,7 @@ def _add_pictures(commands: Commands) -> None:
     for parser in (plot, film):
         parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
         parser.add_argument("--walk", type=COUNT, default=0, metavar="N", help="number of the walk (default: the last)")
+        add_vertical(parser)
 
 
 def _add_logs(commands: Commands) -> None:
@@ -219,6 +221,8 @@ def _add_logs(commands: Commands) -> None:
     recover.add_argument("places", type=Path, nargs="*", metavar="FILE|DIR", help="(default: the configured folder)")
     for parser in (listing, recover):
         parser.add_argument("--config", type=Path, default=Path(DEFAULT_CONFIG), help="names the folder")
+    add_vertical(info)
+    add_vertical(report)
     add_json(info, report, listing, recover)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from estimation.mud import Method
-from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import EVENT, STRIDE, TICK
 from firmware_host.log_reading.log_reader import read_logs
 from firmware_host.log_reading.replay import Replay, configuration_of, replay_files
@@ -47,12 +47,18 @@ def open_log(path: Paths) -> OpenedLog:
     return OpenedLog(paths=paths, **(log._asdict() | arrays))
 
 
-def replay(path: Paths, method: Method | None = None, configuration: Configuration | None = None) -> Replay:
+def replay(
+    path: Paths,
+    method: Method | None = None,
+    configuration: Configuration | None = None,
+    vertical: CaptureAxis | None = None,
+) -> Replay:
     """Estimates the mud from a log again: an MCAP log, its segments, or the authors' CSV. Raises LogError.
 
-    `method` and `configuration` replace those of the log.
+    `method` and `configuration` replace those of the log. `vertical` is the axis of a CSV's capture that points up:
+    "x", "y" or "z" (default: `pose.vertical` of the configuration, "y" without one).
     """
-    return replay_files(_as_paths(path), configuration, method)
+    return replay_files(_as_paths(path), configuration, method, vertical=vertical)
 
 
 def _as_paths(path: Paths) -> tuple[Path, ...]:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket
+from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket, add_vertical
 from command_line.option_types import (
     between,
     depth_cm,
@@ -191,6 +191,7 @@ def _add_lablogs(names: Commands) -> None:
     lablogs.add_argument(
         "--air", action="append", metavar="PATTERN", help="logs without mud, repeatable (default: detected)"
     )
+    add_vertical(lablogs, default="y")
     lablogs.add_argument("--json", action="store_true", help="for machines")
     lablogs.add_argument("--out", type=folder, metavar="FOLDER", help="for report, figures and numbers")
 

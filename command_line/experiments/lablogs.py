@@ -13,7 +13,7 @@ def lablogs(options: argparse.Namespace) -> int:
     if missing:
         return refuse(f"{missing[0]}: no such folder")
     rules = tuple(GroupRule(pattern, name) for pattern, name in options.group or ())
-    plan = Plan(find_logs(options.folders), rules, tuple(options.air or ()))
+    plan = Plan(find_logs(options.folders), rules, tuple(options.air or ()), options.vertical)
     if not plan.logs:
         return refuse(f"{options.folders[0]}: holds no log: no file whose name ends with .csv, .csv.gz or .mcap")
     if unmatched := plan.unmatched():

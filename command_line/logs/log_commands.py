@@ -7,10 +7,11 @@ from pathlib import Path
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import complain_of, show_lab_log
-from command_line.logs.refusals import UsageError, explain_errors
+from command_line.logs.refusals import UsageError, chosen_vertical, explain_errors
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
+from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.log_reading.lab.summary import finding_reports, lab_summary
@@ -27,9 +28,10 @@ CUT_OFF = "the log is not finished: it is still being written, or was cut off; e
 
 @explain_errors
 def replay(options: Options) -> int:
+    chosen_vertical(options)
     configuration = load_configuration(options.config) if options.config else None
     with watched() as watch:
-        replayed = replay_files(options.files, configuration, options.method, watch)
+        replayed = replay_files(options.files, configuration, options.method, watch, options.vertical)
     _show_replay(options.files[0], replayed, options.json)
     return exit_codes.OK
 
@@ -99,7 +101,7 @@ def _picture_path(log: Path, ending: str) -> Path:
 def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
     """Reads the walk and prints its limitations. Raises LogError, also for a picture that cannot be written."""
     with watched() as watch:
-        walk = read_walk(options.files[0], options.walk, options.files[1:], watch)
+        walk = read_walk(options.files[0], options.walk, options.files[1:], watch, chosen_vertical(options))
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise LogError(f"{path} cannot be written; choose another path with --out")
     complain_of(options.files[0], walk.findings)
@@ -144,8 +146,9 @@ def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
 
 @explain_errors
 def info(options: Options) -> int:
+    vertical = chosen_vertical(options)
     if len(options.files) == 1 and is_lab_csv(options.files[0]):
-        _show_lab_info(options.files[0], options.json)
+        _show_lab_info(options.files[0], vertical, options.json)
         return exit_codes.OK
     with watched() as watch:
         summary = log_summary(read_logs(options.files, watch))
@@ -157,9 +160,9 @@ def info(options: Options) -> int:
     return exit_codes.OK
 
 
-def _show_lab_info(path: Path, as_json: bool) -> None:
+def _show_lab_info(path: Path, vertical: CaptureAxis, as_json: bool) -> None:
     """Raises LogError."""
-    lab = read_lab_csv(path)
+    lab = read_lab_csv(path, vertical)
     if as_json:
         print_json("log-info", lab_summary(path, lab))
     else:

@@ -10,14 +10,16 @@ from typing import Any
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import complain_of
-from command_line.logs.refusals import explain_errors
+from command_line.logs.refusals import chosen_vertical, explain_errors
 from command_line.screen import coefficient, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides
 from experiments.reports.report_page import PAGE, Figure, Section, to_json, write_report
 from experiments.reports.text_tables import number
+from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.log.whole_files import copy_whole
 from firmware_host.log_reading.fault_history import read_causes
+from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.lab.summary import finding_reports
 from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
@@ -30,10 +32,11 @@ Report = dict[str, Any]
 
 @explain_errors
 def log_report(options: argparse.Namespace) -> int:
+    chosen_vertical(options)
     folder: Path = options.out or _report_folder(options.files[0])
     folder.mkdir(parents=True, exist_ok=True)
     with watched() as watch:
-        report, sections, replayed = _read_report(options.files, watch)
+        report, sections, replayed = _read_report(options.files, options.vertical, watch)
     logs = [_copy(path, folder) for path in options.files]
     complain_of(options.files[0], replayed.findings)
     written = write_report(folder, report, f"Log {options.files[0].name}", sections, logs)
@@ -57,10 +60,12 @@ def _copy(log: Path, folder: Path) -> Path:
     return copy
 
 
-def _read_report(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Section], Replay]:
+def _read_report(
+    files: Sequence[Path], vertical: CaptureAxis | None, watch: Watch
+) -> tuple[Report, list[Section], Replay]:
     """Raises LogError."""
     ours = read_logs(files, watch) if files[0].suffix == ".mcap" else None
-    replayed = replay_files(files, watch=watch)
+    replayed = replay_files(files, watch=watch, vertical=vertical)
     report: Report = {
         "log": [path.name for path in files],
         "clock": "times of strides and events are by the log's own clock; the log begins at begin_s of it",
@@ -72,7 +77,7 @@ def _read_report(files: Sequence[Path], watch: Watch) -> tuple[Report, list[Sect
         "events": ours.events if ours else [],
         "findings": finding_reports(files[0], replayed.findings),
     }
-    sections = [*_walk_sections(files, watch), _strides_section(replayed)]
+    sections = [*_walk_sections(files, vertical or VERTICAL_AXIS, watch), _strides_section(replayed)]
     if ours:
         return report, [_summary_section(ours), _faults_section(ours), *sections, _events_section(ours)], replayed
     return report, [_findings_section(replayed), *sections], replayed
@@ -95,13 +100,13 @@ def _shown(value: str | int | float | bool) -> str:
     return f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
-def _walk_sections(files: Sequence[Path], watch: Watch) -> list[Section]:
+def _walk_sections(files: Sequence[Path], vertical: CaptureAxis, watch: Watch) -> list[Section]:
     """Returns a section for each walk, or one message where the robot did not walk."""
     try:
-        last = read_walk(files[0], 0, files[1:], watch)
+        last = read_walk(files[0], 0, files[1:], watch, vertical)
     except LogError as problem:
         return [Section("Walks", f"{problem}.")]
-    walks = [read_walk(files[0], count, files[1:], watch) for count in range(1, last.walks)] + [last]
+    walks = [read_walk(files[0], count, files[1:], watch, vertical) for count in range(1, last.walks)] + [last]
     return [_walk_section(walk, count) for count, walk in enumerate(walks, 1)]
 
 

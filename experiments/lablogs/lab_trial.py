@@ -17,6 +17,8 @@ from control.records import FLIPPERS, Estimate, StrideEstimate
 from estimation.mud import Method
 from experiments.lablogs.recording import Recording, read_recording
 from experiments.reports.error_table import COEFFICIENTS
+from firmware_host.configuration.configuration import CaptureAxis
+from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.log_reader import LogError
 
 METHODS: tuple[Method, ...] = ("default", "paper")
@@ -90,11 +92,13 @@ def pair_flippers(strides: Strides) -> list[tuple[StrideEstimate, StrideEstimate
     return [(left[t_start_s], right[t_start_s]) for t_start_s in left if t_start_s in right]
 
 
-def read_trial(paths: Sequence[Path], disturbed: bool = True) -> LabTrial | Refusal:
+def read_trial(
+    paths: Sequence[Path], disturbed: bool = True, vertical: CaptureAxis = VERTICAL_AXIS
+) -> LabTrial | Refusal:
     """Read one log and replay it by every method. Without mud there is nothing to disturb."""
     name = paths[0].name
     try:
-        recording = read_recording(paths)
+        recording = read_recording(paths, vertical)
         in_mud = recording.has_evidence_of_mud()
         replay = partial(_replay_disturbed, name) if disturbed and in_mud else _replay
         replays = {method: replay(recording, method) for method in METHODS}

@@ -13,15 +13,21 @@ from experiments.lablogs.log_choice import GroupRule, Paths, group_key, group_of
 from experiments.lablogs.report import LablogsReport, report_of
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Show
+from firmware_host.configuration.configuration import CaptureAxis
+from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The logs and their groups. Logs that match `air` are those without mud; without patterns they are detected."""
+    """The logs and their groups. Logs that match `air` are those without mud; without patterns they are detected.
+
+    `vertical` is the axis of the captures of CSV logs that points up.
+    """
 
     logs: Sequence[Paths]
     rules: Sequence[GroupRule] = ()
     air: Sequence[str] = ()
+    vertical: CaptureAxis = VERTICAL_AXIS
 
     def group_of(self, name: str) -> str | None:
         return group_of(name, self.rules)
@@ -49,7 +55,7 @@ class Evaluated:
 
 def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Evaluated:
     """Read and replay every log in parallel."""
-    read = run_parallel([partial(read_trial, paths) for paths in plan.logs], show, processes)
+    read = run_parallel([partial(read_trial, paths, vertical=plan.vertical) for paths in plan.logs], show, processes)
     refused = [each for each in read if isinstance(each, Refusal)]
     trials = [each._replace(in_mud=plan.is_in_mud(each)) for each in read if isinstance(each, LabTrial)]
     grouped = [(trial, plan.group_of(trial.name)) for trial in trials]

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from control.records import FLIPPERS, StrideEstimate
 from estimation.mud import Method
+from firmware_host.configuration.configuration import CaptureAxis
+from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
 from firmware_host.log_reading.lab.joint_signs import find_evidence
 from firmware_host.log_reading.lab.log_rows import LogRows
@@ -120,8 +122,8 @@ class OwnRecording(Recording):
         return OwnRecording(self._path, self._log._replace(ticks=self._log.ticks[rows]))
 
 
-def read_recording(paths: Sequence[Path]) -> Recording:
-    """Read a CSV, or the segments of one run. Raises LogError."""
+def read_recording(paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS) -> Recording:
+    """Read a CSV, whose capture has `vertical` upward, or the segments of one run. Raises LogError."""
     if paths[0].suffix == ".mcap":
         return OwnRecording(paths[0], read_logs(paths))
-    return LabRecording(read_lab_csv(paths[0]))
+    return LabRecording(read_lab_csv(paths[0], vertical))

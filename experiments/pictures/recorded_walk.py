@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import FLIPPERS, FlipperLoad, StrideEstimate
-from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import STRIDE, stride_row
+from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv
 from firmware_host.log_reading.log_reader import (
@@ -90,12 +91,21 @@ class RecordedWalk(NamedTuple):
         return [text for name, text in DESCRIPTIONS.items() if not np.any(np.isfinite(getattr(self, name)))]
 
 
-def read_walk(path: Path, number: int = 0, more: Sequence[Path] = (), watch: Watch = unwatched) -> RecordedWalk:
-    """Read walk `number` of a log from 1; 0 is the last one. `more` are segments of the same run. Raises LogError."""
+def read_walk(
+    path: Path,
+    number: int = 0,
+    more: Sequence[Path] = (),
+    watch: Watch = unwatched,
+    vertical: CaptureAxis = VERTICAL_AXIS,
+) -> RecordedWalk:
+    """Read walk `number` of a log from 1; 0 is the last one. Raises LogError.
+
+    `more` are segments of the same run; `vertical` is the axis of a CSV's capture that points up.
+    """
     if more:
         return numbered_walk(path, read_logs([path, *more], watch), number)
     if is_lab_csv(path):
-        return _only_walk(path, read_lab_csv(path), number)
+        return _only_walk(path, read_lab_csv(path, vertical), number)
     if path.suffix == ".mcap":
         return numbered_walk(path, read_log(path, watch), number)
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")

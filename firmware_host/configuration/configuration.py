@@ -28,6 +28,7 @@ from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters
 from firmware_host.configuration.log_parameters import LogParameters
 
+CaptureAxis = Literal["x", "y", "z"]  # of motion capture's frame
 EXIT_CONFIGURATION = 78  # EX_CONFIG of sysexits.h; the service's unit does not restart on it
 
 
@@ -80,6 +81,9 @@ class PoseParameters:
     ] = ""
     socket: Annotated[str, Meaning("path at which a motion-capture bridge sends the position")] = ""
     axis: Annotated[object, Meaning("of motion capture's frame, along the track: x, -z, or three numbers")] = "x"
+    vertical: Annotated[
+        CaptureAxis, Meaning("axis of motion capture's frame that points up; for replays of CSV logs")
+    ] = "y"
     origin_m: Annotated[
         float, Bounds(-1000.0, 1000.0), Meaning("along that axis, or of the encoder, where the robot's x is zero")
     ] = 0.0

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.records import FLIPPERS, UNKNOWN, Phase
+from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS, read_body_track
 from firmware_host.log_reading.lab.columns import (
     CURRENT_COLUMNS,
@@ -61,7 +62,7 @@ def is_lab_csv(path: Path) -> bool:
     return path.name.endswith((".csv", ".csv.gz"))
 
 
-def read_lab_csv(path: Path, vertical: str = VERTICAL_AXIS) -> LabLog:
+def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     """Reads a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
     table = drop_backward_rows(path, read_table(path, READ_COLUMNS))
     _refuse_missing(path, table)

@@ -17,7 +17,7 @@ from estimation.joint_load import FlipperDrive
 from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
 from estimation.mud_map import MapRow
 from estimation.recorded_states import recorded_states
-from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.configuration import CaptureAxis, Configuration, PoseParameters
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
@@ -67,14 +67,19 @@ def replay_files(
     configuration: Configuration | None = None,
     method: Method | None = None,
     watch: Watch = unwatched,
+    vertical: CaptureAxis | None = None,
 ) -> Replay:
     """Replays a log of this project, several segments of one run, or the authors' CSV. Raises LogError.
 
-    `configuration` and `method` replace those of the log.
+    `configuration` and `method` replace those of the log. `vertical` is the axis of a CSV's capture that points up; it
+    replaces `pose.vertical` of the configuration.
     """
     path = paths[0]
     if len(paths) == 1 and is_lab_csv(path):
-        return replay_lab(read_lab_csv(path), configuration, method)
+        known = configuration.pose if configuration else PoseParameters()
+        return replay_lab(read_lab_csv(path, vertical or known.vertical), configuration, method)
+    if vertical:
+        raise LogError(f"{path}: only a CSV of motion capture has a vertical axis to choose")
     if len(paths) == 1 and path.suffix != ".mcap":
         raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
     return replay_log(path, read_logs(paths, watch), configuration, method, watch)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.records import UNKNOWN, Phase
+from firmware_host.configuration.configuration import CaptureAxis, PoseParameters
 from firmware_host.log_reading.lab.columns import BODY_COLUMNS, ORIENTATION_COLUMNS
 from firmware_host.log_reading.lab.csv_table import CsvTable
 from firmware_host.log_reading.lab.findings import Finding, FindingKind
@@ -21,7 +22,7 @@ Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
 AXES = "xyz"
-VERTICAL_AXIS = "y"  # of the authors' capture
+VERTICAL_AXIS = PoseParameters().vertical  # of the authors' capture
 FROZEN_S, LEAP_M = 0.5, 0.02  # a pose is invalid where it is constant for so long and then changes by so much
 MUCH_HEIGHT_M = 0.005  # as much as the depth of a stride; three times the uncertainty of the surface
 LEAST_AGREEMENT = 0.7  # of the stances' sum to their path: on average within 45° of the advance
@@ -36,7 +37,9 @@ class BodyTrack(NamedTuple):
     pitch_rad: Floats  # of the nose upward, since the first known pose
 
 
-def read_body_track(rows: LogRows, table: CsvTable, vertical: str = VERTICAL_AXIS) -> tuple[BodyTrack, list[Finding]]:
+def read_body_track(
+    rows: LogRows, table: CsvTable, vertical: CaptureAxis = VERTICAL_AXIS
+) -> tuple[BodyTrack, list[Finding]]:
     """Returns the track and what is to be reported about it. A file with x alone has the advance alone."""
     unknown, nothing = np.full(len(rows.time_s), UNKNOWN), np.zeros(len(rows.time_s))
     columns = [name for name in BODY_COLUMNS if name in table.column]
@@ -122,7 +125,7 @@ def _report_lost(rows: LogRows, column: str, lost: Truths) -> list[Finding]:
 
 
 def _report_height(rows: LogRows, height_m: Floats, column: str) -> list[Finding]:
-    change_m, row = _largest_change(rows, height_m)
+    change_m, row = largest_change(height_m, rows.phase)
     if abs(change_m) < MUCH_HEIGHT_M:
         return []
     verb = "sinks" if change_m < 0.0 else "rises"
@@ -159,9 +162,9 @@ def _report_tilt(rows: LogRows, tilt_rad: Floats, pitch_rad: Floats) -> list[Fin
     return [rows.finding(FindingKind.POSE, ORIENTATION_COLUMNS[0], row, text)]
 
 
-def _largest_change(rows: LogRows, values: Floats) -> tuple[float, int]:
+def largest_change(values: Floats, phase: NDArray[np.int64]) -> tuple[float, int]:
     """Returns the largest change since the first insertion with a known value, and its row; 0 where none is known."""
-    later = np.isfinite(values) & (np.cumsum(rows.phase == Phase.INSERTION) > 0)
+    later = np.isfinite(values) & (np.cumsum(phase == Phase.INSERTION) > 0)
     if not np.any(later):
         return 0.0, 0
     change = np.where(later, values - values[np.argmax(later)], 0.0)

@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from control.records import Phase
+from firmware_host.log_reading.lab.body_track import largest_change
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab.log_rows import runs
 from firmware_host.log_reading.lab_csv import LabLog
@@ -28,10 +30,17 @@ def lab_summary(path: Path, lab: LabLog) -> dict[str, Any]:
         "flippers": list(lab.flippers),
         "strides": len(runs(lab.phase == Phase.EXTRACTION)),
         "commanded_depth_m": float(np.nanmax(lab.commanded_depth_m)) if np.any(lab.commanded_depth_m > 0.0) else None,
+        "sinking_m": _change(-lab.body_height_m, lab),
+        "pitch_rad": _change(lab.body_pitch_rad, lab),
         "settings": lab.gait,
         "missing_settings": list(lab.missing_settings),
         "findings": finding_reports(path, lab.findings),
     }
+
+
+def _change(values: NDArray[np.float64], lab: LabLog) -> float | None:
+    """Returns the largest change after the first insertion, with its sign; None where the pose is not known."""
+    return largest_change(values, lab.phase)[0] if np.any(np.isfinite(values)) else None
 
 
 def finding_reports(path: Path, findings: Sequence[Finding]) -> list[dict[str, Any]]:

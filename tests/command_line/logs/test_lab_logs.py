@@ -5,10 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import mudskipper
 from command_line import exit_codes
+from experiments.lablogs.lablogs import Plan, evaluate
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log_reading.lab_csv import read_lab_csv
+from firmware_host.log_reading.replay import Replay
 from tests.command_line.command_lines import run
 from tests.lab_logs import SETTINGS, lab_columns, write_lab_log
 
@@ -68,3 +73,59 @@ def test_log_info_says_what_a_csv_is(hung: Path) -> None:
     assert info["settings"]["lateral_angle_range"] == 0.5 and info["missing_settings"] == ["insertion_angle"]
     shown = run("log", "info", str(hung)).stdout
     assert "missing_settings insertion_angle" in shown and "lateral_angle_range 0.5" in shown
+
+
+@pytest.fixture
+def z_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A walk in a capture whose z is up: the body sinks by 61 mm and advances by 33 mm along x."""
+    monkeypatch.chdir(tmp_path)
+    columns = lab_columns()
+    stance = columns["turtle_state"] == 3
+    done = np.cumsum(stance) / np.count_nonzero(stance)
+    for axis, change_m in zip("xyz", (0.033 * done, 0.0 * done, -0.061 * done), strict=True):
+        columns[f"OptitrackPosition_{axis}"] = 0.1 + change_m
+    return write_lab_log(tmp_path / "z_up.csv", columns)
+
+
+@each_command
+def test_every_command_takes_the_vertical_axis_of_the_capture(command: tuple[str, ...], z_up: Path) -> None:
+    assert "sinks by" not in run(*command, str(z_up)).stderr
+    ended = run(*command, str(z_up), "--vertical", "z")
+    assert ended.returncode == exit_codes.OK and "sinks by 61 mm" in ended.stderr
+    refused = run(*command, str(z_up), "--vertical", "w")
+    assert refused.returncode == exit_codes.USAGE and "--vertical" in refused.stderr
+
+
+@each_command
+def test_a_log_without_a_capture_has_no_vertical_axis(command: tuple[str, ...], tmp_path: Path) -> None:
+    ended = run(*command, str(tmp_path / "walk.mcap"), "--vertical", "z")
+    assert ended.returncode == exit_codes.USAGE and "--vertical z" in ended.stderr and "Traceback" not in ended.stderr
+
+
+def test_lablogs_takes_the_vertical_axis_of_its_logs(z_up: Path) -> None:
+    (trial,) = evaluate(Plan([(z_up,)], vertical="z"), lambda done, of: None, 1).trials
+    assert any("sinks by 61 mm" in finding for finding in trial[0].findings)
+
+
+def test_log_info_prints_how_far_the_body_sinks(z_up: Path, hung: Path) -> None:
+    info = json.loads(run("log", "info", str(z_up), "--vertical", "z", "--json").stdout)
+    assert info["sinking_m"] == pytest.approx(0.061, rel=0.01) and info["pitch_rad"] is None
+    assert json.loads(run("log", "info", str(hung), "--json").stdout)["sinking_m"] is None
+
+
+def test_a_replay_takes_the_vertical_axis_of_its_configuration(z_up: Path, example_text: str) -> None:
+    """An argument replaces it."""
+    configuration = parse_configuration(example_text + '\n[pose]\nvertical = "z"\n')
+    by_z, by_y = mudskipper.replay(z_up, vertical="z"), mudskipper.replay(z_up)
+    assert _steps_m(by_z) != _steps_m(by_y)
+    assert _steps_m(mudskipper.replay(z_up, configuration=configuration)) == _steps_m(by_z)
+    assert _steps_m(mudskipper.replay(z_up, configuration=configuration, vertical="y")) == _steps_m(by_y)
+
+
+def _steps_m(replayed: Replay) -> list[float]:
+    return [round(stride.step_m, 9) for stride in replayed.strides[2:]]  # the first stride's is unknown
+
+
+def test_a_replay_refuses_a_vertical_axis_for_its_own_log(tmp_path: Path) -> None:
+    with pytest.raises(mudskipper.LogError, match="vertical"):
+        mudskipper.replay(tmp_path / "walk.mcap", vertical="z")
