@@ -16,6 +16,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
+from command_line.operation.confirmation import end_motion
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import Phase
@@ -24,7 +25,6 @@ from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.rows import STRIDE, TICK
 from firmware_host.log_reading.live_rows import LiveRow, LiveRows
 from firmware_host.operator.reports import known
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 PAGE = Path(__file__).with_name("page.html")
 INTERVAL_S = 0.1  # between two messages
@@ -224,12 +224,6 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def stop_robot(status_socket: Path) -> tuple[HTTPStatus, bytes]:
-    try:
-        client = StatusClient(status_socket)
-        try:
-            client.call("stop")
-        finally:
-            client.close()
-    except (NoDaemonError, NotPermittedError, CallRefusedError) as problem:
-        return HTTPStatus.CONFLICT, f"not stopped: {problem}. Cut motor power.".encode()
-    return HTTPStatus.OK, b"the robot stops"
+    """Waits until every drive has confirmed the stop, as `mudskipper stop` does."""
+    answer = end_motion(status_socket, "stop")
+    return HTTPStatus.OK if answer.confirmed else HTTPStatus.CONFLICT, answer.text.encode()

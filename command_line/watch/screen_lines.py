@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from command_line.operation.confirmed_stop import TORQUE_UNKNOWN
+from command_line.operation.confirmation import TORQUE_UNKNOWN
 from command_line.watch.header_panel import header
 from command_line.watch.history import History
 from command_line.watch.lines import Line, aged, fit

@@ -15,6 +15,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.operation import confirmed_stop, operation
+from command_line.operation.confirmation import TORQUE_UNKNOWN
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.operator.status_client import NotPermittedError, StatusClient
 from firmware_host.operator.status_socket import Methods, StatusSocket
@@ -55,7 +56,7 @@ def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(
     assert command(options) == exit_codes.TORQUE_UNKNOWN
     printed = capsys.readouterr()
     assert printed.out.startswith("accepted") and "mudskipper" in printed.out
-    assert confirmed_stop.TORQUE_UNKNOWN in printed.err
+    assert TORQUE_UNKNOWN in printed.err
 
 
 @pytest.mark.parametrize("attended", [False, True])

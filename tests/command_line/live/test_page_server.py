@@ -117,7 +117,7 @@ def test_a_page_of_another_site_cannot_stop_the_robot(page: PageServer, headers:
 
 def test_a_stop_without_a_daemon_says_to_cut_the_power(page: PageServer) -> None:
     status, text = post(page, X_Mudskipper="stop")
-    assert status == 409 and "Cut motor power" in text
+    assert status == 409 and "cut motor power" in text
 
 
 def test_a_configuration_of_another_version_still_draws_a_robot() -> None:

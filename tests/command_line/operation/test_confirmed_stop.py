@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from command_line import exit_codes
-from command_line.operation import confirmed_stop, operation
-from command_line.operation.confirmed_stop import TORQUE_UNKNOWN, disarm, stop, unconfirmed_drives
+from command_line.live.page_server import stop_robot
+from command_line.operation import confirmation, operation
+from command_line.operation.confirmation import LONGEST_S, TORQUE_UNKNOWN, unconfirmed_drives
+from command_line.operation.confirmed_stop import disarm, stop
+from command_line.watch.orders import send_order
 from control.records import JOINTS
+from firmware_host.operator.status_client import NotPermittedError
 
 OPTIONS = Namespace(socket=Path("/none"))
 Report = dict[str, Any]
@@ -46,7 +51,7 @@ class Robot:
 
     reports: list[Report] = []
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, timeout_s: float = 0.0) -> None:
         return
 
     def call(self, method: str, **params: Any) -> Any:
@@ -60,9 +65,10 @@ class Robot:
 
 @pytest.fixture(autouse=True)
 def robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(operation, "StatusClient", Robot)
-    for name in ("CONFIRMING_S", "STOPPING_S", "ARMING_S"):
-        monkeypatch.setattr(confirmed_stop, name, 0.15)
+    for module in (operation, confirmation):
+        monkeypatch.setattr(module, "StatusClient", Robot)
+    monkeypatch.setattr(confirmation, "CONFIRMING_S", 0.15)
+    monkeypatch.setattr(confirmation, "LONGEST_S", dict.fromkeys(LONGEST_S, 0.15))
 
 
 @pytest.mark.parametrize("command", [stop, disarm])
@@ -90,3 +96,28 @@ def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
     printed = capsys.readouterr()
     assert printed.out == "fault\n"
     assert "left_adduction" in printed.err and "right" not in printed.err and TORQUE_UNKNOWN in printed.err
+
+
+def test_the_page_and_the_screen_wait_for_every_drive_as_well() -> None:
+    Robot.reports = [report("walking", True, -1.0), report("hold", True, -1.0)]
+    assert stop_robot(OPTIONS.socket) == (HTTPStatus.OK, b"stop: every drive has confirmed it")
+    Robot.reports = [report("hold", True, -1.0, {"heartbeat_age_s": 3.0})]
+    status, text = stop_robot(OPTIONS.socket)
+    assert status == HTTPStatus.CONFLICT
+    assert (
+        text.decode()
+        == send_order(OPTIONS.socket, "stop")
+        == f"{TORQUE_UNKNOWN}. stop is not confirmed by " + ("left_adduction")
+    )
+
+
+def test_a_user_who_may_not_see_the_status_reads_that_the_stop_was_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Blind(Robot):
+        def call(self, method: str, **params: Any) -> Any:
+            if method == "status":
+                raise NotPermittedError("status is for members of the group mud. Have root add you")
+            return "accepted"
+
+    monkeypatch.setattr(confirmation, "StatusClient", Blind)
+    text = send_order(OPTIONS.socket, "stop")
+    assert "accepted" in text and "group mud " in text and "refused" not in text and TORQUE_UNKNOWN in text

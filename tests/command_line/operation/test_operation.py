@@ -13,7 +13,7 @@ import pytest
 
 from command_line import commands, exit_codes
 from command_line.main import main
-from command_line.operation.confirmed_stop import TORQUE_UNKNOWN
+from command_line.operation.confirmation import TORQUE_UNKNOWN
 from control.modes import Mode
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reading.log_reader import read_log
