@@ -176,6 +176,7 @@ def _run_loop(
     watchdog, ticker = WatchdogFeed(notifier), Ticker()
     wait = ticker.wait if failures is None else FailingTicker(ticker, failures, loop.events.report).wait
     notifier.send("READY=1", "STATUS=running")
+    print(f"mudskipperd: ready, operated by 'mudskipper' through {status.path}", flush=True)
     now_s = time.monotonic()
     try:
         while not shutdown.step(loop, now_s):

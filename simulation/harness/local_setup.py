@@ -104,10 +104,15 @@ def named_folder(name: str) -> Path:
     return make_own_folder(run_folder() / name)
 
 
-def write_local_setup(folder: Path, logs: Path) -> Path:
-    """Returns the configuration's path, for `mudskipperd --config` and for the simulated robot."""
+def make_buses(folder: Path) -> None:
+    """Makes the folders of the two local buses."""
     for name in ("left", "right"):
         make_own_folder(folder / name)
+
+
+def write_local_setup(folder: Path, logs: Path) -> Path:
+    """Returns the configuration's path, for `mudskipperd --config` and for the simulated robot."""
+    make_buses(folder)
     path = folder / "mudskipper.toml"
     write_private_file(path, configuration_text(folder, logs.absolute()))
     return path

@@ -10,7 +10,7 @@ import ctypes
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -115,20 +115,24 @@ def take_precedence() -> None:
             os.nice(NICENESS)
 
 
-def simulate(options: argparse.Namespace) -> int:
-    """Simulates the robot until a signal ends the process; returns the exit status."""
+def nothing() -> None:
+    """Announces nothing."""
+
+
+def simulate(configuration: Configuration, options: argparse.Namespace, announce: Callable[[], None] = nothing) -> int:
+    """Simulates the robot until a signal ends the process; returns the exit status.
+
+    `announce` is called once the robot has its buses: another one that is simulated on them is left alone.
+    """
     try:
-        configuration = load_configuration(options.config)
         peer = Peer(configuration, _world(options, configuration), options.seed)
+        announce()
     except ConfigurationError as problem:
-        print("\n".join(problem.problems), file=sys.stderr)
-        return EXIT_CONFIGURATION
+        return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
     except BusError as problem:
-        print(problem, file=sys.stderr)
-        return 1
+        return _refuse(str(problem))
     except OSError as problem:
-        print(f"the pose source cannot be provided on this computer: {problem.strerror or problem}", file=sys.stderr)
-        return 1
+        return _refuse(f"the pose source cannot be provided on this computer: {problem.strerror or problem}")
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.request_put_back())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
@@ -137,8 +141,17 @@ def simulate(options: argparse.Namespace) -> int:
     return 0
 
 
+def _refuse(*messages: str, status: int = 1) -> int:
+    print("\n".join(messages), file=sys.stderr)
+    return status
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    return simulate(_parse(arguments))
+    options = _parse(arguments)
+    try:
+        return simulate(load_configuration(options.config), options)
+    except ConfigurationError as problem:
+        return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
 
 
 if __name__ == "__main__":

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from command_line import commands, exit_codes
 from command_line.main import main
+from drivers.can.bus_lock import BusRole
+from firmware_host.buses import lock_buses
+from firmware_host.configuration.loading import parse_configuration
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness import peer
 from simulation.harness.blocks import RESTING_RAD
-from simulation.harness.local_setup import named_folder, write_local_setup
+from simulation.harness.local_setup import configuration_text, named_folder, write_local_setup
 
 WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"
 
@@ -131,6 +135,20 @@ def test_a_world_that_cannot_be_is_refused_before_anything_starts(
     assert capsys.readouterr() == ("", "mudskipper: /nowhere/world.toml: No such file or directory\n")
 
 
+def test_a_second_simulated_robot_leaves_the_first_one_and_its_files_alone(
+    short_folder: Path, peers: list[StillPeer], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
+    locks = lock_buses(parse_configuration(configuration_text(named_folder("twice"), Path())).bus, BusRole.DRIVES)
+    assert main(["simulate", "--bus", "twice"]) == 1
+    printed = capsys.readouterr()
+    assert printed.out == "" and f"process {os.getpid()} simulates" in printed.err
+    assert not (named_folder("twice") / "mudskipper.toml").exists()
+    locks.close()
+    assert main(["simulate", "--bus", "twice"]) == exit_codes.OK
+    assert "mudskipperd --config" in capsys.readouterr().out
+
+
 def test_the_peer_refuses_a_world_too(short_folder: Path, world: Path, capsys: pytest.CaptureFixture[str]) -> None:
     world.write_text("", encoding="utf-8")
     setup = write_local_setup(short_folder, short_folder)
@@ -153,7 +171,12 @@ def test_root_does_not_follow_what_another_user_prepared_among_the_temporary_fil
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
     monkeypatch.setattr("tempfile.tempdir", str(short_folder))
-    monkeypatch.setattr(peer, "simulate", lambda options: exit_codes.OK)
+
+    def begin(configuration: object, options: object, announce: Callable[[], None]) -> int:
+        announce()
+        return exit_codes.OK
+
+    monkeypatch.setattr(peer, "simulate", begin)
     monkeypatch.chdir(tmp_path)
     assert main(["simulate"]) == exit_codes.OK
     assert precious.read_text(encoding="utf-8") == "root's"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,11 +17,14 @@ from drivers.odrive.codec import SET_AXIS_STATE
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
+from firmware_host.operator.status_client import StatusClient
 from firmware_host.ticker import Tick
+from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.firmware_host.served_socket import Served
+from tests.waiting import LONGEST_S
 
 FIRM = Track([(5.0, MUDS["48.5"])])
 
@@ -156,3 +162,16 @@ def test_the_time_in_which_clients_are_served_counts_as_a_part_of_the_tick(
     robot.step()
     assert robot.loop.timing.tick.max_us == pytest.approx(2000.0, abs=1.0)
     served.close()
+
+
+def test_a_daemon_in_the_foreground_prints_when_and_where_it_can_be_operated(short_folder: Path) -> None:
+    """No drive has to be heard for that."""
+    setup = write_local_setup(short_folder, short_folder / "logs")
+    command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(setup)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as daemon:
+        assert daemon.stdout is not None
+        line = daemon.stdout.readline()
+        StatusClient(short_folder / "mudskipper.sock").close()
+        daemon.send_signal(signal.SIGTERM)
+        assert daemon.wait(LONGEST_S) == 0
+    assert "ready" in line and str(short_folder / "mudskipper.sock") in line
