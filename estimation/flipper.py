@@ -8,6 +8,7 @@ force component, which two torques cannot determine; forces are mapped for displ
 """
 
 from collections.abc import Sequence
+from functools import partial
 from math import cos, hypot, sin
 
 from control.geometry import FlipperGeometry
@@ -16,16 +17,19 @@ from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_between
 from estimation.stride_estimator import Learned, StrideEstimator, larger
 from estimation.strokes.air import AirSwing
+from estimation.strokes.fit_samples import NO_FITS, StrideFits, no_samples
 from estimation.strokes.origin_fit import median
 from estimation.strokes.scatter_memory import ScatterMemory
-from estimation.strokes.shear import Base, Shear, find_shear
+from estimation.strokes.shear import Base, Shear, find_shear, shear_samples
 from estimation.strokes.stroke import Batch, Stroke
 from estimation.strokes.stroke_fit import (
     NOT_THERE,
     bound_extraction,
     evaluated,
+    extraction_samples,
     fit_extraction,
     fit_insertion,
+    insertion_samples,
     level_free,
 )
 from estimation.strokes.surface import find_surface
@@ -77,6 +81,7 @@ class FlipperEstimator(StrideEstimator):
             stroke.reset()
         self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
+        self._insertion_samples = no_samples
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         sweep_rad, adduction_rad, depth_m = load[:3]
@@ -142,6 +147,7 @@ class FlipperEstimator(StrideEstimator):
         below = level_free(batches, -corrected_n * length_m)
         own = self._own_surfaces.update(found, 0.0)
         self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+        self._insertion_samples = partial(insertion_samples, self.geometry, below, own)
 
     @property
     def surface_m(self) -> float:
@@ -150,10 +156,16 @@ class FlipperEstimator(StrideEstimator):
 
     def _learned(self) -> Learned:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
+        self.fits = NO_FITS
         if not self._met_mud(stance.batches, extraction.batches):
             no_mud = NOT_THERE._replace(reason=NO_MUD)
             return Learned(k_p=no_mud, k_s=no_mud, k_e=no_mud, surface_m=self.surface_m, extraction_torque_nm=UNKNOWN)
         shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.body_drag_n)
+        self.fits = StrideFits(
+            self._insertion_samples,
+            partial(shear_samples, self.geometry, stance.batches, self.surface_m, shear),
+            partial(extraction_samples, self.geometry, extraction.moving(), self._surface, extraction.first_m),
+        )
         return Learned(
             k_p=self._k_p,
             k_s=self._shear_estimate(shear),

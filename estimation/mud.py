@@ -17,6 +17,7 @@ from estimation.joint_load import NO_COMMANDS, FlipperDrive
 from estimation.knowledge import MudKnowledge
 from estimation.mud_map import MudMap
 from estimation.paper import PaperEstimator
+from estimation.strokes.fit_samples import StrideFits
 from estimation.strokes.shear import Base
 
 PAPER_DRAG_N = 2.5  # the body's drag on its rail in the paper
@@ -75,6 +76,10 @@ class MudEstimator:
         self._closed.clear()
         self.map.reset()
         self.mud_estimate = NOTHING_KNOWN
+
+    def fits_of(self, flipper: str) -> StrideFits:
+        """Return the fits of the flipper's last stride, until its next one closes."""
+        return (self.left if flipper == "left" else self.right).fits
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> MudReading:
         """Take in the newest state of every drive and the body's pose, in the gait's phase that they belong to."""

@@ -15,6 +15,7 @@ from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
 from estimation.joint_load import NO_COMMANDS, CommandTimes, FlipperDrive, JointLoad, JointLoads, JointMotion
 from estimation.stride_clock import StrideClock
+from estimation.strokes.fit_samples import NO_FITS, StrideFits
 
 GRACE_S = 0.3  # after the extraction, for a flipper that is still in the mud: joints follow late by up to 0.2 s
 
@@ -45,6 +46,7 @@ class StrideEstimator(ABC):
     ) -> None:
         self.flipper = flipper
         self.geometry = geometry
+        self.fits: StrideFits = NO_FITS  # of the stride that closed last
         self._loads = JointLoads(geometry, drive, motion)
         self._clock = StrideClock()
         self.reset()

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from control.plate import stance_moment_m4, submerged_plate
 from control.records import UNKNOWN
+from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
 from estimation.strokes.stroke import Batch
 from estimation.strokes.withstood import SHALLOWEST_M, most_withstood
@@ -46,6 +47,7 @@ class Shear(NamedTuple):
     samples: int
     reason: str = ""
     moment_m4: float = inf  # mean Ψ of the batches that count, by which an error of the torque becomes one of k_s
+    steady: Sequence[int] = ()  # the batches of the fit; none for a bound
 
 
 def find_shear(
@@ -75,7 +77,18 @@ def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> flo
 def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: Sequence[float]) -> Shear:
     fit = fit_through_origin([moments[i] for i in steady], [batches[i].sweep_nm for i in steady])
     moment_m4 = sum(moments[i] for i in steady) / len(steady)
-    return Shear(fit, False, case, sum(batches[i].samples for i in steady), moment_m4=moment_m4)
+    return Shear(fit, False, case, sum(batches[i].samples for i in steady), moment_m4=moment_m4, steady=steady)
+
+
+def shear_samples(
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, shear: Shear
+) -> FitSamples | None:
+    """Return the samples of the fit that `find_shear` found; None for a bound."""
+    if shear.fit is None or not shear.steady:
+        return None
+    steady = [batches[i] for i in shear.steady]
+    moments = [_moment_m4(geometry, batch, surface_m) for batch in steady]
+    return FitSamples(moments, [batch.sweep_nm for batch in steady], [1.0] * len(steady), shear.fit.slope)
 
 
 def slips_m(geometry: FlipperGeometry, batches: Sequence[Batch], base: Base) -> list[float] | None:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 from control.geometry import FlipperGeometry
 from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
+from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
 from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.stroke import Batch
@@ -50,8 +51,32 @@ def fit_extraction(
     start_m: float,
 ) -> Estimate:
     """Fit k_e; `start_m` is the depth from which the flipper rises; the scatter of its short strokes is pooled."""
-    deepest_m = surface.depth_m + (1.0 - REVERSAL_FRACTION) * (start_m - surface.depth_m)
-    return _fit(geometry, batches, surface, zero_error_n, scatter, -1.0, deepest_m)
+    return _fit(geometry, batches, surface, zero_error_n, scatter, -1.0, _deepest_m(surface, start_m))
+
+
+def _deepest_m(surface: Surface, start_m: float) -> float:
+    """Return the depth above which the force on a rising plate has reversed."""
+    return surface.depth_m + (1.0 - REVERSAL_FRACTION) * (start_m - surface.depth_m)
+
+
+def insertion_samples(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> FitSamples | None:
+    """Return the samples of `fit_insertion`; None where it has no fit."""
+    return _samples(_pieces(geometry, batches, surface, 1.0, inf))
+
+
+def extraction_samples(
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, start_m: float
+) -> FitSamples | None:
+    """Return the samples of `fit_extraction`; None where it has no fit."""
+    return _samples(_pieces(geometry, batches, surface, -1.0, _deepest_m(surface, start_m)))
+
+
+def _samples(pieces: "_Pieces") -> FitSamples | None:
+    fit = fit_through_origin(pieces.moments, pieces.torques)
+    if fit is None:
+        return None
+    moments, torques = ([a / sqrt(w) for a, w in zip(each, pieces.paths_m, strict=True)] for each in pieces[:2])
+    return FitSamples(moments, torques, pieces.paths_m, fit.slope)
 
 
 def bound_extraction(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> Estimate:
@@ -84,6 +109,7 @@ class _Pieces(NamedTuple):
     torques: list[float]  # that resist the stroke
     crossed_nm: list[float]  # cross-coupling, already subtracted
     depths_m: list[float]
+    paths_m: list[float]
     samples: int
     lever_m: float  # shortest vertical lever of the whole stroke
 
@@ -114,7 +140,7 @@ def _fit(
 def _pieces(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, sign: float, deepest_m: float
 ) -> _Pieces:
-    moments, torques, crossed_nm, depths_m, samples, lever_m = [], [], [], [], 0, inf
+    moments, torques, crossed_nm, depths_m, paths_m, samples, lever_m = [], [], [], [], [], 0, inf
     for batch, path_m in zip(batches, travels_m(batches, surface.depth_m, deepest_m), strict=True):
         vertical_m = geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
         lever_m = min(lever_m, vertical_m)
@@ -127,8 +153,9 @@ def _pieces(
         torques.append(root * sign * (batch.adduction_nm - across_nm))
         crossed_nm.append(root * across_nm)
         depths_m.append(max(batch.travel_m - surface.depth_m, path_m / 2.0))
+        paths_m.append(path_m)
         samples += batch.samples
-    return _Pieces(moments, torques, crossed_nm, depths_m, samples, lever_m)
+    return _Pieces(moments, torques, crossed_nm, depths_m, paths_m, samples, lever_m)
 
 
 def travels_m(batches: Sequence[Batch], shallowest_m: float, deepest_m: float) -> list[float]:

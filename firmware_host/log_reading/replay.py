@@ -12,11 +12,12 @@ from pathlib import Path
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.modes import Mode
-from control.records import BodyPose, Phase, StrideEstimate
+from control.records import FLIPPERS, BodyPose, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
 from estimation.mud_map import MapRow
 from estimation.recorded_states import recorded_states
+from estimation.strokes.fit_samples import StrideFits
 from firmware_host.configuration.configuration import CaptureAxis, Configuration, PoseParameters
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -60,6 +61,7 @@ class Replay:
     segment: int = 0  # of the run with which the log begins
     begin_s: float = 0.0  # on the log's own clock, which is also that of the strides
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
+    fits: tuple[StrideFits, ...] = ()  # behind the estimates, one for each stride
 
 
 def replay_files(
@@ -97,8 +99,16 @@ def replay_log(
     parameters = replace(configuration.estimation, method=method or configuration.estimation.method)
     drag_n = configuration.adaptation.body_drag_n
     estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
-    strides = list(_strides_of_log(estimator, log, watch))
-    return Replay(strides, ("left", "right"), estimator.map.rows(), log.complete, segment_of(log), begin_s(log))
+    found = list(_strides_of_log(estimator, log, watch))
+    return Replay(
+        [stride for stride, _ in found],
+        FLIPPERS,
+        estimator.map.rows(),
+        log.complete,
+        segment_of(log),
+        begin_s(log),
+        fits=tuple(fits for _, fits in found),
+    )
 
 
 def configuration_of(path: Path, text: str) -> Configuration:
@@ -109,8 +119,11 @@ def configuration_of(path: Path, text: str) -> Configuration:
         raise LogError(f"{path}: this version does not accept its configuration: {problem.problems[0]}") from problem
 
 
-def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator[StrideEstimate]:
-    """Yields the strides in the order of the loop: the sample comes before the change of mode that resets a walk."""
+def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator[tuple[StrideEstimate, StrideFits]]:
+    """Yields the strides with their fits.
+
+    The order is that of the loop: the sample comes before the change of mode that resets a walk.
+    """
     ticks = log.ticks
     walking, mode_before = int(Mode.WALKING), -1
     rows = zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True)
@@ -118,7 +131,7 @@ def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator
         if number % WATCHED_TICKS == 0:
             watch("ticks replayed", number, len(ticks))
         reading = estimator.update(now_s, PHASES[phase], recorded_states(now_s, *signals), BodyPose(now_s, body_x_m))
-        yield from reading.strides
+        yield from ((stride, estimator.fits_of(stride.flipper)) for stride in reading.strides)
         if mode == walking and mode_before != walking:
             estimator.reset()
         mode_before = mode
@@ -127,10 +140,20 @@ def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator
 def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
     """Replays with `lab_estimator`."""
     estimator = lab_estimator(lab, configuration, method)
-    strides = [stride for _, reading in lab_readings(estimator, lab) for stride in reading.strides]
-    own = [stride for stride in strides if stride.flipper in lab.flippers]
-    begin_s = float(lab.stamp_s[0])
-    return Replay(own, lab.flippers, estimator.map.rows(), begin_s=begin_s, findings=lab.findings)
+    found = [
+        (stride, estimator.fits_of(stride.flipper))
+        for _, reading in lab_readings(estimator, lab)
+        for stride in reading.strides
+        if stride.flipper in lab.flippers
+    ]
+    return Replay(
+        [stride for stride, _ in found],
+        lab.flippers,
+        estimator.map.rows(),
+        begin_s=float(lab.stamp_s[0]),
+        findings=lab.findings,
+        fits=tuple(fits for _, fits in found),
+    )
 
 
 def lab_estimator(
