@@ -11,10 +11,7 @@ from struct import Struct, error
 from typing import Any
 
 from drivers.can.frames import DATA_MAX_BYTES
-
-
-class MalformedMessageError(ValueError):
-    """A payload has the wrong length, or contains a number that is not finite."""
+from drivers.can.frames import MalformedMessageError as MalformedMessageError  # re-exported for users of the codec
 
 
 class Message:
