@@ -99,10 +99,11 @@ def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration
     plot_path = options.out / log_path.with_suffix(".png").name
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
+    from experiments.pictures.mud_layout import layout_of_track
     from experiments.pictures.recorded_walk import read_walk
     from experiments.pictures.walk_plot import plot_walk  # matplotlib loads slowly; the walk must not wait
 
-    plot_walk(read_walk(log_path), plot_path, demonstration.track)
+    plot_walk(read_walk(log_path), plot_path, layout_of_track(demonstration.track))
     print(f"plot     {plot_path}")
     if options.json:
         options.json.write_text(json.dumps(with_schema("demo", summary), indent=1) + os.linesep, encoding="utf-8")

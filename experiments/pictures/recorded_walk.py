@@ -1,4 +1,4 @@
-"""One walk from a log, for the pictures: the time series of one flipper, and the strides of both.
+"""One walk from a log, for the pictures: the time series and the strides of both flippers, one of which is shown first.
 
 A log of the daemon has all of it, for every walk of its run. The authors' CSV has angles, currents and the position of
 the body; forces and strides are estimated from them, as in `mudskipper replay`. Values that a log does not have are NaN
@@ -33,6 +33,7 @@ from firmware_host.log_reading.log_reader import (
     unwatched,
 )
 from firmware_host.log_reading.replay import configuration_of, lab_estimator, lab_readings
+from firmware_host.log_reading.tick_array import Ticks
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
@@ -43,6 +44,17 @@ DESCRIPTIONS = {
     "depth_command_m": "the commanded depth",
     "force_z_n": "forces",
 }
+
+
+class FlipperSeries(NamedTuple):
+    """The time series of one flipper, a value a row."""
+
+    flipper: str
+    sweep_angle_rad: Floats
+    adduction_angle_rad: Floats
+    depth_m: Floats  # measured, below the nominal surface
+    force_x_n: Floats
+    force_z_n: Floats
 
 
 class RecordedWalk(NamedTuple):
@@ -68,6 +80,12 @@ class RecordedWalk(NamedTuple):
     complete: bool = True  # False if the writer of the log was interrupted, or still writes
     cut: str = ""  # how the walk may extend beyond this log
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
+    series: tuple[FlipperSeries, ...] = ()  # of every flipper that moved, the left one first
+
+    @property
+    def sides(self) -> list["RecordedWalk"]:
+        """The same walk with each flipper as the one that is shown."""
+        return [self._replace(**series._asdict()) for series in self.series] or [self]
 
     @property
     def geometric_step_m(self) -> float:
@@ -105,7 +123,7 @@ def read_walk(
     if more:
         return numbered_walk(path, read_logs([path, *more], watch), number)
     if is_lab_csv(path):
-        return _only_walk(path, read_lab_csv(path, vertical), number)
+        return walk_of_lab(path, read_lab_csv(path, vertical), number)
     if path.suffix == ".mcap":
         return numbered_walk(path, read_log(path, watch), number)
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
@@ -142,27 +160,35 @@ def _refuse_number(path: Path, number: int, walks: int) -> None:
 
 def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: float) -> RecordedWalk:
     """Return the walk in some rows. Strides and events belong to it up to the next walk at `until_s`."""
-    ticks, shown = log.ticks[rows], len(FLIPPERS) - 1
+    ticks = log.ticks[rows]
     start_s = float(ticks["stamp_s"][0])
     strides = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
     events = [event for event in log.events if start_s <= event["stamp_s"] < until_s]
     summary = log_summary(log)
+    series = tuple(_series_of(ticks, number) for number in range(len(FLIPPERS)))
     return RecordedWalk(
         title=f"{summary['robot']}  {summary['started']}",
         geometry=configuration.geometry,
         sweep_rad=radians(configuration.gait.sweep_angle_deg),
-        flipper=FLIPPERS[shown],
+        **series[-1]._asdict(),
         time_s=ticks["stamp_s"] - start_s,
         phase=ticks["phase"].astype(np.int64),
-        sweep_angle_rad=ticks["angle_rad"][:, 2 * shown],
-        adduction_angle_rad=ticks["angle_rad"][:, 2 * shown + 1],
-        depth_m=ticks["depth_m"][:, shown],
         depth_command_m=ticks["depth_command_m"],
-        force_x_n=ticks["force_x_n"][:, shown],
-        force_z_n=ticks["force_z_n"][:, shown],
         body_x_m=ticks["body_x_m"],
         strides=[_since(start_s, stride) for stride in strides],
         noticed_s=[event["stamp_s"] - start_s for event in events if event["text"] == ANOTHER_MUD],
+        series=series,
+    )
+
+
+def _series_of(ticks: Ticks, number: int) -> FlipperSeries:
+    return FlipperSeries(
+        flipper=FLIPPERS[number],
+        sweep_angle_rad=ticks["angle_rad"][:, 2 * number],
+        adduction_angle_rad=ticks["angle_rad"][:, 2 * number + 1],
+        depth_m=ticks["depth_m"][:, number],
+        force_x_n=ticks["force_x_n"][:, number],
+        force_z_n=ticks["force_z_n"][:, number],
     )
 
 
@@ -173,42 +199,52 @@ def _since(start_s: float, stride: dict[str, Any]) -> dict[str, Any]:
 class _LabReading(NamedTuple):
     """The estimator's results for one of the authors' runs."""
 
-    loads: list[FlipperLoad]  # of the flipper shown, a row each
+    loads: list[tuple[FlipperLoad, FlipperLoad]]  # left and right, a row each
     strides: list[StrideEstimate]
     noticed_s: list[float]
 
 
-def _read_lab(lab: LabLog, flipper: str) -> _LabReading:
+def _read_lab(lab: LabLog) -> _LabReading:
     """Estimate one run as `replay_lab` does."""
     estimator, reading = lab_estimator(lab), _LabReading([], [], [])
     for now_s, reported in lab_readings(estimator, lab):
-        reading.loads.append(reported.left if flipper == FLIPPERS[0] else reported.right)
+        reading.loads.append((reported.left, reported.right))
         reading.strides.extend(stride for stride in reported.strides if stride.flipper in lab.flippers)
         if reported.strides and estimator.mud_estimate.boundary:
             reading.noticed_s.append(now_s)
     return reading
 
 
-def _only_walk(path: Path, lab: LabLog, number: int) -> RecordedWalk:
+def walk_of_lab(path: Path, lab: LabLog, number: int = 0) -> RecordedWalk:
+    """Return the one walk of a CSV that was read already; `path` is for its title and messages. Raises LogError."""
     _refuse_number(path, number, 1 if lab.flippers else 0)
-    flipper, start_s = lab.flippers[-1], float(lab.stamp_s[0])
-    shown, reading = FLIPPERS.index(flipper), _read_lab(lab, flipper)
+    start_s, reading = float(lab.stamp_s[0]), _read_lab(lab)
     rows = [STRIDE.decode(stride_row(stride.t_end_s, stride, nan)) for stride in reading.strides]
+    series = tuple(_lab_series(lab, reading, flipper) for flipper in lab.flippers)
     return RecordedWalk(
         title=path.name,
         geometry=FlipperGeometry(),
         sweep_rad=lab.gait.get("lateral_angle_range", radians(lab.gait.get("sweep_angle_deg", nan))),
-        flipper=flipper,
+        **series[-1]._asdict(),
         time_s=lab.stamp_s - start_s,
         phase=lab.phase,
-        sweep_angle_rad=lab.angle_rad[:, 2 * shown],
-        adduction_angle_rad=lab.angle_rad[:, 2 * shown + 1],
-        depth_m=np.array([load.depth_m for load in reading.loads]),
         depth_command_m=lab.commanded_depth_m,
-        force_x_n=np.array([load.force_x_n for load in reading.loads]),
-        force_z_n=np.array([load.force_z_n for load in reading.loads]),
         body_x_m=lab.body_x_m,
         strides=[_since(start_s, row) for row in rows],
         noticed_s=[now_s - start_s for now_s in reading.noticed_s],
         findings=lab.findings,
+        series=series,
+    )
+
+
+def _lab_series(lab: LabLog, reading: _LabReading, flipper: str) -> FlipperSeries:
+    number = FLIPPERS.index(flipper)
+    loads = [both[number] for both in reading.loads]
+    return FlipperSeries(
+        flipper=flipper,
+        sweep_angle_rad=lab.angle_rad[:, 2 * number],
+        adduction_angle_rad=lab.angle_rad[:, 2 * number + 1],
+        depth_m=np.array([load.depth_m for load in loads]),
+        force_x_n=np.array([load.force_x_n for load in loads]),
+        force_z_n=np.array([load.force_z_n for load in loads]),
     )

@@ -1,7 +1,7 @@
 """Plots forces, coefficients, depth, position and steps of a walk against time, after the paper's figure 8.
 
-The paper shades the muds that the experimenters prepared, and so does the demo, which knows its track. A log alone does
-not name the muds: there a mud begins with the stride after which the robot noticed it.
+The paper shades the muds that the experimenters prepared, and so does the demo, which knows its track.
+mud_layout.py says where the names come from. The flippers stand side by side, with the same scales.
 """
 
 from collections.abc import Callable
@@ -14,20 +14,28 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from control.records import FLIPPERS as FLIPPER_NAMES
 from experiments.pictures.colours import FAINT, FLIPPER_COLOURS, FORWARD, INK, MUD_SHADES, OUTCOME_COLOURS, SURFACE, UP
+from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome, outcome_of
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.mud_names import mud_label
-from simulation.mud.track import Track
 
 WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120
+TITLE_HEIGHT = 1.3  # above the names of the muds, in heights of a panel
 NOTICED_DASHES = (0, (2, 2))
 SHORTEST_S = 0.1  # least length of the time axis
+ROOM_FOR_LETTER = 0.018  # of the width of a panel
 HEADROOM = 1.6  # top of a panel as a multiple of its largest value; error bars may be cut
-LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "fontsize": "small", "frameon": False}
+LEGEND: dict[str, Any] = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 0.95),
+    "fontsize": "x-small",
+    "frameon": False,
+    "columnspacing": 1.2,
+    "handlelength": 1.5,
+}
 STYLE: dict[Any, Any] = {
+    "pdf.fonttype": 42,  # TrueType: journals refuse matplotlib's own Type 3
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
     "axes.spines.right": False,
@@ -36,78 +44,86 @@ STYLE: dict[Any, Any] = {
     "xtick.color": INK,
     "ytick.color": INK,
 }
-MudRegion = tuple[float, float, str]  # start and end in s, and the mud's name
 Draw = Callable[[Axes, RecordedWalk], None]
+Panels = list[tuple[str, Draw]]
 
 
-def plot_walk(walk: RecordedWalk, path: Path, track: Track | None = None) -> None:
-    """Draw a walk into a PNG file. `track` holds the true muds where they are known."""
-    wanted, regions = _panels(walk), mud_regions(walk, track)
-    size = (WIDTH_IN, PANEL_IN * len(wanted) + 0.4)
+def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -> None:
+    """Draw a walk into a PNG, SVG or PDF file, each flipper in a column. `layout` names the muds where it is known."""
+    sides, own, of_body = walk.sides, _flipper_panels(), _body_panels(walk)
+    rows = len(own) + -(-len(of_body) // len(sides))
     with rc_context(STYLE):
-        figure = Figure(figsize=size, layout="constrained")
-        panels = figure.subplots(len(wanted), 1, sharex=True, squeeze=False)[:, 0]
-        for panel, (label, draw) in zip(panels, wanted, strict=True):
+        figure = Figure(figsize=(WIDTH_IN, PANEL_IN * rows + 0.6), layout="constrained")
+        axes = _make_panels(figure, rows, len(sides), len(own))
+        for column, side in enumerate(sides):
+            for panel, (_, draw) in zip(axes[:, column], own, strict=False):
+                draw(panel, side)
+            axes[0, column].set_title(f"{side.flipper} flipper", y=TITLE_HEIGHT, weight="bold")
+        for panel, (label, _) in zip(axes[:, 0], own, strict=False):
+            panel.set_ylabel(label)
+        spare = axes[len(own) :].flatten()
+        for panel, (label, draw) in zip(spare, of_body, strict=False):
             draw(panel, walk)
             panel.set_ylabel(label)
-            _shade(panel, regions, walk.noticed_s)
-        _name_muds(panels[0], regions)
-        panels[0].set_xlim(0.0, max(float(walk.time_s[-1]), SHORTEST_S))
-        panels[-1].set_xlabel("time (s)")
-        panels[-1].set_title(f"{walk.flipper} flipper, {walk.title}", y=-0.42, loc="right", size=8, color=FAINT)
-        figure.align_ylabels()
+        _finish(figure, axes, walk, mud_regions(walk, layout))
         figure.savefig(path, dpi=DOTS_PER_INCH)
 
 
-def _panels(walk: RecordedWalk) -> list[tuple[str, Draw]]:
-    """Return the panels for which the log has values."""
-    panels: list[tuple[str, Draw]] = [("force (N)", _plot_forces)]
+def _make_panels(figure: Figure, rows: int, columns: int, shared_rows: int) -> Any:
+    """Return panels with a common time axis, and in the first rows with a common scale for both flippers."""
+    grid, axes = figure.add_gridspec(rows, columns), np.empty((rows, columns), dtype=object)
+    for row, column in np.ndindex(rows, columns):
+        is_shared = column > 0 and row < shared_rows
+        panel = figure.add_subplot(grid[row, column], sharex=axes[0, 0], sharey=axes[row, 0] if is_shared else None)
+        panel.tick_params(labelleft=not is_shared, labelbottom=row == rows - 1)
+        axes[row, column] = panel
+    return axes
+
+
+def _finish(figure: Figure, axes: Any, walk: RecordedWalk, regions: list[MudRegion]) -> None:
+    for panel in figure.axes:
+        _shade(panel, regions, walk.noticed_s)
+    for panel in axes[0]:
+        _name_muds(panel, regions, float(walk.time_s[-1]))
+    axes[0, 0].set_xlim(0.0, max(float(walk.time_s[-1]), SHORTEST_S))
+    for panel in axes[-1]:
+        panel.set_xlabel("time (s)")
+    axes[-1, -1].set_title(walk.title, y=-0.5, loc="right", size=8, color=FAINT)
+    figure.align_ylabels()
+
+
+def _flipper_panels() -> Panels:
+    panels: Panels = [("force (N)", _plot_forces)]
     panels += [(f"${name}$ (N/cm³)", partial(_plot_coefficient, name=name)) for name in COEFFICIENTS]
-    panels.append(("depth (cm)", _plot_depth))
-    if np.any(np.isfinite(walk.body_x_m)):
-        panels += [("body (m)", _plot_position), ("step (cm)", _plot_steps)]
-    return panels
+    return [*panels, ("depth (cm)", _plot_depth)]
 
 
-def mud_regions(walk: RecordedWalk, track: Track | None) -> list[MudRegion]:
-    """Return the muds along the time axis: by the arrival of the body on the track, or as the robot noticed them."""
-    end_s = float(walk.time_s[-1])
-    if track is None:
-        starts_s = [0.0, *walk.mud_starts_s]
-        names = [f"mud {number}" for number in range(1, len(starts_s) + 1)]
-    else:
-        borders_m = [segment.end_m for segment in track.segments[:-1]]
-        starts_s = [0.0, *(_arrival_s(walk, border_m) for border_m in borders_m)]
-        names = [mud_label(segment.clay.name) for segment in track.segments]
-    return [
-        (start_s, until_s, name)
-        for start_s, until_s, name in zip(starts_s, [*starts_s[1:], end_s], names, strict=True)
-        if start_s < until_s
-    ]
-
-
-def _arrival_s(walk: RecordedWalk, position_m: float) -> float:
-    """Return when the body first arrived at a position; the end of the walk where it never did."""
-    beyond = np.flatnonzero(walk.body_x_m >= position_m)
-    return float(walk.time_s[beyond[0] if len(beyond) else -1])
+def _body_panels(walk: RecordedWalk) -> Panels:
+    """Return the panels of the body, where the log has its position."""
+    if not np.any(np.isfinite(walk.body_x_m)):
+        return []
+    return [("body (m)", _plot_position), ("step (cm)", _plot_steps)]
 
 
 def _shade(panel: Axes, regions: list[MudRegion], noticed_s: list[float]) -> None:
-    for number, (start_s, end_s, _) in enumerate(regions):
-        panel.axvspan(start_s, end_s, color=MUD_SHADES[number % len(MUD_SHADES)], linewidth=0, zorder=0)
+    for number, region in enumerate(regions):
+        shade = MUD_SHADES[number % len(MUD_SHADES)]
+        panel.axvspan(region.start_s, region.end_s, color=shade, linewidth=0, zorder=0)
     for at_s in noticed_s:
         panel.axvline(at_s, color=INK, linewidth=1.0, linestyle=NOTICED_DASHES)
 
 
-def _name_muds(panel: Axes, regions: list[MudRegion]) -> None:
-    """Write the names of the muds above the panel's legend."""
+def _name_muds(panel: Axes, regions: list[MudRegion], length_s: float) -> None:
+    """Write the names of the muds above the panel's legend, where there is room for them."""
     above: dict[str, Any] = {
         "xycoords": ("data", "axes fraction"),
-        "xytext": (0.0, 18.0),
+        "xytext": (0.0, 16.0),
         "textcoords": "offset points",
     }
     for start_s, end_s, name in regions:
-        panel.annotate(name, ((start_s + end_s) / 2.0, 1.0), ha="center", weight="bold", annotation_clip=False, **above)
+        short = name.removesuffix(" N/cm³").replace("k_p", "$k_p$")
+        if end_s - start_s > ROOM_FOR_LETTER * len(short) * length_s:
+            panel.annotate(short, ((start_s + end_s) / 2.0, 1.0), ha="center", size=8, annotation_clip=False, **above)
 
 
 def _plot_forces(panel: Axes, walk: RecordedWalk) -> None:
@@ -118,23 +134,20 @@ def _plot_forces(panel: Axes, walk: RecordedWalk) -> None:
 
 def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
     """Explain the marks in the panels of coefficients that occur."""
-    for flipper in dict.fromkeys(FLIPPER_NAMES[stride["flipper"]] for stride in walk.strides):
-        panel.plot([], [], "o", color=FLIPPER_COLOURS[flipper], label=flipper)
-    if any(stride[f"{name}_at_least"] for name in COEFFICIENTS for stride in walk.strides):
+    if any(stride[f"{name}_at_least"] for name in COEFFICIENTS for stride in walk.own_strides):
         panel.plot([], [], "^", color=FAINT, label="lower bound")
-    if any(not stride[f"{name}_valid"] for name in COEFFICIENTS for stride in walk.strides):
+    if any(not stride[f"{name}_valid"] for name in COEFFICIENTS for stride in walk.own_strides):
         panel.plot([], [], "o", color=FAINT, markerfacecolor="white", label="not valid")
     if walk.noticed_s:
         panel.plot([], [], color=INK, linewidth=1.0, linestyle=NOTICED_DASHES, label="another mud noticed")
     if panel.get_legend_handles_labels()[0]:
-        panel.legend(ncols=5, **LEGEND)
+        panel.legend(ncols=3, **LEGEND)
 
 
 def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
     """Draw values as dots, lower bounds as triangles, invalid ones hollow; bars are two standard errors."""
-    known = [stride for stride in walk.strides if np.isfinite(stride[name])]
-    for stride in known:
-        colour = FLIPPER_COLOURS[FLIPPER_NAMES[stride["flipper"]]]
+    colour = FLIPPER_COLOURS[walk.flipper]
+    for stride in (each for each in walk.own_strides if np.isfinite(each[name])):
         panel.errorbar(
             stride["stamp_s"],
             stride[name] / 1e6,
@@ -146,7 +159,7 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
             markerfacecolor=colour if stride[f"{name}_valid"] else "white",
             label="_",
         )
-    largest = max((stride[name] / 1e6 for stride in known), default=0.0)
+    largest = max((stride[name] / 1e6 for stride in walk.strides if np.isfinite(stride[name])), default=0.0)
     panel.set_ylim(0.0, HEADROOM * largest if largest > 0.0 else 1.0)
     if name == COEFFICIENTS[0]:
         _explain_coefficients(panel, walk)
@@ -164,7 +177,7 @@ def _plot_depth(panel: Axes, walk: RecordedWalk) -> None:
         stuck_cm = 100.0 * np.interp(stuck_s, walk.time_s, walk.depth_m)
         panel.plot(stuck_s, stuck_cm, "x", color=OUTCOME_COLOURS[Outcome.STUCK], markeredgewidth=2.0, label="stuck")
     panel.axhline(0.0, color=SURFACE, linewidth=1.0)
-    panel.invert_yaxis()
+    panel.yaxis.set_inverted(True)
     panel.legend(ncols=4, **LEGEND)
 
 

@@ -12,6 +12,7 @@ from itertools import accumulate, chain
 from math import ceil
 from typing import Any
 
+from experiments.pictures.mud_layout import layout_of_lengths
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.bench_robot import (
     RAISING_S,
@@ -40,7 +41,6 @@ MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 o
 SOFT = ("53.1", "51.2")
 SOFT_DEPTHS_M = (0.03, 0.05)
 METHODS = (DEFAULT, PAPER, COMPENSATED)
-BORDER_M = 0.03  # a plate closer to a border than this may be in either mud
 STUCK_S, ADVANCED_M = 60.0, 0.03  # longest time in which the body advances by less
 SLIP_ALLOWANCE = 4  # ordered strides, as a multiple of those of a robot that never slips
 DRAWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start from a standing body
@@ -91,10 +91,7 @@ class Plan:
 
     def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
         """Name the mud in which a plate goes down and slips back; empty past the last mud and near a border."""
-        rear_m, front_m = plates_m - slip_m - BORDER_M, plates_m + BORDER_M
-        if plates_m >= self.length_m or any(rear_m < border_m < front_m for border_m in self.borders_m):
-            return ""
-        return self.muds[sum(plates_m >= border_m for border_m in self.borders_m)].name
+        return layout_of_lengths([(mud.name, mud.length_m) for mud in self.muds]).mud_at(plates_m, slip_m)
 
 
 def soft_name(mud: str, depth_m: float) -> str:

@@ -21,10 +21,11 @@ import experiments.pictures.stride_film
 from command_line import exit_codes
 from command_line.main import main
 from experiments.pictures.colours import OUTCOME_COLOURS
+from experiments.pictures.mud_layout import describe_mud, layout_of_track, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
-from experiments.pictures.walk_plot import mud_regions, plot_walk
+from experiments.pictures.walk_plot import plot_walk
 from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.log_reader import read_log
 from simulation.mud.clay import MUDS, Clay
@@ -133,6 +134,20 @@ def panel(figure: Figure, label: str) -> Axes:
     return found
 
 
+def row_of(figure: Figure, label: str) -> list[Axes]:
+    """The panels of the left and the right flipper."""
+    row = panel(figure, label).get_gridspec(), panel(figure, label).get_subplotspec()
+    assert row[1] is not None
+    return [axes for axes in figure.axes if (spec := axes.get_subplotspec()) and spec.rowspan == row[1].rowspan]
+
+
+def test_the_flippers_stand_side_by_side_with_the_same_scales(figure: Figure) -> None:
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["left flipper", "right flipper"]
+    for label in ("force", "$k_p$", "$k_s$", "$k_e$", "depth"):
+        left, right = row_of(figure, label)
+        assert left.get_ylim() == right.get_ylim() and left.get_xlim() == right.get_xlim()
+
+
 def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) -> None:
     walk = read_walk(two_walks, 1)
     lines = {str(line.get_label()): np.asarray(line.get_ydata()) for axes in figure.axes for line in axes.lines}
@@ -147,8 +162,8 @@ def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) ->
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
 def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: Figure, name: str) -> None:
     walk = read_walk(two_walks, 1)
-    reported = [stride for stride in walk.strides if np.isfinite(stride[name])]
-    containers: Sequence[Any] = panel(figure, f"${name}$").containers
+    reported = [s for flipper in (0, 1) for s in walk.strides if s["flipper"] == flipper and np.isfinite(s[name])]
+    containers: Sequence[Any] = [bar for axes in row_of(figure, f"${name}$") for bar in axes.containers]
     assert len(reported) == len(containers) > 1
     for stride, container in zip(reported, containers, strict=True):
         ((_, low), (_, high)) = container.lines[2][0].get_segments()[0]
@@ -162,7 +177,7 @@ def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
     slipping, stuck = walk.own_strides[0] | {"step_m": 0.01}, walk.own_strides[1] | {"released": False}
     slipping["released"] = True
     figure = drawn(walk._replace(strides=[slipping, stuck]), tmp_path / "walk.png")
-    (mark,) = [line for line in panel(figure, "depth").lines if line.get_label() == "stuck"]
+    (mark,) = [line for line in row_of(figure, "depth")[1].lines if line.get_label() == "stuck"]
     row = int(np.searchsorted(walk.time_s, stuck["stamp_s"]))
     assert np.asarray(mark.get_xdata()) == pytest.approx([stuck["stamp_s"]])
     assert np.asarray(mark.get_ydata()) == pytest.approx([100.0 * walk.depth_m[row]])
@@ -184,7 +199,8 @@ def test_without_a_known_sweep_no_geometric_step_is_drawn(two_walks: Path, tmp_p
 def test_without_a_pose_there_are_no_panels_of_place(two_walks: Path, tmp_path: Path) -> None:
     walk = read_walk(two_walks, 1)
     figure = drawn(walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)), tmp_path / "walk.png")
-    assert [axes.get_ylabel().split()[0] for axes in figure.axes] == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
+    labels = [axes.get_ylabel().split()[0] for axes in figure.axes if axes.get_ylabel()]
+    assert labels == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
 
 
 @pytest.mark.filterwarnings("error")
@@ -201,22 +217,38 @@ def test_strides_that_say_nothing_are_no_trouble(two_walks: Path, tmp_path: Path
     assert png_size(tmp_path / "wild.png") == png_size(tmp_path / "bare.png")
 
 
-def test_muds_are_shaded_where_the_robot_said_so(two_walks: Path) -> None:
+def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_walks: Path) -> None:
     walk = read_walk(two_walks, 1)
-    assert mud_regions(walk, None) == [(0.0, walk.time_s[-1], "mud 1")]
+    name = describe_mud(walk.strides)
+    k_p = float(np.median([stride["k_p"] for stride in walk.strides])) / 1e6
+    assert float(name.split()[1]) == pytest.approx(k_p, rel=0.05) and name.endswith("N/cm³")
+    assert mud_regions(walk, None) == [(0.0, walk.time_s[-1], name)]
     second = walk.own_strides[1]
-    noticed = walk._replace(noticed_s=[second["stamp_s"]])
+    soft = [stride | {"k_p": 0.2e6} if stride["index"] else stride for stride in walk.strides]
+    noticed = walk._replace(noticed_s=[second["stamp_s"]], strides=soft)
     assert mud_regions(noticed, None) == [
-        (0.0, second["t_start_s"], "mud 1"),
-        (second["t_start_s"], walk.time_s[-1], "mud 2"),
+        (0.0, second["t_start_s"], describe_mud(walk.strides[:2])),
+        (second["t_start_s"], walk.time_s[-1], "k_p 0.20 N/cm³"),
     ]
+
+
+def test_muds_that_read_alike_are_told_apart_by_time_and_those_without_value_say_so(two_walks: Path) -> None:
+    walk = read_walk(two_walks, 1)
+    second = walk.own_strides[1]
+    alike = walk._replace(noticed_s=[second["stamp_s"]], strides=[s | {"k_p": 1e6} for s in walk.strides])
+    assert [region.name for region in mud_regions(alike, None)] == [
+        "k_p 1.0 N/cm³",
+        f"k_p 1.0 N/cm³, from {second['t_start_s']:.0f} s",
+    ]
+    bounds = [stride | {"k_p_at_least": True} for stride in walk.strides]
+    assert [region.name for region in mud_regions(walk._replace(strides=bounds), None)] == ["unmeasured mud"]
 
 
 def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Path) -> None:
     walk = read_walk(two_walks, 1)
     position_m = np.linspace(0.0, 0.5, len(walk.time_s))
     track = Track([(0.1, MUDS["48.5"]), (0.3, MUDS["53.1"]), (0.3, Clay("900 Pa", 900.0)), (0.3, MUDS["48.5"])])
-    regions = mud_regions(walk._replace(body_x_m=position_m), track)
+    regions = mud_regions(walk._replace(body_x_m=position_m), layout_of_track(track))
     assert [name for *_, name in regions] == ["w = 48.5 %", "w = 53.1 %", "900 Pa"]  # the last was not reached
     borders_s = np.interp([0.0, 0.1, 0.4, 0.5], position_m, walk.time_s)
     np.testing.assert_allclose([start for start, *_ in regions], borders_s[:3], atol=0.003)  # one tick
@@ -297,6 +329,6 @@ def test_without_matplotlib_a_sentence_says_what_to_install(log: Path) -> None:
 
 def test_another_missing_module_is_no_matter_of_pictures(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "experiments.pictures.walk_plot", raising=False)
-    monkeypatch.setitem(sys.modules, "simulation.mud.track", None)
+    monkeypatch.setitem(sys.modules, "experiments.pictures.mud_layout", None)
     with pytest.raises(ModuleNotFoundError):
         main(["plot", str(log)])

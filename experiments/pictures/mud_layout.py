@@ -1,0 +1,96 @@
+"""Which mud is where: named muds along the track, or those that the robot noticed, described by their coefficient k_p.
+
+A log does not name muds. Who prepared them can: as lengths along the track, or as the world of a simulated robot.
+Without names a mud begins with the stride after which the robot noticed it.
+"""
+
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+from math import inf
+from statistics import median
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.reports.mud_names import mud_label, mud_name
+from experiments.reports.value_text import N_CM3
+from simulation.mud.track import Track
+
+BORDER_M = 0.03  # a plate closer to a border than this may be in either mud
+UNMEASURED = "unmeasured mud"
+
+
+class MudRegion(NamedTuple):
+    """One mud along the time axis of a walk."""
+
+    start_s: float
+    end_s: float
+    name: str
+
+
+class MudLayout(NamedTuple):
+    """Named muds, one after the other from `start_m` on."""
+
+    names: tuple[str, ...]
+    ends_m: tuple[float, ...]
+    start_m: float = 0.0
+
+    def starting_at(self, start_m: float) -> "MudLayout":
+        """Return the same muds with the first one beginning elsewhere."""
+        return self._replace(start_m=start_m, ends_m=tuple(end_m - self.start_m + start_m for end_m in self.ends_m))
+
+    def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
+        """Name the mud in which a plate goes down and slips back; empty past the last mud and near a border."""
+        rear_m, front_m = plates_m - slip_m - BORDER_M, plates_m + BORDER_M
+        if not plates_m < self.ends_m[-1] or any(rear_m < border_m < front_m for border_m in self.ends_m[:-1]):
+            return ""
+        return self.names[sum(plates_m >= border_m for border_m in self.ends_m[:-1])]
+
+
+def layout_of_lengths(muds: Sequence[tuple[str, float]]) -> MudLayout:
+    """Return the layout of muds with their lengths in metres."""
+    return MudLayout(tuple(mud_name(name) for name, _ in muds), tuple(accumulate(length_m for _, length_m in muds)))
+
+
+def layout_of_track(track: Track) -> MudLayout:
+    """Return the layout of a simulated track, the last mud of which has no end."""
+    *borders_m, _ = [segment.end_m for segment in track.segments]
+    return MudLayout(tuple(segment.clay.name for segment in track.segments), (*borders_m, inf))
+
+
+def mud_regions(walk: RecordedWalk, layout: MudLayout | None) -> list[MudRegion]:
+    """Return the muds along the time axis: by the arrival of the body in them, or as the robot noticed them."""
+    end_s = float(walk.time_s[-1])
+    starts_s = [0.0, *walk.mud_starts_s] if layout is None else [0.0, *_arrivals_s(walk, layout)]
+    pieces = [(start_s, until_s) for start_s, until_s in pairwise([*starts_s, end_s])]
+    names = _described(walk, pieces) if layout is None else list(map(mud_label, layout.names))
+    return [
+        MudRegion(start_s, until_s, name)
+        for (start_s, until_s), name in zip(pieces, names, strict=True)
+        if start_s < until_s
+    ]
+
+
+def _arrivals_s(walk: RecordedWalk, layout: MudLayout) -> list[float]:
+    """Return when the body first arrived at each border; the end of the walk where it never did."""
+    arrivals_s = []
+    for border_m in layout.ends_m[:-1]:
+        beyond = np.flatnonzero(walk.body_x_m >= border_m)
+        arrivals_s.append(float(walk.time_s[beyond[0] if len(beyond) else -1]))
+    return arrivals_s
+
+
+def _described(walk: RecordedWalk, pieces: Sequence[tuple[float, float]]) -> list[str]:
+    """Describe the mud of each piece of time by its k_p; where two read alike, also by the time at which they begin."""
+    names: list[str] = []
+    for start_s, until_s in pieces:
+        name = describe_mud([s for s in walk.strides if start_s <= s["t_start_s"] < until_s])
+        names.append(f"{name}, from {start_s:.0f} s" if name in names else name)
+    return names
+
+
+def describe_mud(strides: Sequence[dict[str, Any]]) -> str:
+    """Describe a mud by the median of the strides' valid k_p, to two digits."""
+    known = [each["k_p"] for each in strides if each.get("k_p_valid") and not each["k_p_at_least"]]
+    return f"k_p {median(known) / N_CM3:#.2g} N/cm³" if known else UNMEASURED
