@@ -1,55 +1,42 @@
-"""Adds commands to the parser. All commands share this, and the options that find the daemon."""
+"""The commands of `mudskipper`: function and help of each, and the module that adds its options.
 
-import argparse
-import os
-from pathlib import Path
-from typing import TypeAlias
+A function is named as `module.function` below this package, and imported when the command is used.
+"""
 
-from drivers.can.run_folder import find_run_folder
-
-DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
-SIMULATED = "robot"  # the name that `mudskipper simulate` has without --bus
-AXES = ("x", "y", "z")  # of motion capture
-DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # generic for type checkers alone
-
-
-def add(commands: Commands, name: str, function: str, text: str) -> argparse.ArgumentParser:
-    """Adds a command that runs `function`, named as `module.function` below this package and imported on use."""
-    command = commands.add_parser(name, help=text, description=text)
-    command.set_defaults(function=function)
-    return command
-
-
-def default_socket() -> Path:
-    """Returns $MUDSKIPPER_SOCKET, else the service's socket; where no service runs, that of `mudskipper simulate`."""
-    given, service = os.environ.get("MUDSKIPPER_SOCKET"), Path(DEFAULT_SOCKET)
-    if given or service.exists():
-        return Path(given) if given else service
-    folder = find_run_folder()
-    simulated = folder / SIMULATED / service.name if folder else service
-    return simulated if simulated.exists() else service
-
-
-def add_socket(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--socket",
-        type=Path,
-        default=default_socket(),
-        help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else that of the service or the simulated robot)",
-    )
-
-
-def add_vertical(parser: argparse.ArgumentParser, default: str | None = None) -> None:
-    parser.add_argument(
-        "--vertical",
-        choices=AXES,
-        default=default,
-        metavar="AXIS",
-        help="axis of a CSV log's motion capture that points up: x, y or z (default: y)",
-    )
-
-
-def add_json(*parsers: argparse.ArgumentParser) -> None:
-    for parser in parsers:
-        parser.add_argument("--json", action="store_true", help="print JSON for programs")
+COMMANDS = {  # module of options/ -> command -> function, help
+    "operation": {
+        "status": ("operation.operation.status", "Print the state of the robot."),
+        "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
+        "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
+        "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
+        "stop": ("operation.confirmed_stop.stop", "End the walk, raise the flippers and hold the pose."),
+        "disarm": ("operation.confirmed_stop.disarm", "Switch torque off at once, in any state."),
+        "clear": ("operation.operation.clear", "Clear a fault and the errors of the drives."),
+        "check": (
+            "operation.operation.check",
+            "List what prevents the robot from being armed, and what to do about it.",
+        ),
+        "watch": ("watch.watch.watch", "Show the robot live, with keys that operate it."),
+        "fail": ("operation.failing.fail", "Make a part of the robot fail on purpose, where allowed."),
+    },
+    "computer": {
+        "live": ("live.live.live", "Pass the robot's rows on to Foxglove, Lichtblick or a browser."),
+        "doctor": ("doctor.doctor.doctor", "Check this computer and its buses, line by line."),
+        "install": ("install.installation.install", "Set up the service, network and users of this computer."),
+        "uninstall": (
+            "install.installation.uninstall",
+            "Undo the installation; configuration and logs stay.",
+        ),
+    },
+    "simulation": {
+        "demo": ("demo.demo.demo", "Walk a simulated robot over three muds, in real time."),
+        "simulate": ("simulate.simulate", "Simulate the robot on a bus until Ctrl-C."),
+    },
+    "logs": {
+        "replay": ("logs.log_commands.replay", "Run the estimator over a recorded log."),
+        "plot": ("logs.log_commands.plot", "Draw a walk against time: forces, coefficients, depth."),
+        "film": ("logs.log_commands.film", "Draw strides from the side, as a strip or a film."),
+        "log": ("", "Read and manage logs."),
+    },
+    "experiments": {"experiment": ("", "The paper's experiments.")},
+}

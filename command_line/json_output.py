@@ -1,11 +1,17 @@
 """Prints what a command reports as JSON for programs. An object names its shape and version under `schema`.
 
-A version only grows by keys. A key that changes its meaning or goes away makes a new version. Lists stay lists.
+A version only grows by keys. A key that changes its meaning or goes away makes a new version. Lists stay lists. A
+command that fails before it has printed JSON prints an `error`.
 docs/reference/json.md describes each shape.
 """
 
-import json
+from collections.abc import Sequence
 from typing import Any
+
+from command_line import exit_codes
+
+JSON = "--json"
+answers: list[None] = []  # one for each JSON that this command has printed
 
 EXPERIMENTS = (
     "actuator",
@@ -21,6 +27,7 @@ EXPERIMENTS = (
 )
 SCHEMAS = {  # what prints it -> version
     "status": 2,
+    "error": 1,
     "failures": 1,
     "demo": 1,
     "replay": 1,
@@ -40,4 +47,17 @@ def with_schema(name: str, report: dict[str, Any]) -> dict[str, Any]:
 
 
 def print_json(name: str, report: dict[str, Any]) -> None:
-    print(json.dumps(with_schema(name, report)))
+    print_value(with_schema(name, report))
+
+
+def print_value(value: Any) -> None:
+    """Prints one line of JSON. Raises ValueError for a number that JSON does not have."""
+    import json  # every command imports this module, and few print JSON
+
+    answers.append(None)
+    print(json.dumps(value, allow_nan=False))
+
+
+def print_error(status: int, messages: Sequence[str]) -> None:
+    """Prints why a command failed, in the one shape of all commands."""
+    print_json("error", {"status": status, "meaning": exit_codes.MEANINGS[status], "messages": list(messages)})

@@ -14,6 +14,7 @@ RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m",
 QUIET_S = 2.0  # before progress is shown
 REFRESH_S = 0.1
 BAR_WIDTH = 20  # characters
+complaints: list[str] = []  # what this command has complained of: with --json it is the reason why it failed
 
 
 def coloured(text: str, colour: str) -> str:
@@ -68,6 +69,7 @@ def watched() -> Iterator[Callable[[str, int, int], None]]:
 
 def complain(*messages: str) -> None:
     """Prints messages to standard error."""
+    complaints.extend(messages)
     for message in messages:
         print(f"mudskipper: {message}", file=sys.stderr)
 

@@ -4,9 +4,10 @@ It uses the interfaces that operators and their programs use, and ends with a su
 """
 
 import argparse
-import json
 import os
 import signal
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from command_line import exit_codes
 from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
-from command_line.json_output import with_schema
+from command_line.json_output import print_json
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from control.modes import Mode
 from experiments.reports.mud_names import mud_text
@@ -36,8 +37,11 @@ def demo(options: argparse.Namespace) -> int:
         return refused
     before = set(log_files(options.out, DONE))
     try:
-        report, demonstration = _perform(options)
-        _conclude(options, report, demonstration)
+        with redirect_stdout(sys.stderr if options.json else sys.stdout):  # data goes to standard output, all else not
+            report, demonstration = _perform(options)
+            summary = _conclude(options, report, demonstration)
+        if options.json:
+            print_json("demo", summary)
     except (DemoError, CallRefusedError, NoDaemonError, LogError) as problem:
         complain(str(problem))
         return exit_codes.UNHEALTHY
@@ -65,9 +69,6 @@ def _refuse(options: argparse.Namespace) -> int | None:
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
     options.out.mkdir(parents=True, exist_ok=True)
-    if options.json and not os.access(options.json if options.json.exists() else options.json.parent, os.W_OK):
-        complain(f"{options.json} cannot be written")
-        return exit_codes.UNHEALTHY
     return None
 
 
@@ -92,8 +93,8 @@ def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
         return report, demonstration
 
 
-def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> None:
-    """Prints the summary, draws the plot, and writes the JSON if asked for."""
+def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> dict[str, Any]:
+    """Prints the summary, draws the plot, and returns the summary."""
     log_path = present_path(Path(report["log"]["path"]))
     log = read_log(log_path)
     plot_path = options.out / log_path.with_suffix(".png").name
@@ -105,8 +106,7 @@ def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration
 
     plot_walk(read_walk(log_path), plot_path, layout_of_track(demonstration.track))
     print(f"plot     {plot_path}")
-    if options.json:
-        options.json.write_text(json.dumps(with_schema("demo", summary), indent=1) + os.linesep, encoding="utf-8")
+    return summary
 
 
 def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: Path, plot_path: Path) -> dict[str, Any]:

@@ -5,7 +5,6 @@ Each check is one line with its fix. Nothing is transmitted: `check` listens whe
 
 import argparse
 import grp
-import json
 import os
 import pwd
 import time
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
+from command_line.json_output import print_value
 from command_line.screen import GREEN, RED, YELLOW, coloured
 from control.records import JOINTS
 from drivers.drive_types import make_drives
@@ -166,7 +166,10 @@ def _group_name(gid: int) -> str:
 
 
 def _show(findings: list[Finding], as_json: bool) -> int:
-    print(json.dumps([each._asdict() for each in findings]) if as_json else "\n".join(map(_line, findings)))
+    if as_json:
+        print_value([each._asdict() for each in findings])
+    else:
+        print("\n".join(map(_line, findings)))
     failed = any(finding.level is Level.FAIL for finding in findings)
     return exit_codes.UNHEALTHY if failed else exit_codes.OK
 

@@ -5,16 +5,15 @@ continues from there.
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from command_line import exit_codes
 from command_line.experiments.terminal_prompt import TerminalPrompt
-from command_line.json_output import with_schema
+from command_line.json_output import print_value, with_schema
 from command_line.screen import Progress, complain
 from experiments.reports.report_page import to_json, write_report
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
@@ -42,7 +41,7 @@ def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Findin
     report = with_schema(f"experiment-{options.name}", to_json(finding.report))
     if options.out is not None:
         _print_written(write_report(options.out, report, finding.title, finding.sections))
-    print(json.dumps(report, allow_nan=False) if options.json else finding.text)
+    _print_finding(report, finding, options.json)
     return EXIT_STATUS[finding.ending]
 
 
@@ -67,7 +66,7 @@ def conduct_bench(options: argparse.Namespace, unit: str, run: Callable[[Session
         return exit_codes.REFUSED
     except (BenchError, EndedError, CallRefusedError, KeyboardInterrupt, OSError) as problem:
         return _end_early(folder, problem)
-    print(json.dumps(report, allow_nan=False) if options.json else finding.text)
+    _print_finding(report, finding, options.json)
     _print_written(written)
     return EXIT_STATUS[finding.ending]
 
@@ -85,6 +84,13 @@ def _session(options: argparse.Namespace, folder: Path, progress: Progress) -> S
     if options.simulated:
         return Session(folder, AutomaticOperator(prompt.report), progress.show)
     return Session(folder, prompt, progress.show, getattr(options, "socket", None))
+
+
+def _print_finding(report: dict[str, Any], finding: Finding, as_json: bool) -> None:
+    if as_json:
+        print_value(report)
+    else:
+        print(finding.text)
 
 
 def _print_written(paths: list[Path]) -> None:

@@ -1,11 +1,10 @@
 """Runs `mudskipper fail`: makes a part of the robot fail on purpose, where its configuration allows that."""
 
 import argparse
-import json
 from typing import Any
 
 from command_line import exit_codes
-from command_line.json_output import print_json
+from command_line.json_output import print_json, print_value
 from command_line.operation.operation import with_daemon
 from command_line.screen import complain
 from experiments.reports.text_tables import table
@@ -26,7 +25,10 @@ def fail(options: argparse.Namespace) -> int:
 
 def _fail(client: StatusClient, options: argparse.Namespace) -> int:
     failing = client.call("fail", component=options.component, kind=options.kind, for_s=options.seconds)
-    print(json.dumps(failing) if options.json else failing_table(failing))
+    if options.json:
+        print_value(failing)
+    else:
+        print(failing_table(failing))
     return exit_codes.OK
 
 

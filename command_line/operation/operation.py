@@ -4,7 +4,6 @@ It imports the standard library and msgpack only, so these commands start fast.
 """
 
 import argparse
-import json
 import time
 from collections.abc import Callable
 from math import degrees, radians
@@ -12,6 +11,7 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.drive_state import torque_state
+from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain
 from experiments.reports.text_tables import number, table
@@ -56,7 +56,10 @@ def with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
 def status(options: Options) -> int:
     def show(client: StatusClient) -> int:
         report = client.call("status")
-        print(json.dumps(report) if options.json else status_text(report))
+        if options.json:
+            print_value(report)
+        else:
+            print(status_text(report))
         return exit_codes.UNHEALTHY if report["mode"] in ("fault", "damping") else exit_codes.OK
 
     return with_daemon(options, show)
@@ -161,7 +164,7 @@ def check(options: Options) -> int:
 
 def _show_items(options: Options, items: list[dict[str, Any]]) -> int:
     if options.json:
-        print(json.dumps(items))
+        print_value(items)
     else:
         for item in items:
             if not item.get("cause"):

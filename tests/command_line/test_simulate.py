@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from command_line import commands, exit_codes
+from command_line import exit_codes
 from command_line.main import main
+from command_line.options import shared
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import lock_buses
 from firmware_host.configuration.loading import parse_configuration
@@ -189,13 +190,13 @@ def test_a_second_terminal_finds_the_simulated_robot_where_no_service_runs(
     runtime.mkdir(mode=0o700)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
     monkeypatch.delenv("MUDSKIPPER_SOCKET", raising=False)
-    monkeypatch.setattr(commands, "DEFAULT_SOCKET", str(service))
-    assert commands.default_socket() == service
-    simulated = named_folder(commands.SIMULATED) / "mudskipper.sock"
-    monkeypatch.setattr(commands, "DEFAULT_SOCKET", str(short_folder / "mudskipper.sock"))
+    monkeypatch.setattr(shared, "DEFAULT_SOCKET", str(service))
+    assert shared.default_socket() == service
+    simulated = named_folder(shared.SIMULATED) / "mudskipper.sock"
+    monkeypatch.setattr(shared, "DEFAULT_SOCKET", str(short_folder / "mudskipper.sock"))
     simulated.touch()
-    assert commands.default_socket() == simulated
+    assert shared.default_socket() == simulated
     (short_folder / "mudskipper.sock").touch()  # the service's
-    assert commands.default_socket() == short_folder / "mudskipper.sock"
+    assert shared.default_socket() == short_folder / "mudskipper.sock"
     monkeypatch.setenv("MUDSKIPPER_SOCKET", "/given")
-    assert commands.default_socket() == Path("/given")
+    assert shared.default_socket() == Path("/given")

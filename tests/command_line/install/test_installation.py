@@ -32,7 +32,7 @@ from command_line.install.service_plan import (
     plan_installation,
     plan_removal,
 )
-from command_line.main import build_parser
+from command_line.parser import build_parser
 from tests.folders import ROOT
 
 PREFIX = Path("/opt/robot/venv")

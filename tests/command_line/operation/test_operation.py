@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from command_line import commands, exit_codes
+from command_line import exit_codes
 from command_line.main import main
 from command_line.operation.confirmation import TORQUE_UNKNOWN
+from command_line.options import shared
 from control.modes import Mode
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from firmware_host.log_reading.log_reader import read_log
@@ -173,4 +174,4 @@ def test_the_version_and_a_completion_script_are_printed() -> None:
 def test_the_command_line_and_the_daemon_agree() -> None:
     """The command line does not import these from the daemon, because `status` has to start fast."""
     assert exit_codes.CONFIGURATION == EXIT_CONFIGURATION
-    assert StatusParameters().socket == commands.DEFAULT_SOCKET
+    assert StatusParameters().socket == shared.DEFAULT_SOCKET

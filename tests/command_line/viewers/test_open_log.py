@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.main import VIEWERS, main
+from command_line.main import main
+from command_line.options.logs import VIEWERS
 from command_line.viewers import open_log
 from tests.command_line.command_lines import failure
 from tests.folders import ROOT

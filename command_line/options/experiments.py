@@ -1,9 +1,8 @@
-"""The parsers of `mudskipper experiment NAME`."""
+"""Options of `mudskipper experiment NAME`."""
 
 import argparse
 from pathlib import Path
 
-from command_line.commands import DEFAULT_CONFIG, Commands, add, add_socket, add_vertical
 from command_line.option_types import (
     between,
     depth_cm,
@@ -16,6 +15,7 @@ from command_line.option_types import (
     weights_g,
     whole,
 )
+from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket, add_vertical
 from control.records import JOINTS
 
 SEEDS, TRIALS = whole(1, 1000), whole(1, 100)
@@ -35,8 +35,7 @@ LABLOGS = (
 )
 
 
-def add_experiments(commands: Commands) -> None:
-    experiment = commands.add_parser("experiment", help="The paper's experiments.")
+def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     estimation = add(
         names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
@@ -69,7 +68,7 @@ def add_experiments(commands: Commands) -> None:
 def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -> None:
     option = experiment.add_argument
     option("--simulated", action="store_true", help=simulated)
-    option("--json", action="store_true", help="for machines")
+    add_json(experiment)
     option("--out", type=folder, metavar="DIR", help=out)
 
 
@@ -192,8 +191,8 @@ def _add_lablogs(names: Commands) -> None:
         "--air", action="append", metavar="PATTERN", help="logs without mud, repeatable (default: detected)"
     )
     add_vertical(lablogs, default="y")
-    lablogs.add_argument("--json", action="store_true", help="for machines")
-    lablogs.add_argument("--out", type=folder, metavar="FOLDER", help="for report, figures and numbers")
+    add_json(lablogs)
+    lablogs.add_argument("--out", type=folder, metavar="DIR", help="for report, figures and numbers")
 
 
 def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:

@@ -1,0 +1,39 @@
+"""Options of the commands that set up and check a computer, and serve viewers from it."""
+
+import argparse
+import os
+from pathlib import Path
+
+from command_line.option_types import whole
+from command_line.options.shared import add_config, add_json, add_socket
+
+Parser = argparse.ArgumentParser
+
+
+def add_live(live: Parser) -> None:
+    add_socket(live)
+    live.add_argument("--page", action="store_true", help="serve a page for a browser in place of a viewer's WebSocket")
+    live.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)")
+    live.add_argument("--port", type=whole(0, 65535), default=8765, metavar="N", help="0: a free one (default: 8765)")
+
+
+def add_doctor(doctor: Parser) -> None:
+    add_config(doctor, "of the daemon (default: %(default)s)")
+    add_json(doctor)
+    socket = os.environ.get("MUDSKIPPER_SOCKET")
+    doctor.add_argument(
+        "--socket",
+        type=Path,
+        default=Path(socket) if socket else None,
+        help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else the configured one)",
+    )
+
+
+def add_install(install: Parser) -> None:
+    install.add_argument("--dry-run", action="store_true", help="only show what would be done")
+    install.add_argument("--root", type=Path, default=Path("/"), metavar="DIR", help="root folder of another system")
+
+
+def add_uninstall(uninstall: Parser) -> None:
+    uninstall.add_argument("--purge", action="store_true", help="remove configuration, logs and user too")
+    add_install(uninstall)

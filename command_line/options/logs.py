@@ -1,0 +1,90 @@
+"""Options of the commands on logs."""
+
+import argparse
+from pathlib import Path
+
+from command_line.option_types import folder, picture, whole
+from command_line.options.shared import Commands, add, add_config, add_json, add_vertical
+
+Parser = argparse.ArgumentParser
+METHODS = ("default", "paper")  # of estimation
+VIEWERS = ("foxglove", "plotjuggler", "rerun")
+COUNT = whole(0, 100000)
+SEVERAL_FILES = "log of this project; several files are the segments of one run"
+ANY_LOG = "log of this project, its segments, or a CSV file of the paper's authors"
+FOLDER = "names the folder (default: %(default)s)"
+
+
+def add_replay(replay: Parser) -> None:
+    replay.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
+    add_json(replay)
+    replay.add_argument(
+        "--config", type=Path, metavar="FILE", help="use this configuration (default: the one in the log)"
+    )
+    replay.add_argument("--method", choices=METHODS, help="estimate by this method (default: the configured one)")
+    add_vertical(replay)
+
+
+def add_plot(plot: Parser) -> None:
+    plot.add_argument("--out", type=picture(".png", ".svg", ".pdf"), metavar="PNG", help="or .svg, .pdf")
+    _add_walk(plot)
+
+
+def add_film(film: Parser) -> None:
+    film.add_argument("--out", type=picture(".png", ".gif"), metavar="FILE", help=".png for a strip, .gif for a film")
+    film.add_argument("--stride", action="append", type=COUNT, metavar="N", help="number in the replay, repeatable")
+    _add_walk(film)
+
+
+def _add_walk(parser: Parser) -> None:
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
+    parser.add_argument("--walk", type=COUNT, default=0, metavar="N", help="number of the walk (default: the last)")
+    add_vertical(parser)
+
+
+def add_log(log: Parser) -> None:
+    actions = log.add_subparsers(dest="action", required=True, metavar="action")
+    info = add(actions, "info", "logs.log_commands.info", "Print what a log contains.")
+    info.add_argument("files", type=Path, nargs="+", metavar="FILE", help=SEVERAL_FILES)
+    report = add(actions, "report", "logs.log_report.log_report", "Write a log as one page with pictures.")
+    report.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
+    report.add_argument("--out", type=folder, metavar="DIR", help="(default: a folder named after the log)")
+    _add_export(actions)
+    preserve = add(actions, "preserve", "logs.log_folder_commands.preserve_log", "Exclude logs from the quota.")
+    preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    preserve.add_argument("--undo", action="store_true", help="include them again")
+    _add_catalogue(actions)
+    opening = add(actions, "open", "viewers.open_log.open_log", "Open a log in a viewer, with the project's layout.")
+    opening.add_argument("file", type=Path)
+    opening.add_argument(
+        "--with", choices=VIEWERS, required=True, dest="viewer", help="foxglove: Lichtblick or Foxglove"
+    )
+    listing = add(actions, "list", "logs.log_folder_commands.list_logs", "List the logs and the room that is left.")
+    listing.add_argument("folder", type=Path, nargs="?", help="of the logs (default: the configured one)")
+    recover = add(actions, "recover", "logs.log_folder_commands.recover", "Repair logs whose writer was interrupted.")
+    recover.add_argument("places", type=Path, nargs="*", metavar="FILE|DIR", help="(default: the configured folder)")
+    for parser in (listing, recover):
+        add_config(parser, FOLDER)
+    add_vertical(info)
+    add_vertical(report)
+    add_json(info, report, listing, recover)
+
+
+def _add_catalogue(actions: Commands) -> None:
+    index = add(actions, "index", "logs.catalogue_commands.index", "Read all new logs of a folder into its catalogue.")
+    query = add(actions, "query", "logs.catalogue_commands.query", "Answer a SELECT on the catalogue of the logs.")
+    query.add_argument("sql", metavar="SQL", help='such as "select file, strides, speed_m_s from logs"')
+    for parser in (index, query):
+        parser.add_argument("folder", type=Path, nargs="?", metavar="DIR", help="of the logs (default: the configured)")
+        add_config(parser, FOLDER)
+    add_json(index, query)
+
+
+def _add_export(actions: Commands) -> None:
+    export = add(actions, "export", "logs.log_export.export", "Write a log in a form that other programs read.")
+    export.add_argument("files", type=Path, nargs="+", metavar="FILE", help=SEVERAL_FILES)
+    form = export.add_mutually_exclusive_group(required=True)
+    form.add_argument("--csv", action="store_true", help="the columns of the authors' plotter, to standard output")
+    form.add_argument("--parquet", action="store_true", help="tables of ticks, strides and events, into this folder")
+    form.add_argument("--ros", action="store_true", help="the log with standard ROS 2 messages, to LOG-ros.mcap here")
+    export.add_argument("--out", type=Path, metavar="PATH", help="write this file, for --parquet into this folder")

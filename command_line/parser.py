@@ -1,0 +1,88 @@
+"""The parser of the command line. The options of a command are added when the command is used: `status` starts fast."""
+
+import argparse
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, NoReturn
+
+from command_line import exit_codes
+from command_line.commands import COMMANDS
+from command_line.screen import complaints
+
+
+class Parser(argparse.ArgumentParser):
+    """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
+
+    def __init__(self, *arguments: Any, options: str = "", **keywords: Any) -> None:
+        """`options` names the function that adds the options, as `module.function` below command_line.options."""
+        super().__init__(*arguments, **keywords | {"allow_abbrev": False})
+        self._options = options
+
+    def add_options(self) -> None:
+        if self._options:
+            module, function = self._options.rsplit(".", 1)
+            self._options = ""
+            getattr(import_module(f"command_line.options.{module}"), function)(self)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self.add_options()
+        return super().parse_known_args(args, namespace)
+
+    def error(self, message: str) -> NoReturn:
+        complaints.append(message)
+        super().error(message)
+
+
+class PrintVersion(argparse.Action):
+    """Prints the installed version and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from firmware_host.software_version import software_version  # slow to import, and seldom wanted
+
+        print(f"mudskipper {software_version()}")
+        parser.exit()
+
+
+class PrintCompletion(argparse.Action):
+    """Prints a completion script for a shell and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, _: object, shell: object, __: object = None) -> NoReturn:
+        import shtab
+
+        add_all_options(parser)
+        print(shtab.complete(parser, str(shell)))
+        parser.exit()
+
+
+def build_parser(given: Sequence[str] = ()) -> Parser:
+    """Builds the parser of this command line: of that command alone where one is named, else of all commands."""
+    statuses = ", ".join(f"{status} {meaning}" for status, meaning in exit_codes.MEANINGS.items())
+    parser = Parser(
+        prog="mudskipper",
+        description="Operates a robot that crawls over mud on two flippers.",
+        epilog=f"Exit status: {statuses}.",
+    )
+    parser.add_argument("--version", action=PrintVersion, nargs=0, help="print the version and exit")
+    parser.add_argument(
+        "--print-completion",
+        action=PrintCompletion,
+        choices=("bash", "zsh", "tcsh"),
+        help="print a completion script for this shell and exit",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="command")
+    described = {name: (module, *what) for module, group in COMMANDS.items() for name, what in group.items()}
+    for name in {*given[:1]} & described.keys() or described:
+        module, function, text = described[name]
+        command = commands.add_parser(name, help=text, description=text, options=f"{module}.add_{name}")
+        command.set_defaults(function=function)
+    return parser
+
+
+def add_all_options(parser: argparse.ArgumentParser) -> None:
+    """Completes a parser for its documentation."""
+    if isinstance(parser, Parser):
+        parser.add_options()
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                add_all_options(command)

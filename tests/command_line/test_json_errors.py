@@ -1,0 +1,74 @@
+"""With --json, a command that fails prints its reason as JSON, in one shape; --json is spelled alike everywhere."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.parser import add_all_options, build_parser
+from tests.command_line.command_lines import run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "text"),
+    [
+        ("status --socket /none", exit_codes.NO_DAEMON, "no daemon answers on /none"),
+        ("fail --list all", exit_codes.USAGE, "--list takes neither"),
+        ("fail left_sweep off --socket /none", exit_codes.NO_DAEMON, "no daemon answers on /none"),
+        ("log info /none.mcap", exit_codes.UNHEALTHY, "/none.mcap: No such file"),
+        ("log list /none", exit_codes.UNHEALTHY, "/none: there is no such folder"),
+        ("log query nonsense /none", exit_codes.UNHEALTHY, "/none: there is no such folder"),
+        ("replay /none.csv --config /none.toml", exit_codes.CONFIGURATION, "/none.toml: No such file"),
+        ("status --bogus", exit_codes.USAGE, "unrecognized arguments: --bogus"),
+        ("demo --depth -1", exit_codes.USAGE, "--depth"),
+        ("experiment sweep", exit_codes.USAGE, "--simulated"),
+    ],
+)
+def test_a_failure_is_one_object_with_the_messages_of_standard_error(arguments: str, status: int, text: str) -> None:
+    ended = run(*arguments.split(), "--json")
+    error = json.loads(ended.stdout)
+    assert ended.returncode == status
+    assert error.keys() == {"schema", "status", "meaning", "messages"}
+    assert (error["schema"], error["status"], error["meaning"]) == ("error/1", status, exit_codes.MEANINGS[status])
+    assert text in error["messages"][0]
+    assert all(message in ended.stderr for message in error["messages"])
+
+
+def test_a_command_that_has_answered_adds_no_error(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text("[loop]\ncpu = 'x'\n", encoding="utf-8")
+    ended = run("doctor", "--config", str(tmp_path / "bad.toml"), "--json")
+    assert ended.returncode == exit_codes.UNHEALTHY
+    assert isinstance(json.loads(ended.stdout), list)
+
+
+def test_an_earlier_command_leaves_nothing_behind() -> None:
+    run("log", "info", "/none.mcap", "--json")
+    assert len(json.loads(run("log", "info", "/other.mcap", "--json").stdout)["messages"]) == 1
+
+
+def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    yield parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from commands_of(command)
+
+
+def test_json_is_spelled_alike_everywhere() -> None:
+    parser = build_parser()
+    add_all_options(parser)
+    found = [action for command in commands_of(parser) for action in command._actions if "--json" in str(action)]
+    actions = [action for action in found if action.option_strings == ["--json"]]
+    assert len(actions) == len(found) > 20
+    assert {(action.nargs, action.const, action.help) for action in actions} == {(0, True, "print JSON for programs")}
+
+
+def test_a_command_line_that_names_a_command_is_parsed_as_by_the_complete_parser() -> None:
+    complete = build_parser()
+    for arguments in (["walk", "--depth", "3"], ["log", "list", "."], ["experiment", "walk", "--mud", "47"]):
+        assert build_parser(arguments).parse_args(arguments) == complete.parse_args(arguments)
