@@ -16,6 +16,10 @@ joint shows it. Three quantities are small in every healthy motion, in air and i
                  in air only.
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
+
+A joint that waits too long for its next command still follows the one before, and moves past its target although it
+obeys. Oscillation and following therefore count only where samples and ticks were punctual for a while. On a robot,
+such a gap is a fault of its own (`drive_quiet`, `loop_lagging`); a simulation in real time continues.
 """
 
 from typing import NamedTuple
@@ -31,6 +35,8 @@ AWAY_LEAK_S = 0.3
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 LONGEST_GAP_S = 0.03  # between two samples
+PUNCTUAL_S = 0.012  # between two samples: four periods; a sound joint then moves away by 0.27 rad in all
+SETTLING_S = 0.3  # after a longer gap: the joint returns to its path within a swing
 FASTEST_RAD_S = 1000.0  # more is no measurement
 
 
@@ -57,6 +63,7 @@ class MotionMonitor:
         self._stamp_s, self._angle_rad, self._velocity_rad_s = NEVER_S, UNKNOWN, UNKNOWN
         self._target_rad = UNKNOWN
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
+        self._punctual_s = SETTLING_S  # since the last gap
 
     def update(
         self, found: list[Fault], state: DriveState, dt_s: float, torque_nm: float, target: JointTarget | None
@@ -67,6 +74,7 @@ class MotionMonitor:
         if state.angle_stamp_s == self._stamp_s:
             return
         angle_rad, velocity_rad_s, elapsed_s = state.angle_rad, state.velocity_rad_s, self._elapsed_s
+        self._punctual_s = self._punctual_s + elapsed_s if elapsed_s < PUNCTUAL_S else 0.0
         step_rad, farthest_rad = angle_rad - self._angle_rad, FASTEST_RAD_S * elapsed_s
         measured = -FASTEST_RAD_S < velocity_rad_s < FASTEST_RAD_S and -farthest_rad < step_rad < farthest_rad
         if measured and elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
@@ -85,6 +93,9 @@ class MotionMonitor:
         work_j = self._impulse_nm_s / elapsed_s * step_rad
         unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
+        if self._punctual_s < SETTLING_S:
+            self.away_rad = 0.0
+            return
         self.away_rad *= 1.0 - elapsed_s / AWAY_LEAK_S
         if target is None or target_rad != target_rad:
             return
@@ -99,7 +110,7 @@ class MotionMonitor:
             found.append(kind.fault(self._joint, energy_j=self.unexplained_j, limit_j=self._runaway_j))
         if self.away_rad > AWAY_RAD:
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
-        if target is None:
+        if target is None or self._punctual_s < SETTLING_S:
             return
         error_rad = abs(target.angle_rad - self._angle_rad)
         most_rad = self._following_rad + FOLLOWING_S * abs(target.velocity_rad_s)

@@ -11,7 +11,9 @@ from control.monitors.motion_monitor import (
     FASTEST_RAD_S,
     FOLLOWING_RAD,
     FOLLOWING_S,
+    PUNCTUAL_S,
     RUNAWAY_RAD,
+    SETTLING_S,
     JointDynamics,
     MotionMonitor,
 )
@@ -164,6 +166,19 @@ def test_a_gap_between_two_samples_explains_any_motion() -> None:
     found: list[Fault] = []
     joint.monitor.update(found, DriveState(0.5, 0.0, 1.0), 0.03, TORQUE_NM, None)
     assert not found and joint.monitor.unexplained_j == 0.0
+
+
+@pytest.mark.parametrize(("gap_s", "counts"), [(PUNCTUAL_S - 1e-6, True), (PUNCTUAL_S + 1e-6, False)])
+def test_after_a_late_command_the_path_counts_only_when_the_joint_has_settled(gap_s: float, counts: bool) -> None:
+    monitor, late = MotionMonitor("left_sweep", DYNAMICS, TORQUE_NM), list[Fault]()
+    held = JointTarget(0.0, 0.0)
+    monitor.update(late, DriveState(0.0, 0.0, 1.0), PERIOD_S, 0.0, held)
+    monitor.update(late, DriveState(0.6, 0.0, 1.0 + gap_s), gap_s, 0.0, held)
+    assert {fault.name for fault in late} == ({"joint_oscillating", "following_error"} if counts else set())
+    for tick in range(1, round(SETTLING_S / PERIOD_S) + 10):
+        settled = list[Fault]()
+        monitor.update(settled, DriveState(0.6, 0.0, 2.0 + tick * PERIOD_S), PERIOD_S, 0.0, held)
+    assert {fault.name for fault in settled} == {"following_error"}
 
 
 def test_a_speed_that_no_joint_has_is_no_energy() -> None:
