@@ -16,7 +16,7 @@ from experiments.faults.energy_bounds import energy_bounds
 from tests.dst.operated_robot import OperatedRobot
 from tests.dst.reachability import Reachability
 
-ROUNDING_NM = 1e-6
+ROUNDING_NM = 1e-6  # also of a current that decays exponentially and never is zero
 ON_THE_WAY_TICKS = 3  # from a change of mode until the motor obeys
 CLAMP_S = 0.01  # after a joint was too fast: the current of the drive's clamp decays
 WEAKEST = 0.2  # gain of a motor
@@ -48,8 +48,9 @@ class NoTorqueWithoutMode(Promise):
         if self._off_since_s is None:
             return
         off_s = self.robot.lockstep.robot.now_s - self._off_since_s
+        least_nm = self.reach.cogging_nm + ROUNDING_NM
         for index, torque_nm in enumerate(torques_nm):
-            if abs(torque_nm) > self.reach.cogging_nm and off_s > self.reach.longest_s(index, ON_THE_WAY_TICKS):
+            if abs(torque_nm) > least_nm and off_s > self.reach.longest_s(index, ON_THE_WAY_TICKS):
                 self._late[index] = torque_nm
 
     def update(self) -> Iterator[str]:
