@@ -1,23 +1,22 @@
 """`mudskipper live`: passes a running robot's rows on to viewers, in a process of its own.
 
-The daemon has no network. This program subscribes to its rows (firmware_host/log_reading/live_rows.py) and serves them
-to Foxglove and Lichtblick by WebSocket, or as a page for a browser with `--page`. It waits for a daemon that is not
-there yet, and for one that restarts.
+The daemon has no network. This program subscribes to its rows (firmware_host/log_reading/row_subscription.py) and
+serves them to Foxglove and Lichtblick by WebSocket, or as a page for a browser with `--page`. It waits for a daemon
+that is not there yet, and for one that restarts.
 """
 
 import argparse
 import time
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import NoReturn, Protocol
 
 from command_line import exit_codes
 from command_line.screen import complain
 from firmware_host.log.row_stream import stream_path
 from firmware_host.log_reading.live_rows import LiveRow, LiveRows
-from firmware_host.operator.status_client import NoDaemonError, NotPermittedError
+from firmware_host.log_reading.row_subscription import RowSubscription
+from firmware_host.operator.status_client import NotPermittedError
 
-WAIT_S = 1.0  # between two attempts to find the daemon
 READ_S = 0.2
 
 
@@ -42,7 +41,7 @@ def live(options: argparse.Namespace) -> int:
         return exit_codes.UNHEALTHY
     print(f"Serving on {address}. Ctrl-C ends.", flush=True)
     try:
-        pass_on(stream_path(options.socket), audience)
+        pass_on(RowSubscription(stream_path(options.socket)), audience)
     except NotPermittedError as problem:
         complain(str(problem))
         return exit_codes.NOT_PERMITTED
@@ -64,28 +63,16 @@ def _open_viewers(options: argparse.Namespace) -> tuple[Audience, str]:
     return viewers, f"ws://{options.host}:{viewers.port}; open it in Foxglove or Lichtblick as a Foxglove WebSocket"
 
 
-def pass_on(path: Path, audience: Audience, sleep: Callable[[float], None] = time.sleep) -> NoReturn:
-    """Pass rows on for ever. Raises NotPermittedError."""
-    reported = ""
+def pass_on(rows: RowSubscription, audience: Audience) -> NoReturn:
+    """Passes rows on for ever. Raises NotPermittedError."""
+    served, reported = 0, ""
     while True:
-        try:
-            source = LiveRows(path)
-        except NoDaemonError as problem:
-            if str(problem) != reported:
-                complain(f"{problem}; waiting for it")
-                reported = str(problem)
-            sleep(WAIT_S)
-            continue
-        reported = ""
-        audience.begin(source)
-        _pass_on_one_run(source, audience)
-
-
-def _pass_on_one_run(source: LiveRows, audience: Audience) -> None:
-    try:
-        while True:
-            audience.take(source.read(READ_S), source.lost)
-    except NoDaemonError:
-        complain("the daemon has ended; waiting for it")
-    finally:
-        source.close()
+        received = rows.read(READ_S, time.monotonic())
+        if rows.problem != reported:
+            reported = rows.problem
+            complain(*[f"{reported}; waiting for it"] * bool(reported))
+        if rows.source is not None:
+            if rows.daemons > served:
+                served = rows.daemons
+                audience.begin(rows.source)
+            audience.take(received, rows.source.lost)

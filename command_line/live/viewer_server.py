@@ -1,19 +1,29 @@
-"""Serves rows to Foxglove and Lichtblick by the SDK's WebSocket server; the rows are the log's own messages in CDR.
+"""Serves rows to Foxglove and Lichtblick by the SDK's WebSocket server: the log's own messages, and standard ones.
 
-The SDK queues messages for each viewer and drops the oldest of one that does not read.
+The standard ROS 2 messages are made of ticks only while a viewer has subscribed to one of them. The SDK queues
+messages for each viewer and drops the oldest of one that does not read; a viewer that asks for a channel which does not
+exist is answered with an error and keeps its other channels.
 """
 
-from collections.abc import Sequence
-from time import time_ns
+from collections.abc import Mapping, Sequence
+from time import monotonic_ns, time_ns
+from typing import Any
 
 import foxglove
 from foxglove import Channel, Schema
 
+from control.geometry import FlipperGeometry
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.log.rows import EVENT, STRIDE
 from firmware_host.log_reading.live_rows import LiveRow, LiveRows
+from firmware_host.open_data.ros_definitions import full_definition, schema_name
+from firmware_host.open_data.ros_messages import TOPICS
+from firmware_host.open_data.standard_messages import StandardMessages
 
 
 class ViewerServer:
-    """Owns the WebSocket server and a channel for each kind of row. Raises OSError if the port is in use."""
+    """Owns the WebSocket server and a channel for each kind of message. Raises OSError if the port is in use."""
 
     def __init__(self, host: str, port: int) -> None:
         try:
@@ -22,18 +32,46 @@ class ViewerServer:
             raise OSError(str(problem)) from problem
         self.port = self._server.port
         self._channels: dict[str, Channel] = {}
+        for topic, message in TOPICS.items():
+            self._add_channel(topic, schema_name(message), full_definition(message))
+        self._standard = StandardMessages(FlipperGeometry())
+
+    def _add_channel(self, topic: str, name: str, definition: str) -> None:
+        schema = Schema(name=name, encoding="ros2msg", data=definition.encode())
+        self._channels[topic] = Channel(topic, schema=schema, message_encoding="cdr")
 
     def begin(self, source: LiveRows) -> None:
         for kind in source.kinds:
             if kind.topic not in self._channels:
-                schema = Schema(name=kind.schema_name, encoding="ros2msg", data=kind.definition.encode())
-                self._channels[kind.topic] = Channel(kind.topic, schema=schema, message_encoding="cdr")
+                self._add_channel(kind.topic, kind.schema_name, kind.definition)
+        self._standard = StandardMessages(geometry_of(source.configuration_text))
         self._server.clear_session()
 
     def take(self, rows: Sequence[LiveRow], lost: int) -> None:
-        now_ns = time_ns()
+        offset_ns = time_ns() - monotonic_ns()  # the daemon's clock is the one of this computer
+        wanted = any(self._channels[topic].has_sinks() for topic in TOPICS)
         for row in rows:
-            self._channels[row.kind.topic].log(row.content, log_time=now_ns)
+            stamp_ns = offset_ns + round(1e9 * row.stamp_s)
+            self._channels[row.kind.topic].log(row.content, log_time=stamp_ns)
+            if row.kind.topic == STRIDE.topic:
+                self._standard.add_stride(row.values)
+            elif row.kind.topic == EVENT.topic:
+                self._standard.add_event(row.values)
+            elif wanted:
+                self._send_standard(row.values, stamp_ns)
+
+    def _send_standard(self, tick: Mapping[str, Any], stamp_ns: int) -> None:
+        if self._standard.is_due(tick["tick"]):
+            for topic, content in self._standard.of_tick(stamp_ns, tick).items():
+                self._channels[topic].log(content, log_time=stamp_ns)
 
     def close(self) -> None:
         self._server.stop()
+
+
+def geometry_of(configuration_text: str) -> FlipperGeometry:
+    """Returns the default where the configuration is of another version."""
+    try:
+        return parse_configuration(configuration_text).geometry
+    except ConfigurationError:
+        return FlipperGeometry()

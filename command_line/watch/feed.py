@@ -1,6 +1,6 @@
 """Asks the daemon for its status again and again, in a thread of its own: a daemon that hangs must not stop the keys.
 
-It survives a restart of the daemon: it connects again, as often as it is needed.
+It survives a restart of the daemon: both of its connections, for status and rows, are made again.
 """
 
 import threading
@@ -40,6 +40,7 @@ class Feed:
         if self._thread.is_alive():
             self._thread.join(ANSWER_S)
         self._close()
+        self.rows.close()
 
     def _run(self) -> None:
         due_s = time.monotonic()
@@ -50,7 +51,7 @@ class Feed:
 
     def poll(self, now_s: float) -> bool:
         """Take the newest row, or ask for the status; returns whether the daemon is there."""
-        tick = self.rows.newest()
+        tick = self.rows.newest(now_s)
         if tick is not None and now_s < self._asked_s + STATUS_S:
             report = updated(self.history.status, tick)
             if report["mode"] == self.history.status["mode"]:  # else the reason is wanted at once
@@ -81,8 +82,6 @@ class Feed:
             self._pid = self._client.daemon_pid
             with self.lock:
                 self.history.forget()
-        self.rows.close()
-        self.rows.open()
         return self._client
 
     def _new_strides(self, client: StatusClient, report: dict[str, Any]) -> list[dict[str, Any]]:
@@ -91,7 +90,6 @@ class Feed:
         return client.call("strides", since=since) if report["strides_closed"] > since else []
 
     def _close(self) -> None:
-        self.rows.close()
         if self._client is not None:
             with suppress(OSError):
                 self._client.close()

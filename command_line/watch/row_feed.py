@@ -4,7 +4,6 @@ A status costs the loop a tenth of a millisecond and more, so with rows the feed
 (the log is off, or there are too many viewers) the status has everything too.
 """
 
-import threading
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -14,9 +13,10 @@ from control.modes import Mode
 from control.records import FLIPPERS, Phase
 from firmware_host.log.row_stream import stream_path
 from firmware_host.log.rows import ROW_KINDS, TICK_KIND
-from firmware_host.log_reading.live_rows import LiveRow, LiveRows
+from firmware_host.log_reading.live_rows import LiveRow
+from firmware_host.log_reading.row_subscription import RowSubscription
 from firmware_host.operator.reports import known
-from firmware_host.operator.status_client import NoDaemonError, NotPermittedError
+from firmware_host.operator.status_client import NotPermittedError
 
 MOST_PACKETS = 1000  # in one call: the daemon may send faster than this program reads
 TICK = ROW_KINDS[TICK_KIND].topic
@@ -34,39 +34,25 @@ class RowFeed:
     """Owns the subscription; `live` says whether rows come."""
 
     def __init__(self, status_socket: Path) -> None:
-        self._path = stream_path(status_socket)
-        self._rows: LiveRows | None = None
+        self._rows = RowSubscription(stream_path(status_socket))
 
     @property
     def live(self) -> bool:
-        return self._rows is not None
+        return self._rows.live
 
-    def open(self) -> None:
-        """Subscribe in a thread of its own: with too many viewers the answer takes seconds."""
-        threading.Thread(target=self._open, name="rows", daemon=True).start()
-
-    def _open(self) -> None:
-        with suppress(NoDaemonError, NotPermittedError):
-            self._rows = LiveRows(self._path)
-
-    def newest(self) -> dict[str, Any] | None:
+    def newest(self, now_s: float) -> dict[str, Any] | None:
         """Return the newest tick since the last call, and drop those before."""
-        source = self._rows
         newest: LiveRow | None = None
-        try:
-            for _ in range(MOST_PACKETS if source else 0):
-                rows = source.read(0.0) if source else []
+        with suppress(NotPermittedError):  # the status says so too
+            for _ in range(MOST_PACKETS):
+                rows = self._rows.read(0.0, now_s)
+                newest = next((row for row in reversed(rows) if row.kind.topic == TICK), newest)
                 if not rows:
                     break
-                newest = next((row for row in reversed(rows) if row.kind.topic == TICK), newest)
-        except NoDaemonError:
-            self.close()
         return newest.values if newest else None
 
     def close(self) -> None:
-        if self._rows is not None:
-            self._rows.close()
-            self._rows = None
+        self._rows.close()
 
 
 def updated(status: Mapping[str, Any], tick: Mapping[str, Any]) -> dict[str, Any]:

@@ -24,36 +24,49 @@ class LiveRow(NamedTuple):
     def values(self) -> dict[str, Any]:
         return self.kind.decode(self.content)
 
+    @property
+    def stamp_s(self) -> float:
+        return self.kind.stamp_s(self.content)
+
 
 class LiveRows:
     """Owns the connection to the rows' socket. Raises NoDaemonError or NotPermittedError."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, opening_s: float = OPENING_S) -> None:
+        """Waits `opening_s` for the daemon's description of its rows; with 0 s, `read` takes it, and then `is_open`."""
         self.lost = 0  # rows, because this program did not read in time
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        try:
-            self._socket.connect(str(path))
-        except PermissionError as problem:
-            raise NotPermittedError(f"no permission to use {path}") from problem
-        except OSError as problem:
-            raise NoDaemonError(f"no daemon serves rows on {path}: it is not running, or its log is off") from problem
         self.kinds: list[RowKind] = []
         self.metadata: dict[str, Any] = {}
         self.configuration_text = ""
-        self._read_opening(path)
+        self._path = path
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.setblocking(False)  # with too many subscribers, connecting would wait for one to leave
+        try:
+            self._connect()
+            if opening_s > 0.0 and not (self.read(opening_s) or self.is_open):
+                raise self.too_many
+        except (NoDaemonError, NotPermittedError):
+            self.close()
+            raise
 
-    def _read_opening(self, path: Path) -> None:
-        if not select.select([self._socket], [], [], OPENING_S)[0]:
-            raise NoDaemonError(f"{path} accepts no more subscribers; end another viewer")
-        for number, content in split_records(self._socket.recv(BUFFER_BYTES))[0]:
-            if number == REFUSAL:
-                raise NotPermittedError(content.decode())
-            if number == OPENING:
-                opening = json.loads(content)
-                self.metadata, self.configuration_text = opening["metadata"], opening["configuration_text"]
-                self.kinds = [_kind(own, served) for own, served in zip(ROW_KINDS, opening["kinds"], strict=False)]
-        if not self.kinds:
-            raise NoDaemonError(f"what answers on {path} is no mudskipper daemon")
+    def _connect(self) -> None:
+        try:
+            self._socket.connect(str(self._path))
+        except PermissionError as problem:
+            raise NotPermittedError(f"no permission to use {self._path}") from problem
+        except BlockingIOError:
+            raise self.too_many from None
+        except OSError as problem:
+            missing = f"no daemon serves rows on {self._path}: it is not running, or its log is off"
+            raise NoDaemonError(missing) from problem
+
+    @property
+    def too_many(self) -> NoDaemonError:
+        return NoDaemonError(f"{self._path} accepts no more subscribers; end another viewer")
+
+    @property
+    def is_open(self) -> bool:
+        return bool(self.kinds)
 
     def fileno(self) -> int:
         return self._socket.fileno()
@@ -72,10 +85,20 @@ class LiveRows:
 
     def _rows(self, packet: bytes) -> Iterator[LiveRow]:
         for number, content in split_records(packet)[0]:
-            if number == LOST:
+            if number == REFUSAL:
+                raise NotPermittedError(content.decode())
+            if number == OPENING:
+                self._open(json.loads(content))
+            elif not self.is_open:
+                raise NoDaemonError(f"what answers on {self._path} is no mudskipper daemon")
+            elif number == LOST:
                 self.lost += int(json.loads(content)["rows"])
             elif number < len(self.kinds):
                 yield LiveRow(self.kinds[number], content)
+
+    def _open(self, opening: dict[str, Any]) -> None:
+        self.metadata, self.configuration_text = opening["metadata"], opening["configuration_text"]
+        self.kinds = [_kind(own, served) for own, served in zip(ROW_KINDS, opening["kinds"], strict=False)]
 
     def close(self) -> None:
         self._socket.close()

@@ -1,7 +1,7 @@
 """Writes a log once more, with standard ROS 2 messages next to its own rows.
 
 The standard messages would make every log larger by more than a fifth (docs/how-to/open_data.md has the number), so an
-export adds them, at 95 Hz, and the diagnostics once a second and at each event.
+export adds them.
 """
 
 import heapq
@@ -13,8 +13,6 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from control.geometry import FlipperGeometry
-from control.rate import RATE_HZ
-from control.records import FLIPPERS
 from firmware_host.log.log_file import ATTACHMENT, EXPORTED, METADATA
 from firmware_host.log.rows import EVENT, ROW_KINDS, STRIDE, TICK
 from firmware_host.log.schema import CDR_HEADER
@@ -22,11 +20,9 @@ from firmware_host.log.whole_files import whole_file
 from firmware_host.log_reading.log_reader import Log, Watch, unwatched
 from firmware_host.log_reading.tick_array import Ticks, tick_type
 from firmware_host.open_data.ros_definitions import full_definition, schema_name
-from firmware_host.open_data.ros_messages import TOPICS, diagnostics, tick_messages
+from firmware_host.open_data.ros_messages import TOPICS
+from firmware_host.open_data.standard_messages import StandardMessages
 
-MESSAGE_HZ = 95.0
-TICKS_A_MESSAGE = max(1, round(RATE_HZ / MESSAGE_HZ))
-DIAGNOSTICS_S = 1.0  # between two of them
 LATEST_NS = (1 << 31) * 1_000_000_000 - 1
 WATCHED_ROWS = 5000
 
@@ -90,35 +86,14 @@ def _encoded(ticks: Ticks) -> Iterator[bytes]:
 
 
 def _standard(log: Log, geometry: FlipperGeometry, offset_ns: int) -> Iterator[_Message]:
-    """Yields the messages of every fourth tick; ticks that were thinned at rest are all taken."""
-    last_tick, diagnosed_s = -TICKS_A_MESSAGE, -np.inf
-    news = _News(log)
+    standard = StandardMessages(geometry)
+    coming = sorted([*log.strides, *log.events], key=lambda row: float(row["stamp_s"]), reverse=True)
     for tick in log.ticks:
-        if tick["tick"] < last_tick + TICKS_A_MESSAGE:
+        if not standard.is_due(int(tick["tick"])):
             continue
-        last_tick, stamp_s = int(tick["tick"]), float(tick["stamp_s"])
-        stamp_ns = _wall_ns(stamp_s, offset_ns)
-        yield from (_Message(stamp_s, *message) for message in tick_messages(stamp_ns, tick, geometry).items())
-        if news.advance(stamp_s) or stamp_s >= diagnosed_s + DIAGNOSTICS_S:
-            diagnosed_s = stamp_s
-            yield _Message(stamp_s, "/diagnostics", diagnostics(stamp_ns, tick, news.strides, news.event))
-
-
-class _News:
-    """Owns the latest stride of each flipper and the latest event."""
-
-    def __init__(self, log: Log) -> None:
-        self.strides: dict[str, dict[str, object]] = {}
-        self.event = ""
-        self._coming = sorted([*log.strides, *log.events], key=lambda row: float(row["stamp_s"]), reverse=True)
-
-    def advance(self, stamp_s: float) -> bool:
-        """Returns whether there was something new until this time."""
-        before = len(self._coming)
-        while self._coming and self._coming[-1]["stamp_s"] <= stamp_s:
-            row = self._coming.pop()
-            if "flipper" in row:
-                self.strides[FLIPPERS[bool(row["flipper"])]] = row
-            else:
-                self.event = str(row["text"])
-        return len(self._coming) < before
+        stamp_s = float(tick["stamp_s"])
+        while coming and coming[-1]["stamp_s"] <= stamp_s:
+            row = coming.pop()
+            (standard.add_stride if "flipper" in row else standard.add_event)(row)
+        messages = standard.of_tick(_wall_ns(stamp_s, offset_ns), tick)
+        yield from (_Message(stamp_s, *message) for message in messages.items())

@@ -17,12 +17,13 @@ from firmware_host.log.rows import COEFFICIENTS, TICK
 from firmware_host.open_data.cdr import CdrMessage
 
 TRACK, BASE = "track", "base_link"
+DIAGNOSTICS = "/diagnostics"
 TOPICS = {  # topic -> message
     "/joint_states": "sensor_msgs/JointState",
     "/tf": "tf2_msgs/TFMessage",
     **{f"/{flipper}/pose": "geometry_msgs/PoseStamped" for flipper in FLIPPERS},
     **{f"/{flipper}/force": "geometry_msgs/WrenchStamped" for flipper in FLIPPERS},
-    "/diagnostics": "diagnostic_msgs/DiagnosticArray",
+    DIAGNOSTICS: "diagnostic_msgs/DiagnosticArray",
 }
 OK, WARN, ERROR = range(3)
 STRIDE_VALUES = ("index", *(f"{k}{part}" for k in COEFFICIENTS for part in ("", "_std_error")), "depth_m", "step_m")

@@ -2,6 +2,8 @@
 
 import json
 import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -11,8 +13,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from websockets.sync.client import ClientConnection, connect
 
 from command_line.live.viewer_server import ViewerServer
+from control.records import JOINTS
 from firmware_host.log.rows import ROW_KINDS, TICK
 from firmware_host.log_reading.live_rows import LiveRow, LiveRows
+from firmware_host.open_data.ros_definitions import schema_name
+from firmware_host.open_data.ros_messages import TOPICS
 from tests.command_line.command_lines import failure
 
 SUBPROTOCOL = "foxglove.sdk.v1"
@@ -26,27 +31,68 @@ def next_json(socket: ClientConnection, operation: str) -> dict[str, Any]:
             return dict(json.loads(message))
 
 
-def test_a_foreign_client_decodes_a_tick_by_the_definition_that_it_was_sent() -> None:
-    server = ViewerServer("127.0.0.1", 0)
-    server.begin(cast(LiveRows, SimpleNamespace(kinds=list(ROW_KINDS))))
+@pytest.fixture
+def server() -> Iterator[ViewerServer]:
+    made = ViewerServer("127.0.0.1", 0)
+    made.begin(cast(LiveRows, SimpleNamespace(kinds=list(ROW_KINDS), configuration_text="")))
+    yield made
+    made.close()
+
+
+@contextmanager
+def viewer_of(server: ViewerServer) -> Iterator[tuple[ClientConnection, dict[str, Any]]]:
+    """Yields a connection and the advertised channels by topic."""
     with connect(f"ws://127.0.0.1:{server.port}", subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
-        channels = {c["topic"]: c for c in next_json(socket, "advertise")["channels"]}
-        assert {"/tick", "/stride", "/event"} <= channels.keys()
-        channel = channels["/tick"]
-        socket.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channel["id"]}]}))
-        row = TICK.encode_named(stamp_s=1.5, tick=42, angle_rad=(0.1, 0.2, 0.3, 0.4))
-        payload = received(socket, server, LiveRow(TICK, row))
-    server.close()
+        yield socket, {channel["topic"]: channel for channel in next_json(socket, "advertise")["channels"]}
+
+
+def subscribe(socket: ClientConnection, channel_id: int) -> None:
+    socket.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channel_id}]}))
+
+
+def decoded(channel: dict[str, Any], payload: bytes) -> Any:
+    """Decodes a message by the definition that was advertised."""
     types = get_typestore(Stores.EMPTY)
     types.register(get_types_from_msg(channel["schema"], channel["schemaName"]))
-    tick = cast(Any, types.deserialize_cdr(payload, channel["schemaName"]))
+    return types.deserialize_cdr(payload, channel["schemaName"])
+
+
+def tick_row(number: int) -> LiveRow:
+    return LiveRow(TICK, TICK.encode_named(stamp_s=1.5, tick=number, angle_rad=(0.1, 0.2, 0.3, 0.4)))
+
+
+def test_a_foreign_client_decodes_a_tick_by_the_definition_that_it_was_sent(server: ViewerServer) -> None:
+    with viewer_of(server) as (socket, channels):
+        assert {"/tick", "/stride", "/event"} <= channels.keys()
+        subscribe(socket, channels["/tick"]["id"])
+        tick = decoded(channels["/tick"], received(socket, server, lambda number: tick_row(42)))
     assert (tick.stamp_s, tick.tick, tick.angle_rad.tolist()) == (1.5, 42, [0.1, 0.2, 0.3, 0.4])
 
 
-def received(socket: ClientConnection, server: ViewerServer, row: LiveRow) -> bytes:
+def test_the_stream_has_standard_messages_with_named_joints(server: ViewerServer) -> None:
+    with viewer_of(server) as (socket, channels):
+        assert channels.keys() >= TOPICS.keys()
+        assert {topic: channels[topic]["schemaName"] for topic in TOPICS} == {
+            t: schema_name(m) for t, m in TOPICS.items()
+        }
+        subscribe(socket, channels["/joint_states"]["id"])
+        state = decoded(channels["/joint_states"], received(socket, server, lambda number: tick_row(4 * number)))
+    assert dict(zip(state.name, state.position, strict=True)) == dict(zip(JOINTS, (0.1, 0.2, 0.3, 0.4), strict=True))
+    assert state.header.frame_id == "base_link"
+
+
+def test_a_viewer_that_asks_for_an_unknown_channel_reads_so_and_goes_on(server: ViewerServer) -> None:
+    with viewer_of(server) as (socket, channels):
+        subscribe(socket, 99999)
+        assert "99999" in next_json(socket, "status")["message"]
+        subscribe(socket, channels["/tick"]["id"])
+        assert received(socket, server, lambda number: tick_row(42))
+
+
+def received(socket: ClientConnection, server: ViewerServer, row_of: Callable[[int], LiveRow]) -> bytes:
     """Returns the content of the first data message; the subscription may take effect after a few rows."""
-    for _ in range(1000):
-        server.take([row], lost=0)
+    for number in range(1000):
+        server.take([row_of(number)], lost=0)
         try:
             message = socket.recv(timeout=0.1)
         except TimeoutError:

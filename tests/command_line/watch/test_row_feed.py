@@ -69,6 +69,7 @@ def test_with_rows_the_daemon_is_asked_less_often_and_the_screen_stays_current(
         assert feed.poll(0.0)  # connects to both
         while not feed.rows.live:
             stream.publish([])
+            feed.rows.newest(0.0)
             time.sleep(0.01)
         while len(feed.history.strides) < feed.history.status["strides_closed"]:
             feed.poll(0.0)

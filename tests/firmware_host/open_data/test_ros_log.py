@@ -18,8 +18,9 @@ from control.modes import Mode
 from control.records import FLIPPERS, JOINTS
 from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.open_data.ros_definitions import full_definition, schema_name
-from firmware_host.open_data.ros_log import MESSAGE_HZ, write_ros_log
+from firmware_host.open_data.ros_log import write_ros_log
 from firmware_host.open_data.ros_messages import TOPICS, flipper_pose
+from firmware_host.open_data.standard_messages import MESSAGE_HZ
 from tests.folders import ROOT
 
 GEOMETRY = FlipperGeometry()
