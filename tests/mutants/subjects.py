@@ -64,7 +64,16 @@ SUBJECTS = (
     ),
     Subject(
         "control.monitors.joint_monitor",
-        ("control/monitors/test_joint_bounds.py", "control/monitors/test_joint_monitor.py"),
+        (
+            "control/monitors/test_joint_edges.py",
+            "control/monitors/test_joint_bounds.py",
+            "control/monitors/test_joint_monitor.py",
+        ),
+        equivalent={
+            "always in `if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:`": MORE_OFTEN,
+            "Lt to LtE in `state.bus_voltage_v < self._bounds.voltage_low_v`": MORE_OFTEN,
+            "LtE to Lt in `facts.dt_s <= MOST_SEEN_S`": "the same value replaces itself",
+        },
     ),
     Subject(
         "control.monitors.encoder_monitor",
