@@ -23,11 +23,6 @@ def coloured(text: str, colour: str) -> str:
     return f"{colour}{text}{PLAIN}"
 
 
-def size_text(size: float) -> str:
-    """Formats a number of bytes."""
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
-
-
 def bar(done: int, total: int) -> str:
     filled = BAR_WIDTH * min(done, total) // max(total, 1)
     return f"[{'#' * filled}{'.' * (BAR_WIDTH - filled)}]"

@@ -31,8 +31,10 @@ from firmware_host.computer.host_checks import (
     examine_folder,
     examine_host,
     examine_limits,
+    examine_shell,
     examine_storage,
     examine_this_python,
+    log_space,
     this_account,
 )
 from firmware_host.computer.host_facts import (
@@ -77,9 +79,12 @@ def doctor(options: argparse.Namespace) -> int:
 
 def examine_all(configuration: Configuration, socket: Path, links: dict[str, CanLink]) -> Iterator[Finding]:
     pid, daemon = _ask_daemon(socket, configuration.faults.longest_watchdog_s)
-    limits = process_limits(ROOT, pid) if pid else unit_limits(ROOT) or process_limits(ROOT, None)
+    service = process_limits(ROOT, pid) if pid else unit_limits(ROOT)
+    shell = process_limits(ROOT, None)
     priority = thread_priority(ROOT, pid) if pid else None
-    yield from examine_host(ROOT, configuration.loop, limits, priority)
+    yield from examine_host(ROOT, configuration.loop, service or shell, priority)
+    if service:
+        yield from examine_shell(configuration.loop, shell)
     yield from examine_buses(configuration, links)
     yield from examine_storage(ROOT, configuration.log, _log_writer(), pid is not None)
     yield _examine_clock()
@@ -228,7 +233,7 @@ def _pose_items(configuration: Configuration) -> list[dict[str, Any]]:
 def _host_items(configuration: Configuration) -> list[dict[str, Any]]:
     findings = []
     if configuration.log.enabled:
-        findings.append(examine_folder(Path(configuration.log.directory), this_account()))
+        findings += [log_space(configuration.log), examine_folder(Path(configuration.log.directory), this_account())]
     findings += examine_limits(configuration.loop, process_limits(Path("/"), None))
     opened = [f"bus.{name}" for name in configuration.bus]  # _drive_items reported whether they open
     findings += [finding for finding in examine_buses(configuration, read_links()) if finding.id not in opened]

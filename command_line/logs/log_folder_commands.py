@@ -12,7 +12,7 @@ from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.catalogue_commands import catalogued, chosen_folder, configured_folder
 from command_line.logs.refusals import explain_errors
-from command_line.screen import QUIET_S, Progress, complain, size_text
+from command_line.screen import QUIET_S, Progress, complain
 from experiments.reports.text_tables import number, table
 from firmware_host.catalogue.entry import LogEntry
 from firmware_host.log.log_folder import (
@@ -24,6 +24,7 @@ from firmware_host.log.log_folder import (
     free_space,
     log_files,
     preserve,
+    size_text,
     stored_files,
     unfinished_files,
     why_not_moved,

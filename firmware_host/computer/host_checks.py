@@ -27,10 +27,13 @@ from firmware_host.computer.host_facts import (
 )
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
-from firmware_host.log.log_folder import FreeSpace, free_space, unfinished_files
+from firmware_host.log.log_folder import FreeSpace, free_space, size_text, unfinished_files
 from firmware_host.operator.counted_nouns import counted
 
 ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less memory
+WALK_BYTES_PER_MIN = 6e6  # of a log, measured: 5.3 to 5.6 MB in a minute with torque
+LEAST_MIN, ENOUGH_MIN = 2.0, 60.0  # of walking that the disk should have room for
+SHELL_LIMITS = "for a shell: /etc/security/limits.d"
 OLDEST_PYTHON = (3, 11)
 EARLIEST_YEAR = 2024  # a clock before that was never set
 VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # in memory, or likely so: lost at power-off
@@ -83,11 +86,24 @@ def examine_limits(loop: LoopParameters, limits: Limits | None) -> Iterator[Find
         enough = limits.rtprio >= loop.priority
         permitted = "permitted" if enough else "not permitted: the loop may be late"
         text = f"real-time priority {loop.priority} is {permitted} (limit {_limit_text(limits.rtprio)} {limits.whose})"
-        yield ok_if(enough, "realtime", text, "raise the rtprio limit (LimitRTPRIO= in the unit)", Level.FAIL)
+        yield ok_if(
+            enough,
+            "realtime",
+            text,
+            f"raise the rtprio limit (LimitRTPRIO= in the unit; {SHELL_LIMITS})",
+            Level.FAIL,
+        )
     if loop.lock_memory:
         text = f"{_limit_text(limits.memlock_bytes)} bytes may be locked in memory ({limits.whose})"
-        fix = "raise the memlock limit (LimitMEMLOCK=infinity in the unit)"
+        fix = f"raise the memlock limit (LimitMEMLOCK=infinity in the unit; {SHELL_LIMITS})"
         yield ok_if(limits.memlock_bytes >= ENOUGH_MEMLOCK_BYTES, "memlock", text, fix)
+
+
+def examine_shell(loop: LoopParameters, limits: Limits | None) -> Iterator[Finding]:
+    """Checks the limits of a daemon that is started by hand, where a service is installed: none of them fails."""
+    for finding in examine_limits(loop, limits):
+        text = f"{finding.text}; it counts only for a daemon that you start by hand"
+        yield ok_if(finding.level is Level.OK, f"shell.{finding.id}", text, finding.fix)
 
 
 def _limit_text(value: float) -> str:
@@ -142,10 +158,7 @@ def examine_storage(root: Path, log: LogParameters, writer: Account, daemon_runs
     if mount is not None:
         yield examine_mount(mount)
     below_root = root / folder.absolute().relative_to("/")
-    try:
-        yield examine_space(free_space(below_root), log.min_free_fraction)
-    except OSError as problem:
-        yield fail("disk", f"{folder}: {problem.strerror}", "mount it")
+    yield log_space(log, root)
     yield examine_folder(below_root, writer)
     if not daemon_runs:
         yield examine_unfinished(below_root)
@@ -164,13 +177,28 @@ def examine_mount(mount: Mount) -> Finding:
 
 
 def examine_space(space: FreeSpace, least_fraction: float) -> Finding:
-    text = f"{space.free_bytes / 1e9:.1f} GB free, {100.0 * space.free_fraction:.0f} %"
-    if space.free_bytes == 0:
-        return fail("disk", "the disk is full", "free some of it")
+    """Judges by the time that a walk can be logged, and by the fraction below which old logs are deleted."""
+    minutes = space.free_bytes / WALK_BYTES_PER_MIN
+    text = f"{size_text(space.free_bytes)} free, {100.0 * space.free_fraction:.0f} %: {_time_text(minutes)} of walking"
+    if minutes < LEAST_MIN:
+        return fail("disk", text, "free some of it, or set log.directory to another disk")
     if space.free_fraction < least_fraction:
         fix = "free some of it, or lower log.min_free_fraction"
-        return warn("disk", f"{text}: less than log.min_free_fraction, so old logs are deleted", fix)
-    return ok("disk", text)
+        return warn("disk", f"{text}; less than log.min_free_fraction is free, so old logs are deleted", fix)
+    return ok_if(minutes >= ENOUGH_MIN, "disk", text, "free some of it, or set log.directory to another disk")
+
+
+def _time_text(minutes: float) -> str:
+    return f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.0f} h"
+
+
+def log_space(log: LogParameters, root: Path = Path("/")) -> Finding:
+    """Checks the free space for the logs."""
+    folder = Path(log.directory).absolute()
+    try:
+        return examine_space(free_space(root / folder.relative_to("/")), log.min_free_fraction)
+    except OSError as problem:
+        return fail("disk", f"{folder}: {problem.strerror}", "mount it")
 
 
 def examine_folder(folder: Path, writer: Account) -> Finding:

@@ -59,8 +59,9 @@ def process_limits(root: Path, pid: int | None) -> Limits | None:
 
 
 def unit_limits(root: Path) -> Limits | None:
-    """Returns the limits that the installed service gives its daemon."""
-    settings = dict(re.findall(r"^(Limit\w+)=(\S+)$", read_text(root / UNIT), re.MULTILINE))
+    """Returns the limits that the installed service, with its drop-ins, gives its daemon."""
+    files = [root / UNIT, *sorted((root / f"{UNIT}.d").glob("*.conf"))]
+    settings = dict(re.findall(r"^(Limit\w+)=(\S+)$", "\n".join(map(read_text, files)), re.MULTILINE))
     if not settings:
         return None
     return Limits(_limit(settings.get("LimitRTPRIO", "0")), _limit(settings.get("LimitMEMLOCK", "0")), "in the unit")

@@ -16,7 +16,7 @@ class LogParameters:
     )
     segment_bytes: Annotated[int, Bounds(100_000, 2_000_000_000), Meaning("largest size of one file")] = 64_000_000
     quota_bytes: Annotated[int, Bounds(0, 10**15), Meaning("above which the oldest logs are deleted; 0: no quota")] = (
-        8_000_000_000  # two days of torque
+        8_000_000_000  # a day of torque
     )
     min_free_fraction: Annotated[
         float, Bounds(0.0, 0.9), Meaning("of the disk; below it the oldest logs are deleted")

@@ -28,6 +28,11 @@ class FreeSpace(NamedTuple):
     free_bytes: int
 
 
+def size_text(size: float) -> str:
+    """Formats a number of bytes."""
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
+
+
 class DeletedLog(NamedTuple):
     name: str
     size: int  # bytes

@@ -132,6 +132,7 @@ def test_check_without_a_daemon_checks_what_it_can(
     items = {item["id"]: item for item in json.loads(capsys.readouterr().out)}
     assert not items["daemon"]["ok"] and items["configuration"]["ok"]
     assert "nocan0" in items["bus"]["text"] and items["bus"]["fix"]
+    assert "of walking" in items["disk"]["text"]
 
 
 def test_status_loads_no_large_library() -> None:

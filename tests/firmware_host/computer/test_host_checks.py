@@ -12,6 +12,9 @@ import pytest
 from firmware_host.computer import host_facts
 from firmware_host.computer.findings import Finding, Level
 from firmware_host.computer.host_checks import (
+    ENOUGH_MIN,
+    LEAST_MIN,
+    WALK_BYTES_PER_MIN,
     Account,
     examine_clock,
     examine_folder,
@@ -21,6 +24,7 @@ from firmware_host.computer.host_checks import (
     examine_priority,
     examine_processor,
     examine_python,
+    examine_shell,
     examine_space,
     examine_storage,
     may_write,
@@ -37,6 +41,7 @@ from firmware_host.computer.host_facts import (
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import ACTIVE, FreeSpace
+from firmware_host.log_reading.log_reader import read_log
 from tests.folders import ROOT
 
 GOOD_LIMITS = Limits(49, inf, "in the unit")
@@ -137,6 +142,8 @@ def test_limits_are_read_of_a_process_and_of_the_unit(computer: Computer, monkey
     assert host_facts.unit_limits(computer.root) is None
     computer.write(host_facts.UNIT, "[Service]\nLimitRTPRIO=49\nLimitMEMLOCK=infinity")
     assert host_facts.unit_limits(computer.root) == GOOD_LIMITS
+    computer.write(f"{host_facts.UNIT}.d/override.conf", "[Service]\nLimitRTPRIO=20")
+    assert host_facts.unit_limits(computer.root) == Limits(20, inf, "in the unit")
 
 
 def test_the_installed_unit_s_limits_suffice_for_the_example_configuration(tmp_path: Path) -> None:
@@ -152,6 +159,15 @@ def test_a_limit_below_the_loop_s_priority_fails_and_a_small_memlock_warns() -> 
     assert (realtime.level, memory.level) == (Level.FAIL, Level.WARN)
     assert "not permitted" in realtime.text
     assert not list(examine_limits(LoopParameters(priority=0, lock_memory=False), Limits(0, 0, "")))
+
+
+def test_where_a_service_is_installed_the_shell_s_limits_are_lines_apart_and_never_fail() -> None:
+    found = {finding.id: finding for finding in examine_shell(LoopParameters(), Limits(0, 8e6, "of this shell"))}
+    assert {identity: finding.level for identity, finding in found.items()} == {
+        "shell.realtime": Level.WARN,
+        "shell.memlock": Level.WARN,
+    }
+    assert all("start by hand" in finding.text for finding in found.values())
 
 
 def test_a_running_loop_that_did_not_get_its_priority_fails() -> None:
@@ -236,10 +252,27 @@ def test_logs_that_were_cut_off_are_told_where_no_daemon_is_writing_them(compute
 
 
 @pytest.mark.parametrize(
-    ("space", "level"), [(FREE, Level.OK), (FreeSpace(0.05, 10**9), Level.WARN), (FreeSpace(0.0, 0), Level.FAIL)]
+    ("space", "level", "text"),
+    [
+        (FREE, Level.OK, "10.0 GB free, 50 %: 28 h of walking"),
+        (FreeSpace(0.05, 10**9), Level.WARN, "log.min_free_fraction"),
+        (FreeSpace(0.0, 0), Level.FAIL, "0 min"),
+        (FreeSpace(0.99, 3_000_000), Level.FAIL, "3.0 MB free, 99 %: 0 min of walking"),  # a small disk in memory
+        (FreeSpace(0.99, round(WALK_BYTES_PER_MIN * LEAST_MIN) - 1), Level.FAIL, ""),
+        (FreeSpace(0.99, round(WALK_BYTES_PER_MIN * LEAST_MIN)), Level.WARN, "2 min"),
+        (FreeSpace(0.99, round(WALK_BYTES_PER_MIN * ENOUGH_MIN) - 1), Level.WARN, "60 min"),
+        (FreeSpace(0.99, round(WALK_BYTES_PER_MIN * ENOUGH_MIN)), Level.OK, "60 min"),
+    ],
 )
-def test_a_disk_that_fills_up_is_warned_of_and_a_full_one_fails(space: FreeSpace, level: Level) -> None:
-    assert examine_space(space, 0.1).level is level
+def test_a_disk_is_judged_by_the_walking_time_that_it_has_room_for(space: FreeSpace, level: Level, text: str) -> None:
+    found = examine_space(space, 0.1)
+    assert found.level is level and text in found.text
+
+
+def test_the_length_of_a_log_that_a_disk_has_room_for_is_that_of_a_walk() -> None:
+    walk = read_log(ROOT / "tests/fixtures/walk_0_1.mcap")
+    minutes = (walk.ticks["stamp_s"][-1] - walk.ticks["stamp_s"][0]) / 60.0
+    assert 0.8 < (ROOT / "tests/fixtures/walk_0_1.mcap").stat().st_size / minutes / WALK_BYTES_PER_MIN <= 1.0
 
 
 @pytest.mark.parametrize("mode", [0o700, 0o070, 0o007, 0o770, 0o000, 0o755])
