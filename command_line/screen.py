@@ -5,13 +5,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
 
 RED, GREEN, YELLOW, BOLD, PLAIN = "\033[31m", "\033[32m", "\033[33m", "\033[1m", "\033[0m"
 QUIET_S = 2.0  # before progress is shown
+PACE_S = 1.0  # of work before its end can be foreseen
 REFRESH_S = 0.1
 BAR_WIDTH = 20  # characters
 complaints: list[str] = []  # what this command has complained of: with --json it is the reason why it failed
@@ -28,24 +29,45 @@ def bar(done: int, total: int) -> str:
     return f"[{'#' * filled}{'.' * (BAR_WIDTH - filled)}]"
 
 
+class Count(NamedTuple):
+    """How much was done at a time of the monotonic clock."""
+
+    now_s: float
+    done: int
+
+
+def time_left_text(begun: Count, now: Count, total: int) -> str:
+    """Formats the time that the rest will take at the pace so far; empty before there is a pace."""
+    done, elapsed_s = now.done - begun.done, now.now_s - begun.now_s
+    if done <= 0 or elapsed_s < PACE_S or now.done >= total:
+        return ""
+    left_s = round(elapsed_s * (total - now.done) / done)
+    return f", {left_s} s left" if left_s < 120 else f", {left_s // 60} min left"
+
+
 class Progress:
-    """Shows progress in one line on the terminal of standard error, after `quiet_s`; shows nothing elsewhere."""
+    """Shows progress and the time left in one line on standard error's terminal, after `quiet_s`; nothing elsewhere."""
 
     def __init__(self, what: str, quiet_s: float = 0.0) -> None:
         self._what = what
+        self._begun = Count(time.monotonic(), 0)
         self._shown = sys.stderr.isatty()
         self._interval_s = REFRESH_S if quiet_s else 0.0  # rows come faster than a terminal draws
         self._due_s = time.monotonic() + quiet_s
 
     def follow(self, what: str, done: int, total: int) -> None:
         """Shows a part of the work that has its own count."""
-        self._what = what
+        if what != self._what:
+            self._what, self._begun = what, Count(time.monotonic(), done)
         self.show(done, total)
 
     def show(self, done: int, total: int) -> None:
-        if self._shown and time.monotonic() >= self._due_s:
-            self._due_s = time.monotonic() + self._interval_s
-            print(f"\r\033[K{bar(done, total)} {done} of {total} {self._what}", end="", file=sys.stderr, flush=True)
+        now_s = time.monotonic()
+        if self._shown and now_s >= self._due_s:
+            self._due_s = now_s + self._interval_s
+            left = time_left_text(self._begun, Count(now_s, done), total)
+            text = f"{bar(done, total)} {done} of {total} {self._what}{left}"
+            print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         if self._shown:

@@ -8,6 +8,7 @@ from typing import Any
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.refusals import explain_errors
+from command_line.logs.shown_values import value_shown
 from command_line.screen import complain, watched
 from experiments.reports.text_tables import table
 from firmware_host.catalogue.entry import LogEntry
@@ -84,18 +85,10 @@ def query(options: Options) -> int:
     if options.json:
         print_json("log-query", {"rows": [dict(zip(names, map(_for_json, row), strict=True)) for row in rows]})
     else:
-        print(table([names, *([_shown(value) for value in row] for row in rows)]))
+        print(table([names, *([value_shown(value) for value in row] for row in rows)]))
     return exit_codes.OK
 
 
 def _for_json(value: Any) -> Any:
     """Returns numbers, texts, lists and structures as they are, and times and other values of SQL as text."""
     return value if isinstance(value, str | int | float | list | dict | None) else str(value)
-
-
-def _shown(value: Any) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, list):
-        return ", ".join(map(_shown, value))
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+from command_line.logs.shown_values import value_shown
 from command_line.screen import complain
+from experiments.reports.text_tables import table
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab.summary import lab_summary
 from firmware_host.log_reading.lab_csv import LabLog
@@ -17,17 +18,6 @@ def complain_of(path: Path, findings: Sequence[Finding]) -> None:
 
 def show_lab_log(path: Path, lab: LabLog) -> None:
     """Prints the summary as lines, and the findings as warnings."""
-    for name, value in lab_summary(path, lab).items():
-        if name != "findings":
-            print(f"{name:16} {_shown(value)}")
+    summary = lab_summary(path, lab)
+    print(table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"]))
     complain_of(path, lab.findings)
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {number:g}" for name, number in value.items()) or "-"
-    if isinstance(value, list):
-        return ", ".join(value) or "-"
-    if value is None:
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

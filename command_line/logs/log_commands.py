@@ -2,15 +2,18 @@
 
 import argparse
 import os
+from math import nan
 from pathlib import Path
 
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import complain_of, show_lab_log
 from command_line.logs.refusals import UsageError, chosen_vertical, explain_errors
+from command_line.logs.shown_values import value_shown
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
+from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
@@ -18,7 +21,7 @@ from firmware_host.log_reading.lab.summary import finding_reports, lab_summary
 from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
 from firmware_host.log_reading.log_reader import LogError, log_summary, read_logs
 from firmware_host.log_reading.replay import Replay, replay_files
-from firmware_host.operator.reports import map_report, stride_report
+from firmware_host.operator.reports import known, map_report, stride_report
 
 Options = argparse.Namespace
 
@@ -37,7 +40,11 @@ def replay(options: Options) -> int:
 
 
 def _show_replay(path: Path, replayed: Replay, as_json: bool) -> None:
-    strides = [stride_report(stride) for stride in replayed.strides]
+    chosen_m = replayed.chosen_depths_m or [nan] * len(replayed.strides)
+    strides = [
+        stride_report(stride) | {"chosen_depth_m": known(depth_m)}
+        for stride, depth_m in zip(replayed.strides, chosen_m, strict=True)
+    ]
     if as_json:
         report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
         findings = finding_reports(path, replayed.findings)
@@ -155,8 +162,7 @@ def info(options: Options) -> int:
     if options.json:
         print_json("log-info", summary)
     else:
-        for name, value in summary.items():
-            print(f"{name:16} {value}")
+        print(table([(name, value_shown(value)) for name, value in summary.items()]))
     return exit_codes.OK
 
 

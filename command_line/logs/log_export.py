@@ -68,7 +68,8 @@ def _write_parquet(log: Log, options: Options) -> list[Path]:
         raise UsageError(f"{folder}: --parquet writes three files; name a folder")
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        return write_parquet(log, folder, _stem(options))
+        with watched() as watch:
+            return write_parquet(log, folder, _stem(options), watch)
     except OSError as problem:  # pyarrow's own text names no file
         reason = os.strerror(problem.errno) if problem.errno else str(problem)
         raise LogError(f"{folder}: nothing was written: {reason}") from None

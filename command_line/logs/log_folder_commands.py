@@ -15,6 +15,7 @@ from command_line.logs.refusals import explain_errors
 from command_line.screen import QUIET_S, Progress, complain
 from experiments.reports.text_tables import number, table
 from firmware_host.catalogue.entry import LogEntry
+from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import (
     BROKEN,
     DONE,
@@ -33,9 +34,11 @@ from firmware_host.log_reading.log_reader import DAMAGE, LogError
 from firmware_host.log_reading.recovery import Recovered, recover_log
 
 Options = argparse.Namespace
+BEING_WRITTEN = "being written"
+SOUND = ("whole", "export", BEING_WRITTEN)
 
 LEGEND = (
-    "unfinished: still being written, or cut off; broken: damaged, or left by a recovery that did not end.\n"
+    "unfinished: cut off; broken: damaged, or left by a recovery that did not end.\n"
     "'mudskipper log recover' repairs what it can; remove files that it cannot repair, and those that are no logs"
 )
 
@@ -89,6 +92,8 @@ def _summarised(path: Path) -> dict[str, Any]:
 def _state_of(path: Path, has_summary: bool) -> str:
     if has_summary:
         return "whole"
+    if is_being_written(path):
+        return BEING_WRITTEN
     if path.name.endswith(BROKEN) or path.parent.name in (DONE, PRESERVED):
         return "broken"
     return "unfinished" if path.name.endswith((ENDING, PART)) else "no log"
@@ -113,8 +118,8 @@ def _listing(report: dict[str, Any]) -> str:
     rows += [_listed(log) for log in report["logs"]]
     sizes = [size_text(report[name]) for name in ("logs_bytes", "free_bytes", "disk_bytes")]
     total = f"{sizes[0]} of logs, {sizes[1]} free of {sizes[2]}"
-    unfinished = any(log["state"] not in ("whole", "export") for log in report["logs"])
-    return "\n".join([table(rows), *[LEGEND] * unfinished, total])
+    unsound = any(log["state"] not in SOUND for log in report["logs"])
+    return "\n".join([table(rows), *[LEGEND] * unsound, total])
 
 
 def _listed(log: dict[str, Any]) -> list[str]:

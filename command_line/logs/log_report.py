@@ -11,6 +11,7 @@ from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import complain_of
 from command_line.logs.refusals import chosen_vertical, explain_errors
+from command_line.logs.shown_values import value_shown
 from command_line.screen import coefficient, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides
@@ -90,14 +91,8 @@ def _findings_section(replayed: Replay) -> Section:
 
 def _summary_section(log: Log) -> Section:
     unfinished = "" if log.complete else "The log was not finished: everything up to where it ends was read."
-    rows = [["", ""], *([name, _shown(value)] for name, value in log_summary(log).items())]
+    rows = [["", ""], *([name, value_shown(value)] for name, value in log_summary(log).items())]
     return Section("Contents of the log", unfinished, rows=rows)
-
-
-def _shown(value: str | int | float | bool) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
 def _walk_sections(files: Sequence[Path], vertical: CaptureAxis, watch: Watch) -> list[Section]:

@@ -238,28 +238,38 @@ def _why_not_joined(numbers: list[int]) -> str:
     return f"segments {numbers[0]} to {numbers[-1]} of its run are not all here, each once: {'; '.join(wrong)}"
 
 
-def log_summary(log: Log) -> dict[str, str | int | float | bool]:
-    """Returns what `mudskipper log info` prints."""
+def log_summary(log: Log) -> dict[str, Any]:
+    """Returns what `mudskipper log info` prints. At rest the log has fewer rows than ticks ran."""
     stamps_s = log.ticks["stamp_s"]
     duration_s = float(stamps_s[-1] - stamps_s[0]) if len(stamps_s) else 0.0
+    ticks = _ticks_run(log.ticks)
     return {
         "robot": log.metadata.get("robot", ""),
         "run": log.metadata.get("run_id", ""),
-        "segment": log.metadata.get("segment", ""),
+        "segment": segment_of(log) if log.metadata.get("segment") else None,
         "started": _start_time(log),
-        "duration_s": duration_s,
-        "ticks": len(stamps_s),
+        "duration_s": round(duration_s, 3),
+        "rate_hz": round((ticks - 1) / duration_s, 2) if duration_s > 0.0 else None,
+        "rows": len(stamps_s),
+        "ticks": ticks,
         "missed_ticks": int(log.ticks["missed_ticks"][-1]) if len(stamps_s) else 0,
-        "rate_hz": (len(stamps_s) - 1) / duration_s if duration_s > 0.0 else 0.0,
         "strides": len(log.strides),
         "events": len(log.events),
         "complete": log.complete,
         "recovered": log.metadata.get("recovered") == "true",
         "version": log.metadata.get("version", ""),
         "commit": log.metadata.get("commit", ""),
-        "unknown_fields": ", ".join(log.unknown_fields),
-        "missing_fields": ", ".join(log.missing_fields),
+        "unknown_fields": list(log.unknown_fields),
+        "missing_fields": list(log.missing_fields),
     }
+
+
+def _ticks_run(ticks: Ticks) -> int:
+    """Returns the number of ticks from the first row to the last one, without those that were missed."""
+    if not len(ticks):
+        return 0
+    first, last = ticks[0], ticks[-1]
+    return int(last["tick"]) - int(first["tick"]) + 1 - (int(last["missed_ticks"]) - int(first["missed_ticks"]))
 
 
 def segment_of(log: Log) -> int:

@@ -62,6 +62,7 @@ class Replay:
     begin_s: float = 0.0  # on the log's own clock, which is also that of the strides
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
     fits: tuple[StrideFits, ...] = ()  # behind the estimates, one for each stride
+    chosen_depths_m: tuple[float, ...] = ()  # after each stride, by the robot itself; NaN where the log does not say
 
 
 def replay_files(
@@ -108,7 +109,13 @@ def replay_log(
         segment_of(log),
         begin_s(log),
         fits=tuple(fits for _, fits in found),
+        chosen_depths_m=tuple(_chosen_depths(log, [stride for stride, _ in found])),
     )
+
+
+def _chosen_depths(log: Log, strides: Sequence[StrideEstimate]) -> Iterator[float]:
+    chosen_m = {(FLIPPERS[bool(row["flipper"])], row["t_start_s"]): row["chosen_depth_m"] for row in log.strides}
+    return (chosen_m.get((stride.flipper, stride.t_start_s), nan) for stride in strides)
 
 
 def configuration_of(path: Path, text: str) -> Configuration:

@@ -16,7 +16,7 @@ from firmware_host.log.log_file import ATTACHMENT
 from firmware_host.log.rows import EVENT, STRIDE, TICK
 from firmware_host.log.schema import RowKind
 from firmware_host.log.whole_files import whole_files
-from firmware_host.log_reading.log_reader import Log
+from firmware_host.log_reading.log_reader import Log, Watch, unwatched
 from firmware_host.open_data.flat_columns import Column, flat_columns, stack_rows
 
 
@@ -26,7 +26,7 @@ class _Part(NamedTuple):
     kind: RowKind
 
 
-def write_parquet(log: Log, folder: Path, stem: str) -> list[Path]:
+def write_parquet(log: Log, folder: Path, stem: str, watch: Watch = unwatched) -> list[Path]:
     """Writes STEM-ticks.parquet, STEM-strides.parquet and STEM-events.parquet: all, or none. Raises OSError."""
     parts = [
         _Part("ticks", log.ticks, TICK),
@@ -36,7 +36,8 @@ def write_parquet(log: Log, folder: Path, stem: str) -> list[Path]:
     paths = [folder / f"{stem}-{part.name}.parquet" for part in parts]
     metadata = log.metadata | {ATTACHMENT: log.configuration_text, "complete": str(log.complete).lower()}
     with whole_files(paths) as hidden:
-        for part, path in zip(parts, hidden, strict=True):
+        for number, (part, path) in enumerate(zip(parts, hidden, strict=True)):
+            watch("tables written", number, len(parts))
             pq.write_table(arrow_table(flat_columns(part.rows, part.kind), metadata), path, compression="zstd")
     return paths
 

@@ -66,13 +66,13 @@ def test_nonsense_is_refused_by_every_command(command: tuple[str, ...], hung: Pa
 def test_log_info_says_what_a_csv_is(hung: Path) -> None:
     info = json.loads(run("log", "info", str(hung), "--json").stdout)
     log = read_lab_csv(hung)
-    assert info["schema"] == "log-info/1" and info["rows"] == len(log.stamp_s)
+    assert info["schema"] == "log-info/2" and info["rows"] == len(log.stamp_s)
     assert info["duration_s"] == pytest.approx(log.stamp_s[-1]) and info["rate_hz"] == pytest.approx(200.0)
     assert info["distinct_rate_hz"] == pytest.approx(200.0, rel=0.01)
     assert info["flippers"] == ["left", "right"] and info["strides"] == 3
     assert info["settings"]["lateral_angle_range"] == 0.5 and info["missing_settings"] == ["insertion_angle"]
     shown = run("log", "info", str(hung)).stdout
-    assert "missing_settings insertion_angle" in shown and "lateral_angle_range 0.5" in shown
+    assert "missing_settings   insertion_angle" in shown and "lateral_angle_range 0.5" in shown
 
 
 @pytest.fixture

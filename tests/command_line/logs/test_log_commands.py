@@ -53,7 +53,19 @@ def test_log_info_counts(walk: Path) -> None:
     reported = json.loads(run("log", "info", str(walk), "--json").stdout)
     assert reported["robot"] == "test" and reported["complete"] is True
     assert reported["missed_ticks"] == 0 and reported["strides"] == 4
-    assert "ticks" in run("log", "info", str(walk)).stdout
+    assert reported["segment"] is None or isinstance(reported["segment"], int)
+    assert reported["unknown_fields"] == [] and 0 < reported["rows"] <= reported["ticks"]
+    lines = dict(line.split(maxsplit=1) for line in run("log", "info", str(walk)).stdout.splitlines())
+    assert lines["complete"] == "yes" and lines["unknown_fields"] == "-"
+    assert lines["rate_hz"].startswith("380")
+
+
+def test_replay_shows_the_depth_that_the_robot_chose(walk: Path) -> None:
+    chosen_m = [stride["chosen_depth_m"] for stride in read_log(walk).strides]
+    strides = json.loads(run("replay", str(walk), "--json").stdout)["strides"]
+    assert [stride["chosen_depth_m"] for stride in strides] == chosen_m
+    for line, depth_m in zip(run("replay", str(walk)).stdout.splitlines()[2:], chosen_m, strict=True):
+        assert f" {100.0 * depth_m:.2f} " in line
 
 
 def test_an_exported_log_replays_like_the_log(walk: Path, tmp_path: Path) -> None:

@@ -47,6 +47,20 @@ def test_the_list_shows_what_is_known(folder: Path, capsys: pytest.CaptureFixtur
     assert "GB free" in capsys.readouterr().out
 
 
+def test_a_log_that_is_being_written_is_not_taken_for_one_that_was_cut_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = make_log(tmp_path, "1.mcap")
+    assert main.main(["log", "list", str(tmp_path), "--json"]) == exit_codes.OK
+    assert [entry["state"] for entry in json.loads(capsys.readouterr().out)["logs"]] == ["being written"]
+    assert main.main(["log", "list", str(tmp_path)]) == exit_codes.OK
+    printed = capsys.readouterr().out
+    assert "being written" in printed and "recover" not in printed
+    log.finish()  # the list has not taken its lock away
+    assert main.main(["log", "list", str(tmp_path), "--json"]) == exit_codes.OK
+    assert [entry["state"] for entry in json.loads(capsys.readouterr().out)["logs"]] == ["whole"]
+
+
 def test_what_is_not_whole_is_listed_and_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     contents = (folder / DONE / "1.mcap").read_bytes()
     (folder / DONE / "0.mcap").write_bytes(contents[:-100])
