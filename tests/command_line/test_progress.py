@@ -6,7 +6,6 @@ import sys
 
 import pytest
 
-from command_line import screen
 from command_line.screen import PACE_S, Count, Progress, time_left_text
 
 
@@ -28,7 +27,7 @@ def test_each_part_of_the_work_has_a_pace_of_its_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     now_s = [0.0]
-    monkeypatch.setattr(screen.time, "monotonic", lambda: now_s[0])
+    monkeypatch.setattr("command_line.screen.time.monotonic", lambda: now_s[0])
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     progress = Progress("")
     for now_s[0], what, done in ((0.0, "rows read", 0), (100.0, "rows read", 90), (100.0, "rows written", 0)):
