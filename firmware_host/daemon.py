@@ -28,6 +28,7 @@ from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import Failures
 from drivers.pose.pose_port import OpenedPose, PoseSource, PoseSourceError
 from firmware_host.buses import BusError, lock_buses, reopening_ports
+from firmware_host.computer.awake_processors import AwakeProcessors
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
@@ -145,9 +146,12 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
+        processors = AwakeProcessors(configuration.loop.stay_awake)
+        stack.callback(processors.close)
+        warnings += [processors.problem] if processors.problem else []
         warnings += prepare_loop(configuration.loop.priority, configuration.loop.cpu, configuration.loop.lock_memory)
         _print_warnings("", warnings)
-        return _run_loop(loop, buses, pose, failures, status, notifier, shutdown)
+        return _run_loop(loop, buses, pose, failures, status, notifier, processors, shutdown)
 
 
 def _make_loop(
@@ -171,6 +175,7 @@ def _run_loop(
     failures: Failures | None,
     status: StatusSocket,
     notifier: SystemdNotifier,
+    processors: AwakeProcessors,
     shutdown: Shutdown,
 ) -> int:
     watchdog, ticker = WatchdogFeed(notifier), Ticker()
@@ -185,6 +190,7 @@ def _run_loop(
             loop.tick(tick)
             serve(loop, status, now_s)
             watchdog.update(tick, loop.mode)
+            processors.update(loop.mode in ENERGISED)
             reopen_buses(loop, buses, now_s)
             reopen_pose(loop, pose, now_s)
         notifier.send("STOPPING=1")

@@ -19,17 +19,18 @@ from typing import NamedTuple
 DEFAULT_PREFIX = "/opt/mudskipper/venv"  # in the unit
 MANIFEST = "etc/mudskipper/.installed.json"
 LINK = "usr/local/bin/mudskipper"
-INTERFACES = ("can0", "can1")
+UDEV_DEVICES = ("net/can0", "net/can1", "misc/cpu_dma_latency")  # below /sys/class
 SERVICE, NETWORKD, WAIT_ONLINE = "mudskipper", "systemd-networkd", "systemd-networkd-wait-online"
 SYSUSERS = "etc/sysusers.d/mudskipper.conf"
 LINK_FILE = "etc/systemd/network/80-can.link"
+RULES = "etc/udev/rules.d/70-mudskipper-cpu.rules"
 NETWORK = "etc/systemd/network/80-can.network"
 UNIT = "etc/systemd/system/mudskipper.service"
 LIVE_UNIT = "etc/systemd/system/mudskipper-live.service"  # not enabled by the installation
 CONFIGURATION = "etc/mudskipper/mudskipper.toml"
 SOURCES = {  # name in systemd/ by installed path
     SYSUSERS: "mudskipper.sysusers",
-    **{path: path.rpartition("/")[2] for path in (LINK_FILE, NETWORK, UNIT, LIVE_UNIT, CONFIGURATION)},
+    **{path: path.rpartition("/")[2] for path in (RULES, LINK_FILE, NETWORK, UNIT, LIVE_UNIT, CONFIGURATION)},
 }
 OWNED = ("etc/mudskipper", "var/lib/mudskipper")  # folders that a purge removes
 
@@ -156,10 +157,10 @@ def _commands(system: System, changed: set[str]) -> Iterator[Step]:
         yield system.command("systemd-sysusers")
     if UNIT in changed and live:
         yield Command(("systemctl", "daemon-reload"))
-    if LINK_FILE in changed and live:
+    if changed & {LINK_FILE, RULES} and live:
         yield Command(("udevadm", "control", "--reload"))
-        links = [system.root / "sys/class/net" / name for name in INTERFACES]
-        present = [str(link) for link in links if link.exists()]
+        devices = [system.root / "sys/class" / name for name in UDEV_DEVICES]
+        present = [str(device) for device in devices if device.exists()]
         if present:
             yield Command(("udevadm", "trigger", "--action=add", *present))
     if not system.is_enabled(NETWORKD):

@@ -21,9 +21,11 @@ from firmware_host.computer.host_facts import (
     Mount,
     Thread,
     can_interrupts,
+    deepest_sleep_us,
     isolated_processors,
     mount_of,
     read_text,
+    wake_limit_us,
 )
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
@@ -64,6 +66,7 @@ def examine_host(root: Path, loop: LoopParameters, limits: Limits | None, priori
     if priority is not None:
         yield examine_priority(loop.priority, priority)
     yield _examine_governor(root)
+    yield _examine_sleep(root, loop.stay_awake)
     present = len(list((root / "sys/devices/system/cpu").glob("cpu[0-9]*")))
     yield examine_processor(loop.cpu, isolated_processors(root), present)
     yield examine_interrupts(priority or loop.priority, can_interrupts(root))
@@ -124,6 +127,22 @@ def _examine_governor(root: Path) -> Finding:
     text, fast = ", ".join(sorted(names)), names == {"performance"}
     fix = "'cpupower frequency-set --governor performance', or cpufreq.default_governor=performance for the kernel"
     return ok_if(fast, "governor", text if fast else f"{text}: the loop wakes late where the clock is slow", fix)
+
+
+def _examine_sleep(root: Path, stay_awake: bool) -> Finding:
+    """Checks whether the processors sleep between two ticks, and whether the daemon may forbid it."""
+    deepest_us = deepest_sleep_us(root)
+    if deepest_us == 0:
+        return ok("sleep", "the processors have no sleep state that takes time to leave")
+    text = f"a processor that sleeps takes up to {deepest_us} µs to wake"
+    if not stay_awake:
+        return warn("sleep", f"{text}: ticks come late", "set loop.stay_awake = true")
+    limit_us = wake_limit_us(root)
+    if limit_us is None:
+        return warn("sleep", f"{text}; whether the daemon may forbid it is not readable", "run this with sudo")
+    if limit_us == 0:
+        return ok("sleep", "all processors are kept awake now, which costs power")
+    return ok("sleep", f"{text}; the daemon keeps all of them awake while torque is on, which costs power")
 
 
 def examine_processor(cpu: int, isolated: set[int], present: int) -> Finding:

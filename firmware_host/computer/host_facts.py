@@ -7,6 +7,7 @@ proc_pid_stat(5). Threaded interrupts are kernel threads named irq/NUMBER-DEVICE
 import ctypes
 import os
 import re
+import struct
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -71,6 +72,20 @@ def _limit(text: str) -> float:
     if text in ("unlimited", "infinity"):
         return inf
     return float(text) if text.isdigit() else 0.0
+
+
+def deepest_sleep_us(root: Path) -> int:
+    """Returns the longest time that the first processor's sleep states take to leave."""
+    texts = [read_text(path) for path in (root / "sys/devices/system/cpu/cpu0/cpuidle").glob("state*/latency")]
+    return max((int(text) for text in texts if text.isdigit()), default=0)
+
+
+def wake_limit_us(root: Path) -> int | None:
+    """Returns the time that processors may take to wake, by all programs' requests; None where it is not readable."""
+    with suppress(OSError, struct.error):
+        limit_us: int = struct.unpack("=i", (root / "dev/cpu_dma_latency").read_bytes()[:4])[0]
+        return limit_us
+    return None
 
 
 def isolated_processors(root: Path) -> set[int]:

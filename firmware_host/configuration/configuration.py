@@ -56,6 +56,7 @@ class LoopParameters:
     priority: Annotated[int, Bounds(0, 99), Meaning("SCHED_FIFO; 0: none", "1")] = 45  # under the interrupt threads' 50
     cpu: Annotated[int, Bounds(-1, 1023), Meaning("to run on; -1: any", "CPU number")] = -1
     lock_memory: Annotated[bool, Meaning("keep the process in RAM")] = True
+    stay_awake: Annotated[bool, Meaning("keep all processors awake while torque is on; costs power")] = True
     wait_for_bus: Annotated[
         bool, Meaning("start without a bus that does not open and retry every second; false: exit")
     ] = False

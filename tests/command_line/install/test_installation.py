@@ -190,13 +190,13 @@ def test_an_upgrade_keeps_what_was_edited_and_puts_the_new_one_beside_it_once(
 
 
 def test_a_running_system_is_told_to_look_again(machine: Machine) -> None:
-    for name in ("can0", "lo"):
-        (machine.root / "sys/class/net" / name).mkdir(parents=True)
+    for name in ("net/can0", "net/lo", "misc/cpu_dma_latency"):
+        (machine.root / "sys/class" / name).mkdir(parents=True)
     assert commands(plan_installation(machine.system())) == [
         "systemd-sysusers",
         "systemctl daemon-reload",
         "udevadm control --reload",
-        f"udevadm trigger --action=add {machine.root}/sys/class/net/can0",
+        f"udevadm trigger --action=add {machine.root}/sys/class/net/can0 {machine.root}/sys/class/misc/cpu_dma_latency",
         "systemctl enable --now systemd-networkd",
         "systemctl disable systemd-networkd-wait-online",
         "networkctl reload",
@@ -227,7 +227,7 @@ def test_a_failure_says_what_was_done_and_the_next_run_does_the_rest(
     said = capsys.readouterr().err
     assert "could not run systemd-sysusers" in said
     assert "Failed to connect to bus" in said
-    assert "done before that: 7 of 12 steps" in said
+    assert "done before that: 8 of 13 steps" in said
     assert "Traceback" not in said
     machine.failing = ""
     assert machine.install() == exit_codes.OK

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 from datetime import UTC, datetime
 from math import inf
 from pathlib import Path
@@ -86,7 +87,7 @@ def computer(tmp_path: Path) -> Computer:
 
 def test_a_robot_s_computer_is_ok_in_every_line(computer: Computer) -> None:
     found = computer.levels()
-    assert set(found) == {"kernel", "realtime", "memlock", "governor", "processors", "interrupts"}
+    assert set(found) == {"kernel", "realtime", "memlock", "governor", "sleep", "processors", "interrupts"}
     assert set(found.values()) == {Level.OK}
 
 
@@ -116,6 +117,29 @@ def test_a_real_time_kernel_is_known_by_its_version_or_its_flag(
 def test_a_governor_that_saves_power_is_warned_of(computer: Computer) -> None:
     computer.write("sys/devices/system/cpu/cpu2/cpufreq/scaling_governor", "ondemand")
     assert computer.levels()["governor"] is Level.WARN
+
+
+@pytest.mark.parametrize(
+    ("limit_us", "stay_awake", "level", "text"),
+    [
+        (0, True, Level.OK, "all processors are kept awake now"),
+        (2_000_000_000, True, Level.OK, "takes up to 133 µs to wake; the daemon keeps all of them awake"),
+        (2_000_000_000, False, Level.WARN, "ticks come late"),
+        (None, True, Level.WARN, "is not readable"),
+    ],
+)
+def test_processors_that_sleep_are_named_with_their_latency_and_with_what_holds_them(
+    computer: Computer, limit_us: int | None, stay_awake: bool, level: Level, text: str
+) -> None:
+    for state, latency_us in enumerate((0, 2, 133)):
+        computer.write(f"sys/devices/system/cpu/cpu0/cpuidle/state{state}/latency", str(latency_us))
+    if limit_us is not None:
+        device = computer.root / "dev/cpu_dma_latency"
+        device.parent.mkdir()
+        device.write_bytes(struct.pack("=i", limit_us))
+    loop = LoopParameters(stay_awake=stay_awake)
+    (found,) = (each for each in examine_host(computer.root, loop, GOOD_LIMITS, None) if each.id == "sleep")
+    assert found.level is level and text in found.text
 
 
 @pytest.mark.parametrize(("text", "found"), [("", set()), ("3", {3}), ("1-3,6", {1, 2, 3, 6})])
