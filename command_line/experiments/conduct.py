@@ -5,8 +5,10 @@ continues from there.
 """
 
 import argparse
+import json
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,16 +17,17 @@ from command_line import exit_codes
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from command_line.json_output import print_value, with_schema
 from command_line.screen import Progress, complain
-from experiments.reports.report_page import to_json, write_report
+from experiments.reports.report_page import SUMMARY, to_json, write_report
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
 from experiments.robot.prompt import AutomaticOperator
-from experiments.trials.notebook import NotebookError, anything_measured
+from experiments.trials.notebook import Notebook, NotebookError, anything_measured
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.file_problems import why_not
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.status_client import CallRefusedError
 
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
+NOT_COMPARED = ("command", "name", "function", "json", "out")  # of the options of a computed experiment
 Result = TypeVar("Result")
 
 
@@ -35,12 +38,16 @@ def refuse(message: str) -> int:
 
 def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Finding]) -> int:
     """Run a computed experiment, which writes files only with --out. `unit` names what the progress bar counts."""
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)  # an impossible folder is refused before minutes of work
+    try:
+        notebook = _notebook_of_options(options) if options.out else None  # refused before minutes of work
+    except NotebookError as problem:
+        complain(str(problem))
+        return exit_codes.REFUSED
     finding = _run(unit, lambda progress: run(progress.show))
     report = with_schema(f"experiment-{options.name}", to_json(finding.report))
-    if options.out is not None:
+    if notebook is not None:
         _print_written(write_report(options.out, report, finding.title, finding.sections))
+        notebook.write("report", {"title": finding.title})
     _print_finding(report, finding, options.json)
     return EXIT_STATUS[finding.ending]
 
@@ -52,6 +59,7 @@ def conduct_bench(options: argparse.Namespace, unit: str, run: Callable[[Session
     folder: Path = options.out or Path(f"mudskipper-{options.name}")
     folder.mkdir(parents=True, exist_ok=True)
     try:
+        _require_own_folder(folder, options.name)
         finding = _run(unit, lambda progress: run(_session(options, folder, progress)))
         title = f"{finding.title} (simulated)" if options.simulated else finding.title
         report = with_schema(
@@ -69,6 +77,22 @@ def conduct_bench(options: argparse.Namespace, unit: str, run: Callable[[Session
     _print_finding(report, finding, options.json)
     _print_written(written)
     return EXIT_STATUS[finding.ending]
+
+
+def _notebook_of_options(options: argparse.Namespace) -> Notebook:
+    """Return a notebook whose plan is what was typed. Raises NotebookError for a report of other options."""
+    _require_own_folder(options.out, options.name)
+    typed = {name: value for name, value in vars(options).items() if name not in NOT_COMPARED}
+    return Notebook(options.out, json.loads(json.dumps({"experiment": options.name} | typed, default=str)))
+
+
+def _require_own_folder(folder: Path, name: str) -> None:
+    """Raises NotebookError for the results of another experiment."""
+    earlier = name
+    with suppress(OSError, ValueError, AttributeError):
+        earlier = json.loads((folder / SUMMARY).read_bytes()).get("experiment", name)
+    if earlier != name:
+        raise NotebookError(f"{folder} has the results of experiment {earlier}: choose another folder with --out")
 
 
 def _run(unit: str, run: Callable[[Progress], Result]) -> Result:

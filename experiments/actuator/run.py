@@ -168,7 +168,7 @@ class SimulatedBench:
 
 def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> dict[str, Any]:
     configuration = parse_configuration(text)
-    notebook = Notebook(folder / joint, notebook_plan(plan, joint))
+    notebook = Notebook(folder / joint, notebook_plan(plan, joint) | {"simulated_seed": seed})
     robot, weights = simulated_bench(configuration, joint, plan, seed, _new_log(folder, joint))
     try:
         entries = Calibration(robot, joint, plan, weights, AutomaticOperator(_discard), notebook, _discard).run()

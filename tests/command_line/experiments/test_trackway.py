@@ -166,6 +166,24 @@ def test_json_is_one_object_and_is_written_too(
     assert "summary.json" in printed.err
 
 
+def test_a_folder_with_a_report_is_refused_to_other_options_and_other_experiments(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, synthetic: None
+) -> None:
+    def run(name: str, *options: str) -> int:
+        return main(["experiment", name, "--simulated", "--out", str(tmp_path / "out"), *options])
+
+    assert run("sweep", "--seeds", "2") == exit_codes.OK
+    before = (tmp_path / "out" / "summary.json").read_bytes()
+    capsys.readouterr()
+    assert run("sweep", "--seeds", "3") == exit_codes.REFUSED
+    assert "seeds = 2, and the options ask for seeds = 3" in capsys.readouterr().err
+    for other in ("mud-fit", "trackway"):
+        assert run(other) == exit_codes.REFUSED
+        assert "has the results of experiment sweep" in capsys.readouterr().err
+    assert (tmp_path / "out" / "summary.json").read_bytes() == before
+    assert run("sweep", "--seeds", "2", "--json") == exit_codes.OK
+
+
 @pytest.mark.parametrize("name", ["trackway", "sweep"])
 def test_the_walks_are_drawn(name: str, tmp_path: Path, synthetic: None) -> None:
     assert main(["experiment", name, "--simulated", "--out", str(tmp_path)]) == exit_codes.OK
