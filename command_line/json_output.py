@@ -31,6 +31,7 @@ SCHEMAS = {  # what prints it -> version
     "failures": 1,
     "demo": 1,
     "replay": 1,
+    "log-comparison": 1,
     "log-info": 2,
     "log-index": 1,
     "log-list": 1,

@@ -8,8 +8,8 @@ from typing import Any
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.refusals import explain_errors
-from command_line.logs.shown_values import value_shown
 from command_line.screen import complain, watched
+from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
 from firmware_host.catalogue.entry import LogEntry
 from firmware_host.log_reading.log_reader import LogError

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from command_line.logs.shown_values import value_shown
 from command_line.screen import complain
+from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab.summary import lab_summary

@@ -3,13 +3,14 @@
 import argparse
 from pathlib import Path
 
-from command_line.option_types import folder, picture, whole
+from command_line.option_types import folder, mud_length, picture, whole
 from command_line.options.shared import Commands, add, add_config, add_json, add_vertical
 
 Parser = argparse.ArgumentParser
 METHODS = ("default", "paper")  # of estimation
 VIEWERS = ("foxglove", "plotjuggler", "rerun")
 COUNT = whole(0, 100000)
+MUDS_ALONG = "mud and its length (default: 61), repeatable, in the order of the track"
 SEVERAL_FILES = "log of this project; several files are the segments of one run"
 ANY_LOG = "log of this project, its segments, or a CSV file of the paper's authors"
 FOLDER = "names the folder (default: %(default)s)"
@@ -46,9 +47,12 @@ def add_log(log: Parser) -> None:
     actions = log.add_subparsers(dest="action", required=True, metavar="action")
     info = add(actions, "info", "logs.log_commands.info", "Print what a log contains.")
     info.add_argument("files", type=Path, nargs="+", metavar="FILE", help=SEVERAL_FILES)
-    report = add(actions, "report", "logs.log_report.log_report", "Write a log as one page with pictures.")
-    report.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
+    report = add(actions, "report", "logs.log_report.log_report", "Write a run, or a comparison of runs, as a page.")
+    report.add_argument("files", type=Path, nargs="+", metavar="FILE", help=f"{ANY_LOG}; several runs are compared")
     report.add_argument("--out", type=folder, metavar="DIR", help="(default: a folder named after the log)")
+    muds = report.add_mutually_exclusive_group()
+    muds.add_argument("--mud", type=mud_length, action="append", metavar="NAME[=CM]", help=MUDS_ALONG)
+    muds.add_argument("--world", type=Path, metavar="FILE", help="of the simulated robot: names the muds")
     _add_export(actions)
     preserve = add(actions, "preserve", "logs.log_folder_commands.preserve_log", "Exclude logs from the quota.")
     preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")

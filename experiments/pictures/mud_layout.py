@@ -30,15 +30,17 @@ class MudRegion(NamedTuple):
 
 
 class MudLayout(NamedTuple):
-    """Named muds, one after the other from `start_m` on."""
+    """Named muds along the track, one after the other."""
 
     names: tuple[str, ...]
     ends_m: tuple[float, ...]
-    start_m: float = 0.0
+    from_start: bool = False  # positions count from where the first walk begins, not from the origin of the pose
 
-    def starting_at(self, start_m: float) -> "MudLayout":
-        """Return the same muds with the first one beginning elsewhere."""
-        return self._replace(start_m=start_m, ends_m=tuple(end_m - self.start_m + start_m for end_m in self.ends_m))
+    def beginning_at(self, start_m: float) -> "MudLayout":
+        """Return the same muds by the positions of a log in which the first walk begins at `start_m`."""
+        if not self.from_start:
+            return self
+        return MudLayout(self.names, tuple(start_m + end_m for end_m in self.ends_m))
 
     def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
         """Name the mud in which a plate goes down and slips back; empty past the last mud and near a border."""
@@ -49,8 +51,9 @@ class MudLayout(NamedTuple):
 
 
 def layout_of_lengths(muds: Sequence[tuple[str, float]]) -> MudLayout:
-    """Return the layout of muds with their lengths in metres."""
-    return MudLayout(tuple(mud_name(name) for name, _ in muds), tuple(accumulate(length_m for _, length_m in muds)))
+    """Return the layout of muds with their lengths in metres, on which the first walk begins."""
+    ends_m = tuple(accumulate(length_m for _, length_m in muds))
+    return MudLayout(tuple(mud_name(name) for name, _ in muds), ends_m, from_start=True)
 
 
 def layout_of_track(track: Track) -> MudLayout:

@@ -129,10 +129,20 @@ def read_walk(
     raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
 
 
+def all_walks(path: Path, log: Log) -> list[RecordedWalk]:
+    """Return every walk of a log that was read already, none where the robot did not walk. Raises LogError."""
+    return [numbered_walk(path, log, number + 1) for number in range(len(_walk_borders(log)) // 2)]
+
+
+def _walk_borders(log: Log) -> NDArray[np.int64]:
+    """Return the first row of each walk and the row after its last one, in turn."""
+    return np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
+
+
 def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
     """Return a walk of a log that was read already; `path` is for messages. Raises LogError."""
     configuration = configuration_of(path, log.configuration_text)
-    borders = np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
+    borders = _walk_borders(log)
     starts, ends = borders[::2], borders[1::2]
     _refuse_number(path, number, len(starts))
     chosen = number - 1 if number else len(starts) - 1

@@ -9,37 +9,44 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
 from html import escape
+from itertools import product
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from experiments.reports.text_tables import Rows as Rows
+from experiments.reports.text_tables import TitledRows
 from firmware_host.log.whole_files import whole_file
 from firmware_host.software_version import software_version
 
 FLAT: Mapping[str, Any] = {"flat": True}  # metadata of a field
 PAGE, SUMMARY = "report.html", "summary.json"
 STYLE = """\
-body { font: 15px/1.5 Georgia, serif; max-width: 62em; margin: 2em auto; padding: 0 1.5em; color: #111 }
+body { font: 15px/1.5 Georgia, serif; max-width: 66em; margin: 2em auto; padding: 0 1.5em; color: #111 }
 h1, h2, table, footer { font-family: Helvetica, Arial, sans-serif }
 h1 { font-size: 1.6em; margin-bottom: 0 } h2 { font-size: 1.15em; margin-top: 2em }
-table { border-collapse: collapse; font-size: 0.85em; margin: 1em 0 }
-th { text-align: left; border-bottom: 1.5px solid #111 } td { border-bottom: 1px solid #ccc }
+p { max-width: 46em } .table { overflow-x: auto; margin: 1em 0 }
+table { border-collapse: collapse; font-size: 0.8em; font-variant-numeric: tabular-nums }
+table { border-bottom: 1.5px solid #111 } tr + tr td { border-top: 1px solid #ddd }
+caption { text-align: left; font-weight: bold; padding-bottom: 0.3em }
+th { text-align: left; border-top: 1.5px solid #111; border-bottom: 1px solid #111 }
 pre { font-size: 0.78em; line-height: 1.35; overflow-x: auto }
-th, td { padding: 0.25em 1.2em 0.25em 0; vertical-align: top; white-space: nowrap }
-td:last-child { white-space: normal }
+th, td { padding: 0.25em 1.2em 0.25em 0; vertical-align: top; white-space: nowrap } td.long { white-space: normal }
 thead { display: table-header-group } tr { break-inside: avoid }
 figure { margin: 1em 0; break-inside: avoid } img { max-width: 100% }
 figcaption, footer, .when { color: #444; font-size: 0.9em } footer { margin-top: 3em; border-top: 1px solid #ccc }
-@media print { body { margin: 0; max-width: none } h2 { break-after: avoid } pre { white-space: pre-wrap } }
+@page { size: A4; margin: 15mm }
+@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10.5px } h2, caption { break-after: avoid }
+  pre { white-space: pre-wrap } .table { overflow: visible } th, td { padding-right: 0.8em } img { max-height: 240mm } }
 """
+LONG = 32  # letters of a cell from which it may be broken into lines
 
 
 @dataclass(frozen=True)
 class Figure:
     name: str  # of its file, without the ending
     caption: str
-    draw: Callable[[Path], None]  # into a PNG file
+    draw: Callable[[Path], None]  # into a file of the kind that its ending says: a PNG, unless others are asked for
 
 
 @dataclass(frozen=True)
@@ -49,17 +56,31 @@ class Section:
     screen: str = ""  # preformatted text
     rows: Rows = ()  # of a table, the head first
     figures: Sequence[Figure] = ()
+    tables: Sequence[TitledRows] = ()  # further ones, each below its title
 
 
 def write_report(
-    folder: Path, report: Any, title: str, sections: Sequence[Section], logs: Sequence[Path] = ()
+    folder: Path,
+    report: Any,
+    title: str,
+    sections: Sequence[Section],
+    logs: Sequence[Path] = (),
+    also: Sequence[str] = (),
+    watch: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> list[Path]:
-    """Write everything and return the paths. `report` becomes the summary. Raises OSError."""
+    """Write everything and return the paths. Raises OSError.
+
+    `report` becomes the summary; `also` are further endings for the pictures next to the page, such as .svg.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     summary, page = folder / SUMMARY, folder / PAGE
     _write(summary, json.dumps(to_json(report), indent=1, allow_nan=False) + "\n")
-    pictures = [_draw(figure, folder) for section in sections for figure in section.figures]
-    _write(page, _page(folder, title, sections, logs))
+    figures = [figure for section in sections for figure in section.figures]
+    pictures = []
+    for done, (figure, ending) in enumerate(product(figures, (".png", *also))):
+        watch("pictures drawn", done, len(figures) * (1 + len(also)))
+        pictures.append(_draw(figure, folder, ending))
+    _write(page, _page(folder, title, sections, logs, also))
     return [page, summary, *pictures, *logs]
 
 
@@ -93,21 +114,17 @@ def _record_to_json(record: Any) -> dict[str, Any]:
     return entries
 
 
-def _draw(figure: Figure, folder: Path) -> Path:
-    path = _picture_path(figure, folder)
+def _draw(figure: Figure, folder: Path, ending: str) -> Path:
+    path = folder / f"{figure.name}{ending}"
     with whole_file(path) as hidden:
         figure.draw(hidden)
     return path
 
 
-def _picture_path(figure: Figure, folder: Path) -> Path:
-    return folder / f"{figure.name}.png"
-
-
-def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[Path]) -> str:
+def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[Path], also: Sequence[str]) -> str:
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     logs_text = f"Logs: {', '.join(escape(log.name) for log in logs)}." if logs else ""
-    body = "\n".join(_section(section, folder) for section in sections)
+    body = "\n".join(_section(section, folder, also) for section in sections)
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
@@ -116,28 +133,36 @@ def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[
     )
 
 
-def _section(section: Section, folder: Path) -> str:
+def _section(section: Section, folder: Path, also: Sequence[str]) -> str:
     paragraphs = [f"<p>{escape(part)}</p>" for part in section.text.split("\n\n") if part]
-    figures = [_figure(figure, _picture_path(figure, folder)) for figure in section.figures]
+    tables = [("", section.rows)] * bool(section.rows) + [*section.tables]
+    figures = [_figure(figure, folder, also) for figure in section.figures]
     screen = [f"<pre>{escape(section.screen)}</pre>"] if section.screen else []
-    parts = [f"<h2>{escape(section.heading)}</h2>", *paragraphs, *([_table(section.rows)] if section.rows else [])]
+    parts = [f"<h2>{escape(section.heading)}</h2>", *paragraphs, *(_table(*titled) for titled in tables)]
     return "\n".join([*parts, *screen, *figures])
 
 
-def _table(rows: Rows) -> str:
+def _table(title: str, rows: Rows) -> str:
     head, *body = rows
+    caption = f"<caption>{escape(title)}</caption>\n" if title else ""
     lines = "\n".join(_row(row, "td") for row in body)
-    return f"<table>\n<thead>{_row(head, 'th')}</thead>\n{lines}\n</table>"
+    return f'<div class="table"><table>\n{caption}<thead>{_row(head, "th")}</thead>\n{lines}\n</table></div>'
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
-    return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+    return "<tr>" + "".join(_cell(cell, tag) for cell in cells) + "</tr>"
 
 
-def _figure(figure: Figure, path: Path) -> str:
-    picture = base64.b64encode(path.read_bytes()).decode()
+def _cell(text: str, tag: str) -> str:
+    kind = ' class="long"' if tag == "td" and len(text) > LONG else ""
+    return f"<{tag}{kind}>{escape(text)}</{tag}>"
+
+
+def _figure(figure: Figure, folder: Path, also: Sequence[str]) -> str:
+    picture = base64.b64encode((folder / f"{figure.name}.png").read_bytes()).decode()
     caption = escape(figure.caption)
+    others = f" Also as {' and '.join(f'{escape(figure.name)}{ending}' for ending in also)}." if also else ""
     return (
         f'<figure><img alt="{caption}" src="data:image/png;base64,{picture}">\n'
-        f"<figcaption>{caption}</figcaption></figure>"
+        f"<figcaption>{caption}{others}</figcaption></figure>"
     )

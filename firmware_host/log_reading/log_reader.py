@@ -206,7 +206,11 @@ def _decode_rows(path: Path, found: _Findings, number: int) -> list[dict[str, An
 
 def read_logs(paths: Sequence[Path], watch: Watch = unwatched, from_s: float = -inf) -> Log:
     """Reads one log, or joins several segments of one run. Raises LogError, also where a segment between is missing."""
-    logs = [read_log(path, watch, from_s) for path in paths]
+    return join_logs(paths, [read_log(path, watch, from_s) for path in paths])
+
+
+def join_logs(paths: Sequence[Path], logs: Sequence[Log]) -> Log:
+    """Joins the logs of several segments of one run; a single log stays as it is. Raises LogError."""
     if len(logs) == 1:
         return logs[0]
     if len({log.metadata.get("run_id") for log in logs}) > 1 or "run_id" not in logs[0].metadata:

@@ -1,8 +1,10 @@
-"""`mudskipper log report`: one page of any log, whatever it holds."""
+"""`mudskipper log report`: one page of any log, whatever it holds, and one page that compares several runs."""
 
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,19 +14,21 @@ import pytest
 from command_line import exit_codes
 from command_line.logs import log_report
 from command_line.main import main
-from experiments.pictures import recorded_walk
 from experiments.reports.report_page import Section
+from experiments.run_report import run as run_module
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading import replay
 from firmware_host.log_reading.log_reader import Log, read_log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.command_line.command_lines import failure, refusal
 from tests.folders import SHARED_DATA
+from tests.recorded_walks import record_walks
 
 UPTIME_S = 36384.0
 LAB_LOGS = SHARED_DATA / "flipper_in_mud"
+Page = list[tuple[str, str, Sequence[Sequence[str]]]]
 
 
 def test_the_page_shows_every_walk_stride_and_event(
@@ -35,46 +39,47 @@ def test_the_page_shows_every_walk_stride_and_event(
     report = json.loads(capsys.readouterr().out)
     assert report == {"schema": "log-report/1"} | json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     log = read_log(two_walks)
-    assert len(report["strides"]) == len(log.strides) > 0 and report["summary"]["ticks"] == len(log.ticks)
+    assert len(report["strides"]) == len(report["fits"]) == len(log.strides) > 0
+    assert report["summary"]["ticks"] == len(log.ticks) and report["log"] == [two_walks.name]
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("<td>left</td>") + page.count("<td>right</td>") == len(log.strides)
-    assert page.count("data:image/png") == 4 and all((folder / f"walk-{walk}.png").exists() for walk in (1, 2))
-    assert all(event["text"] in page.replace("&#x27;", "'") for event in log.events)
+    assert page.count("data:image/png") == 5  # two of each walk, and the fits
+    for name in ("walk-1", "walk-2", "strides-1", "strides-2", "fits"):
+        starts = {ending: (folder / f"{name}{ending}").read_bytes()[:5] for ending in (".png", ".svg", ".pdf")}
+        assert starts == {".png": b"\x89PNG\r", ".svg": b"<?xml", ".pdf": b"%PDF-"}
+        assert f"{name}.svg and {name}.pdf" in page
+    pdf = (folder / "fits.pdf").read_bytes()
+    assert b"/Type3" not in pdf  # journals refuse such fonts
     assert (folder / "two.mcap").read_bytes() == two_walks.read_bytes()
 
 
-def reported_pages(log: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, Sequence[Sequence[str]]]]:
+def pages_of(monkeypatch: pytest.MonkeyPatch, *words: str) -> Page:
     """What a page would show, without its pictures."""
-    pages: list[Section] = []
+    sections: list[Section] = []
 
-    def take(folder: Path, report: dict[str, Any], title: str, sections: list[Section], logs: list[Path]) -> list[Path]:
-        pages.extend(sections)
+    def take(folder: Path, report: Any, title: str, shown: list[Section], logs: list[Path], *_: object) -> list[Path]:
+        sections.extend(shown)
         return logs
 
     monkeypatch.setattr(log_report, "write_report", take)
-    assert main(["log", "report", str(log), "--out", str(log.parent / "report")]) == exit_codes.OK
-    return [(section.heading, section.text, section.rows) for section in pages]
+    assert main(["log", "report", *words]) == exit_codes.OK
+    tables = [(each.heading, each.text, each.rows) for each in sections]
+    return tables + [(title, "", rows) for each in sections for title, rows in each.tables]
 
 
-def test_people_are_told_times_since_the_log_s_begin_however_long_the_computer_is_up(
-    two_walks: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def section(pages: Page, heading: str) -> tuple[str, Sequence[Sequence[str]]]:
+    ((text, rows),) = [(text, rows) for name, text, rows in pages if name == heading]
+    return text, rows
+
+
+def test_times_count_from_the_log_s_begin_however_long_the_computer_is_up(
+    two_walks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def read_later(path: Path, *_: object) -> Log:
-        return after(read_log(path), UPTIME_S)
-
-    before = reported_pages(two_walks, monkeypatch)
-    capsys.readouterr()
-    assert main(["replay", str(two_walks)]) == exit_codes.OK
-    strides = capsys.readouterr().out
-    monkeypatch.setattr(recorded_walk, "read_log", read_later, raising=False)
-    for module in (log_report, recorded_walk, replay):
-        monkeypatch.setattr(module, "read_logs", lambda paths, *_: read_later(paths[0]), raising=False)
-    assert reported_pages(two_walks, monkeypatch) == before
-    capsys.readouterr()
-    assert main(["replay", str(two_walks)]) == exit_codes.OK
-    assert capsys.readouterr().out == strides
-    (second,) = (text for heading, text, _ in before if heading == "Walk 2")
-    assert "Its pictures count from there" in second and not second.startswith("It begins 0.")
+    words = (str(two_walks), "--out", str(tmp_path))
+    before = pages_of(monkeypatch, *words)
+    monkeypatch.setattr(run_module, "read_log", lambda path, *_: after(read_log(path), UPTIME_S))
+    assert pages_of(monkeypatch, *words) == before
+    text, _ = section(before, "Walk 2")
+    assert "Its pictures count from there" in text and not text.startswith("It begins 0.")
 
 
 def after(log: Log, uptime_s: float) -> Log:
@@ -88,22 +93,152 @@ def after(log: Log, uptime_s: float) -> Log:
     return log._replace(metadata=metadata, ticks=ticks, strides=strides, events=events)
 
 
+def test_left_and_right_of_a_stride_are_one_row_with_r_squared(
+    two_walks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages = pages_of(monkeypatch, str(two_walks), "--out", str(tmp_path))
+    _, (_, *strides) = section(pages, "Strides")
+    assert [row[:2] for row in strides] == [["1", "0"], ["1", "1"], ["2", "0"]]
+    _, (head, *rows) = section(pages, "k_p by stride")
+    assert [name.split()[0] for name in head[2:]] == ["left", "R²", "residual", "right", "R²", "residual"]
+    assert len(rows) == len(strides) and all(0.0 < float(row[3]) < 1.0 and float(row[4]) > 0.0 for row in rows)
+
+
+def test_every_line_on_the_terminal_fits_80_columns(
+    two_walks: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(two_walks.parent)
+    pages_of(monkeypatch, "two.mcap")
+    printed = capsys.readouterr()
+    assert printed.out == "two-report/report.html\n"
+    assert "3 strides: 3 good" in printed.err.replace("\n", " ")
+    assert max(map(len, printed.err.splitlines())) <= 80
+
+
+def test_muds_have_the_names_they_are_given(two_walks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By name and length, or by the world; else their k_p describes them."""
+    out = ("--out", str(tmp_path))
+    text, (_, unnamed) = section(pages_of(monkeypatch, str(two_walks), *out), "Result")
+    assert re.fullmatch(r"k_p 1\.\d N/cm³", unnamed[0]) and "names no muds" in text
+    text, (_, named) = section(pages_of(monkeypatch, str(two_walks), *out, "--mud", "pond=60"), "Result")
+    assert named == ["pond", *unnamed[1:]] and "you named" in text
+    world = tmp_path / "world.toml"
+    world.write_text(
+        "[[segment]]\nstart_m = 0.0\nend_m = 0.5\nwater_percent = 48.5\n"
+        "[[segment]]\nstart_m = 0.5\nend_m = 1.0\nwater_percent = 50.0\n",
+        encoding="utf-8",
+    )
+    _, (_, known) = section(pages_of(monkeypatch, str(two_walks), *out, "--world", str(world)), "Result")
+    assert known == ["w = 48.5 %", *unnamed[1:]]
+
+
 def test_a_log_without_a_walk_says_so(
     configuration: Configuration, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    recorder = FileRecorder(tmp_path / "rest.mcap", configuration)
-    Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder).run_for(1.0)
-    recorder.close()
+    record_rest(tmp_path / "rest.mcap", configuration)
     monkeypatch.chdir(tmp_path)
     assert main(["log", "report", "rest.mcap"]) == exit_codes.OK
     assert capsys.readouterr().out == "rest-report/report.html\n"
     page = Path("rest-report/report.html").read_text(encoding="utf-8")
-    assert "No complete stride." in page and "there is no walk in this log" in page
+    assert "The robot did not walk." in page and "No complete stride." in page
+
+
+def record_rest(path: Path, configuration: Configuration) -> None:
+    recorder = FileRecorder(path, configuration)
+    Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder).run_for(1.0)
+    recorder.close()
 
 
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not beside the project")
-def test_the_authors_logs_have_a_page_too(tmp_path: Path) -> None:
+def test_the_authors_logs_have_a_page_too_with_the_mud_of_their_name(tmp_path: Path) -> None:
     log = LAB_LOGS / "single_12.5N_trial5.csv.gz"
     assert main(["log", "report", str(log), "--out", str(tmp_path)]) == exit_codes.OK
-    assert "strides-1" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<td>12.5 N</td>" in page and "No fault" not in page
     assert (tmp_path / "strides-1.png").exists() and (tmp_path / log.name).exists()
+
+
+# several runs
+
+
+@pytest.fixture(scope="module")
+def another_walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
+    path = tmp_path_factory.mktemp("logs") / "another.mcap"
+    record_walks(path, configuration, 3)
+    return path
+
+
+def test_runs_are_compared_on_one_page_with_one_table_and_one_figure(
+    two_walks: Path, another_walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same simulated mud in both: no coefficient differs."""
+    out = tmp_path / "out"
+    words = ["log", "report", str(two_walks), str(another_walk), "--mud", "48.5=60", "--out", str(out), "--json"]
+    assert main(words) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert report["schema"] == "log-comparison/1"
+    assert [each["run"] for each in report["runs"]] == ["two", "another"]
+    quantities = {each["quantity"]: each for each in report["differences"]}
+    assert set(quantities) == {"speed", "k_p", "k_e"}  # k_s is a bound in both
+    for name in ("k_p", "k_e"):
+        assert abs(quantities[name]["difference"]) < 3.0 * quantities[name]["std_error"]
+        assert quantities[name]["difference"] == quantities[name]["other"] - quantities[name]["first"]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png") == 1 and page.count("<table>") == 2
+    names = {path.name for path in out.iterdir()}
+    pictures = {f"comparison{ending}" for ending in (".png", ".svg", ".pdf")}
+    assert names == {"report.html", "summary.json", "two.mcap", "another.mcap", *pictures}
+
+
+def test_a_run_without_strides_is_a_row_of_the_comparison(
+    two_walks: Path, configuration: Configuration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rest = tmp_path / "rest.mcap"
+    record_rest(rest, configuration)
+    pages = pages_of(monkeypatch, str(two_walks), str(rest), "--out", str(tmp_path / "out"))
+    text, (head, *rows) = section(pages, "Result")
+    assert [row[0] for row in rows] == ["two", "rest"] and len({len(row) for row in (head, *rows)}) == 1
+    assert "No complete stride in rest." in text
+
+
+# bad input: one sentence each
+
+
+@pytest.fixture
+def log(two_walks: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(two_walks, tmp_path / "two.mcap"))
+
+
+def test_logs_that_cannot_be_read_are_refused_by_name(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = log.parent
+    text, broken, missing = folder / "notes.txt", folder / "broken.mcap", folder / "missing.mcap"
+    text.write_text("no log", encoding="utf-8")
+    (folder / "table.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    contents = bytearray(log.read_bytes())
+    contents[len(contents) // 2] ^= 0xFF
+    broken.write_bytes(contents)
+    for path in (text, broken, missing, folder / "table.csv"):
+        for words in ([str(path)], [str(log), str(path)]):
+            message = failure(capsys, "log", "report", *words, "--out", str(folder / "out"))
+            assert message.startswith(f"mudskipper: {path}: ")
+    assert not (folder / "out").exists()
+
+
+def test_a_log_given_twice_and_an_unwritable_folder_are_refused(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert f"{log}: given twice" in failure(capsys, "log", "report", str(log), str(log))
+    (log.parent / "file").write_text("", encoding="utf-8")
+    assert "Not a directory" in failure(capsys, "log", "report", str(log), "--out", str(log.parent / "file" / "out"))
+
+
+@pytest.mark.parametrize("words", [("--mud", "pond=1"), ("--mud", "=40"), ("--mud", "a", "--world", "b.toml")])
+def test_wrong_names_of_muds_are_wrong_usage(
+    words: tuple[str, ...], log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "--mud" in refusal(capsys, "log", "report", str(log), *words)
+
+
+@pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not beside the project")
+def test_several_muds_need_a_position(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = str(LAB_LOGS / "single_12.5N_trial5.csv.gz")
+    words = ("--mud", "48.5", "--mud", "53.1", "--out", str(tmp_path))
+    assert "no position of the body" in failure(capsys, "log", "report", log, *words)

@@ -62,6 +62,24 @@ def test_the_page_contains_its_pictures_and_loads_nothing(tmp_path: Path) -> Non
     assert written[2].read_bytes() == DOT
 
 
+def test_pictures_can_have_further_forms_and_sections_further_tables(tmp_path: Path) -> None:
+    titled = Section("Two", rows=[["a"], ["1"]], tables=[("Second < first", [["b"], ["2"]])], figures=SECTION.figures)
+    seen: list[tuple[int, int]] = []
+    written = write_report(
+        tmp_path,
+        {},
+        "Title",
+        [titled],
+        also=(".svg", ".pdf"),
+        watch=lambda what, done, total: seen.append((done, total)),
+    )
+    assert [path.name for path in written[2:]] == ["dots.png", "dots.svg", "dots.pdf"]
+    assert seen == [(0, 3), (1, 3), (2, 3)]
+    page = written[0].read_text(encoding="utf-8")
+    assert page.count("<table>") == 2 and "<caption>Second &lt; first</caption>" in page
+    assert "dots.svg and dots.pdf" in page
+
+
 @pytest.mark.parametrize("place", range(3))
 def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
     place: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -1,0 +1,107 @@
+"""Draws every fit with its residuals next to it, the left flipper next to the right one, after the law τ = k Φ.
+
+Moments in cm⁴ and torques in N·cm make the slope of a line the coefficient in N/cm³.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from estimation.strokes.fit_samples import FitSamples
+from experiments.pictures.colours import FAINT
+from experiments.pictures.walk_plot import STYLE
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_styles import LABELS, looks_of
+from experiments.reports.value_text import N_CM3
+from experiments.run_report.fit_quality import N_CM
+from experiments.run_report.run import ReportedStride, Run
+
+CM4 = 1e8  # in m⁴
+MOST_DRAWN = 10  # strides of each mud, evenly over the run
+INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
+SIZE_IN, DOTS_PER_INCH = (10.0, 7.2), 120
+
+
+def plot_fits(run: Run, path: Path) -> None:
+    """Draw into a PNG, SVG or PDF file."""
+    muds = list(dict.fromkeys(stride.mud for stride in run.strides if stride.mud))
+    looks = looks_of(muds)
+    with rc_context(STYLE):
+        figure = Figure(
+            figsize=(SIZE_IN[0] * (1.0 if len(run.flippers) > 1 else 0.6), SIZE_IN[1]), layout="constrained"
+        )
+        axes = figure.subplots(len(COEFFICIENTS), 2 * len(run.flippers), squeeze=False)
+        for row, name in zip(axes, COEFFICIENTS, strict=True):
+            for fit, residuals, flipper in zip(row[::2], row[1::2], run.flippers, strict=True):
+                _draw_fits(fit, residuals, drawn_samples(run, flipper, name), looks)
+                fit.set_title(f"{LABELS[name]}, {flipper}", size="medium")
+                residuals.set_title("residuals", size="medium")
+            _share_scales(row)
+            row[0].set_ylabel("torque (N·cm)")
+        for panel in axes[-1]:
+            panel.set_xlabel("moment (cm⁴)")
+        handles = [axes[0, 0].plot([], [], **_mark(looks[mud]), label=mud)[0] for mud in muds]
+        figure.legend(handles=handles, loc="outside upper center", ncols=max(len(muds), 1), frameon=False)
+        figure.savefig(path, dpi=DOTS_PER_INCH)
+
+
+def drawn_samples(run: Run, flipper: str, name: str) -> Iterator[tuple[str, FitSamples]]:
+    """Yield the mud and the samples of at most MOST_DRAWN strides of each mud."""
+    by_mud: dict[str, list[ReportedStride]] = {}
+    for stride in run.strides:
+        if stride.mud and stride.samples(flipper, name):
+            by_mud.setdefault(stride.mud, []).append(stride)
+    for mud, strides in by_mud.items():
+        for position in np.unique(np.linspace(0, len(strides) - 1, MOST_DRAWN).round().astype(int)):
+            if samples := strides[position].samples(flipper, name):
+                yield mud, samples
+
+
+def _draw_fits(
+    fit: Axes, residuals: Axes, drawn: Iterator[tuple[str, FitSamples]], looks: Mapping[str, dict[str, Any]]
+) -> None:
+    for mud, samples in drawn:
+        moments, torques = CM4 * np.array(samples.moments_m4), N_CM * np.array(samples.torques_nm)
+        end = moments.max()
+        fit.plot(moments, torques, **_mark(looks[mud]))
+        fit.plot([0.0, end], [0.0, samples.slope / N_CM3 * end], color=looks[mud]["color"], linewidth=0.8)
+        residuals.plot(moments, N_CM * np.array(samples.residuals_nm), **_mark(looks[mud]))
+    residuals.axhline(0.0, color=FAINT, linewidth=0.8)
+
+
+def _mark(look: Mapping[str, Any]) -> dict[str, Any]:
+    return {"color": look["color"], "marker": look["marker"], "markersize": 3.0, "alpha": 0.7, "linestyle": ""}
+
+
+def _share_scales(row: Sequence[Axes]) -> None:
+    """Give fits, and residuals, of both flippers the same scales."""
+    for panels in (row[::2], row[1::2]):
+        for panel in panels[1:]:
+            panel.sharex(panels[0])
+            panel.sharey(panels[0])
+        panels[0].autoscale()
+        marks = [line for panel in panels for line in panel.lines if line.get_marker() != "None"]
+        _cut_outliers(panels, [np.asarray(line.get_ydata(), dtype=float) for line in marks])
+
+
+def _cut_outliers(panels: Sequence[Axes], heights: Sequence[NDArray[np.float64]]) -> None:
+    """Leave single samples far off out of the picture, and count them in it."""
+    if not heights:
+        return
+    low, high = np.percentile(np.concatenate(heights), [INSIDE, 100.0 - INSIDE])
+    room = BEYOND * (high - low)
+    bottom, top = panels[0].get_ylim()
+    bottom, top = max(bottom, float(low - room)), min(top, float(high + room))
+    if not bottom < top:
+        return
+    panels[0].set_ylim(bottom, top)
+    for panel in panels:
+        values = [y for line in panel.lines if line.get_marker() != "None" for y in np.asarray(line.get_ydata())]
+        if outside := sum(not bottom <= y <= top for y in values):
+            panel.annotate(f"{outside} beyond", (0.98, 0.02), xycoords="axes fraction", ha="right", size=7, color=FAINT)
