@@ -20,6 +20,15 @@ def test_an_operator_arms_walks_stops_and_disarms(robot: Robot) -> None:
     assert robot.torque_is_off()
 
 
+def test_the_processors_are_kept_awake_while_torque_is_on(robot: Robot) -> None:
+    limit_us = "od -A n -t d4 /dev/cpu_dma_latency"  # by all programs' requests
+    assert int(robot.shell(limit_us)) > 1e6
+    robot.succeed("arm")
+    assert int(robot.shell(limit_us)) == 0
+    robot.succeed("disarm")
+    assert int(robot.shell(limit_us)) > 1e6
+
+
 @pytest.mark.parametrize("command", ["arm", "walk", "status", "clear"])
 def test_an_unauthorised_user_is_refused(booted: Robot, command: str) -> None:
     answer = booted.operate(command, user=UNAUTHORISED)
