@@ -39,7 +39,7 @@ class LocalRobot:
 
     def __init__(self, folder: Path, log_lines: str = "") -> None:
         """`log_lines`: further lines of the configuration's log section."""
-        self.logs, self._socket = folder / "logs", folder / "mudskipper.sock"
+        self.logs, self.socket = folder / "logs", folder / "mudskipper.sock"
         self.configuration = write_local_setup(folder, self.logs)
         text = self.configuration.read_text(encoding="utf-8")
         self.configuration.write_text(text.replace("[log]\n", f"[log]\n{log_lines}"), encoding="utf-8")
@@ -56,7 +56,7 @@ class LocalRobot:
 
     def call(self, method: str, **params: Any) -> Any:
         """Calls the daemon on a connection of its own."""
-        client = StatusClient(self._socket)
+        client = StatusClient(self.socket)
         try:
             return client.call(method, **params)
         finally:

@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.behaviour import differences
 from benchmarks.report import run_benchmark, show_progress, summary_us
-from benchmarks.speed import lockstep_speed, tick_time, timed_walk
+from benchmarks.speed import lockstep_speed, tick_time, timed_walk, viewers_cost
 from benchmarks.speed.timed_walk import STAGES
 from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
@@ -27,7 +27,7 @@ from tests.folders import ROOT
 TIMEOUT_S = 240.0  # on a machine that others keep busy
 ALWAYS = {"benchmark", "reached", "verdict"}
 FOLDERS = {
-    "speed": ("tick_time", "loop_jitter", "lockstep_speed"),
+    "speed": ("tick_time", "loop_jitter", "lockstep_speed", "viewers_cost"),
     "stress": (
         "soak", "daemon_kills", "configuration_fuzz", "socket_fuzz", "corrupted_logs", "log_kills", "can_fuzz",
     ),
@@ -71,6 +71,16 @@ def test_loop_jitter() -> None:
         assert loop["ticks"] > 0
         assert loop["missed_ticks"] >= 0
     assert report.keys() >= {"warnings", "faults", "dropped_rows"}
+
+
+def test_viewers_cost(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The screen, `live` and its clients run until the turn ends."""
+    assert run_benchmark(viewers_cost.measure, ["--seconds", "0.5", "--pairs", "1"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    figures = {f"{name}_{part}" for name in ("tick_us", "wake_late_us") for part in ("p50", "p99")}
+    assert report.keys() >= {*figures, *ALWAYS, "screen_cpu", "missed_ticks"}
+    assert report["all_run"] is True
+    assert all(set(report[name]) == {"without", "with", "ratio"} for name in figures)
 
 
 def test_lockstep_speed(capsys: pytest.CaptureFixture[str]) -> None:
