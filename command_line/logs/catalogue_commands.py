@@ -12,7 +12,7 @@ from command_line.screen import complain, watched
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
 from firmware_host.catalogue.entry import LogEntry
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_error import LogError
 
 Options = argparse.Namespace
 LISTING_READS_S = 1.0  # new logs that `log list` reads; it describes the others by the summary at their end

@@ -1,14 +1,25 @@
-"""Prints what the reader noticed in a CSV of the paper's authors, and what such a file contains."""
+"""What is special to a CSV of the paper's authors: its vertical axis, what the reader noticed in it, its contents."""
 
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from command_line.logs.refusals import UsageError
 from command_line.screen import complain
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
+from firmware_host.configuration.configuration import CaptureAxis
+from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab.summary import lab_summary
-from firmware_host.log_reading.lab_csv import LabLog
+from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv
+
+
+def chosen_vertical(options: argparse.Namespace) -> CaptureAxis:
+    """Returns the axis of the capture that points up. Raises UsageError for a log that has none."""
+    if options.vertical and not is_lab_csv(options.files[0]):
+        raise UsageError(f"--vertical {options.vertical}: {options.files[0]} is not a CSV log with a motion capture")
+    return options.vertical or VERTICAL_AXIS
 
 
 def complain_of(path: Path, findings: Sequence[Finding]) -> None:

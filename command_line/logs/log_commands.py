@@ -7,8 +7,8 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.logs.lab_findings import complain_of, show_lab_log
-from command_line.logs.refusals import UsageError, chosen_vertical, explain_errors
+from command_line.logs.lab_findings import chosen_vertical, complain_of, show_lab_log
+from command_line.logs.refusals import UsageError, explain_errors
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of

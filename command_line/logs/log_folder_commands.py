@@ -30,8 +30,7 @@ from firmware_host.log.log_folder import (
     unfinished_files,
     why_not_moved,
 )
-from firmware_host.log_reading.log_reader import DAMAGE, LogError
-from firmware_host.log_reading.recovery import Recovered, recover_log
+from firmware_host.log_reading.log_error import DAMAGE, LogError
 
 Options = argparse.Namespace
 BEING_WRITTEN = "being written"
@@ -149,8 +148,10 @@ def recover(options: Options) -> int:
     return exit_codes.UNHEALTHY if problems else exit_codes.OK
 
 
-def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Recovered], list[str]]:
+def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[str]]:
     """Recovers the logs and returns messages about the others. Skips files of living writers that were not named."""
+    from firmware_host.log_reading.recovery import recover_log  # slow to import, and a listing does without it
+
     recovered, problems = [], []
     progress = Progress("", QUIET_S)
     for done, path in enumerate(paths):

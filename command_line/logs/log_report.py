@@ -9,8 +9,8 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.logs.lab_findings import complain_of
-from command_line.logs.refusals import chosen_vertical, explain_errors
+from command_line.logs.lab_findings import chosen_vertical, complain_of
+from command_line.logs.refusals import explain_errors
 from command_line.screen import watched
 from experiments.pictures.mud_layout import MudLayout, layout_of_lengths, layout_of_track
 from experiments.reports.report_page import PAGE, to_json, write_report

@@ -6,24 +6,14 @@ from functools import wraps
 
 from command_line import exit_codes
 from command_line.screen import complain
-from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
-from firmware_host.log_reading.lab_csv import is_lab_csv
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_error import LogError
 
 Command = Callable[[argparse.Namespace], int]
 
 
 class UsageError(Exception):
     """The options do not fit the log."""
-
-
-def chosen_vertical(options: argparse.Namespace) -> CaptureAxis:
-    """Returns the axis of the capture that points up. Raises UsageError for a log that has none."""
-    if options.vertical and not is_lab_csv(options.files[0]):
-        raise UsageError(f"--vertical {options.vertical}: {options.files[0]} is not a CSV log with a motion capture")
-    return options.vertical or VERTICAL_AXIS
 
 
 def explain_errors(command: Command) -> Command:

@@ -32,7 +32,7 @@ from firmware_host.catalogue.entry import (
 )
 from firmware_host.log.log_folder import ACTIVE, ENDING
 from firmware_host.log.whole_files import hidden_path, whole_file
-from firmware_host.log_reading.log_reader import LogError, Watch
+from firmware_host.log_reading.log_error import LogError, Watch
 
 NAME = "catalogue.parquet"
 VERSION = 1  # of COLUMNS; an older catalogue is made again

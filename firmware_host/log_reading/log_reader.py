@@ -9,7 +9,7 @@ this version lies over the stored bytes without a copy.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from math import inf
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from mcap.exceptions import EndOfFile, McapError, RecordLengthLimitExceeded
+from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
@@ -27,16 +27,15 @@ from firmware_host.log.log_folder import why_not_read
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from firmware_host.log_reading.chunks import Row, open_chunk, split_records
+from firmware_host.log_reading.log_error import DAMAGE as DAMAGE
+from firmware_host.log_reading.log_error import LogError as LogError
+from firmware_host.log_reading.log_error import Watch as Watch
+from firmware_host.log_reading.log_error import unwatched as unwatched
 from firmware_host.log_reading.tick_array import Ticks, sort_ticks, stack_ticks
 
-DAMAGE = (McapError, ValueError, RuntimeError, OverflowError, MemoryError, struct.error)  # raised by damaged bytes
 ADVICE = "'mudskipper log recover' saves its readable rows"
 OTHER_VERSION = "read it with the version of mudskipper that wrote it"
 KIND_OF_TOPIC = {kind.topic: number for number, kind in enumerate(ROW_KINDS)}
-
-
-class LogError(ValueError):
-    """A log that cannot be read: the message names the file, the byte or row, and the reason."""
 
 
 class Log(NamedTuple):
@@ -50,13 +49,6 @@ class Log(NamedTuple):
     complete: bool  # False where the writer was cut off; everything before that is here
     unknown_fields: tuple[str, ...] = ()  # such as "/tick battery_v", which this version does not know
     missing_fields: tuple[str, ...] = ()  # which the version that wrote the log did not know
-
-
-Watch = Callable[[str, int, int], None]  # called with the work, how much of it is done, and how much there is
-
-
-def unwatched(what: str, done: int, total: int) -> None:
-    """Reports no progress."""
 
 
 def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Log:

@@ -78,6 +78,19 @@ def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: py
     assert "walk.mcap" in printed.out and "update mudskipper" in printed.err
 
 
+def test_a_listing_of_known_logs_loads_no_library_that_reads_logs(folder: Path) -> None:
+    """They take longer to load than a thousand entries to list."""
+    assert main(["log", "index", str(folder)]) == exit_codes.OK
+    program = (
+        f"import sys; from command_line.main import main; main(['log', 'list', {str(folder)!r}]);"
+        "print([name for name in ('numpy', 'can', 'pydantic', 'matplotlib') if name in sys.modules])"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True, cwd=ROOT
+    )
+    assert ended.stdout.splitlines()[-1] == "[]"
+
+
 def test_without_the_extra_logs_are_listed_all_the_same(folder: Path) -> None:
     program = (
         "import sys; sys.modules['duckdb'] = None; from command_line.main import main\n"
