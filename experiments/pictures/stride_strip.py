@@ -23,7 +23,7 @@ WITH_POSE = "Arrow: advance of the body since the start of the insertion.  Red l
 WITHOUT_POSE = "Red line: path of the plate's lower edge.  This log has no position of the body."
 
 
-def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> None:
+def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Figure:
     """Draw one row for each stride, with its moments from left to right."""
     shown = {moment.caption for stride in strides for moment in moments_of(walk, stride)}
     captions = [caption for caption, *_ in MOMENTS if caption in shown]
@@ -40,6 +40,7 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Non
     legend = WITH_POSE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_POSE
     figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
     figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 def _write_captions(figure: Figure, captions: Sequence[str], width_m: float, height_in: float) -> None:

@@ -48,7 +48,7 @@ Draw = Callable[[Axes, RecordedWalk], None]
 Panels = list[tuple[str, Draw]]
 
 
-def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -> None:
+def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -> Figure:
     """Draw a walk into a PNG, SVG or PDF file, each flipper in a column. `layout` names the muds where it is known."""
     sides, own, of_body = walk.sides, _flipper_panels(), _body_panels(walk)
     rows = len(own) + -(-len(of_body) // len(sides))
@@ -67,6 +67,7 @@ def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -
             panel.set_ylabel(label)
         _finish(figure, axes, walk, mud_regions(walk, layout))
         figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 def _make_panels(figure: Figure, rows: int, columns: int, shared_rows: int) -> Any:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
 from html import escape
-from itertools import product
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -46,7 +45,7 @@ LONG = 32  # letters of a cell from which it may be broken into lines
 class Figure:
     name: str  # of its file, without the ending
     caption: str
-    draw: Callable[[Path], None]  # into a file of the kind that its ending says: a PNG, unless others are asked for
+    draw: Callable[[Path], Any]  # into a file of the kind that its ending says; may return the figure of matplotlib
 
 
 @dataclass(frozen=True)
@@ -76,10 +75,10 @@ def write_report(
     summary, page = folder / SUMMARY, folder / PAGE
     _write(summary, json.dumps(to_json(report), indent=1, allow_nan=False) + "\n")
     figures = [figure for section in sections for figure in section.figures]
-    pictures = []
-    for done, (figure, ending) in enumerate(product(figures, (".png", *also))):
-        watch("pictures drawn", done, len(figures) * (1 + len(also)))
-        pictures.append(_draw(figure, folder, ending))
+    pictures: list[Path] = []
+    for done, figure in enumerate(figures):
+        watch("pictures drawn", done, len(figures))
+        pictures += _draw(figure, [folder / f"{figure.name}{ending}" for ending in (".png", *also)])
     _write(page, _page(folder, title, sections, logs, also))
     return [page, summary, *pictures, *logs]
 
@@ -114,11 +113,23 @@ def _record_to_json(record: Any) -> dict[str, Any]:
     return entries
 
 
-def _draw(figure: Figure, folder: Path, ending: str) -> Path:
-    path = folder / f"{figure.name}{ending}"
-    with whole_file(path) as hidden:
-        figure.draw(hidden)
-    return path
+def _draw(figure: Figure, paths: Sequence[Path]) -> Sequence[Path]:
+    """Draw a picture once, and save it in its further forms where it can be saved again."""
+    first, *others = paths
+    with whole_file(first) as hidden:
+        picture = figure.draw(hidden)
+    for path in others:
+        with whole_file(path) as hidden:
+            figure.draw(hidden) if picture is None else _save_again(picture, hidden)
+    return paths
+
+
+def _save_again(picture: Any, path: Path) -> None:
+    from matplotlib import rc_context  # slow to import
+
+    picture.set_layout_engine("none")  # its parts stay where they are
+    with rc_context({"pdf.fonttype": 42}):  # TrueType: journals refuse matplotlib's own Type 3
+        picture.savefig(path)
 
 
 def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[Path], also: Sequence[str]) -> str:

@@ -32,6 +32,7 @@ class Difference:
     other: float
     difference: float
     std_error: float | None  # None where a run has a single value without an error
+    like_depths: bool  # the strides of both runs reached the same depths
 
     @property
     def is_shown(self) -> bool | None:
@@ -61,7 +62,21 @@ def _between(first: ComparedRun, other: ComparedRun) -> Iterator[Difference]:
         for quantity, (a, a_error), (b, b_error) in _quantities(before, after, same_robot):
             if a is not None and b is not None:
                 error = None if a_error is None or b_error is None else hypot(a_error, b_error)
-                yield Difference(other.run.name, first.run.name, before.mud, quantity, a, b, b - a, error)
+                yield Difference(
+                    run=other.run.name,
+                    first_run=first.run.name,
+                    mud=before.mud,
+                    quantity=quantity,
+                    first=a,
+                    other=b,
+                    difference=b - a,
+                    std_error=error,
+                    like_depths=_overlap(before, after),
+                )
+
+
+def _overlap(before: MudResult, after: MudResult) -> bool:
+    return before.shallowest_m <= after.deepest_m and after.shallowest_m <= before.deepest_m
 
 
 Value = tuple[float | None, float | None]  # with its standard error

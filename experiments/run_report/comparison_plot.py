@@ -17,10 +17,11 @@ from experiments.run_report.comparison import ComparedRun
 from experiments.run_report.mud_results import MudResult
 
 SIZE_IN, DOTS_PER_INCH = (10.0, 6.0), 120
+HEADROOM = 1.12  # for the arrows of bounds
 WIDTH = 0.6  # of the runs of one mud, as a fraction of the distance between two muds
 
 
-def plot_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
+def plot_comparison(runs: Sequence[ComparedRun], path: Path) -> Figure:
     """Draw into a PNG, SVG or PDF file; bars are two standard errors, arrows lower bounds."""
     muds = {mud_key(result.mud): result.mud for each in runs for result in each.headline.muds}
     looks = looks_of([each.run.name for each in runs])
@@ -37,10 +38,11 @@ def plot_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
             panel.set_ylabel("speed (cm/s)" if name == "speed" else f"{LABELS[name]} (N/cm³)")
             panel.set_xticks(range(len(muds)), [mud.replace(" N/cm³", "") for mud in muds.values()])
             panel.set_xlim(-0.5, max(len(muds), 1) - 0.5)
-            panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
+            panel.set_ylim(min(0.0, panel.get_ylim()[0]), HEADROOM * panel.get_ylim()[1])
         handles = [axes[0].plot([], [], **mark_of(look), linestyle="", label=run)[0] for run, look in looks.items()]
         figure.legend(handles=handles, loc="outside upper center", ncols=min(len(runs), 3), frameon=False)
         figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 def _mark(panel: Axes, x: float, result: MudResult, name: str, look: dict[str, Any]) -> None:

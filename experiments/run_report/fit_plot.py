@@ -28,7 +28,7 @@ INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their ra
 SIZE_IN, DOTS_PER_INCH = (10.0, 7.2), 120
 
 
-def plot_fits(run: Run, path: Path) -> None:
+def plot_fits(run: Run, path: Path) -> Figure:
     """Draw into a PNG, SVG or PDF file."""
     muds = list(dict.fromkeys(stride.mud for stride in run.strides if stride.mud))
     looks = looks_of(muds)
@@ -49,6 +49,7 @@ def plot_fits(run: Run, path: Path) -> None:
         handles = [axes[0, 0].plot([], [], **_mark(looks[mud]), label=mud)[0] for mud in muds]
         figure.legend(handles=handles, loc="outside upper center", ncols=max(len(muds), 1), frameon=False)
         figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 def drawn_samples(run: Run, flipper: str, name: str) -> Iterator[tuple[str, FitSamples]]:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from experiments.pictures.mud_layout import MudLayout
 from experiments.pictures.recorded_walk import RecordedWalk
@@ -10,8 +11,7 @@ from experiments.pictures.stride_choice import choose_strides
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.shown_values import value_shown
-from experiments.reports.value_text import N_CM3, value_text
-from experiments.run_report.comparison import SHOWN, SPEED, ComparedRun, Difference, differences
+from experiments.run_report.comparison import SHOWN, ComparedRun, differences
 from experiments.run_report.event_groups import group_events
 from experiments.run_report.fit_quality import R_SQUARED, quality_rows
 from experiments.run_report.headline import Headline, headline_sentences
@@ -48,6 +48,7 @@ FITS = (
     "Every fit and its residuals: the torque that resists the flipper against the moment of the submerged plate. The "
     "slope of a line is the coefficient of one stride. At most ten strides of each mud are drawn."
 )
+DEPTHS = "Coefficients from other depths differ also in the same mud."
 COMPARED = "Speed and coefficients of each run by mud. Bars are two standard errors; an arrow marks a lower bound."
 
 
@@ -106,10 +107,10 @@ def _walk_section(walk: RecordedWalk, number: int, layout: MudLayout | None) -> 
     return Section(f"Walk {number}", "\n\n".join(filter(None, (begun, missing, cut))), figures=figures)
 
 
-def _draw_strip(walk: RecordedWalk, path: Path) -> None:
+def _draw_strip(walk: RecordedWalk, path: Path) -> Any:
     from experiments.pictures.stride_strip import draw_strip
 
-    draw_strip(walk, choose_strides(walk), path)
+    return draw_strip(walk, choose_strides(walk), path)
 
 
 def _fits_section(run: Run) -> Section:
@@ -154,22 +155,25 @@ def comparison_sections(runs: Sequence[ComparedRun]) -> list[Section]:
 
 
 def comparison_sentences(runs: Sequence[ComparedRun]) -> list[str]:
-    """Say what was compared, and which differences are larger than their uncertainty."""
+    """Say how fast each run was, and how many differences are larger than their uncertainty."""
     strides = sum(each.headline.strides for each in runs)
+    speeds = [(each.run.name, each.headline.motion.speed_m_s) for each in runs]
+    known = [f"{name} {speed_m_s / CM:.1f} cm/s" for name, speed_m_s in speeds if speed_m_s is not None]
     empty = [each.run.name for each in runs if not each.headline.strides]
+    return [
+        f"{counted(len(runs), 'run')}, {counted(strides, 'stride')}.",
+        *[f"Mean speeds: {', '.join(known)}."] * bool(known),
+        *[f"No complete stride in {', '.join(empty)}."] * bool(empty),
+        *_differences_sentence(runs),
+    ]
+
+
+def _differences_sentence(runs: Sequence[ComparedRun]) -> list[str]:
     found = differences(runs)
-    shown = [difference_text(each) for each in found if each.is_shown]
-    without = [f"No complete stride in {', '.join(empty)}."] if empty else []
-    verdict = shown or ["No difference is larger than its uncertainty."] if found else []
-    return [f"{counted(len(runs), 'run')}, {counted(strides, 'stride')}.", *without, *verdict]
-
-
-def difference_text(each: Difference) -> str:
-    unit, per = ("cm/s", CM) if each.quantity == SPEED else ("N/cm³", N_CM3)
-    size, higher = value_text(abs(each.difference), each.std_error, per=per), each.difference > 0.0
-    return (
-        f"In mud {each.mud} the {each.quantity} of {each.run} is {size} {unit} {'higher' if higher else 'lower'} "
-        f"than in {each.first_run}."
+    shown = sum(bool(each.is_shown) for each in found)
+    first = runs[0].run.name
+    return [f"{shown} of {counted(len(found), 'difference')} to {first} exceed {SHOWN:g} standard errors."] * bool(
+        found
     )
 
 
@@ -178,6 +182,6 @@ def _differences_section(runs: Sequence[ComparedRun]) -> Section:
     if not found:
         return Section("Differences", f"No other run has a value in a mud of the same name as one of {first.name}.")
     robots = {each.run.robot for each in runs}
-    shared = " The error that all strides of one robot share is left out: it moves its runs alike." * (len(robots) == 1)
-    text = f"Every run compared with {first.name}. A difference is shown beyond {SHOWN:g} standard errors.{shared}"
-    return Section("Differences", text, rows=difference_rows(found))
+    text = f"Every run compared with {first.name}. A difference is shown beyond {SHOWN:g} standard errors. {DEPTHS}"
+    shared = " The error that all strides of one robot share is left out: it moves its runs alike."
+    return Section("Differences", text + shared * (len(robots) == 1), rows=difference_rows(found))

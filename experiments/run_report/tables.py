@@ -166,5 +166,6 @@ def _difference_row(each: Difference) -> list[str]:
         value_text(each.other, per=per),
         value_text(each.difference, each.std_error, per=per),
         fraction,
-        {None: "uncertainty not known", True: "differs", False: "no difference shown"}[each.is_shown],
+        {None: "uncertainty not known", True: "differs", False: "no difference shown"}[each.is_shown]
+        + (", at another depth" if each.quantity != SPEED and not each.like_depths else ""),
     ]
