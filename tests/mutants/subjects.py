@@ -13,9 +13,10 @@ class Subject(NamedTuple):
 
 
 A_TEXT = "a text of the diagram"
-CONTINUOUS = "the fade has the same value there from both sides"
+CONTINUOUS = "it has the same value there from both sides"
 NOT_FINITE = "a difference with NaN is NaN as much as a sum"
 MORE_OFTEN = "the same counters are only read more often"
+REPORTED = "the report tests the exact bound again"
 SPEED = "the rest then computes the same from nothing"
 SUBJECTS = (
     Subject("drivers.transmit_gate", ("drivers/test_transmit_gate.py",), EVERY_MUTANT),
@@ -81,6 +82,20 @@ SUBJECTS = (
         equivalent={
             "0.0 to 1.0 in `self, state: DriveState, dt_s: float, torque_nm: float=0.0`": "a torque that never changes",
             "without `self._reset_frozen()` in `def reset(self) -> None:`": "the first message does the same",
+        },
+    ),
+    Subject(
+        "control.monitors.motion_monitor",
+        ("control/monitors/test_motion_bounds.py", "control/monitors/test_motion_monitor.py"),
+        equivalent={
+            "LtE to Lt in `abs(target.angle_rad - angle_rad) <= self._following_rad`": REPORTED,
+            "LtE to Lt in `self.unexplained_j <= self._runaway_j`": REPORTED,
+            "LtE to Lt in `self.away_rad <= AWAY_RAD`": REPORTED,
+            "always in `if not (following and self.unexplained_j <= self._runaway_j and"
+            " (self.away_rad <= AWAY_RAD`": REPORTED,
+            "Gt to GtE in `unexplained_j > 0.0`": CONTINUOUS,
+            "Gt to GtE in `away_rad > 0.0`": CONTINUOUS,
+            "without `self._target_rad = UNKNOWN` in `def reset(self) -> None:`": "the first sample sets it",
         },
     ),
     Subject("firmware_host.operator.lease", ("firmware_host/operator/test_lease.py",)),
