@@ -62,6 +62,7 @@ class OdriveDrives:
         self._armed_s = self._disarmed_s = NEVER_S
         self._requested_s = {"version": NEVER_S, "watchdog": NEVER_S, "serial": NEVER_S}
         self._lost_before = self._lost
+        self._idling_lost = False  # the bus refused a command to idle, whatever the drives report
 
     def read(self, now_s: float) -> DriveStates:
         for axis in self.axes:
@@ -132,14 +133,19 @@ class OdriveDrives:
             axis.close_loop()
 
     def disarm(self, now_s: float, at_once: bool = False) -> None:
-        """Closes the gate; commands zero torque and idle `at_once`, later every REPEAT_S where still in closed loop."""
+        """Closes the gate; commands zero torque and idle `at_once`, later every REPEAT_S.
+
+        Later it commands the drives still in closed loop, and all of them where the bus refused the last command.
+        """
         self.gate.close()
         if not at_once and now_s - self._disarmed_s < REPEAT_S:
             return
+        lost_before, everyone = self._lost, at_once or self._idling_lost
         for axis in self.axes:
-            if at_once or axis.closed_loop:
+            if everyone or axis.closed_loop:
                 self._disarmed_s = now_s
                 axis.disarm()
+        self._idling_lost = self._lost > lost_before
 
     def force_idle(self, repeats: int) -> None:
         self.gate.close()

@@ -16,6 +16,7 @@ from tests.dst.operated_robot import OperatedRobot
 WATCHDOG_S = 0.1
 AFTERMATH_S = 0.03  # after a failure's end: delayed frames arrive, and lost requests are repeated
 HEARTBEATS_S = 0.25  # until the loop has seen a drive in closed loop and has commanded it idle again
+LONGEST_LAG_S = 0.02  # of a motor's current behind its command (tests/dst/harms.py)
 REPEAT_S = 0.1  # between two requests to go idle
 
 
@@ -33,6 +34,8 @@ class Reachability:
         drive = robot.loop.configuration.drive
         self._paths = [(f"bus.{drive[joint].bus}", joint, f"{joint}.command") for joint in JOINTS]
         self.cogging_nm = 2.0 * max(each.parameters.cogging_nm for each in robot.lockstep.robot.drives)
+        self._lags_s = self._current_lags_s()
+        self._hastened_s = [float("-inf")] * len(JOINTS)  # when a motor's current lost its lag
         self.stalled_s = 0.0  # since the start
         self.update()
 
@@ -42,6 +45,11 @@ class Reachability:
         if missed != self._missed:
             self.stalled_s += (missed - self._missed) * self._period_s
             self._missed, self._late_s = missed, now_s
+        lags_s = self._current_lags_s()
+        for index, (before_s, lag_s) in enumerate(zip(self._lags_s, lags_s, strict=True)):
+            if lag_s < before_s:
+                self._hastened_s[index] = now_s
+        self._lags_s = lags_s
         harms = self._robot.harms
         self.gains = [_gain(drive.parameters) for drive in self._robot.lockstep.robot.drives]
         for index, joint in enumerate(JOINTS):
@@ -49,6 +57,9 @@ class Reachability:
                 self._disturbed_s[index] = now_s
             if any(active.harm.joint == joint and active.harm.name in FOREIGN for active in harms.active):
                 self._foreign_s[index] = now_s
+
+    def _current_lags_s(self) -> list[float]:
+        return [drive.parameters.current_lag_s for drive in self._robot.lockstep.robot.drives]
 
     def _cuts(self, component: str) -> bool:
         failure = self._failures.of(component)
@@ -74,9 +85,10 @@ class Reachability:
         return HEARTBEATS_S + REPEAT_S
 
     def bunched_s(self, index: int) -> float:
-        """Returns how much closer together than they were sent commands may arrive."""
+        """Returns how much closer together than they were sent commands may take effect."""
         late = self._recently(self._disturbed_s[index], AFTERMATH_S)
-        return self._period_s + (MOST_DELAY_S if late else 0.0)
+        hastened = self._recently(self._hastened_s[index], AFTERMATH_S)
+        return self._period_s + (MOST_DELAY_S if late else 0.0) + (LONGEST_LAG_S if hastened else 0.0)
 
     def is_foreign(self, index: int) -> bool:
         """Returns whether others command the drive's torque."""

@@ -86,4 +86,37 @@ REGRESSIONS = (
             for_s=0.059,
         ),
     ),
+    Regression(
+        "a drive that a bus-off kept from going idle stayed in closed loop because it reported to have left it",
+        Scenario(
+            seed=4487,
+            surroundings=Surroundings(),
+            start="hold",
+            events=(
+                Failure(at_s=0.126, component="bus.left", kind="bus-off", for_s=0.032),
+                Failure(at_s=0.127, component="left_adduction.error", kind="off", for_s=0.583),
+            ),
+            for_s=0.76,
+        ),
+    ),
+    Regression(
+        "a motor whose current loses its lag catches up with its command faster than the slew rate",
+        Scenario(
+            seed=4359,
+            surroundings=Surroundings(
+                seed=272,
+                depth_m=0.027,
+                drives=(("cogging_nm", 0.003), ("message_delay_s", 0.0005), ("overspeed_fraction", 1.2)),
+                configuration=(
+                    ("motion.path_speed_rad_s", 2.6),
+                    ("motion.fade_in_s", 0.1),
+                    ("gait.swing_duration_s", 0.4),
+                    ("gait.insertion_speed_m_s", 0.2),
+                ),
+            ),
+            start="extraction",
+            events=(Harm(at_s=0.217, name="slow current", joint="right_sweep", for_s=0.19),),
+            for_s=0.457,
+        ),
+    ),
 )

@@ -337,6 +337,19 @@ def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> 
     assert len(bench.sent()["left"]) == 2
 
 
+def test_disarming_that_the_bus_refused_is_repeated_whatever_the_drives_report(bench: Bench) -> None:
+    bench.report_everything(1.0, closed_loop=False)
+    bench.drives.read(1.0)
+    bench.drives.ports["left"].full = True  # type: ignore[attr-defined]
+    bench.drives.disarm(1.0, at_once=True)
+    bench.drives.ports["left"].full = False  # type: ignore[attr-defined]
+    bench.sent()
+    bench.drives.disarm(1.01 + REPEAT_S)
+    assert [frame.arbitration_id for frame in bench.sent()["left"]] == [0x00E, 0x007, 0x02E, 0x027]
+    bench.drives.disarm(1.02 + 2.0 * REPEAT_S)
+    assert bench.silent()
+
+
 def test_errors_are_cleared_on_all_drives(bench: Bench) -> None:
     bench.drives.clear_errors()
     assert bench.sent() == {
