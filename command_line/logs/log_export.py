@@ -8,6 +8,7 @@ from pathlib import Path
 from command_line import exit_codes
 from command_line.logs.refusals import UsageError, explain_errors
 from command_line.screen import watched
+from firmware_host.log.whole_files import whole_file
 from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.log_reader import Log, LogError, read_logs
 
@@ -40,9 +41,19 @@ def _write_csv(log: Log, options: Options) -> list[Path]:
     if options.out is None:
         write_lab_csv(log, sys.stdout)
         return []
-    with Path(options.out).open("w", encoding="utf-8") as out, watched() as watch:
-        write_lab_csv(log, out, watch)
-    return []
+    path = Path(options.out)
+    try:
+        with whole_file(path) as hidden, hidden.open("w", encoding="utf-8") as out, watched() as watch:
+            write_lab_csv(log, out, watch)
+    except OSError as problem:
+        raise _not_written(path, problem) from None
+    return [path]
+
+
+def _not_written(path: Path, problem: OSError) -> LogError:
+    """Returns the message for a file or folder that stays as it was; pyarrow's own text names no file."""
+    reason = os.strerror(problem.errno) if problem.errno else str(problem)
+    return LogError(f"{path}: nothing was written: {reason}")
 
 
 def _write_ros(log: Log, options: Options) -> list[Path]:
@@ -55,7 +66,7 @@ def _write_ros(log: Log, options: Options) -> list[Path]:
         with watched() as watch:
             write_ros_log(log, geometry, path, watch)
     except OSError as problem:
-        raise LogError(f"{path}: nothing was written: {problem.strerror or problem}") from None
+        raise _not_written(path, problem) from None
     return [path]
 
 
@@ -70,6 +81,5 @@ def _write_parquet(log: Log, options: Options) -> list[Path]:
     try:
         with watched() as watch:
             return write_parquet(log, folder, _stem(options), watch)
-    except OSError as problem:  # pyarrow's own text names no file
-        reason = os.strerror(problem.errno) if problem.errno else str(problem)
-        raise LogError(f"{folder}: nothing was written: {reason}") from None
+    except OSError as problem:
+        raise _not_written(folder, problem) from None

@@ -10,7 +10,8 @@ from pathlib import Path
 
 
 def hidden_path(path: Path) -> Path:
-    return path.with_name(f".{path.name}")
+    """Return where a file is written first: a device or a pipe, such as /dev/null, itself."""
+    return path if path.exists() and not path.is_file() else path.with_name(f".{path.name}")
 
 
 @contextmanager
@@ -22,9 +23,10 @@ def whole_files(paths: Sequence[Path]) -> Iterator[list[Path]]:
         for written, path in zip(hidden, paths, strict=True):
             written.replace(path)
     except BaseException:
-        for written in hidden:
+        for written, path in zip(hidden, paths, strict=True):
             with suppress(OSError):
-                written.unlink()
+                if written != path:
+                    written.unlink()
         raise
 
 

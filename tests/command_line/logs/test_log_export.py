@@ -48,6 +48,15 @@ def test_a_ros_export_on_a_full_disk_leaves_nothing(tmp_path: Path, capsys: pyte
     assert "nothing was written" in message and list(tmp_path.iterdir()) == []
 
 
+def test_a_csv_on_a_full_disk_leaves_the_file_before(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "walk.csv"
+    path.write_text("before", encoding="utf-8")
+    with files_of_at_most(100_000):
+        message = failure(capsys, "log", "export", "--csv", LOG, "--out", str(path))
+    assert f"{path}: nothing was written" in message
+    assert [(each, each.read_text(encoding="utf-8")) for each in tmp_path.iterdir()] == [(path, "before")]
+
+
 def test_parquet_into_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").touch()
     message = refusal(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
