@@ -92,6 +92,7 @@ class FaultKind(StrEnum):
     DRIVE_VERSION = "drive_version", "drive", NONE, ALWAYS, WHEN_GONE, 2
     DUPLICATE_NODE_ID = "duplicate_node_id", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 500
     WRONG_DRIVE = "wrong_drive", "drive", NONE, ALWAYS, WHEN_GONE, 2
+    DRIVE_SETTINGS = "drive_settings", "drive", NONE, ALWAYS, WHEN_GONE, 800
     FOREIGN_COMMANDS = "foreign_commands", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 2
     SETPOINT_MISMATCH = "setpoint_mismatch", "drive", DRIVES_IDLE, ALWAYS, BY_HAND, 120
     WATCHDOG_UNKNOWN = "watchdog_unknown", "watchdog", NONE, UNLESS_FORCED, WHEN_GONE, 2

@@ -1,25 +1,24 @@
 """The interface of motor drives, independent of the protocol that they speak.
 
-Four drives, one for each joint, are commanded together as `Drives`: read their states, send torques, arm, disarm. A
+A `DriveAxis` is one drive as one joint; drivers/drives.py commands all four together, whatever they speak. A
 `DriveHealth` contains what a drive reports about itself, as opposed to its joint. A `DriveType` describes one protocol:
-the parameters that the configuration states, the drives that speak it, and how to read its frames without commanding a
-drive, which the checks of the wiring and the fault injection need. drivers/drive_types.py lists the types that exist.
-
-Only `Drives` send commands on the drives' buses. Every frame passes a gate (drivers/transmit_gate.py), which refuses
-and counts any command that the limits forbid.
+the parameters that the configuration states, the axis and the gate's table of one drive, and how to read its frames
+without commanding a drive, which the checks of the wiring and the fault injection need. drivers/drive_types.py lists
+the types that exist.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import Annotated, NamedTuple, Protocol
+from typing import Annotated, ClassVar, NamedTuple, Protocol
 
 from control.bounds import Bounds, Meaning
-from control.limits import JointLimits
-from control.records import UNKNOWN, DriveStates, Joints, Torques
+from control.records import UNKNOWN, DriveState
 from drivers.can.bus_load import FrameRate
-from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
+from drivers.transmit_gate import FrameKind, GateTable
+
+FD = 1 << 29  # above every arbitration id
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class DriveParameters:
 
     bus: Annotated[str, Meaning("name of a [bus.NAME] section")]
     node_id: Annotated[int, Bounds(0, 62), Meaning("on that bus", "id")]
-    type: Annotated[str, Meaning("the protocol that the drive speaks; the same for all joints")] = "odrive"
+    type: Annotated[str, Meaning("the protocol that the drive speaks")] = "odrive"
     sign: Annotated[
         int, Bounds(-1, 1), Meaning("-1 for a mirrored motor: inverts angle, velocity, current and torque", "±1")
     ] = 1  # 0 is refused
@@ -38,9 +37,14 @@ class DriveParameters:
     )
     current_limit_a: Annotated[float, Bounds(0.1, 200.0), Meaning("of the drive")] = 12.0
     heartbeat_period_s: Annotated[float, Bounds(0.01, 1.0), Meaning("as set on the drive")] = 0.1  # its default
+    command_delay_s: Annotated[
+        float, Bounds(0.003, 1.0), Meaning("for which it may still report the set-point of an older command")
+    ] = 0.0079  # 3 T
     serial_number: Annotated[
         str, Meaning("of the drive; the robot is not armed with another one; empty: not compared")
     ] = ""
+
+    serial_digits: ClassVar[int] = 12  # hexadecimal ones, of a serial number of this type of drive
 
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         """Yields reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
@@ -79,56 +83,72 @@ class DriveHealth(NamedTuple):
     setpoint_problem: str = ""  # it follows other torques than the commanded ones: for example which
     serial_number: str = ""  # empty until the drive has reported it
     expected_serial_number: str = ""  # as configured
+    setting_problem: str = ""  # a setting that was read back differs from the configuration: which, and what to do
+    other_protocol: str = ""  # in which another drive answers under this id
     busy_state: str = ""  # an activity that this program did not ask for, such as a calibration
     active_errors: str = ""
     errors: str = ""  # active errors and the reason of the last disarming
 
 
-class Drives(Protocol):
-    """The drives of all joints, on one bus or several."""
+class Outlet(Protocol):
+    """The path on which an axis sends its frames."""
 
-    ports: dict[str, CanPort]  # by the name of the bus
-    unknown_frames: int  # of ids that belong to none of the drives
-    malformed_frames: int  # of one of the drives, with a payload that cannot be decoded
+    def send(self, frame: Frame) -> None: ...
 
-    @property
-    def health(self) -> Joints[DriveHealth]: ...
 
-    @property
-    def heard(self) -> bool:
-        """Returns whether every drive has sent every signal that control depends on at least once."""
+class DriveAxis(Protocol):
+    """One drive as one joint: what it reports, and the frames that command it."""
 
     @property
-    def refused_commands(self) -> int:
-        """Commands that the gate has refused since the start."""
+    def parameters(self) -> DriveParameters: ...
 
     @property
-    def last_refusal(self) -> str: ...
+    def closed_loop(self) -> bool:
+        """Returns whether the drive follows torque, by its newest report."""
 
-    def read(self, now_s: float) -> DriveStates:
-        """Reads all frames that have arrived; returns the newest of every signal."""
+    @property
+    def receivers(self) -> Mapping[int, Callable[[bytes, float], None]]:
+        """The handler of payload and stamp for each arbitration id to listen to; with the bit FD for CAN FD frames."""
 
-    def send(self, torques_nm: Torques, elapsed_s: float) -> None:
-        """Commands all torques. They may differ from the ones before by the slew rate times `elapsed_s`."""
+    @property
+    def state(self) -> DriveState: ...
 
-    def send_torque(self, joint: str, torque_nm: float) -> None:
-        """Commands one joint alone, within the step that the last `send` allowed."""
+    @property
+    def health(self) -> DriveHealth: ...
 
-    def arm(self, now_s: float, at_once: bool = False) -> None:
-        """Prepares all drives when `at_once`, else prepares and enables those that do not follow torque yet."""
+    def reset(self) -> None: ...
 
-    def disarm(self, now_s: float, at_once: bool = False) -> None:
-        """Commands zero torque and idle: to all drives when `at_once`, else to those that still follow torque."""
+    def begin_read(self, now_s: float) -> None:
+        """Begins a read: the frames that follow arrived between the previous call and `now_s`."""
 
-    def force_idle(self, repeats: int) -> None:
-        """Commands zero torque and idle to every drive, `repeats` times. Never raises."""
+    def poll(self) -> None:
+        """Asks for all signals, where the drive reports only when asked."""
+
+    def send_torque(self, torque_nm: float) -> None: ...
+
+    def forget_commands(self) -> None:
+        """The last torques may not have left, so the drive may follow older ones."""
+
+    def prepare(self) -> None:
+        """Sets what the drive needs to follow torque; it stays idle."""
+
+    def close_loop(self) -> None: ...
+
+    def disarm(self) -> None:
+        """Commands zero torque and idle."""
 
     def clear_errors(self) -> None: ...
 
     def request_settings(self, now_s: float) -> None:
-        """Asks for firmware version and watchdog, every few seconds: a restart forgets them, and they may change."""
+        """Asks for settings that are unknown or were read long ago. It is called in every tick while idle."""
 
-    def close(self) -> None: ...
+
+class Span(NamedTuple):
+    """Where a signal stands in a payload that contains several, and its bytes where the drive does not know it."""
+
+    begin: int
+    end: int
+    absent: bytes
 
 
 class FrameContent(NamedTuple):
@@ -137,6 +157,7 @@ class FrameContent(NamedTuple):
     node_id: int  # of the drive that sends it or is addressed
     is_command: bool = False  # a drive obeys it and never sends it
     signals: tuple[str, ...] = ()  # what it reports, the main one first: position, current, heartbeat, error, ...
+    spans: Mapping[str, Span] = {}  # of these signals; one without a span is the whole payload
 
 
 class DriveType(Protocol):
@@ -158,13 +179,22 @@ class DriveType(Protocol):
     def reports(self) -> tuple[FrameRate, ...]:
         """The messages that each drive sends cyclically, at the rates that the set-up instructions give."""
 
-    def make_drives(
-        self,
-        parameters: Mapping[str, DriveParameters],
-        ports: Mapping[str, CanPort],
-        limits: JointLimits,
-        endpoints: Sequence[WatchdogEndpoints],
-    ) -> Drives: ...
+    @property
+    def kind(self) -> FrameKind:
+        """The kind of the frames that this program sends. All drives of a bus need the same."""
+
+    def gate_table(self, parameters: DriveParameters) -> GateTable:
+        """Lists everything that may leave for one drive."""
+
+    def make_axis(
+        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
+    ) -> DriveAxis: ...
+
+    def query(self, node_id: int) -> Frame | None:
+        """Returns the frame that asks a drive for all signals; None where drives report by themselves."""
+
+    def announces(self, node_id: int) -> Frame:
+        """Returns a frame that only a drive of this type sends under this id, by itself or when asked."""
 
     def read_frame(self, frame: Frame) -> FrameContent | None:
         """Returns the content of a frame by its id; None for frames of another kind than the protocol uses."""

@@ -1,36 +1,70 @@
 """The types of motor drive that `[drive.JOINT] type` can name. Adding a protocol adds one line to the table.
 
-All drives of a robot are of one type.
+The joints of a robot may have drives of different types, as long as those on one bus send frames of the same kind.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 
 from control.limits import JointLimits
+from control.records import JOINTS
 from drivers.can.bus_load import FrameRate
 from drivers.can.can_port import CanPort
-from drivers.drive import DriveParameters, Drives, DriveType, WatchdogEndpoints
+from drivers.can.frames import Frame
+from drivers.drive import FD, DriveParameters, DriveType, FrameContent, WatchdogEndpoints
+from drivers.drives import Drives
+from drivers.moteus.drive_type import Moteus
 from drivers.odrive.drive_type import Odrive
+from drivers.transmit_gate import TransmitGate
 
 DEFAULT = "odrive"
-DRIVE_TYPES: Mapping[str, DriveType] = {"odrive": Odrive()}
+DRIVE_TYPES: Mapping[str, DriveType] = {"odrive": Odrive(), "moteus": Moteus()}
 
 
-def type_of(parameters: Iterable[DriveParameters]) -> DriveType:
-    """Returns the type of all drives of a robot."""
-    return DRIVE_TYPES[next(iter(parameters)).type]
+def type_of(parameters: DriveParameters) -> DriveType:
+    return DRIVE_TYPES[parameters.type]
 
 
 def make_drives(
     parameters: Mapping[str, DriveParameters],
     ports: Mapping[str, CanPort],
-    limits: JointLimits,
+    limits: JointLimits | None = None,
     endpoints: Sequence[WatchdogEndpoints] = (),
 ) -> Drives:
     """Makes the robot's drives from their parameters by joint, on ports by the name of the bus.
 
     `limits` are what the gate lets pass; `endpoints` belong to further builds of the drives' firmware.
     """
-    return type_of(parameters.values()).make_drives(parameters, ports, limits, endpoints)
+    gate = TransmitGate(limits or JointLimits())
+    outlets = {
+        name: gate.outlet(port, [type_of(each).gate_table(each) for each in parameters.values() if each.bus == name])
+        for name, port in ports.items()
+    }
+    axes = [
+        type_of(parameters[joint]).make_axis(joint, parameters[joint], outlets[parameters[joint].bus], endpoints)
+        for joint in JOINTS
+    ]
+    return Drives(axes, ports, gate, {name: _other_types(parameters, name) for name in ports})
+
+
+def _other_types(parameters: Mapping[str, DriveParameters], bus: str) -> dict[int, tuple[str, str]]:
+    """Returns what drives of other types would send under these node ids: by id, the joint and the type."""
+    return {
+        announced.arbitration_id | FD * announced.is_fd: (joint, name)
+        for joint, drive in parameters.items()
+        if drive.bus == bus
+        for name, other in DRIVE_TYPES.items()
+        if name != drive.type
+        for announced in [other.announces(drive.node_id)]
+    }
+
+
+def read_frame(frame: Frame, drives: Iterable[DriveParameters]) -> FrameContent | None:
+    """Returns the content of a frame on the bus of these drives, by the first of their protocols that knows it."""
+    for name in dict.fromkeys(drive.type for drive in drives):
+        content = DRIVE_TYPES[name].read_frame(frame)
+        if content is not None:
+            return content
+    return None
 
 
 def traffic_of(drives: Iterable[DriveParameters]) -> list[FrameRate]:

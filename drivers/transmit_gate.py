@@ -2,10 +2,11 @@
 
 Each drive has a table in the bytes of its protocol: payloads that may always leave (idle, the configured limits, the
 reading of a parameter), payloads that may leave while the gate is open (following torque), and how a torque command is
-decoded. A torque must be finite, within the limit, and within one slew step of the torque that left before for that
-drive; a torque towards zero is always allowed. It must be exactly zero while the gate is closed. The gate examines the
-bytes as they leave, so it covers signs and encodings. control/limits.py enforces the same limits earlier and more
-gently; this check is the last one and relies on nothing before it.
+decoded. Where all of them share one arbitration id, their payloads distinguish them. A torque must be finite, within
+the limit, and within one slew step of the torque that left before for that drive; a torque towards zero is always
+allowed. It must be exactly zero while the gate is closed, and where a torque command alone lets a drive follow torque,
+none may leave then. The gate examines the bytes as they leave, so it covers signs and encodings. control/limits.py
+enforces the same limits earlier and more gently; this check is the last one and relies on nothing before it.
 
 A refused frame is not sent. It is counted, and its reason is recorded as a message, since a refusal always is a bug. In
 place of a refused torque the gate sends zero torque: the drive's watchdog stays fed and its motor without torque, until
@@ -22,6 +23,7 @@ from control.records import NEVER_S
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 
+NOT_ARMED = "the drives are not armed"
 ROUNDING_NM = 1e-6  # binary32 rounds a torque of 5 N·m by less than a quarter of this
 
 
@@ -45,6 +47,7 @@ class GateTable(NamedTuple):
     checks: Mapping[int, Callable[[bytes], bool]]  # return whether a payload may leave, where a set cannot list it
     requests: frozenset[Frame]  # remote frames that may always leave
     kind: FrameKind = FrameKind()
+    idle: bytes = b""  # replaces a torque while the gate is closed, where even zero torque ends a drive's idleness
 
 
 class TransmitGate:
@@ -85,7 +88,7 @@ class TransmitGate:
         if torque_nm == 0.0:
             return ""
         if not self.is_open:
-            return "the drives are not armed"
+            return NOT_ARMED
         if not -self._largest_nm <= torque_nm <= self._largest_nm:
             return f"the limit is {self._largest_nm:.4g} N·m"
         if not min(before_nm - self._step_nm, 0.0) <= torque_nm <= max(before_nm + self._step_nm, 0.0):
@@ -125,11 +128,13 @@ class GatedPort:
         identifier, data, is_remote, is_error, is_extended, _, is_fd, bit_rate_switch = frame
         if is_remote or is_error or (is_extended, is_fd, bit_rate_switch) != self._kind:
             passes = frame._replace(stamp_s=NEVER_S) in self._requests
-        elif identifier in self._tables:
-            self._send_torque(frame, self._tables[identifier])
-            return
         else:
             passes = self._may_leave(identifier, data)
+            if identifier in self._tables:
+                if not passes:
+                    self._send_torque(frame, self._tables[identifier])
+                    return
+                self._sent_nm[identifier] = 0.0  # another command of the same id, after which no torque is known
         if passes:
             self._port.send(frame)
         else:
@@ -138,11 +143,12 @@ class GatedPort:
     def _send_torque(self, frame: Frame, table: GateTable) -> None:
         identifier = table.torque_id
         torque_nm = table.decode_torque(frame.data)
-        problem = self._gate.torque_problem(torque_nm, self._sent_nm[identifier])
+        idle = b"" if self._gate.is_open else table.idle
+        problem = NOT_ARMED if idle else self._gate.torque_problem(torque_nm, self._sent_nm[identifier])
         if problem:
             what = f"The torque command of {torque_nm:.4g} N·m to node {table.node_id}"
             self._gate.refuse(f"{what} was replaced by zero torque: {problem}.")
-            torque_nm, frame = 0.0, frame._replace(data=table.zero_torque)
+            torque_nm, frame = 0.0, frame._replace(data=idle or table.zero_torque)
         self._sent_nm[identifier] = torque_nm
         self._port.send(frame)
 

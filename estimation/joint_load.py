@@ -8,7 +8,8 @@ repeats the one before adds nothing.
 In a quick stroke the inertial torque exceeds the mud's load, so all terms must belong to the same time. Two velocities
 give the mean acceleration between their measurements; the angle is taken half-way, and the current as its mean over
 that interval. A drive holds each command until the next, so its current is a staircase with a step at each command; if
-the last two samples answer the last two commands, that mean is known. If messages come more slowly than commands, or
+the last two samples answer two successive commands, that mean is known: the last two, or, of drives that answer before
+they execute a command, those before. If messages come more slowly than commands, or
 the times of the commands are unknown, the current is taken along the line through both samples. (Across a step the line
 errs by up to half of it: in a walk's quick extraction from soft mud, by a seventh of k_e.) Drives send angle and
 current separately, and faster or slower than the loop, so each has its own stamp.
@@ -73,8 +74,9 @@ def motion_between(before: DriveState, now: DriveState, commands_s: CommandTimes
     dt_s, change_rad_s = angle_s - angle_before_s, now_rad_s - before_rad_s
     if not (SHORTEST_GAP_S < dt_s < LONGEST_GAP_S and isfinite(change_rad_s)):
         return angle_rad, now_rad_s, 0.0, current_a
-    if earlier_s < current_before_s <= later_s < current_s:
-        fraction = (later_s - angle_before_s) / dt_s
+    stepped_s = later_s if later_s < current_s else earlier_s  # the newest command that this current follows
+    if earlier_s < current_before_s <= later_s < current_s or current_before_s <= earlier_s < current_s <= later_s:
+        fraction = (stepped_s - angle_before_s) / dt_s
         current_a += (current_before_a - current_a) * (
             fraction if 0.0 < fraction < 1.0 else 1.0 if fraction > 0.0 else 0.0
         )

@@ -30,7 +30,7 @@ class BusError(NotOpenError):
 def open_bus(name: str, bus: BusParameters) -> CanPort:
     """Open one bus; raises BusError."""
     try:
-        return open_port(bus.interface, bus.channel, bus.options)
+        return open_port(bus.interface, bus.channel, bus.options, fd=bus.data_bit_rate_kbit_s > 0)
     except (can.CanError, OSError, ValueError, TypeError, ImportError) as problem:
         cause = CAUSES.get(_error_number(problem), str(problem))
         raise BusError(f"bus.{name} ({bus.interface} {bus.channel}) does not open: {cause}") from problem

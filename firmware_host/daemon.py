@@ -21,8 +21,8 @@ from control.modes import ENERGISED, Mode, Request
 from control.rate import RATE_HZ
 from drivers.can.bus_lock import BusRole
 from drivers.can.reopening_port import ReopeningPort
-from drivers.drive import Drives
 from drivers.drive_types import make_drives
+from drivers.drives import Drives
 from drivers.fault_injection.failing_port import failing_ports
 from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import Failures

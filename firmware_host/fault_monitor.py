@@ -27,7 +27,8 @@ from control.records import (
     same_for_both,
 )
 from drivers.can.can_port import BusState
-from drivers.drive import DriveHealth, Drives
+from drivers.drive import DriveHealth
+from drivers.drives import Drives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import LogReport
 from firmware_host.loop_monitor import LogMonitor, LoopMonitor
@@ -166,9 +167,8 @@ class FaultMonitor:
             lost = port.failed_sends > self._failed_sends[name]
             self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
             self._failed_sends[name] = port.failed_sends
-            if self._refused_ticks[name] >= REFUSED_TICKS:
-                ticks, reason = self._refused_ticks[name], port.last_send_error
-                found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=reason))
+            if (ticks := self._refused_ticks[name]) >= REFUSED_TICKS:
+                found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=port.last_send_error))
 
     def _check_joints(
         self, found: list[Fault], tick: Tick, monitor_input: MonitorInput, drives: Joints[DriveHealth]
@@ -221,9 +221,8 @@ class FaultMonitor:
         self.trusted = Joints(*(joint not in blind for joint in JOINTS)) if blind else ALL_TRUSTED
 
     def _check_arming(self, found: list[Fault], states: DriveStates) -> None:
-        for joint, state in zip(JOINTS, states, strict=True):
-            if not state.closed_loop:
-                found.append(FaultKind.ARMING_FAILED.fault(joint, longest_s=ARMING_S))
+        idle = (joint for joint, state in zip(JOINTS, states, strict=True) if not state.closed_loop)
+        found += [FaultKind.ARMING_FAILED.fault(joint, longest_s=ARMING_S) for joint in idle]
 
     def _check_gate(self, found: list[Fault]) -> None:
         refused = self._drives.refused_commands
@@ -251,11 +250,13 @@ class FaultMonitor:
             found.append(FaultKind.DUPLICATE_NODE_ID.fault(joint))
         self._check_obedience(found, health)
         if health.serial_number != health.expected_serial_number and health.expected_serial_number:
-            serials = {"serial": health.serial_number or "unknown", "expected": health.expected_serial_number}
-            found.append(FaultKind.WRONG_DRIVE.fault(joint, **serials))
+            serial, expected = health.serial_number or "unknown", health.expected_serial_number
+            found.append(FaultKind.WRONG_DRIVE.fault(joint, serial=serial, expected=expected))
         if not health.firmware_supported:
-            version, supported = health.firmware or "unknown", health.supported_firmware
-            found.append(FaultKind.DRIVE_VERSION.fault(joint, version=version, supported=supported))
+            version = health.firmware or "unknown"
+            found.append(FaultKind.DRIVE_VERSION.fault(joint, version=version, supported=health.supported_firmware))
+        if health.setting_problem:
+            found.append(FaultKind.DRIVE_SETTINGS.fault(joint, reason=health.setting_problem))
         self._check_watchdog(found, joint, health.watchdog_s)
 
     def _check_obedience(self, found: list[Fault], health: DriveHealth) -> None:
@@ -269,11 +270,9 @@ class FaultMonitor:
 
     def _check_watchdog(self, found: list[Fault], joint: str, watchdog_s: float) -> None:
         """Check the drive's watchdog, the only protection if this program dies."""
-        if 0.0 < watchdog_s <= self._longest_watchdog_s:
-            return
         if isnan(watchdog_s):
             found.append(FaultKind.WATCHDOG_UNKNOWN.fault(joint))
-        else:
+        elif not 0.0 < watchdog_s <= self._longest_watchdog_s:
             setting = f"set to {watchdog_s:g} s" if watchdog_s else "off"
             found.append(FaultKind.WATCHDOG_OFF.fault(joint, setting=setting, longest_s=self._longest_watchdog_s))
 

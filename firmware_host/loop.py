@@ -28,7 +28,7 @@ from control.records import (
     Torques,
     same_for_all,
 )
-from drivers.drive import Drives
+from drivers.drives import Drives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
@@ -218,13 +218,14 @@ class Loop:
     def _command(self, now_s: float) -> None:
         """Send the axis states that the mode needs, then the torques.
 
-        Idle drives get zero torque, which feeds their watchdogs. In BOOT only disarming is sent.
+        Idle drives get zero torque, which feeds their watchdogs. In BOOT only disarming and requests are sent.
         """
         if self.mode is Mode.ARMING:
             self.drives.arm(now_s)
         elif self.mode not in ENERGISED:
             self.drives.disarm(now_s)
         if self.mode is Mode.BOOT:
+            self.drives.poll()
             return
         if self.mode is Mode.IDLE:
             self.drives.request_settings(now_s)

@@ -159,11 +159,22 @@ def test_a_circle_is_noticed() -> None:
 def test_only_its_own_folder_and_the_tables_know_a_protocol(protocol: str) -> None:
     """A further drive protocol touches drivers/PROTOCOL, drivers/drive_types.py and simulation/devices alone."""
     driver, device = f"drivers.{protocol}", f"simulation.devices.{protocol}"
-    assert any(room(module) == driver for module in sources()) and device in sources()
+    assert any(room(module) == driver for module in sources())
+    assert any(module == device or room(module) == device for module in sources())
     knowing = {
         module
         for module in sources()
         for imported in imported_modules(module)
-        if (imported == device or room(imported) == driver) and room(module) != driver
+        if (imported == device or room(imported) in (device, driver)) and room(module) != driver
     }
-    assert {module for module in knowing if room(module) != "simulation.devices"} == {"drivers.drive_types"}
+    assert {each for each in knowing if not each.startswith("simulation.devices")} == {"drivers.drive_types"}
+
+
+@pytest.mark.parametrize("protocol", DRIVE_TYPES)
+def test_no_file_of_the_process_names_a_protocol(protocol: str) -> None:
+    naming = [
+        str(path.relative_to(ROOT))
+        for path in (ROOT / "firmware_host").rglob("*.py")
+        if protocol in path.read_text(encoding="utf-8").lower()
+    ]
+    assert not naming

@@ -16,6 +16,7 @@ def run_faults(options: argparse.Namespace) -> int:
             faults=tuple(dict.fromkeys(options.fault or matrix.FAULTS)),
             phases=tuple(dict.fromkeys(options.phase or PHASES)),
             seeds=options.seeds,
+            drive=options.drive,
         )
     except ValueError as problem:
         return refuse(str(problem))

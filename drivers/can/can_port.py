@@ -16,6 +16,7 @@ import can
 from can.interfaces.socketcan import SocketcanBus
 
 from control.records import NEVER_S
+from drivers.can.can_fd import fd_options
 from drivers.can.frames import Frame, without_stamps
 from drivers.can.port_health import MOST_FRAMES_PER_READ as MOST_FRAMES_PER_READ
 from drivers.can.port_health import BusState as BusState  # re-exported for users of a port
@@ -152,8 +153,10 @@ def message_from(frame: Frame) -> can.Message:
     )
 
 
-def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool]) -> CanPort:
+def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool], fd: bool = False) -> CanPort:
     """Opens an interface; raises python-can's own errors where it does not open: see firmware_host/buses.py.
+
+    With `fd` it also carries CAN FD frames; ValueError is raised where it cannot.
 
     The configuration files and environment variables of python-can are ignored: they would add a user's own options to
     the bus, and reading them leaves garbage in cycles, which a process without a garbage collector never frees.
@@ -161,7 +164,8 @@ def open_port(interface: str, channel: str, options: dict[str, str | int | float
     if interface in ECHOING_INTERFACES or options.get("receive_own_messages"):
         raise ValueError("it would receive its own frames, which look like another program's commands")
     logging.getLogger("can").setLevel(logging.WARNING)  # at level debug it would format every frame
-    bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **options)  # type: ignore[arg-type]
+    more: dict[str, Any] = (fd_options(interface, channel) if fd else {}) | options
+    bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **more)
     if isinstance(bus, SocketcanBus):
         return SocketcanPort(bus)
     return SlcanPort(bus) if interface == "slcan" else PythonCanPort(bus)

@@ -17,8 +17,8 @@ from struct import Struct
 
 from drivers.can.can_port import BusState, CanPort
 from drivers.can.frames import DATA_MAX_BYTES, STANDARD_MASK, Frame
-from drivers.drive import DriveParameters, DriveType
-from drivers.drive_types import type_of
+from drivers.drive import DriveParameters, FrameContent, Span
+from drivers.drive_types import read_frame, type_of
 from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
 
 NO_NODE = -1
@@ -70,8 +70,8 @@ class FailingPort:
         self._bus = f"bus.{name}"
         self._port = port
         self._failures = failures
-        self._drive_type: DriveType = type_of(drives.values())
-        joints = {drive.node_id: joint for joint, drive in drives.items() if drive.bus == name}
+        self._drives = {joint: drive for joint, drive in drives.items() if drive.bus == name}
+        joints = {drive.node_id: joint for joint, drive in self._drives.items()}
         self._joints = joints
         self._listeners = {node_id: (self._bus, joint, f"{joint}.command") for node_id, joint in joints.items()}
         self._incoming, self._outgoing = DelayLine(attrgetter("arbitration_id")), DelayLine(self._node_id)
@@ -110,7 +110,7 @@ class FailingPort:
             changed = self._after_failures(frame)
             if changed is None:
                 continue
-            if not self._delays(changed, self._senders_of(changed), self._incoming):
+            if not self._delays(changed, self._senders_of(changed)[0], self._incoming):
                 arrived.append(changed)
         if failure and failure.kind is FailureKind.GARBAGE:
             arrived += _random_frames(failures.random)
@@ -128,13 +128,16 @@ class FailingPort:
             return True
         return False
 
-    def _senders_of(self, frame: Frame) -> tuple[str, ...]:
-        """Returns the components whose failures change a frame from the bus, in this order."""
-        content = self._drive_type.read_frame(frame)
+    def _senders_of(self, frame: Frame) -> tuple[tuple[str, ...], FrameContent | None]:
+        """Returns the components whose failures change a frame from the bus, in this order, and its content."""
+        content = self._content(frame)
         joint = self._joints.get(content.node_id) if content else None
         if content is None or joint is None:
-            return (self._bus,)
-        return (self._bus, joint, *(f"{joint}.{signal}" for signal in content.signals))
+            return (self._bus,), None
+        return (self._bus, joint, *(f"{joint}.{signal}" for signal in content.signals)), content
+
+    def _content(self, frame: Frame) -> FrameContent | None:
+        return read_frame(frame, self._drives.values())
 
     @property
     def _due_s(self) -> float:
@@ -143,19 +146,33 @@ class FailingPort:
 
     def _after_failures(self, frame: Frame) -> Frame | None:
         """Returns the frame as the active failures change it, or None where they lose it."""
-        for component in self._senders_of(frame):
+        components, content = self._senders_of(frame)
+        for component in components:
             failure = self._failures.of(component)
             if failure is None:
                 continue
+            joint, _, signal = component.partition(".")
+            span = content.spans.get(signal) if content else None
             data: bytes | None
-            if component.endswith(".error"):
-                data = self._with_error(frame, failure)
+            if signal == "error":
+                data = self._with_error(frame, failure, self._drives[joint])
+            elif span is not None:
+                data = self._with_failed_span(frame, failure, span)
             else:
                 data = self._after_failure(frame, failure, of_bus=component == self._bus)
             if data is None:
                 return None
             frame = frame if data is frame.data else frame._replace(data=data)
         return frame
+
+    def _with_failed_span(self, frame: Frame, failure: Failure, span: Span) -> bytes:
+        """Changes one signal of a payload that contains several."""
+        data, own = frame.data, frame._replace(data=frame.data[span.begin : span.end])
+        changed = self._after_failure(own, failure, of_bus=False)
+        if changed is None:
+            changed = span.absent
+        changed = changed.ljust(len(own.data), b"\0")[: len(own.data)]
+        return data[: span.begin] + changed + data[span.end :]
 
     def _after_failure(self, frame: Frame, failure: Failure, of_bus: bool) -> bytes | None:
         """Returns the changed payload, or None. A bus corrupts half of its frames, and a stuck one still hears."""
@@ -175,18 +192,19 @@ class FailingPort:
             self._frozen[key] = failure, data
         return data
 
-    def _with_error(self, frame: Frame, failure: Failure) -> bytes:
+    def _with_error(self, frame: Frame, failure: Failure, drive: DriveParameters) -> bytes:
         """Adds an error to a heartbeat or an error report; returns one that is malformed already as it is."""
         kind = failure.kind
         if kind is FailureKind.INTERMITTENT and self._failures.loses():
             return frame.data
-        flags = 0 if kind is FailureKind.OFF else self._drive_type.example_error
+        drive_type = type_of(drive)
+        flags = 0 if kind is FailureKind.OFF else drive_type.example_error
         if kind is FailureKind.GARBAGE:
             flags = self._failures.random.getrandbits(32) | 1
-        return self._drive_type.with_error(frame, flags, idle=kind is not FailureKind.GARBAGE)
+        return drive_type.with_error(frame, flags, idle=kind is not FailureKind.GARBAGE)
 
     def _node_id(self, frame: Frame) -> int:
-        content = self._drive_type.read_frame(frame)
+        content = self._content(frame)
         return content.node_id if content else NO_NODE
 
     def send(self, frame: Frame) -> None:

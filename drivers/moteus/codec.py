@@ -16,9 +16,10 @@ from struct import Struct, error
 from typing import NamedTuple
 
 from drivers.can.frames import MalformedMessageError
+from drivers.moteus.registers import padded
 
 REPLY_WANTED = 0x8000
-BROADCAST = 0x7F
+HOST = 0  # the id of this program
 
 
 class Mode(IntEnum):
@@ -34,6 +35,7 @@ STOP = bytes.fromhex("010000")
 # mode as int8; position and velocity as float; q current as float; motor temperature as int8; voltage, board
 # temperature and fault as int8; torque of the drive's controller as int16
 QUERY = bytes.fromhex("1100 1e01 1d04 110a 130d 153a")
+QUERY_ALONE, STOP_AND_QUERY = padded(QUERY), padded(STOP + QUERY)
 _FLOAT = Struct("<f")
 _TORQUE_HEAD = bytes.fromhex("01000a 02208000 0d22")  # position mode; position NaN, velocity 0; torque as float
 _TORQUE_TAIL = bytes.fromhex("02230000 012b00") + QUERY  # scales of kp, kd and the integrator's limit 0
@@ -41,9 +43,10 @@ TORQUE_BYTES = len(_TORQUE_HEAD) + _FLOAT.size + len(_TORQUE_TAIL)
 # The headers of the reply's subframes stand between the values, and one NOP behind them.
 _REPLY = Struct("<2s b 2s 2f 2s f 2s b 2s 3b 2s h s")
 _REPLY_HEADS = tuple(bytes.fromhex(head) for head in ("2100", "2e01", "2d04", "210a", "230d", "253a", "50"))
-REPLY_BYTES = _REPLY.size
+REPLY_BYTES, FIRST_REPLY_BYTE = _REPLY.size, 0x21
+ABSENT = -128  # an int8 that the drive does not know
 VOLTAGE_V, TORQUE_NM = 0.5, 0.01  # of the smallest step
-FIRST_FAULT, LAST_FAULT = 32, 95  # beyond, the code says which limit is active and is no fault
+UNKNOWN_FAULT = 0xFF  # a drive that reports the mode FAULT without a code
 TIMEOUT_FLAG = 0x100  # this program's own number for the mode TIMEOUT, next to the drive's fault codes
 
 FAULT_NAMES = {
@@ -81,6 +84,7 @@ class Reply(NamedTuple):
     voltage_v: float
     fault: int
     control_torque_nm: float
+    board_temperature_c: float = 0.0
 
 
 def command_id(node_id: int) -> int:
@@ -89,6 +93,13 @@ def command_id(node_id: int) -> int:
 
 def reply_id(node_id: int) -> int:
     return node_id << 8
+
+
+def error_flags(mode: int, fault: int) -> int:
+    """Returns the drive's fault, or TIMEOUT_FLAG; 0 for the limits that the same register names in other modes."""
+    if mode == Mode.TIMEOUT:
+        return TIMEOUT_FLAG
+    return (fault or UNKNOWN_FAULT) if mode == Mode.FAULT else 0
 
 
 def error_text(flags: int) -> str:
@@ -120,10 +131,10 @@ def encode_reply(reply: Reply) -> bytes:
         c,
         reply.q_current_a,
         d,
-        -128 if temperature_c != temperature_c else int(temperature_c),
+        ABSENT if temperature_c != temperature_c else int(temperature_c),
         e,
         int(reply.voltage_v / VOLTAGE_V),
-        0,
+        int(reply.board_temperature_c),
         reply.fault,
         f,
         -32768 if torque_nm != torque_nm else int(torque_nm / TORQUE_NM),
@@ -134,7 +145,9 @@ def encode_reply(reply: Reply) -> bytes:
 def decode_reply(data: bytes) -> Reply:
     """Raises MalformedMessageError for a payload that does not answer QUERY."""
     try:
-        a, mode, b, position, velocity, c, current, d, motor, e, voltage, _, fault, f, torque, g = _REPLY.unpack(data)
+        a, mode, b, position, velocity, c, current, d, motor, e, voltage, board, fault, f, torque, g = _REPLY.unpack(
+            data
+        )
     except error as problem:
         raise MalformedMessageError(f"a reply of {len(data)} bytes") from problem
     if (a, b, c, d, e, f, g) != _REPLY_HEADS:
@@ -144,8 +157,9 @@ def decode_reply(data: bytes) -> Reply:
         position,
         velocity,
         current,
-        nan if motor == -128 else float(motor),
-        nan if voltage == -128 else VOLTAGE_V * voltage,
+        nan if motor == ABSENT else float(motor),
+        nan if voltage == ABSENT else VOLTAGE_V * voltage,
         fault,
         nan if torque == -32768 else TORQUE_NM * torque,
+        board,
     )

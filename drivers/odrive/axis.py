@@ -11,28 +11,21 @@ Emergency stops are no such commands, and neither are requests to read: any prog
 
 from collections.abc import Callable, Sequence
 from math import isfinite, isnan, nan, pi
-from typing import Protocol
 
 from control.records import NEVER_S, UNKNOWN, DriveState
 from drivers.can.frames import Frame
-from drivers.drive import DriveHealth, WatchdogEndpoints
+from drivers.drive import DriveHealth, Outlet, WatchdogEndpoints
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
 from drivers.odrive.drive_settings import SUPPORTED, DriveSettings
 from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
 from drivers.odrive.parameters import OdriveParameters
-from drivers.odrive.setpoint_monitor import SetpointMonitor
+from drivers.setpoint_monitor import SetpointMonitor
 
 RESTART_SILENCE_S = 0.3  # three heartbeats
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
 QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)  # in which nothing runs by itself
-
-
-class Outlet(Protocol):
-    """The path on which an axis sends its frames."""
-
-    def send(self, frame: Frame) -> None: ...
 
 
 class OdriveAxis:
@@ -48,7 +41,9 @@ class OdriveAxis:
         self._rad_per_turn = parameters.sign * TURN_RAD
         self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
         self._duplicates = DuplicateNodeMonitor(parameters.heartbeat_period_s)
-        self.setpoints = SetpointMonitor(parameters)
+        self.setpoints = SetpointMonitor(
+            parameters.command_delay_s, parameters.velocity_limit_turn_s, parameters.velocity_gain_nm_s_turn
+        )
         self.reset()
 
     def reset(self) -> None:
@@ -66,7 +61,7 @@ class OdriveAxis:
         self._foreign_commands = 0
         self._duplicates.reset()
         self.setpoints.reset()
-        self.settings.forget()
+        self.settings.reset()
         self._health: DriveHealth | None = None
 
     def begin_read(self, now_s: float) -> None:
@@ -266,22 +261,15 @@ class OdriveAxis:
     def clear_errors(self) -> None:
         self._transmit(codec.CLEAR_ERRORS, 0)
 
-    def request_version(self) -> None:
-        """Asks for the version by a remote frame."""
-        self._outlet.send(Frame(arbitration_id(self.parameters.node_id, codec.GET_VERSION), is_remote=True))
+    def forget_commands(self) -> None:
+        self.setpoints.forget_commands()
 
-    def request_serial_number(self) -> None:
-        """Asks where one is expected. Firmware 0.5 would take the request for a new node id, so 0.6 must be known."""
-        if self.settings.expected_serial_number and self.settings.supported:
-            self._outlet.send(Frame(arbitration_id(self.parameters.node_id, codec.ADDRESS), is_remote=True))
+    def poll(self) -> None:
+        """Does nothing: an ODrive reports by itself."""
 
-    def request_watchdog(self) -> None:
-        """Asks for the watchdog's settings where their numbers in the drive's build are known."""
-        endpoints = self.settings.watchdog_endpoints
-        if endpoints is None:
-            return
-        for endpoint in (endpoints.enable, endpoints.timeout):
-            self._transmit(codec.RX_SDO, codec.SDO_READ, endpoint, 0)
+    def request_settings(self, now_s: float) -> None:
+        for frame in self.settings.due_requests(self.parameters.node_id, now_s):
+            self._outlet.send(frame)
 
     def _transmit(self, message: Message, *values: float) -> None:
         self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values)))

@@ -5,16 +5,19 @@ every build and for each kind of board, and publishes the numbers as flat_endpoi
 numbers of this very build the watchdog stays unknown, because a number of another build reads some other parameter.
 """
 
-from collections.abc import Sequence
-from math import nan
+from collections.abc import Iterator, Sequence
+from math import isfinite, nan
 from typing import NamedTuple
 
-from control.records import UNKNOWN
+from control.records import NEVER_S, UNKNOWN
+from drivers.can.frames import Frame
 from drivers.drive import WatchdogEndpoints
 from drivers.odrive import codec
-from drivers.odrive.codec import MalformedMessageError
+from drivers.odrive.codec import MalformedMessageError, arbitration_id
 
 SUPPORTED = (0, 6)  # major and minor version of the firmware whose messages the codec knows
+REPEAT_UNKNOWN_S = 0.5  # between two requests for a setting that is still unknown
+REFRESH_S = 2.0  # between two requests for a known setting, which may be changed over USB
 LONGEST_WATCHDOG_S = 3600.0  # a larger number is no time-out
 
 
@@ -30,6 +33,10 @@ class DriveSettings:
     def __init__(self, expected_serial_number: str = "", endpoints: Sequence[WatchdogEndpoints] = ()) -> None:
         self.expected_serial_number = expected_serial_number  # empty: any
         self._endpoints = tuple(endpoints)
+        self.reset()
+
+    def reset(self) -> None:
+        self._requested_s = {"version": NEVER_S, "watchdog": NEVER_S, "serial number": NEVER_S}
         self.forget()
 
     def forget(self) -> None:
@@ -59,6 +66,24 @@ class DriveSettings:
             if not 0.0 <= timeout_s <= LONGEST_WATCHDOG_S:
                 raise MalformedMessageError("not a time")
             self._watchdog_timeout_s = timeout_s
+
+    def due_requests(self, node_id: int, now_s: float) -> Iterator[Frame]:
+        """Yields the frames that ask for settings: unknown ones every REPEAT_UNKNOWN_S, all others every REFRESH_S."""
+        if self._is_due("version", self.version is not None, now_s):
+            yield Frame(arbitration_id(node_id, codec.GET_VERSION), is_remote=True)
+        endpoints = self.watchdog_endpoints
+        if self._is_due("watchdog", isfinite(self.watchdog_s), now_s) and endpoints is not None:
+            for endpoint in (endpoints.enable, endpoints.timeout):
+                yield Frame(arbitration_id(node_id, codec.RX_SDO), codec.RX_SDO.encode(codec.SDO_READ, endpoint, 0))
+        # Firmware 0.5 would take this request for a new node id.
+        if self._is_due("serial number", self.identified, now_s) and self.expected_serial_number and self.supported:
+            yield Frame(arbitration_id(node_id, codec.ADDRESS), is_remote=True)
+
+    def _is_due(self, setting: str, is_known: bool, now_s: float) -> bool:
+        if now_s - self._requested_s[setting] < (REFRESH_S if is_known else REPEAT_UNKNOWN_S):
+            return False
+        self._requested_s[setting] = now_s
+        return True
 
     @property
     def identified(self) -> bool:

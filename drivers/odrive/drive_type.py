@@ -4,16 +4,16 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import cast
 
-from control.limits import JointLimits
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
-from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
-from drivers.drive import DriveParameters, FrameContent, WatchdogEndpoints
+from drivers.drive import DriveParameters, FrameContent, Outlet, WatchdogEndpoints
 from drivers.odrive import codec
+from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
-from drivers.odrive.drives import OdriveDrives
+from drivers.odrive.gate_tables import gate_table
 from drivers.odrive.parameters import OdriveParameters
+from drivers.transmit_gate import FrameKind, GateTable
 
 SIGNALS: Mapping[int, tuple[str, ...]] = {
     codec.GET_ENCODER_ESTIMATES.command: ("position",),
@@ -33,6 +33,7 @@ class Odrive:
     """Describes the ODrive protocol, as DriveType requires."""
 
     parameters = OdriveParameters
+    kind = FrameKind()
     example_error = GATE_DRIVER_FAULT
     command = FrameRate(len(codec.SET_INPUT_TORQUE.encode(0.0)), RATE_HZ)
     reports = (
@@ -41,14 +42,19 @@ class Odrive:
         *(FrameRate(REPORT_BYTES, SLOW_HZ),) * 4,  # heartbeat, errors, temperature, voltage
     )
 
-    def make_drives(
-        self,
-        parameters: Mapping[str, DriveParameters],
-        ports: Mapping[str, CanPort],
-        limits: JointLimits,
-        endpoints: Sequence[WatchdogEndpoints],
-    ) -> OdriveDrives:
-        return OdriveDrives(cast(Mapping[str, OdriveParameters], parameters), ports, limits, endpoints)
+    def gate_table(self, parameters: DriveParameters) -> GateTable:
+        return gate_table(cast(OdriveParameters, parameters))
+
+    def make_axis(
+        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
+    ) -> OdriveAxis:
+        return OdriveAxis(joint, cast(OdriveParameters, parameters), outlet, endpoints)
+
+    def query(self, node_id: int) -> None:
+        """An ODrive reports by itself."""
+
+    def announces(self, node_id: int) -> Frame:
+        return Frame(arbitration_id(node_id, codec.HEARTBEAT), codec.HEARTBEAT.encode(0, AxisState.IDLE, 0, 0))
 
     def read_frame(self, frame: Frame) -> FrameContent | None:
         if frame.is_extended or frame.is_error or frame.is_fd:
@@ -61,9 +67,7 @@ class Odrive:
         return {
             "requests of the position": Frame(arbitration_id(node_id, codec.GET_ENCODER_ESTIMATES), is_remote=True),
             "requests of the version": Frame(arbitration_id(node_id, codec.GET_VERSION), is_remote=True),
-            "heartbeats of another drive": Frame(
-                arbitration_id(UNUSED_NODE, codec.HEARTBEAT), codec.HEARTBEAT.encode(0, AxisState.IDLE, 0, 0)
-            ),
+            "heartbeats of another drive": self.announces(UNUSED_NODE),
         }
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:

@@ -17,9 +17,6 @@ class OdriveParameters(DriveParameters):
     velocity_gain_nm_s_turn: Annotated[
         float, Bounds(0.01, 20.0), Meaning("with which the drive cuts torque above the velocity limit")
     ] = 0.5
-    command_delay_s: Annotated[
-        float, Bounds(0.003, 1.0), Meaning("for which it may still report the set-point of an older command")
-    ] = 0.0079  # 3 T
 
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         """The drive clamps torque to its velocity limit times the gain without reporting it."""

@@ -64,12 +64,10 @@ def check_watchdog_times(test_rig: TestRig) -> Readings:
 
 
 def check_what_feeds_watchdogs(test_rig: TestRig) -> Readings:
-    drive_type = type_of(test_rig.configuration.drive.values())
-    for kind in drive_type.harmless_frames(0):
-        others = [
-            (test_rig.drives.ports[drive.bus], drive_type.harmless_frames(drive.node_id)[kind])
-            for drive in test_rig.configuration.drive.values()
-        ]
+    drives = test_rig.configuration.drive.values()
+    harmless = [(test_rig.drives.ports[drive.bus], type_of(drive).harmless_frames(drive.node_id)) for drive in drives]
+    for kind in dict.fromkeys(kind for _, frames in harmless for kind in frames):
+        others = [(port, frames[kind]) for port, frames in harmless if kind in frames]
         yield from _readings_among(test_rig, kind, others)
 
 

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from math import inf, isfinite, isnan, nan
 
 from control.rate import PERIOD_S, RATE_HZ
-from drivers.can.bus_load import MOST_FRACTION, bus_load, frame_bits
+from drivers.can.bus_load import MOST_FRACTION, FrameRate, bus_load
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, DriveParameters, FrameContent
-from drivers.drive_types import traffic_of, type_of
+from drivers.drive_types import read_frame, traffic_of, type_of
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import TestRig
@@ -42,11 +42,11 @@ def check_ids(test_rig: TestRig) -> Readings:
 
 
 def _messages_of(test_rig: TestRig, bus: str, node_id: int) -> int:
-    return sum(_is_ours(test_rig, frame, {node_id}) for frame in test_rig.rig.overheard.frames[bus])
+    return sum(_is_ours(test_rig, bus, frame, {node_id}) for frame in test_rig.rig.overheard.frames[bus])
 
 
-def _content(test_rig: TestRig, frame: Frame) -> FrameContent | None:
-    return type_of(test_rig.configuration.drive.values()).read_frame(frame)
+def _content(test_rig: TestRig, bus: str, frame: Frame) -> FrameContent | None:
+    return read_frame(frame, (drive for drive in test_rig.configuration.drive.values() if drive.bus == bus))
 
 
 def _whereabouts(test_rig: TestRig, drive: DriveParameters) -> str:
@@ -62,22 +62,24 @@ def check_unknown_ids(test_rig: TestRig) -> Readings:
     """Check that no other drive or program sends on the buses."""
     for bus, frames in test_rig.rig.overheard.frames.items():
         ours = {drive.node_id for drive in test_rig.configuration.drive.values() if drive.bus == bus}
-        strange = Counter(_name_of(test_rig, frame) for frame in frames if not _is_ours(test_rig, frame, ours))
+        strange = Counter(
+            _name_of(test_rig, bus, frame) for frame in frames if not _is_ours(test_rig, bus, frame, ours)
+        )
         most = ", ".join(name for name, _ in strange.most_common(3))
         advice = f"{most}: take it off the bus, or correct its node id" if strange else ""
         yield Reading(f"{bus}: frames of unknown senders", sum(strange.values()), "", 0, 0, advice)
 
 
-def _is_ours(test_rig: TestRig, frame: Frame, node_ids: set[int]) -> bool:
+def _is_ours(test_rig: TestRig, bus: str, frame: Frame, node_ids: set[int]) -> bool:
     """Return whether one of these drives sent the frame."""
-    content = None if frame.is_remote else _content(test_rig, frame)
+    content = None if frame.is_remote else _content(test_rig, bus, frame)
     return content is not None and content.node_id in node_ids and not content.is_command
 
 
-def _name_of(test_rig: TestRig, frame: Frame) -> str:
+def _name_of(test_rig: TestRig, bus: str, frame: Frame) -> str:
     if frame.is_error:
         return "error frames (check wiring, termination and bit rate)"
-    content = _content(test_rig, frame)
+    content = _content(test_rig, bus, frame)
     if content is None:
         return f"{'extended ' if frame.is_extended else ''}id 0x{frame.arbitration_id:x}"
     by_a_program = f"commands to node {content.node_id} from another program"
@@ -99,7 +101,7 @@ def check_message_rates(test_rig: TestRig) -> Readings:
 def _rate_hz(test_rig: TestRig, drive: DriveParameters, signal: str) -> float:
     """The rate of the messages whose main signal this is."""
     overheard = test_rig.rig.overheard
-    contents = [_content(test_rig, frame) for frame in overheard.frames[drive.bus] if not frame.is_remote]
+    contents = [_content(test_rig, drive.bus, frame) for frame in overheard.frames[drive.bus] if not frame.is_remote]
     count = sum(
         each is not None and (each.node_id, each.signals[:1]) == (drive.node_id, (signal,)) for each in contents
     )
@@ -111,12 +113,11 @@ def check_bus_loads(test_rig: TestRig) -> Readings:
     overheard = test_rig.rig.overheard
     for name, bus in test_rig.configuration.bus.items():
         drives = [drive for drive in test_rig.configuration.drive.values() if drive.bus == name]
-        commands = [type_of(drives).command for _ in drives]
-        frames = overheard.frames[name]  # an extended identifier has 20 bits more
-        bits_s = sum(frame_bits(len(frame.data))[1] + 20 * frame.is_extended for frame in frames) / overheard.duration_s
-        bits_s += sum(command.rate_hz * frame_bits(command.data_bytes)[1] for command in commands)
-        fraction = bits_s / (1e3 * bus.bit_rate_kbit_s)
-        reported = bus_load(traffic_of(drives), 1e3 * bus.bit_rate_kbit_s)
+        commands = [type_of(drive).command for drive in drives]
+        frames = overheard.frames[name]
+        heard = [FrameRate(len(each.data), 1.0 / overheard.duration_s, each.is_extended, each.is_fd) for each in frames]
+        fraction = bus_load([*heard, *commands], bus.bit_rates).most
+        reported = bus_load(traffic_of(drives), bus.bit_rates)
         advice = f"its drives should cause {reported}: remove other senders, or raise bit rate or message periods"
         yield Reading(f"{name}: load with commands", 100.0 * fraction, "%", 0.0, 100.0 * MOST_FRACTION, advice)
 

@@ -13,6 +13,7 @@ from control.faults import Blocks, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.rate import PERIOD_S
+from drivers.drive_types import DEFAULT
 from experiments.faults.bench import FaultBench
 from experiments.faults.energy_bounds import DELAY_TICKS, SLEWING_TICKS, WATCHDOG_TICKS
 from experiments.faults.evaluation import LONGEST_STOP_S, Cell, problems
@@ -30,13 +31,13 @@ AFTER_S = 1.0  # in which nothing may come back
 WALKED_ON_S = 0.3  # with a fault that does not stop the robot
 
 
-def run_cell(name: str, phase: str, seed: int) -> Cell:
-    """Run one cell, which depends on nothing but its three arguments."""
+def run_cell(name: str, phase: str, seed: int, drive: str = DEFAULT) -> Cell:
+    """Run one cell, which depends on nothing but its arguments; `drive` is the type of the robot's drives."""
     mode, random = BY_NAME[name], Random(f"{name} {phase} {seed}")
     joint = random.choice(mode.joints(phase))
     cell = Cell(mode.fault, name, phase, seed, joint, _reaction_text(mode), _bound_ticks(mode))
     try:
-        _inject_and_measure(mode, cell, random)
+        _inject_and_measure(mode, cell, random, mode.drive or drive)
     except Exception as problem:  # noqa: BLE001 - an escaped exception is a result of the cell
         cell.exception = f"{type(problem).__name__}: {problem}"
         cell.why.append(f"an exception escaped: {cell.exception}")
@@ -45,8 +46,8 @@ def run_cell(name: str, phase: str, seed: int) -> Cell:
     return cell
 
 
-def _inject_and_measure(mode: FailureMode, cell: Cell, random: Random) -> None:
-    bench = bench_for(cell.phase, random, hopeless=mode.fault == "flipper_stuck")
+def _inject_and_measure(mode: FailureMode, cell: Cell, random: Random, drive: str) -> None:
+    bench = bench_for(cell.phase, random, hopeless=mode.fault == "flipper_stuck", drive=drive)
     enter_phase(bench, cell.phase, random)
     with mode.inject(bench, cell.joint):
         measurement = Measurement(bench, mode, cell)

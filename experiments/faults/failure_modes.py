@@ -74,6 +74,7 @@ class FailureMode:
     demands_reaction: bool = True  # False: any reaction will do, as long as no motor puts in too much energy
     torque_nm: float = 0.0  # of another program's commands, above the torque limit
     loses_rows: bool = False  # of the log
+    drive: str = ""  # the only type of drives with which it can occur; empty: any
 
     @property
     def name(self) -> str:
@@ -176,6 +177,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("drive_version", forged(Forgery.OLD_FIRMWARE), phases=("idle", "stance")),
     FailureMode("duplicate_node_id", duplicate(0.3), 1.6),
     FailureMode("wrong_drive", forged(Forgery.OTHER_DRIVE), phases=("idle",)),
+    FailureMode("drive_settings", forged(Forgery.OTHER_SETTING), 2.5, ("idle",), drive="moteus"),
     FailureMode("foreign_commands", commanded_by_another(0.3, every=2, heard=True), 1.0),
     FailureMode(
         "setpoint_mismatch", commanded_by_another(1.0, every=10, heard=False), 1.0, MOVING, "every tenth command"
@@ -272,6 +274,7 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "current_stale": ("drive_late",),
     "current_silent": ("drive_late", "current_stale", "torque_missing"),
     "heartbeat_silent": ("drive_energised",),
+    "drive_settings": ("foreign_commands",),  # by which another program changed them
     "drive_energised": ("foreign_commands",),  # by which another program closed the loop
     "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": ABSENT_DRIVE,

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from experiments.faults.cell import run_cell
 from experiments.faults.evaluation import Cell
 from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES
@@ -26,6 +27,7 @@ class CellKey(NamedTuple):
     mode_name: str
     phase: str
     seed: int
+    drive: str = DEFAULT
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,12 @@ class Plan:
     faults: tuple[str, ...] = FAULTS
     phases: tuple[str, ...] = PHASES
     seeds: int = 1
+    drive: str = DEFAULT  # the type of the robot's drives
 
     def __post_init__(self) -> None:
-        """Raises ValueError for an unknown fault or phase."""
-        for what, names, known in (("fault", self.faults, FAULTS), ("phase", self.phases, PHASES)):
+        """Raises ValueError for an unknown fault, phase or type of drive."""
+        given = (("fault", self.faults, FAULTS), ("phase", self.phases, PHASES), ("drive", (self.drive,), DRIVE_TYPES))
+        for what, names, known in given:
             for name in names:
                 if name not in known:
                     raise ValueError(f"{what} {name!r}: must be one of {', '.join(known)}")
@@ -44,7 +48,7 @@ class Plan:
     @property
     def cells(self) -> list[CellKey]:
         return [
-            CellKey(mode.name, phase, seed)
+            CellKey(mode.name, phase, seed, self.drive)
             for seed in range(1, self.seeds + 1)
             for mode in FAILURE_MODES
             if mode.fault in self.faults

@@ -12,6 +12,7 @@ from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import FaultBounds
 from control.records import Phase
+from drivers.drive_types import DEFAULT
 from experiments.faults.bench import FaultBench
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.configuration import Configuration
@@ -37,17 +38,20 @@ EVERYWHERE = ("idle", *AWAKE)
 PHASES = (*EVERYWHERE, "recovery")
 
 
-def bench_for(phase: str, random: Random, hopeless: bool = False) -> FaultBench:
+def bench_for(phase: str, random: Random, hopeless: bool = False, drive: str = DEFAULT) -> FaultBench:
     """Make a robot at power-on. In recovery its flippers are stuck; if `hopeless`, the robot soon gives up."""
     clay = HOLDING_CLAY if phase == "recovery" else random.choice(list(MUDS.values()))
-    configuration = _configuration(hopeless)
+    configuration = _configuration(hopeless, drive)
     return FaultBench(configuration, Track([(LENGTH_M, clay)]), random.getrandbits(31))
 
 
-def _configuration(hopeless: bool) -> Configuration:
+def _configuration(hopeless: bool, drive_type: str) -> Configuration:
     """Use the bounds of a real robot; simulations in real time have wider ones, for the pauses of a busy computer."""
-    usual = configuration_of(WALKING)
-    drives = {joint: replace(drive, serial_number=f"{drive.node_id:012x}") for joint, drive in usual.drive.items()}
+    usual = configuration_of(WALKING, drive_type)
+    drives = {
+        joint: replace(drive, serial_number=f"{drive.node_id:0{drive.serial_digits}x}")
+        for joint, drive in usual.drive.items()
+    }
     configuration = replace(usual, faults=FaultBounds(), drive=drives)
     return replace(configuration, recovery=SHORT_RECOVERY) if hopeless else configuration
 

@@ -13,6 +13,7 @@ from control.gait.gait import SINGLE_FLIPPER, GaitParameters
 from control.mud_estimate import MudEstimate
 from control.rate import PERIOD_S
 from control.records import BodyPose, StrideEstimate
+from drivers.drive_types import DEFAULT
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
 from experiments.robot.lockstep_robot import simulated_configuration
@@ -52,10 +53,10 @@ class Trial:
     truths: Sequence[StrideTruth]
 
 
-def configuration_of(setup: Setup) -> Configuration:
-    """Return the simulated robot's configuration with a setup's gait and base."""
+def configuration_of(setup: Setup, drive_type: str = DEFAULT) -> Configuration:
+    """Return the simulated robot's configuration with a setup's gait and base, and drives of this type."""
     estimation = EstimationParameters(fixed_base=setup.fixed_base)
-    configuration = replace(simulated_configuration(), gait=setup.gait, estimation=estimation)
+    configuration = replace(simulated_configuration(drive_type=drive_type), gait=setup.gait, estimation=estimation)
     return _with_bench_drives(configuration) if setup.fixed_base else configuration
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drivers.can.bus_load import MOST_FRACTION, WARN_FRACTION, bus_load
+from drivers.can.can_fd import FD_MTU, carries_fd
 from drivers.drive import DriveParameters
 from drivers.drive_types import traffic_of
 from firmware_host.computer.findings import Finding, Level, fail, ok, ok_if
@@ -21,12 +22,13 @@ from firmware_host.configuration.configuration import BusParameters, Configurati
 
 QUEUE_FRAMES = (16, 64)  # a shorter queue overflows in the tick of arming, a longer one delivers old torques late
 LONGEST_RESTART_MS = 1000
-SAMPLE_POINTS = (0.7, 0.9)
+SAMPLE_POINTS, FD_SAMPLE_POINTS = (0.7, 0.9), (0.6, 0.9)
 FLAG_UP = 0x1
 ARPHRD_CAN = 280
 NETWORK_FILE = "/etc/systemd/network/80-can.network"
 GOOD_STATES = ("", "ERROR-ACTIVE")
 BRING_UP = "'networkctl reload', or 'ip link set {0} up type can bitrate {1}000 restart-ms 100'"
+BRING_UP_FD = "'ip link set {0} up type can bitrate {1}000 dbitrate {2}000 fd on restart-ms 100'"
 
 
 class CanLink(NamedTuple):
@@ -40,6 +42,8 @@ class CanLink(NamedTuple):
     sample_point: float = nan
     restart_ms: int = -1
     queue_frames: int = 0
+    carries_fd: bool | None = None  # None: unknown
+    data_bit_rate_bit_s: int = 0
 
 
 def parse_links(text: str) -> dict[str, CanLink]:
@@ -64,6 +68,8 @@ def _parse_link(link: dict[str, Any]) -> CanLink:
         sample_point=float(timing.get("sample_point", nan)),
         restart_ms=int(details.get("restart_ms", -1)),
         queue_frames=int(link.get("txqlen", 0)),
+        carries_fd=link["mtu"] >= FD_MTU if "mtu" in link else None,
+        data_bit_rate_bit_s=int(details.get("data_bittiming", {}).get("bitrate", 0)),
     )
 
 
@@ -82,7 +88,7 @@ def read_sys_links(root: Path) -> dict[str, CanLink]:
             kind, flags, queue = ((folder / name).read_text() for name in ("type", "flags", "tx_queue_len"))
             if int(kind) == ARPHRD_CAN:
                 up = bool(int(flags, 16) & FLAG_UP)
-                links[folder.name] = CanLink(folder.name, up, queue_frames=int(queue))
+                links[folder.name] = CanLink(folder.name, up, queue_frames=int(queue), carries_fd=carries_fd(folder))
     return links
 
 
@@ -124,9 +130,13 @@ def _examine_settings(name: str, bus: BusParameters, link: CanLink) -> Iterator[
         text += "" if right else f", its drives at {drives_kbit_s}"
         fix = f"set BitRate= in {NETWORK_FILE}, or bus.{name}.bit_rate_kbit_s if the drives run at that"
         yield ok_if(right, f"bit_rate.{name}", text, fix, Level.FAIL)
+    if bus.data_bit_rate_kbit_s:
+        yield from _examine_fd(name, bus, link)
     if isfinite(link.sample_point):
-        text, fix = f"{100.0 * link.sample_point:.1f} % of a bit", f"set SamplePoint=80% in {NETWORK_FILE}"
-        yield ok_if(SAMPLE_POINTS[0] <= link.sample_point <= SAMPLE_POINTS[1], f"sample_point.{name}", text, fix)
+        lowest, highest = FD_SAMPLE_POINTS if bus.data_bit_rate_kbit_s else SAMPLE_POINTS
+        point = "66.6%" if bus.data_bit_rate_kbit_s else "80%"
+        text, fix = f"{100.0 * link.sample_point:.1f} % of a bit", f"set SamplePoint={point} in {NETWORK_FILE}"
+        yield ok_if(lowest <= link.sample_point <= highest, f"sample_point.{name}", text, fix)
     if link.restart_ms >= 0:
         after = f"back from bus-off after {link.restart_ms} ms"
         text = after if link.restart_ms else "after a bus-off the interface stays off"
@@ -137,10 +147,24 @@ def _examine_settings(name: str, bus: BusParameters, link: CanLink) -> Iterator[
         yield ok_if(QUEUE_FRAMES[0] <= link.queue_frames <= QUEUE_FRAMES[1], f"queue.{name}", text, fix)
 
 
+def _examine_fd(name: str, bus: BusParameters, link: CanLink) -> Iterator[Finding]:
+    fix = f"set FDMode=yes and DataBitRate={bus.data_bit_rate_kbit_s}K in {NETWORK_FILE}, or " + BRING_UP_FD.format(
+        link.name, bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s
+    )
+    if link.carries_fd is not None:
+        text = f"{link.name} {'carries' if link.carries_fd else 'does not carry'} CAN FD frames"
+        yield ok_if(link.carries_fd, f"fd.{name}", text, fix, Level.FAIL)
+    if link.data_bit_rate_bit_s:
+        right = link.data_bit_rate_bit_s == 1000 * bus.data_bit_rate_kbit_s
+        text = f"{link.name} sends data at {link.data_bit_rate_bit_s / 1000:g} kbit/s"
+        text += "" if right else f", its drives at {bus.data_bit_rate_kbit_s}"
+        yield ok_if(right, f"data_bit_rate.{name}", text, fix, Level.FAIL)
+
+
 def _examine_load(name: str, bus: BusParameters, drives: Sequence[DriveParameters], link: CanLink | None) -> Finding:
     """Uses the interface's bit rate where it is known, or else the configured one."""
     bit_s = (link.bit_rate_bit_s if link else 0) or 1000 * bus.bit_rate_kbit_s
-    load = bus_load(traffic_of(drives), bit_s)
+    load = bus_load(traffic_of(drives), bus.bit_rates._replace(nominal_bit_s=bit_s))
     text = f"{len(drives)} drives will take {load} of {bit_s / 1000:g} kbit/s"
     fix = "raise the bit rate of interface and drives to 1 Mbit/s, or put two drives on a bus of their own"
     level = Level.FAIL if load.most > MOST_FRACTION else Level.WARN

@@ -20,6 +20,7 @@ from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import FaultBounds
 from control.monitors.winding import WindingParameters
 from control.records import JOINTS, Joints, same_for_both
+from drivers.can.bus_load import BitRates
 from drivers.drive import DriveParameters, WatchdogEndpoints
 from drivers.fault_injection.failures import FailureParameters
 from drivers.pose.natnet_sockets import NatNetParameters
@@ -49,6 +50,13 @@ class BusParameters:
     bit_rate_kbit_s: Annotated[
         int, Bounds(10, 1000), Meaning("of the drives on the bus; `doctor` compares the interface with it")
     ] = 1000
+    data_bit_rate_kbit_s: Annotated[
+        int, Bounds(0, 8000), Meaning("of the data in CAN FD frames; 0: a bus without CAN FD")
+    ] = 0
+
+    @property
+    def bit_rates(self) -> BitRates:
+        return BitRates(1e3 * self.bit_rate_kbit_s, 1e3 * self.data_bit_rate_kbit_s)
 
 
 @dataclass(frozen=True)

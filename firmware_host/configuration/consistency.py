@@ -18,9 +18,9 @@ from control.joint_pd import (
     largest_stiffness_nm_rad,
     phase_margin_rad,
 )
-from control.records import JOINTS
 from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
 from firmware_host.configuration.configuration import Configuration, PoseParameters
+from firmware_host.configuration.drive_consistency import bus_problems, drive_problems
 from firmware_host.configuration.toml_records import shown
 
 LONGEST_INTERFACE = 15  # IFNAMSIZ with its final zero
@@ -40,7 +40,8 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
     """Yields a message with key, value and bound for each contradiction."""
     yield from _text_problems(configuration)
     yield from _pose_problems(configuration.pose)
-    yield from _drive_problems(configuration)
+    yield from drive_problems(configuration)
+    yield from bus_problems(configuration)
     yield from _motor_force_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
@@ -71,29 +72,6 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
             yield f"status.{key}: must be without a zero byte"
     if "\0" in configuration.log.directory:
         yield f"log.directory = {configuration.log.directory!r}: must be without a zero byte"
-
-
-def _drive_problems(configuration: Configuration) -> Iterator[str]:
-    joint_at: dict[tuple[str, int], str] = {}
-    for joint in JOINTS:
-        if joint not in configuration.drive:
-            yield f"drive.{joint} is missing: all of {', '.join(JOINTS)} are needed"
-    for section, table in (("drive", configuration.drive), ("friction", configuration.friction)):
-        for joint in (joint for joint in table if joint not in JOINTS):
-            yield f"{section}.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
-    for joint, drive in configuration.drive.items():
-        if drive.bus not in configuration.bus:
-            known = ", ".join(configuration.bus) or "none"
-            yield f"drive.{joint}.bus = {drive.bus!r}: no such bus; there is {known}"
-        if drive.sign == 0:
-            yield f"drive.{joint}.sign = 0: must be 1 or -1"
-        duplicate = joint_at.setdefault((drive.bus, drive.node_id), joint)
-        if duplicate != joint:
-            yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {drive.bus!r}"
-        if not re.fullmatch("([0-9a-f]{12})?", drive.serial_number):
-            yield f"drive.{joint}.serial_number = {drive.serial_number!r}: must be 12 hexadecimal digits in lower case"
-        for value, problem in drive.torque_problems(configuration.limits.torque_nm):  # it would clamp without a report
-            yield f"drive.{joint}.{value}: {problem}"
 
 
 def _lead_problems(configuration: Configuration) -> Iterator[str]:

@@ -6,14 +6,16 @@ each value is checked against its own bounds, and then the values are checked ag
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from control.gait.gait import PROTOCOLS
+from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.consistency import contradictions
 from firmware_host.configuration.toml_records import (
     ConfigurationError,
+    OneOf,
     RecordReader,
     parse_document,
     read_text,
@@ -35,10 +37,8 @@ FORMER_KEYS = {  # key of version 0.1: present key in the same section; version 
 }
 NO_KEYS = frozenset({"text", "warnings"})  # fields of the record that are no keys of the file
 
-_READERS = {
-    name: RecordReader(Configuration, without=NO_KEYS, hints={"drive": dict[str, each.parameters]})  # type: ignore[name-defined]
-    for name, each in DRIVE_TYPES.items()
-}
+_DRIVE = OneOf("type", {name: each.parameters for name, each in DRIVE_TYPES.items()}, DEFAULT)
+_READER = RecordReader(Configuration, without=NO_KEYS, hints={"drive": dict[str, Annotated[DriveParameters, _DRIVE]]})
 
 
 def load_configuration(path: Path) -> Configuration:
@@ -51,7 +51,8 @@ def parse_configuration(text: str, file: Path | None = None) -> Configuration:
     document = parse_document(text, file)
     warnings = rename_former_keys(document, FORMER_KEYS)
     _apply_protocol(document)
-    fields = _READERS[_drive_type(document)].read(document)
+    _require_known_types(document)
+    fields = _READER.read(document)
     configuration = Configuration(**fields, text=text, warnings=tuple(warnings))
     problems = list(contradictions(configuration))
     if problems:
@@ -59,22 +60,19 @@ def parse_configuration(text: str, file: Path | None = None) -> Configuration:
     return configuration
 
 
-def _drive_type(document: dict[str, Any]) -> str:
-    """Returns the type of all drives. Raises ConfigurationError where it is unknown, or not the same for all."""
+def _require_known_types(document: dict[str, Any]) -> None:
+    """Raises ConfigurationError where the type of a drive is unknown."""
     drives = document.get("drive")
     tables = drives if isinstance(drives, dict) else {}
     types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
     known = tuple(DRIVE_TYPES)  # not the dictionary: a malformed type may not be hashable
-    first = next((name for name in types.values() if name in known), DEFAULT)
-    problems = []
-    for joint, name in types.items():
-        if name not in known:
-            problems.append(f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(DRIVE_TYPES)}")
-        elif name != first:
-            problems.append(f"drive.{joint}.type = {name!r}: must be {first!r}, as that of the first drive")
+    problems = [
+        f"drive.{joint}.type = {shown(name)}: must be one of {', '.join(known)}"
+        for joint, name in types.items()
+        if name not in known
+    ]
     if problems:
         raise ConfigurationError(problems)
-    return str(first)
 
 
 def _apply_protocol(document: dict[str, Any]) -> None:

@@ -9,9 +9,9 @@ import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, create_model
 
 from control.bounds import Bounds
 from firmware_host.configuration.file_problems import ConfigurationError as ConfigurationError  # for its users here
@@ -120,6 +120,9 @@ def _checked_hint(hint: Any) -> Any:
     """Returns the type that pydantic checks for a field; a checked table becomes a record again."""
     if get_origin(hint) is Annotated:
         kind, *extras = get_args(hint)
+        choice = next((extra for extra in extras if isinstance(extra, OneOf)), None)
+        if choice:
+            return choice.checked_hint()
         changes = next((extra for extra in extras if isinstance(extra, ChangesOf)), None)
         if changes:
             return Annotated[_model_of(changes.record, changes.without), AfterValidator(_given_fields)]
@@ -134,6 +137,27 @@ def _checked_hint(hint: Any) -> Any:
     return Annotated[_model_of(hint), AfterValidator(lambda checked: hint(**dict(checked)))]
 
 
+@dataclass(frozen=True)
+class OneOf:
+    """A table that is one of several records: the value of its `key` names the record."""
+
+    key: str
+    records: Mapping[str, type]
+    default: str
+
+    def checked_hint(self) -> Any:
+        tagged = tuple(Annotated[_checked_hint(record), Tag(_tag(name))] for name, record in self.records.items())
+        return Annotated[Union.__getitem__(tagged), Discriminator(self._tag_of)]
+
+    def _tag_of(self, table: Any) -> str:
+        return _tag(table.get(self.key, self.default) if isinstance(table, dict) else self.default)
+
+
+def _tag(name: object) -> str:
+    """Returns the tag of a record among several; `_key` leaves it out of the path of a key."""
+    return f"<{name}>"
+
+
 def _given_fields(checked: BaseModel) -> dict[str, Any]:
     """Returns only the fields that the file sets; the part that makes the record has the others."""
     return {name: value for name, value in checked if name in checked.model_fields_set}
@@ -143,7 +167,8 @@ def _key(location: tuple[str | int, ...]) -> str:
     """`limits.torque_nm`, `segment 2.layer 1.factor`."""
     key = ""
     for part in location:
-        key += f" {part + 1}" if isinstance(part, int) else f".{part}" if key else part
+        if not (isinstance(part, str) and part.startswith("<")):  # the tag of one of several records
+            key += f" {part + 1}" if isinstance(part, int) else f".{part}" if key else part
     return key
 
 

@@ -16,10 +16,11 @@ from drivers.drive import DriveHealth
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.loop import Loop
 from firmware_host.loop_snapshot import take_snapshot
-from firmware_host.operator.fault_texts import fault_message, what_to_do
+from firmware_host.operator.fault_texts import SET_UP, fault_message, what_to_do
 from firmware_host.operator.reports import check_item
 
-HEARING = "check its power, wiring, node id and cyclic message periods (docs/how-to/odrive.md)"
+HEARING = f"check its power, wiring, node id, type and message periods; {SET_UP}"
+OTHER_TYPE = "correct its type or node_id in [drive.JOINT], or give the other drive another id"
 SIGNALS = ("position", "current", "heartbeat")
 MESSAGES_PER_LINE = 4  # an answer is made between two ticks
 UNWATCHED = ", but never its temperature: the currents alone guard it"
@@ -91,7 +92,8 @@ def _drive_lines(health: DriveHealth, state: DriveState) -> dict[str, str]:
     stamps_s = (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s)
     missing = [signal for signal, stamp_s in zip(SIGNALS, stamps_s, strict=True) if not isfinite(stamp_s)]
     if missing:
-        return {f"drive.{joint}": f"not heard: no {', '.join(missing)} yet"}
+        other = f"; {health.other_protocol} answers under its id: {OTHER_TYPE}" if health.other_protocol else ""
+        return {f"drive.{joint}": f"not heard: no {', '.join(missing)} yet{other}"}
     unwatched = not isfinite(state.temperature_stamp_s)
     heat = f", {state.temperature_c:.0f} degrees C" if isfinite(state.temperature_c) else ""
     lines = {

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
 
-WIRING = "check its power, wiring, node id and message periods (docs/how-to/odrive.md)"
+SET_UP = "see the guide to set up its type of drive (docs/how-to)"
+WIRING = f"check its power, wiring, node id and message periods; {SET_UP}"
 FIX = "fix the cause, then 'mudskipper clear'"
 COOL = "let it cool; walk less deep or slower"
 REPORT = "this is a bug: keep the log, report it, and restart the daemon"
@@ -89,6 +90,9 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         "The {subject} drive's serial number is {serial}, not {expected}.",
         "connect the right drive, or calibrate this one and write its serial_number into [drive.JOINT]",
     ),
+    FaultKind.DRIVE_SETTINGS: FaultText(
+        "A drive's settings differ from the configuration.", "The settings of the {subject} drive do not fit.", SET_UP
+    ),
     FaultKind.FOREIGN_COMMANDS: FaultText(
         "Another program commands a drive.", "Another program sent {commands} commands to {subject}.", OTHERS
     ),
@@ -96,19 +100,15 @@ FAULT_TEXTS: dict[FaultKind, FaultText] = {
         "A drive follows other torques than commanded.", "{subject} follows other torques than commanded.", OTHERS
     ),
     FaultKind.WATCHDOG_UNKNOWN: FaultText(
-        "A drive's watchdog settings could not be read back.",
-        "The {subject} drive's watchdog settings were not read back.",
-        "see docs/how-to/odrive.md, or arm with --force",
+        "A drive's watchdog is unknown.", "The {subject} drive's watchdog is unknown.", f"{SET_UP}, or arm with --force"
     ),
     FaultKind.WATCHDOG_OFF: FaultText(
         "A drive's watchdog is off or too slow.",
         "The {subject} drive's watchdog is {setting}; it must trip within {longest_s:g} s.",
-        "set enable_watchdog and watchdog_timeout = 0.1 on the drive, and save",
+        f"set the drive's watchdog to 0.1 s, and save; {SET_UP}",
     ),
     FaultKind.ARMING_FAILED: FaultText(
-        "A drive did not go into closed loop.",
-        "The {subject} drive did not go into closed loop within {longest_s:g} s.",
-        FIX,
+        "A drive did not go into closed loop.", "{subject} did not go into closed loop within {longest_s:g} s.", FIX
     ),
     FaultKind.BUS_WARNING: FaultText(
         "A bus controller counts many errors.", "The {subject} bus has many errors.", WIRES

@@ -14,7 +14,7 @@ from drivers.can.frames import Frame
 class SimulatedDriveParameters:
     """One simulated drive and its motor: what the configuration fixes, then what differs from an ideal drive."""
 
-    node_id: Annotated[int, Bounds(0, 62)]
+    node_id: Annotated[int, Bounds(0, 126)]
     sign: Annotated[int, Bounds(-1, 1)] = 1
     zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
     torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # in the drive's own settings
@@ -43,6 +43,8 @@ class SimulatedDriveParameters:
     temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
     bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
     motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
+    current_limit_a: Annotated[float, Bounds(0.1, 200.0)] = 12.0  # in the settings of a drive that has it there
+    timeout_mode: Annotated[int, Bounds(0, 15)] = 12  # moteus: what it does once its watchdog has expired
     serial_number: str = ""
     type: str = "odrive"
 
@@ -56,6 +58,7 @@ class Forgery(Enum):
     STARTING = auto()
     WATCHDOG_OFF = auto()
     OTHER_DRIVE = auto()
+    OTHER_SETTING = auto()  # for drives whose settings are read back
 
 
 class DriveError(Enum):

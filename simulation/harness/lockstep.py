@@ -33,7 +33,7 @@ from simulation.mud.track import Track
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
     """Returns simulated drives with the configuration's ids, signs, zeros and torque constants."""
-    fields = ("type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "serial_number")
+    fields = ("type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a", "serial_number")
     return {
         joint: SimulatedDriveParameters(**({name: getattr(drive, name) for name in fields} | changes))
         for joint, drive in configuration.drive.items()

@@ -16,7 +16,7 @@ from control.faults import FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode, Request
 from control.records import Torques
-from drivers.odrive.drives import OdriveDrives
+from drivers.drives import Drives
 from drivers.transmit_gate import TransmitGate
 from firmware_host import loop
 from firmware_host.log.segments import LogSegments
@@ -91,7 +91,7 @@ def silent_without_torque() -> AbstractContextManager[Any]:
         if self.mode in ENERGISED:
             true_command(self, now_s)
 
-    silent = mock.patch.object(OdriveDrives, "disarm", lambda *arguments, **options: None)
+    silent = mock.patch.object(Drives, "disarm", lambda *arguments, **options: None)
     return _both(silent, mock.patch.object(Loop, "_command", command))
 
 

@@ -1,6 +1,6 @@
 """Two abstract drives under the product's own arming sequence: one that obeys, and one that may do anything.
 
-The drives of all joints (drivers/odrive/drives.py) are used as they are; only axes, gate and port are replaced. A drive
+The drives of all joints (drivers/drives.py) are used as they are; only axes, gate and port are replaced. A drive
 here has an axis state, and reports it in heartbeats that may fail to arrive.
 """
 
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from control.records import JOINTS, NEVER_S, DriveState, DriveStates, Joints, Torques
 from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth
-from drivers.odrive.drives import OdriveDrives
+from drivers.drives import Drives
 
 PERIOD_S = 1.5  # long ticks: the modes' durations of 2 and 3 s are then few of them
 SILENT_HEARTBEATS = 3  # so many missing ones are a silence, and are not counted further
@@ -97,6 +97,9 @@ class AbstractAxis:
             self._port.failed_sends += 1
         return obedience is Obedience.ALL
 
+    def poll(self) -> None:
+        """Does nothing: these drives report by themselves."""
+
     def prepare(self) -> None:
         if self._arrives():
             self.prepared = True
@@ -143,7 +146,7 @@ class AbstractGate:
         pass
 
 
-class AbstractDrives(OdriveDrives):
+class AbstractDrives(Drives):
     """Two drives: one obeys, the other one does what the search wants."""
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ from control import modes
 from control.fault_latch import FaultLatch
 from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, MOVING, TRANSITIONS, Health, Mode, Request
-from drivers.odrive.drives import OdriveDrives
+from drivers.drives import Drives
 from firmware_host import loop as loop_module
 from firmware_host.loop import Loop
 from firmware_host.operator.lease import Lease
@@ -87,13 +87,13 @@ def keeps_request(loop: Loop) -> Request:
     return loop.pending_request
 
 
-def asks_without_preparing(drives: OdriveDrives, now_s: float, at_once: bool = False) -> None:
+def asks_without_preparing(drives: Drives, now_s: float, at_once: bool = False) -> None:
     drives.gate.open()
     for axis in drives.axes:
         axis.close_loop()
 
 
-def ignores_refused_frames(drives: OdriveDrives, now_s: float, at_once: bool = False) -> None:
+def ignores_refused_frames(drives: Drives, now_s: float, at_once: bool = False) -> None:
     drives.gate.open()
     for axis in drives.axes:
         axis.prepare()
@@ -144,9 +144,9 @@ WEAKENED: dict[str, tuple[Scope, Patch]] = {
     "forgets whom it ousted": (OPERATORS, replaced(Lease, "oust", lambda lease, by: lease.reset())),
     "latches nothing": (FAULTS, replaced(FaultLatch, "_is_over", never_latches)),
     "detects nothing": (FAULTS, dropped(FaultLatch, "_detect")),
-    "idles drives later": (DRIVES, dropped(OdriveDrives, "disarm")),
-    "asks without preparing": (DRIVES, replaced(OdriveDrives, "arm", asks_without_preparing)),
-    "ignores refused frames": (DRIVES, replaced(OdriveDrives, "arm", ignores_refused_frames)),
+    "idles drives later": (DRIVES, dropped(Drives, "disarm")),
+    "asks without preparing": (DRIVES, replaced(Drives, "arm", asks_without_preparing)),
+    "ignores refused frames": (DRIVES, replaced(Drives, "arm", ignores_refused_frames)),
     "ends no move": (Scope(ORDERS, (FaultKind.CURRENT_STALE,)), dropped(Loop, "_end_move")),
 }
 

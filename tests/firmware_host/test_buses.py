@@ -20,7 +20,7 @@ from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
-from drivers.odrive.drives import OdriveDrives
+from drivers.drives import Drives
 from firmware_host import buses
 from firmware_host.buses import BusError, lock_buses, open_bus, open_ports, reopening_ports
 from firmware_host.configuration.configuration import BusParameters, Configuration
@@ -52,7 +52,7 @@ TICKS_A_SECOND = 380
 def test_the_error_of_a_bus_that_does_not_open_names_bus_and_cause(
     problem: Exception, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*arguments: object) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
         raise problem
 
     monkeypatch.setattr(buses, "open_port", refuse)
@@ -63,7 +63,7 @@ def test_the_error_of_a_bus_that_does_not_open_names_bus_and_cause(
 
 
 def test_the_operating_system_s_error_is_found_behind_a_library_s(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
         try:
             raise FileNotFoundError(errno.ENOENT, "No such file or directory")
         except FileNotFoundError as problem:
@@ -85,7 +85,7 @@ class Opened:
 def test_when_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     first = Opened()
 
-    def open_left_alone(interface: str, channel: str, options: object) -> Opened:
+    def open_left_alone(interface: str, channel: str, options: object, fd: bool) -> Opened:
         if channel == "can1":
             raise OSError(errno.ENODEV, "No such device")
         return first
@@ -97,7 +97,7 @@ def test_when_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.Mo
 
 
 def test_a_missing_bus_that_is_waited_for_is_off_and_reports_its_cause(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
         raise OSError(errno.ENODEV, "No such device")
 
     monkeypatch.setattr(buses, "open_port", refuse)
@@ -113,7 +113,7 @@ class Plug:
 
     def __init__(self, robot: Lockstep) -> None:
         drives = robot.loop.drives
-        assert isinstance(drives, OdriveDrives)
+        assert isinstance(drives, Drives)
         wire = drives.ports["left"]
         assert isinstance(wire, MockPort)
         self.inside = True

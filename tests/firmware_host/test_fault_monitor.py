@@ -15,7 +15,8 @@ from control.rate import PERIOD_S
 from control.records import JOINTS, NO_TORQUE, BodyPose, DriveState, DriveStates, Joints, same_for_all
 from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockBus, MockPort
-from drivers.drive import DriveHealth, Drives
+from drivers.drive import DriveHealth
+from drivers.drives import Drives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import (
     ARMING_S,

@@ -11,7 +11,7 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.can.stamp_clock import StampClock
-from drivers.odrive.drives import OdriveDrives
+from drivers.drives import Drives
 from firmware_host.configuration.configuration import Configuration
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -67,7 +67,7 @@ def walking(configuration: Configuration) -> Lockstep:
 def test_a_walk_goes_on_while_the_wall_clock_is_stepped(walking: Lockstep, step_s: float) -> None:
     robot = copy_of(walking)
     drives, wall = robot.loop.drives, WallClock(robot)
-    assert isinstance(drives, OdriveDrives)
+    assert isinstance(drives, Drives)
     for index, (port, receivers) in enumerate(drives._receivers):
         assert isinstance(port, MockPort)
         drives._receivers[index] = (KernelStampedPort(port, wall), receivers)  # type: ignore[assignment]

@@ -6,16 +6,17 @@ import random
 
 import pytest
 
-from drivers.can.bus_load import BusLoad, frame_bits
+from drivers.can.bus_load import BitRates, BusLoad, FrameRate, frame_bits, frame_times_s
 from drivers.can.bus_load import bus_load as load_of
 from drivers.drive import DriveParameters
 from drivers.drive_types import traffic_of
+from drivers.moteus.parameters import MoteusParameters
 
 CRC15 = 0x4599  # of ISO 11898-1
 
 
 def bus_load(drives: int, bit_rate_bit_s: float) -> BusLoad:
-    return load_of(traffic_of([DriveParameters("left", 0)] * drives), bit_rate_bit_s)
+    return load_of(traffic_of([DriveParameters("left", 0)] * drives), BitRates(bit_rate_bit_s))
 
 
 def bits_on_the_wire(identifier: int, data: bytes) -> int:
@@ -59,4 +60,24 @@ def test_what_odrives_are_delivered_with_cannot_carry_two_drives() -> None:
 
 
 def test_every_message_that_the_readme_sets_is_counted() -> None:
-    assert sum(rate_hz for _, rate_hz in traffic_of([DriveParameters("left", 0)])) == 380 + 2 * 500 + 4 * 10
+    assert sum(each.rate_hz for each in traffic_of([DriveParameters("left", 0)])) == 380 + 2 * 500 + 4 * 10
+
+
+def test_a_frame_without_a_second_rate_takes_as_long_as_its_bits() -> None:
+    least_s, most_s = frame_times_s(FrameRate(8, 1.0), BitRates(1e6))
+    assert (1e6 * least_s, 1e6 * most_s) == pytest.approx((111, 135))
+
+
+def test_a_can_fd_frame_is_fast_only_between_the_two_changes_of_the_rate() -> None:
+    """A frame of 32 bytes with a 29-bit identifier, counted field by field from the standard."""
+    before = [1, 11, 1, 1, 18, 1, 1, 1, 1]  # start, base id, SRR, IDE, extension, RRS, FDF, reserved, rate switch
+    fast = [1, 4, 8 * 32, 4, 21, 7, 1]  # ESI, length, data, stuff count, checksum, its fixed stuff bits, delimiter
+    after = [2, 7, 3]  # acknowledgement, end of frame, rest
+    least_s, most_s = frame_times_s(FrameRate(32, 1.0, is_extended=True, is_fd=True), BitRates(1e6, 5e6))
+    assert least_s == pytest.approx(1e-6 * (sum(before) + sum(after)) + 0.2e-6 * sum(fast))
+    assert least_s < most_s < 1.25 * least_s
+
+
+def test_four_moteus_on_one_bus_leave_most_of_it_free() -> None:
+    traffic = traffic_of([MoteusParameters("left", node) for node in (1, 2, 3, 4)])
+    assert load_of(traffic, BitRates(1e6, 5e6)).most < 0.45

@@ -24,7 +24,7 @@ from drivers.can.frames import Frame, encode_frame
 from drivers.can.port_health import MOST_FRAMES_PER_READ, BusState
 from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPort
 from drivers.drive_types import make_drives
-from drivers.odrive.drives import OdriveDrives
+from drivers.drives import Drives
 from firmware_host.configuration.configuration import Configuration
 
 ENCODER = Frame(0x009, bytes(range(8)))
@@ -226,7 +226,7 @@ def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(c
     benches = {name: Bench() for name in configuration.bus}
     ports = {name: bench.port for name, bench in benches.items()}
     drives = make_drives(configuration.drive, ports, configuration.limits)
-    assert isinstance(drives, OdriveDrives)
+    assert isinstance(drives, Drives)
     for name, bench in benches.items():
         filters = bench.socket.can_options[constants.CAN_RAW_FILTER]
         wanted = {

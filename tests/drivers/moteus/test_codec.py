@@ -107,6 +107,7 @@ def random_reply(random: Random) -> Reply:
         voltage_v=0.5 * random.randint(0, 127),
         fault=random.choice([0, *range(32, 51), *range(96, 104)]),
         control_torque_nm=0.01 * random.randint(-32767, 32767),
+        board_temperature_c=float(random.randint(-40, 127)),
     )
 
 
@@ -116,7 +117,7 @@ def test_random_replies_are_read_as_by_the_package() -> None:
         reply = random_reply(random)
         data = codec.encode_reply(reply)
         decoded, read = codec.decode_reply(data), moteus.parse_registers(data).response
-        expected = [read[each] for each in (0x0, 0x1, 0x2, 0x4, 0xA, 0xD, 0xF, 0x3A)]
+        expected = [read[each] for each in (0x0, 0x1, 0x2, 0x4, 0xA, 0xD, 0xF, 0x3A, 0xE)]
         assert all(map(same, decoded, expected)), (reply, decoded, expected)
 
 

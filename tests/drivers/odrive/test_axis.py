@@ -15,9 +15,10 @@ from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.drive import WatchdogEndpoints
+from drivers.drive_types import make_drives
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message, arbitration_id
-from drivers.odrive.drives import REFRESH_S, REPEAT_UNKNOWN_S, OdriveDrives
+from drivers.odrive.drive_settings import REFRESH_S, REPEAT_UNKNOWN_S
 from drivers.odrive.parameters import OdriveParameters
 
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
@@ -34,12 +35,14 @@ class Bench:
             joint: OdriveParameters("one", node, heartbeat_period_s=heartbeat_period_s)
             for node, joint in enumerate(JOINTS)
         }
-        self.drives = OdriveDrives(parameters, {"one": bus.open()}, endpoints=endpoints)
+        self.drives = make_drives(parameters, {"one": bus.open()}, endpoints=endpoints)
         self.now_s = 0.0
 
     @property
     def axis(self) -> OdriveAxis:
-        return self.drives.axes[0]
+        axis = self.drives.axes[0]
+        assert isinstance(axis, OdriveAxis)
+        return axis
 
     def report(self, message: Message, *values: float, stamp_s: float = -1.0) -> None:
         self.far.send(Frame(arbitration_id(0, message), message.encode(*values), stamp_s=stamp_s))
@@ -335,13 +338,11 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
     bench.report_setting(BUILD.timeout, "cdcccc3d")
     bench.read(0.0)
     assert bench.axis.settings.watchdog_s == pytest.approx(0.1)
-    for axis in bench.drives.axes[1:]:  # all are known: no question is left over
-        axis.settings = bench.axis.settings
     asked = []
     for tick in range(round(3.0 * REFRESH_S / PERIOD_S)):
-        bench.drives.request_settings(tick * PERIOD_S)
+        bench.axis.request_settings(tick * PERIOD_S)
         asked.append(len(bench.far.receive()))
-    assert [count for count in asked if count] == [4 + 8] * 3
+    assert [count for count in asked if count] == [1 + 2] * 3  # the version, the flag and the time-out
     bench.report_setting(BUILD.enable, "00")
     bench.read(6.0)
     assert bench.axis.settings.watchdog_s == 0.0

@@ -12,6 +12,9 @@ from control.rate import PERIOD_S
 from control.records import JOINTS, NEVER_S, DriveStates, Joints
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
+from drivers.drive_types import make_drives
+from drivers.drives import REPEAT_S
+from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import (
     ADDRESS,
     COMMANDS,
@@ -28,7 +31,7 @@ from drivers.odrive.codec import (
     Message,
     arbitration_id,
 )
-from drivers.odrive.drives import REPEAT_S, REPEAT_UNKNOWN_S, OdriveDrives
+from drivers.odrive.drive_settings import REPEAT_UNKNOWN_S
 from drivers.odrive.parameters import OdriveParameters
 
 PARAMETERS = {
@@ -61,7 +64,12 @@ class Bench:
         buses = {"left": MockBus(), "right": MockBus()}
         self.parameters = parameters
         self.far: dict[str, MockPort] = {name: bus.open() for name, bus in buses.items()}
-        self.drives = OdriveDrives(parameters, {name: bus.open() for name, bus in buses.items()}, limits)
+        self.drives = make_drives(parameters, {name: bus.open() for name, bus in buses.items()}, limits)
+
+    def axis(self, index: int) -> OdriveAxis:
+        axis = self.drives.axes[index]
+        assert isinstance(axis, OdriveAxis)
+        return axis
 
     def report(self, joint: str, message: Message, *values: float, stamp_s: float = NEVER_S) -> None:
         drive = self.parameters[joint]
@@ -141,7 +149,7 @@ def test_every_field_comes_from_its_message(bench: Bench) -> None:
     assert (state.temperature_c, state.bus_voltage_v) == (40.0, 24.0)
     bench.report("right_sweep", GET_ERROR, 0x2000000, 0x1000000)
     assert bench.drives.read(3.0)[2].error_flags == 0x2000000
-    assert bench.drives.axes[2].disarm_reason == 0x1000000
+    assert bench.axis(2).disarm_reason == 0x1000000
 
 
 def test_a_node_id_on_the_wrong_bus_is_unknown(bench: Bench) -> None:
@@ -366,7 +374,7 @@ def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Benc
     }
     bench.far["left"].send(Frame(0x000, bytes.fromhex("02 04 04 3a 00 06 0b 00")))
     bench.drives.read(1.1)
-    assert bench.drives.axes[0].settings.version == (0, 6, 11)
+    assert bench.axis(0).settings.version == (0, 6, 11)
     bench.drives.request_settings(1.0 + 0.99 * REPEAT_UNKNOWN_S)
     assert bench.silent()
     bench.drives.request_settings(1.01 + REPEAT_UNKNOWN_S)
@@ -380,7 +388,7 @@ def test_a_reset_forgets_everything(bench: Bench) -> None:
     bench.drives.reset()
     assert not bench.drives.heard
     assert bench.drives.malformed_frames == 0
-    assert bench.drives.axes[0].settings.version is None
+    assert bench.axis(0).settings.version is None
     assert repr(bench.drives.read(2.0)) == repr(Bench().drives.read(2.0))
 
 

@@ -52,7 +52,7 @@ def levels(links: dict[str, CanLink], drives: int = 2, bus: BusParameters = CAN0
 
 def test_all_of_a_configured_interface_is_read() -> None:
     assert parse_links(DEBIAN_12) == {
-        "can0": CanLink("can0", True, "can", "ERROR-ACTIVE", 1_000_000, 0.75, 100, 32),
+        "can0": CanLink("can0", True, "can", "ERROR-ACTIVE", 1_000_000, 0.75, 100, 32, carries_fd=False),
     }
 
 

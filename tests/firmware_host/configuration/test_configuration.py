@@ -69,10 +69,16 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("node_id = 0", "node_id = 0\ncurrent_limit_a = 5.0", [
         "drive.left_sweep.current_limit_a = 5.0: must be at least 9.04 for limits.torque_nm = 0.75"
     ]),
-    ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "moteus"', [
-        "drive.left_sweep.type = 'moteus': must be one of odrive"
+    ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "vesc"', [
+        "drive.left_sweep.type = 'vesc': must be one of odrive, moteus"
     ]),
-    ("[drive.left_sweep]", "[drive.left_sweep]\ntype = 7", ["drive.left_sweep.type = 7: must be one of odrive"]),
+    ("[drive.left_sweep]", "[drive.left_sweep]\ntype = 7", [
+        "drive.left_sweep.type = 7: must be one of odrive, moteus"
+    ]),
+    ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "moteus"', ["drive.left_sweep.node_id = 0: must be at least 1"]),
+    ("node_id = 0", 'node_id = 5\ntype = "moteus"', [
+        "drive.left_sweep.type = 'moteus': uses CAN FD, which disturbs drive.left_adduction (odrive) on the same bus"
+    ]),
     ("[drive.right_sweep]", "[drive.right_swep]", [
         "drive.right_sweep is missing: ", "drive.right_swep: there is no such joint"
     ]),

@@ -6,16 +6,17 @@ from random import Random
 import pytest
 
 from control.rate import PERIOD_S
-from drivers.odrive.parameters import OdriveParameters
-from drivers.odrive.setpoint_monitor import SetpointMonitor
+from drivers.setpoint_monitor import SetpointMonitor
 
 REPORTS_A_HEARTBEAT = 50
 TURN_RAD = 2.0 * pi
 LONGEST_REPORTS = 250  # 0.5 s
 
 
-def make_monitor(**changes: float) -> SetpointMonitor:
-    return SetpointMonitor(OdriveParameters("left", 0, **changes))  # type: ignore[arg-type]
+def make_monitor(
+    command_delay_s: float = 0.0079, velocity_limit_turn_s: float = 4.0, velocity_gain_nm_s_turn: float = 0.5
+) -> SetpointMonitor:
+    return SetpointMonitor(command_delay_s, velocity_limit_turn_s, velocity_gain_nm_s_turn)
 
 
 def commanded(*torques_nm: float) -> SetpointMonitor:

@@ -1,4 +1,4 @@
-"""The robot's four ODrives on one or two CAN ports, as joints.
+"""The robot's drives on its CAN ports, as joints: of one protocol or of several, each described by its DriveType.
 
 `read` drains the ports and stores the newest value of every signal with the time when it arrived. `send` commands
 torque, through the gate (drivers/transmit_gate.py) like everything that leaves. Nothing is transmitted unless the
@@ -8,73 +8,78 @@ caller asks for it. Frames of unknown ids and malformed frames are counted and i
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain
-from math import isfinite
 
-from control.limits import JointLimits
 from control.records import JOINTS, NEVER_S, DriveStates, Joints, Torques
 from drivers.can.can_port import CanPort
-from drivers.can.frames import Frame
-from drivers.drive import DriveHealth, WatchdogEndpoints
-from drivers.odrive.axis import OdriveAxis
-from drivers.odrive.codec import MalformedMessageError
-from drivers.odrive.gate_tables import gate_table
-from drivers.odrive.parameters import OdriveParameters
+from drivers.can.frames import EXTENDED_MASK, STANDARD_MASK, Frame, MalformedMessageError
+from drivers.drive import FD, DriveAxis, DriveHealth
 from drivers.transmit_gate import TransmitGate
 
-REPEAT_S = 0.1  # between two requests to change the axis state; the heartbeat reports the result
+REPEAT_S = 0.1  # between two requests to change the state of a drive; its next report has the result
 LONGEST_IN_QUEUE_S = 2.0  # an older stamp belongs to another clock
-REPEAT_UNKNOWN_S = 0.5  # between two requests for a setting that is still unknown
-REFRESH_S = 2.0  # between two requests for a known setting, which may be changed over USB
 
 
-class OdriveDrives:
-    """The drives of all joints: a `Drives` of drivers/drive.py."""
+class Drives:
+    """The drives of all joints, on one bus or several."""
 
     def __init__(
         self,
-        parameters: Mapping[str, OdriveParameters],
+        axes: Sequence[DriveAxis],
         ports: Mapping[str, CanPort],
-        limits: JointLimits | None = None,
-        endpoints: Sequence[WatchdogEndpoints] = (),
+        gate: TransmitGate,
+        others: Mapping[str, Mapping[int, tuple[str, str]]] | None = None,
     ) -> None:
-        self.ports = dict(ports)
-        self.gate = TransmitGate(limits or JointLimits())
-        outlets = {
-            name: self.gate.outlet(port, [gate_table(drive) for drive in parameters.values() if drive.bus == name])
-            for name, port in self.ports.items()
-        }
-        self.axes = tuple(
-            OdriveAxis(joint, parameters[joint], outlets[parameters[joint].bus], endpoints) for joint in JOINTS
-        )
+        """`others`: by bus and id, what drives of other types send: the joint whose node id it is, and their type."""
+        self.ports = dict(ports)  # by the name of the bus
+        self.gate = gate
+        self.axes = tuple(axes)  # in the order of JOINTS
+        self._other_protocols: dict[str, str] = {}  # of the joints under whose id another type of drive answers
         self._receivers: list[tuple[CanPort, dict[int, Callable[[bytes, float], None]]]] = []
         for name, port in self.ports.items():
             tables = (axis.receivers.items() for axis in self.axes if axis.parameters.bus == name)
-            self._receivers.append((port, dict(chain.from_iterable(tables))))
-            port.listen_to(self._receivers[-1][1])
+            strange = {key: self._note(*other) for key, other in (others or {}).get(name, {}).items()}
+            self._receivers.append((port, strange | dict(chain.from_iterable(tables))))
+            port.listen_to(key & EXTENDED_MASK for key in self._receivers[-1][1])
         self.reset()
 
+    def _note(self, joint: str, protocol: str) -> Callable[[bytes, float], None]:
+        """Makes the handler of frames that only a drive of another type sends."""
+
+        def note(data: bytes, now_s: float) -> None:
+            self._other_protocols[joint] = protocol
+            self.unknown_frames += 1
+
+        return note
+
     def reset(self) -> None:
+        self._other_protocols.clear()
         for axis in self.axes:
             axis.reset()
         self.gate.close()
-        self.unknown_frames = 0  # of other ids, remote or extended, where the port does not keep them away
+        self.unknown_frames = 0  # of other ids or another kind, where the port does not keep them away
         self.malformed_frames = 0  # of these drives, with a payload that cannot be decoded
         self._armed_s = self._disarmed_s = NEVER_S
-        self._requested_s = {"version": NEVER_S, "watchdog": NEVER_S, "serial": NEVER_S}
         self._lost_before = self._lost
         self._idling_lost = False  # the bus refused a command to idle, whatever the drives report
 
+    def poll(self) -> None:
+        """Asks the drives that report only when asked; the others are asked nothing. `send` asks them as well."""
+        for axis in self.axes:
+            axis.poll()
+
     def read(self, now_s: float) -> DriveStates:
+        """Reads all frames that have arrived; returns the newest of every signal."""
         for axis in self.axes:
             axis.begin_read(now_s)
         for port, receivers in self._receivers:
             for frame in port.receive():
-                receive = None if frame.is_remote or frame.is_extended else receivers.get(frame.arbitration_id)
-                if receive is None or frame.is_error:
+                identifier, data, is_remote, is_error, is_extended, _, is_fd, _ = frame
+                receive = receivers.get(identifier | FD if is_fd else identifier)
+                if receive is None or is_remote or is_error or is_extended is not (identifier > STANDARD_MASK):
                     self.unknown_frames += 1
                     continue
                 try:
-                    receive(frame.data, _stamp_s(frame, now_s))
+                    receive(data, _stamp_s(frame, now_s))
                 except MalformedMessageError:
                     self.malformed_frames += 1
         a, b, c, d = self.axes
@@ -86,15 +91,21 @@ class OdriveDrives:
 
     @property
     def heard(self) -> bool:
+        """Returns whether every drive has sent every signal that control depends on at least once."""
         return all(axis.state.heard for axis in self.axes)
 
     @property
     def health(self) -> Joints[DriveHealth]:
         a, b, c, d = self.axes
-        return Joints(a.health, b.health, c.health, d.health)
+        health = Joints(a.health, b.health, c.health, d.health)
+        if not self._other_protocols:
+            return health
+        others = self._other_protocols
+        return health.map(lambda each: each._replace(other_protocol=others.get(each.joint, "")))
 
     @property
     def refused_commands(self) -> int:
+        """Commands that the gate has refused since the start."""
         return self.gate.refused
 
     @property
@@ -102,6 +113,7 @@ class OdriveDrives:
         return self.gate.last_refusal
 
     def send(self, torques_nm: Torques, elapsed_s: float) -> None:
+        """Commands all torques. They may differ from the ones before by the slew rate times `elapsed_s`."""
         self.gate.allow_step(elapsed_s)
         for axis, torque_nm in zip(self.axes, torques_nm, strict=True):
             axis.send_torque(torque_nm)
@@ -109,9 +121,10 @@ class OdriveDrives:
         if lost != self._lost_before:
             self._lost_before = lost
             for axis in self.axes:
-                axis.setpoints.forget_commands()
+                axis.forget_commands()
 
     def send_torque(self, joint: str, torque_nm: float) -> None:
+        """Commands one joint alone, within the step that the last `send` allowed."""
         self.axes[JOINTS.index(joint)].send_torque(torque_nm)
 
     def arm(self, now_s: float, at_once: bool = False) -> None:
@@ -148,6 +161,7 @@ class OdriveDrives:
         self._idling_lost = self._lost > lost_before
 
     def force_idle(self, repeats: int) -> None:
+        """Commands zero torque and idle to every drive, `repeats` times. Never raises."""
         self.gate.close()
         for axis in self.axes * repeats:
             with suppress(Exception):  # one bus may be what broke; the others' drives still have to receive it
@@ -158,20 +172,9 @@ class OdriveDrives:
             axis.clear_errors()
 
     def request_settings(self, now_s: float) -> None:
-        self._request(now_s, "version", lambda axis: axis.settings.version is not None, OdriveAxis.request_version)
-        self._request(now_s, "watchdog", lambda axis: isfinite(axis.settings.watchdog_s), OdriveAxis.request_watchdog)
-        self._request(now_s, "serial", lambda axis: axis.settings.identified, OdriveAxis.request_serial_number)
-
-    def _request(
-        self, now_s: float, setting: str, is_known: Callable[[OdriveAxis], bool], request: Callable[[OdriveAxis], None]
-    ) -> None:
-        """Asks the drives with the setting unknown every REPEAT_UNKNOWN_S, and all every REFRESH_S once it is known."""
-        unknown = [axis for axis in self.axes if not is_known(axis)]
-        if now_s - self._requested_s[setting] < (REPEAT_UNKNOWN_S if unknown else REFRESH_S):
-            return
-        self._requested_s[setting] = now_s
-        for axis in unknown or self.axes:
-            request(axis)
+        """Asks for firmware, watchdog and other settings, now and then: a restart forgets them, and they may change."""
+        for axis in self.axes:
+            axis.request_settings(now_s)
 
     def close(self) -> None:
         for port in self.ports.values():

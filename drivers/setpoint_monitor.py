@@ -10,14 +10,13 @@ is never a fault, and 10 % is one after some 80 reports. FOUND is more than five
 A set-point of zero is also what a drive reports that left closed loop by itself, before its heartbeat says so. Such
 reports count only when the next heartbeat still says closed loop.
 
-The drive reduces torque near its velocity limit without reporting it. A set-point that this explains does not count.
+A drive may reduce torque near its velocity limit without reporting it. A set-point that this explains does not count.
 """
 
 from collections import deque
 from math import inf, isfinite, pi
 
 from control.rate import PERIOD_S
-from drivers.odrive.parameters import OdriveParameters
 
 TOLERANCE_NM = 0.05  # a drive with compensation of its cogging adds as much
 TOLERANCE_FRACTION = 0.2  # two conventions of a torque constant differ by 15.5 %: 8.27 / KV and 9.55 / KV
@@ -29,11 +28,14 @@ SPEED_UP_TURN_S = 0.5  # of a joint at full torque, from one report to the next
 class SetpointMonitor:
     """Torques are the motor's. Owns the last commands."""
 
-    def __init__(self, parameters: OdriveParameters) -> None:
-        followed = max(round(parameters.command_delay_s / PERIOD_S), 1)  # any of so many commands
+    def __init__(
+        self, command_delay_s: float, velocity_limit_turn_s: float = inf, velocity_gain_nm_s_turn: float = inf
+    ) -> None:
+        """The drive may report any command of the last `command_delay_s`, and clamps torque to its velocity limit."""
+        followed = max(round(command_delay_s / PERIOD_S), 1)  # any of so many commands
         self._commands: deque[float] = deque(maxlen=followed)
-        self._clamp_from_rad_s = (parameters.velocity_limit_turn_s - SPEED_UP_TURN_S) * TURN_RAD
-        self._clamp_nm_s_rad = parameters.velocity_gain_nm_s_turn / TURN_RAD
+        self._clamp_from_rad_s = (velocity_limit_turn_s - SPEED_UP_TURN_S) * TURN_RAD
+        self._clamp_nm_s_rad = velocity_gain_nm_s_turn / TURN_RAD
         self.reset()
 
     def reset(self) -> None:

@@ -1,0 +1,254 @@
+"""One moteus as one joint: the newest reply, what it says of the drive, and the frames that command it.
+
+The drive sends nothing unless it is asked, so every frame to it asks for all signals, and the reply to the frame of one
+tick is read in the next. A drive answers before it executes the command of the same frame: the signals have the time of
+the question as their stamp, and their current is still that of the command before. While the drive is idle the frames
+only ask, because a torque command of zero would let it follow torque. A joint's sign inverts angle, velocity, current
+and torque of a mirrored motor alike.
+
+A drive counts as restarted when it answers again after RESTART_SILENCE_S of unanswered questions. More answers than
+questions come from a second drive with this id. A command for this drive that arrives here comes from another program,
+because a port does not receive its own frames. Stops and questions are no such commands: any program may send them.
+"""
+
+from collections.abc import Callable
+from math import isfinite, nan, pi
+
+from control.records import NEVER_S, UNKNOWN, DriveState
+from drivers.can.frames import Frame
+from drivers.drive import FD, DriveHealth, Outlet
+from drivers.moteus import codec, registers
+from drivers.moteus.codec import Mode
+from drivers.moteus.parameters import MoteusParameters
+from drivers.moteus.registers import Register
+from drivers.moteus.settings import REGISTER_MAP, MoteusSettings
+from drivers.setpoint_monitor import SetpointMonitor
+
+RESTART_SILENCE_S = 0.3
+MOST_UNANSWERED = 4  # questions; more were lost, and a second drive's answers must not be taken for theirs
+SURPLUS_ANSWERS = 8  # in a row, none SURPLUS_S apart: a second drive
+SURPLUS_S = 1.0
+LARGEST_FLOAT = 3.4e38  # of binary32
+TURN_RAD = 2.0 * pi
+QUIET_MODES = (Mode.STOPPED, Mode.FAULT, Mode.POSITION, Mode.TIMEOUT)  # in which nothing runs by itself
+
+
+class MoteusAxis:
+    """Owns everything that is known about one drive, and whether it is to follow torque."""
+
+    def __init__(self, joint: str, parameters: MoteusParameters, outlet: Outlet) -> None:
+        self.joint = joint
+        self.parameters = parameters
+        self._outlet = outlet
+        self._id = codec.command_id(parameters.node_id)
+        self._rad_per_turn = parameters.sign * TURN_RAD
+        self.settings = MoteusSettings(parameters)
+        self.setpoints = SetpointMonitor(parameters.command_delay_s)
+        self.reset()
+
+    def reset(self) -> None:
+        self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
+        self._temperature_c = self._bus_voltage_v = UNKNOWN
+        self._angle_stamp_s = self._current_stamp_s = self._mode_stamp_s = NEVER_S
+        self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
+        self._read_s = self._read_before_s = NEVER_S
+        self._mode = int(Mode.STOPPED)
+        self._error_flags = 0
+        self.closed_loop = False  # by the drive's newest reply
+        self._following = False  # commanded by this program
+        self._foreign_commands = self._restarts = 0
+        self._unanswered = self._surplus = 0
+        self._asked_s = self._surplus_s = NEVER_S  # when the oldest unanswered question was asked
+        self.settings.reset()
+        self.setpoints.reset()
+        self._health: DriveHealth | None = None
+
+    def begin_read(self, now_s: float) -> None:
+        self._read_before_s, self._read_s = self._read_s, now_s
+
+    @property
+    def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
+        node_id = self.parameters.node_id
+        return {
+            codec.reply_id(node_id) | FD: self._receive,
+            codec.command_id(node_id) | FD: self._receive_foreign,
+            node_id | FD: self._receive_foreign,  # without a wish for a reply
+        }
+
+    def _receive(self, data: bytes, now_s: float) -> None:
+        if len(data) == codec.REPLY_BYTES and data[0] == codec.FIRST_REPLY_BYTE:
+            self._receive_signals(data, now_s)
+        else:
+            self._receive_settings(data, now_s)
+
+    def _receive_signals(self, data: bytes, now_s: float) -> None:
+        mode, turns, turns_s, current_a, temperature_c, voltage_v, fault, control_nm, _ = codec.decode_reply(data)
+        self._count_answer()
+        asked_s = self._read_before_s  # every tick asks after it has read
+        if NEVER_S < asked_s < now_s:
+            now_s = asked_s
+        if turns - turns == 0.0 == turns_s - turns_s:  # finite
+            self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
+            self._velocity_rad_s = turns_s * self._rad_per_turn
+            self._angle_stamp_s = now_s
+        if current_a - current_a == 0.0:
+            self._current_a = self.parameters.sign * current_a
+            self._current_stamp_s = now_s
+        if temperature_c != 0.0 and temperature_c == temperature_c:  # zero where no thermistor is configured
+            self._temperature_c, self._temperature_stamp_s = temperature_c, now_s
+        if voltage_v == voltage_v:
+            self._bus_voltage_v, self._bus_voltage_stamp_s = voltage_v, now_s
+        if mode != codec.ABSENT:
+            self._receive_mode(mode, fault, now_s)
+        if self.closed_loop and control_nm == control_nm:
+            self.setpoints.on_report(control_nm, self.parameters.sign * self._velocity_rad_s)
+
+    def _receive_mode(self, mode: int, fault: int, now_s: float) -> None:
+        """Handles mode and fault. A drive that left position mode by itself is not commanded back into it."""
+        flags = codec.error_flags(mode, fault)
+        if mode != self._mode or flags != self._error_flags:
+            self._mode, self._error_flags, self._health = mode, flags, None
+        if self.closed_loop and mode != Mode.POSITION:
+            self._following = False
+        self.closed_loop = mode == Mode.POSITION
+        self._mode_stamp_s = now_s
+        self.setpoints.on_heartbeat(self.closed_loop)
+
+    def _receive_settings(self, data: bytes, now_s: float) -> None:
+        values: dict[int, float] = {}
+        for subframe in registers.decode_frame(data):
+            if subframe.kind == registers.CONSOLE_OUTPUT:
+                self.settings.on_console(subframe.text, now_s)
+            else:
+                values |= registers.replied_values([subframe])
+        self.settings.on_registers(values)
+        self._health = None
+
+    def _receive_foreign(self, data: bytes, now_s: float) -> None:
+        """Counts commands of another program; its questions get answers too."""
+        subframes = list(registers.decode_frame(data))
+        if any(each.kind == registers.READ and each.register == Register.MODE for each in subframes):
+            self._count_question()
+        stops = [each for each in subframes if each.register == Register.MODE and each.values == (Mode.STOPPED,)]
+        commands = [each for each in subframes if each.kind in (registers.WRITE, registers.CONSOLE_INPUT)]
+        if len(commands) > len(stops):
+            self._foreign_commands += 1
+            self._health = None
+
+    def _count_question(self) -> None:
+        if not self._unanswered:
+            self._asked_s = self._read_s
+        self._unanswered = min(self._unanswered + 1, MOST_UNANSWERED)
+
+    def _count_answer(self) -> None:
+        if self._read_before_s - self._asked_s > RESTART_SILENCE_S and isfinite(self._mode_stamp_s):
+            self._restarts += 1
+            self.settings.forget()
+            self._health = None
+        self._asked_s = self._read_s
+        if self._unanswered:
+            self._unanswered -= 1
+            return
+        self._surplus = self._surplus + 1 if self._read_s - self._surplus_s < SURPLUS_S else 1
+        self._surplus_s = self._read_s
+
+    @property
+    def duplicates(self) -> bool:
+        """Returns whether two drives seem to share this id."""
+        return self._surplus >= SURPLUS_ANSWERS and self._read_s - self._surplus_s < SURPLUS_S
+
+    @property
+    def state(self) -> DriveState:
+        return DriveState(
+            self._angle_rad,
+            self._velocity_rad_s,
+            self._angle_stamp_s,
+            self._current_a,
+            self._current_stamp_s,
+            self.closed_loop,
+            self._error_flags,
+            self._mode_stamp_s,
+            self._temperature_c,
+            self._temperature_stamp_s,
+            self._bus_voltage_v,
+            self._bus_voltage_stamp_s,
+        )
+
+    @property
+    def health(self) -> DriveHealth:
+        """The drive's report about itself, built again only when it has changed."""
+        health = self._health
+        if (
+            health is None
+            or health.duplicate_id is not self.duplicates
+            or bool(health.setpoint_problem) is not self.setpoints.found
+        ):
+            self._health = health = self._build_health()
+        return health
+
+    def _build_health(self) -> DriveHealth:
+        settings = self.settings
+        return DriveHealth(
+            joint=self.joint,
+            firmware=settings.firmware,
+            supported_firmware=f"one with register map {REGISTER_MAP}",
+            firmware_supported=settings.supported,
+            watchdog_s=settings.watchdog_s,
+            watchdog_advice="the drive did not answer on its console: is another program connected to it?",
+            watchdog_expired=self._mode == Mode.TIMEOUT,
+            restarts=self._restarts,
+            duplicate_id=self.duplicates,
+            foreign_commands=self._foreign_commands,
+            setpoint_problem=self._setpoint_text() if self.setpoints.found else "",
+            setting_problem=settings.problem,
+            serial_number=settings.serial_number,
+            expected_serial_number=self.parameters.serial_number,
+            busy_state="" if self._mode in QUIET_MODES else f"mode {self._mode}",
+            active_errors=codec.error_text(self._error_flags),
+            errors=codec.error_text(self._error_flags),
+        )
+
+    def _setpoint_text(self) -> str:
+        followed_nm, commanded_nm = (self.parameters.sign * torque_nm for torque_nm in self.setpoints.example)
+        return f"{followed_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
+
+    def poll(self) -> None:
+        self._transmit(codec.QUERY_ALONE)
+
+    def send_torque(self, torque_nm: float) -> None:
+        """Commands torque; to a drive that is to be idle zero torque is no command, but a question, or a stop."""
+        if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
+            torque_nm = nan
+        motor_nm = self.parameters.sign * torque_nm
+        self.setpoints.on_command(motor_nm)
+        if self._following or motor_nm != 0.0:
+            self._transmit(codec.encode_torque(motor_nm))
+        else:
+            self._transmit(codec.STOP_AND_QUERY if self.closed_loop else codec.QUERY_ALONE)
+
+    def forget_commands(self) -> None:
+        self.setpoints.forget_commands()
+
+    def prepare(self) -> None:
+        """Does nothing: every torque command states the mode and all that it depends on."""
+
+    def close_loop(self) -> None:
+        """Lets the torque commands that follow, and not the questions, leave."""
+        self._following = True
+
+    def disarm(self) -> None:
+        self._following = False
+        self._transmit(codec.STOP_AND_QUERY)
+
+    def clear_errors(self) -> None:
+        """Stops the drive, which clears a fault and the latched time-out."""
+        self._transmit(codec.STOP_AND_QUERY)
+
+    def request_settings(self, now_s: float) -> None:
+        request = self.settings.due_request(now_s)
+        if request:
+            self._outlet.send(Frame(self._id, request, is_extended=True, is_fd=True, bit_rate_switch=True))
+
+    def _transmit(self, data: bytes) -> None:
+        self._count_question()
+        self._outlet.send(Frame(self._id, data, is_extended=True, is_fd=True, bit_rate_switch=True))

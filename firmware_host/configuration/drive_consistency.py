@@ -1,0 +1,58 @@
+"""Checks that every joint has a drive of its own, which can exert the torque, on a bus that carries its frames."""
+
+import re
+from collections.abc import Iterator
+
+from control.records import JOINTS
+from drivers.can.can_fd import CLASSIC_INTERFACES
+from drivers.drive_types import type_of
+from firmware_host.configuration.configuration import Configuration
+
+
+def drive_problems(configuration: Configuration) -> Iterator[str]:
+    joint_at: dict[tuple[str, int], str] = {}
+    for joint in JOINTS:
+        if joint not in configuration.drive:
+            yield f"drive.{joint} is missing: all of {', '.join(JOINTS)} are needed"
+    for section, table in (("drive", configuration.drive), ("friction", configuration.friction)):
+        for joint in (joint for joint in table if joint not in JOINTS):
+            yield f"{section}.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
+    for joint, drive in configuration.drive.items():
+        if drive.bus not in configuration.bus:
+            known = ", ".join(configuration.bus) or "none"
+            yield f"drive.{joint}.bus = {drive.bus!r}: no such bus; there is {known}"
+        if drive.sign == 0:
+            yield f"drive.{joint}.sign = 0: must be 1 or -1"
+        duplicate = joint_at.setdefault((drive.bus, drive.node_id), joint)
+        if duplicate != joint:
+            yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {drive.bus!r}"
+        digits = drive.serial_digits
+        if not re.fullmatch(f"([0-9a-f]{{{digits}}})?", drive.serial_number):
+            must = f"must be {digits} hexadecimal digits in lower case"
+            yield f"drive.{joint}.serial_number = {drive.serial_number!r}: {must}"
+        for value, problem in drive.torque_problems(configuration.limits.torque_nm):  # it would clamp without a report
+            yield f"drive.{joint}.{value}: {problem}"
+
+
+def bus_problems(configuration: Configuration) -> Iterator[str]:
+    """Checks that each bus carries the frames of its drives, and that these do not disturb each other."""
+    for name, bus in configuration.bus.items():
+        drives = {f"drive.{joint}": each for joint, each in configuration.drive.items() if each.bus == name}
+        kinds = {key: type_of(drive).kind for key, drive in drives.items()}
+        fd = next((key for key, kind in kinds.items() if kind.is_fd), "")
+        classic = next((key for key, kind in kinds.items() if not kind.is_fd), "")
+        if fd and classic:
+            yield (
+                f"{fd}.type = {drives[fd].type!r}: uses CAN FD, which disturbs {classic} ({drives[classic].type}) on"
+                f" the same bus {name!r}; put them on two buses"
+            )
+        elif fd and bus.interface in CLASSIC_INTERFACES:
+            yield (
+                f"bus.{name}.interface = {bus.interface!r}: carries no CAN FD, which {fd} ({drives[fd].type}) needs;"
+                " use an adapter with SocketCAN and CAN FD"
+            )
+        elif fd and not bus.data_bit_rate_kbit_s:
+            yield (
+                f"bus.{name}.data_bit_rate_kbit_s = 0: must be that of {fd} ({drives[fd].type}), which uses CAN FD,"
+                " such as 5000"
+            )

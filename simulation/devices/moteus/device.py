@@ -1,0 +1,303 @@
+"""Simulates a motor drive on the bus: a moteus on CAN FD, byte for byte, with the registers that this program uses.
+
+It has the modes stopped, fault, position and timeout. In position mode it adds the feed-forward torque to a PD law of
+position and velocity, scaled as the command says, within the commanded torque and the configured current. Its watchdog
+runs in position mode only and is fed by commands alone. Once it expires, the mode timeout is latched until a stop, and
+the drive does what `servo.timeout_mode` says: 12 damps with the scale of kd of the last command, as the firmware does
+(ISR_DoZeroVelocity of fw/bldc_servo_control.h), 15 shorts the windings, 10 holds the position, 0 lets go.
+
+It sends nothing unless it is asked: the answer to a frame leaves with the values of that moment. Between the drive and
+the joint lie the same imperfections as in simulation/devices/odrive.py.
+"""
+
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from math import cos, exp, isnan, nan, pi, radians
+from random import Random
+
+from control.records import NEVER_S
+from drivers.can.frames import Frame, MalformedMessageError
+from drivers.moteus import codec, registers
+from drivers.moteus.codec import Mode, Reply
+from drivers.moteus.registers import Register, Subframe
+from drivers.moteus.settings import MAX_CURRENT, REGISTER_MAP, TIMEOUT_MODE, WATCHDOG
+from simulation.devices.cogging import cogging_torque_nm
+from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
+from simulation.devices.late_messages import LateMessages
+from simulation.devices.moteus.console import MoteusConsole
+from simulation.devices.moteus.forgeries import answer_frame, command_frame, forged_frame
+from simulation.devices.moteus.torque import position_mode_nm, timeout_nm
+
+TURN_RAD = 2.0 * pi
+BOOT_S = 0.5  # silence of a drive that restarts
+FIRMWARE = 0x010100  # 1.1.0
+FAULTS = {DriveError.OVERCURRENT: 33, DriveError.OVERSPEED: 50}
+DEFAULTS = {  # of the registers that a command does not write
+    Register.COMMAND_POSITION: 0.0,
+    Register.COMMAND_VELOCITY: 0.0,
+    Register.COMMAND_TORQUE: 0.0,
+    Register.KP_SCALE: 1.0,
+    Register.KD_SCALE: 1.0,
+    Register.MAX_TORQUE: nan,
+    Register.WATCHDOG: 0.0,
+    Register.ILIMIT_SCALE: 1.0,
+}
+PURE_TORQUE = {  # what codec.encode_torque writes besides the torque
+    Register.COMMAND_POSITION: nan,
+    Register.KP_SCALE: 0.0,
+    Register.KD_SCALE: 0.0,
+    Register.ILIMIT_SCALE: 0.0,
+}
+
+
+class SimulatedMoteus:
+    """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
+
+    def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
+        self.parameters = parameters
+        self._random = random
+        self._late = LateMessages(random)
+        self._ids = (codec.command_id(parameters.node_id), parameters.node_id)
+        self.reset(0.0)
+
+    def reset(self, now_s: float) -> None:
+        """Restores the state after power-on."""
+        self.console = MoteusConsole(self.parameters)
+        self.mode = Mode.STOPPED
+        self.fault = 0
+        self._command = dict(DEFAULTS)
+        self._fed_s = self._stepped_s = now_s
+        self._current_a = self._setpoint_nm = 0.0  # the motor's current, and the torque that it follows
+        self._turns = self._turns_s = self._reported_turns = self._held_turns = 0.0
+        self._boots_until_s = NEVER_S
+        self._late.reset()
+        self._answers: list[Frame] = []  # that have not arrived yet
+        self._repeated: bytes | None = None
+        self._forged_current_a = nan
+
+    def restart(self, now_s: float) -> None:
+        """Restarts as after a supply dip: ignores and answers nothing for BOOT_S."""
+        turns, turns_s = self._turns, self._turns_s
+        self.reset(now_s + BOOT_S)
+        self._turns, self._turns_s, self._stepped_s = turns, turns_s, now_s
+        self._boots_until_s = now_s + BOOT_S
+
+    def receive(self, frame: Frame, now_s: float) -> list[Frame]:
+        """Executes one frame of the bus and returns the answer to it, if it wants one and is not late."""
+        if frame.arbitration_id not in self._ids or not frame.is_fd or now_s < self._boots_until_s:
+            return []
+        try:
+            data = self._usual_answer(frame.data, now_s) or self._any_answer(frame.data, now_s)
+        except MalformedMessageError:  # a drive ignores malformed frames
+            return []
+        if not data or not frame.arbitration_id & codec.REPLY_WANTED:
+            return []
+        answer = answer_frame(self.parameters.node_id, self._new_or_repeated(data), now_s)
+        if not self.parameters.message_delay_s:
+            return [answer]
+        self._answers.append(answer)
+        return []
+
+    def _any_answer(self, data: bytes, now_s: float) -> bytes:
+        """Answers with the values of before, as a drive does, and executes the frame."""
+        subframes = list(registers.decode_frame(data))
+        answer = registers.padded(b"".join(map(self._answer, subframes)))
+        self._execute(subframes, now_s)
+        return answer
+
+    def _usual_answer(self, data: bytes, now_s: float) -> bytes:
+        """The same for a torque command or the question for all signals alone, ten times as fast; else nothing."""
+        torque_nm = codec.decode_torque(data)
+        if isnan(torque_nm) and data != codec.QUERY_ALONE:
+            return b""
+        answer = codec.encode_reply(
+            Reply(
+                self.mode,
+                self._value(Register.POSITION),
+                self._value(Register.VELOCITY),
+                self._measured_current_a(),
+                self.parameters.temperature_c,
+                self.parameters.bus_voltage_v,
+                self.fault,
+                self._setpoint_nm,
+                self.parameters.temperature_c,
+            )
+        )
+        if data != codec.QUERY_ALONE:
+            self._follow(PURE_TORQUE | {Register.COMMAND_TORQUE: torque_nm}, now_s)
+        return answer
+
+    def _execute(self, subframes: Iterable[Subframe], now_s: float) -> None:
+        """Writes the registers; the mode comes first, and all that a command does not write is at its default."""
+        written: dict[int, float] = {}
+        for each in subframes:
+            if each.kind == registers.CONSOLE_INPUT:
+                with suppress(ValueError):  # a value that is no number
+                    self.console.write(each.text)
+            elif each.kind == registers.WRITE:
+                written |= {each.register + index: value for index, value in enumerate(each.values)}
+        if self.parameters.any_frame_feeds:
+            self._fed_s = now_s
+        mode = written.pop(Register.MODE, None)
+        if mode == Mode.STOPPED:
+            self.mode, self.fault = Mode.STOPPED, 0
+        elif mode == Mode.POSITION:
+            self._follow({Register(each): value for each, value in written.items() if each in DEFAULTS}, now_s)
+
+    def _follow(self, written: Mapping[Register, float], now_s: float) -> None:
+        """Enters position mode, or stays there; a fault or an expired watchdog ends with a stop only."""
+        if self.mode not in (Mode.STOPPED, Mode.POSITION):
+            return
+        if self.mode is Mode.STOPPED:
+            self._held_turns = self._turns
+        self._command = {**DEFAULTS, **written}
+        self.mode, self._fed_s = Mode.POSITION, now_s
+
+    def _answer(self, subframe: Subframe) -> bytes:
+        """Returns the answer to one subframe: values for a read, text for a poll."""
+        if subframe.kind == registers.CONSOLE_POLL:
+            return registers.encode_console(registers.CONSOLE_OUTPUT, self.console.read(subframe.length))
+        if subframe.kind != registers.READ:
+            return b""
+        values = [self._value(subframe.register + index) for index in range(subframe.length)]
+        return registers.encode_values(registers.REPLY, subframe.resolution, subframe.register, values)
+
+    def _value(self, register: int) -> float:
+        parameters = self.parameters
+        match register:
+            case Register.MODE:
+                return float(self.mode)
+            case Register.POSITION:
+                return self._measured_turns()
+            case Register.VELOCITY:
+                noise_rad_s = parameters.velocity_noise_rad_s
+                noise_turn_s = self._random.gauss(0.0, noise_rad_s) / TURN_RAD if noise_rad_s else 0.0
+                return 0.0 if parameters.encoder_frozen else self._turns_s + noise_turn_s
+            case Register.Q_CURRENT:
+                return self._measured_current_a()
+            case Register.MOTOR_TEMPERATURE | Register.BOARD_TEMPERATURE:
+                return parameters.temperature_c
+            case Register.VOLTAGE:
+                return parameters.bus_voltage_v
+            case Register.FAULT:
+                return float(self.fault)
+            case Register.CONTROL_TORQUE:
+                return self._setpoint_nm
+            case Register.FIRMWARE | Register.REGISTER_MAP:
+                return float(FIRMWARE if register == Register.FIRMWARE else REGISTER_MAP)
+        return self._serial_part(register - Register.SERIAL_NUMBER)
+
+    def _serial_part(self, index: int) -> float:
+        """Returns one of the three words of the serial number; 0 for any other register."""
+        if not 0 <= index < 3:
+            return 0.0
+        word = int(self.parameters.serial_number.rjust(24, "0")[8 * index : 8 * index + 8], 16)
+        return float(word - (1 << 32) if word >> 31 else word)
+
+    def _measured_turns(self) -> float:
+        parameters = self.parameters
+        if parameters.encoder_frozen:
+            return self._reported_turns
+        error_rad = parameters.encoder_offset_rad
+        if parameters.encoder_noise_rad:
+            error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
+        turns = self._turns + parameters.sign * error_rad / TURN_RAD
+        self._reported_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        return self._reported_turns
+
+    def _measured_current_a(self) -> float:
+        forged_a, self._forged_current_a = self._forged_current_a, nan
+        if not isnan(forged_a):
+            return forged_a
+        noise_a = self.parameters.current_noise_a
+        return self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
+
+    def _new_or_repeated(self, data: bytes) -> bytes:
+        fraction = self.parameters.repeated_fraction
+        if not fraction or len(data) != codec.REPLY_BYTES or data[0] != codec.FIRST_REPLY_BYTE:
+            return data
+        if self._repeated is None or self._random.random() >= fraction:
+            self._repeated = data
+        return self._repeated
+
+    @property
+    def energised(self) -> bool:
+        return self.mode is Mode.POSITION
+
+    @energised.setter
+    def energised(self, energised: bool) -> None:
+        self.mode = Mode.POSITION if energised else Mode.STOPPED
+
+    @property
+    def failed(self) -> bool:
+        return self.mode in (Mode.FAULT, Mode.TIMEOUT)
+
+    def trip(self, error: DriveError) -> None:
+        if error is DriveError.WATCHDOG:
+            self.mode, self._held_turns = Mode.TIMEOUT, self._turns
+        else:
+            self.mode, self.fault = Mode.FAULT, FAULTS[error]
+
+    def forge(self, forgery: Forgery) -> Frame:
+        return forged_frame(self.parameters.node_id, forgery)
+
+    def forge_current(self, current_a: float) -> Frame:
+        """The next answer reports this current; the frame itself, an empty answer, says nothing."""
+        self._forged_current_a = current_a
+        return answer_frame(self.parameters.node_id, registers.padded(b""))
+
+    def forge_torque(self, torque_nm: float) -> Frame:
+        return command_frame(self.parameters.node_id, codec.encode_torque(self.parameters.sign * torque_nm))
+
+    def torque_nm(self, now_s: float) -> float:
+        """Returns the torque that the motor exerts at the joint now."""
+        parameters = self.parameters
+        if self.mode is Mode.POSITION and 0.0 < self._timeout_s() < now_s - self._fed_s:
+            self.trip(DriveError.WATCHDOG)
+        torque_nm = 0.0
+        if self.mode in (Mode.POSITION, Mode.TIMEOUT):
+            torque_nm = self._computed_nm(now_s) * (1.0 + parameters.torque_constant_error)
+            if parameters.commutation_error_deg:
+                torque_nm *= cos(radians(parameters.commutation_error_deg))
+        else:
+            self._current_a = self._setpoint_nm = 0.0
+        self._stepped_s = now_s
+        if parameters.cogging_nm:
+            torque_nm += cogging_torque_nm(parameters, self._turns)
+        return parameters.sign * torque_nm
+
+    def _timeout_s(self) -> float:
+        """Returns the time-out of the last command; 0 for none."""
+        timeout_s = self._command[Register.WATCHDOG] or self.console.settings[WATCHDOG]
+        return 0.0 if isnan(timeout_s) else timeout_s
+
+    def _computed_nm(self, now_s: float) -> float:
+        """Returns the torque by the drive's own torque constant, after its limits and the lag of the current."""
+        parameters, motion = self.parameters, (self._turns, self._turns_s, self._held_turns)
+        if self.mode is Mode.TIMEOUT:
+            torque_nm = timeout_nm(self.console.settings[TIMEOUT_MODE], self._command[Register.KD_SCALE], *motion)
+        else:
+            torque_nm = position_mode_nm(self._command, *motion)
+        largest_a = min(self.console.settings[MAX_CURRENT], parameters.motor_current_limit_a)
+        largest_nm = largest_a * parameters.torque_constant_nm_a
+        torque_nm = -largest_nm if torque_nm < -largest_nm else largest_nm if torque_nm > largest_nm else torque_nm
+        self._setpoint_nm = torque_nm
+        if parameters.current_lag_s:
+            before_nm = self._current_a * parameters.torque_constant_nm_a
+            torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
+        self._current_a = torque_nm / parameters.torque_constant_nm_a
+        return torque_nm
+
+    def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
+        """Sets the joint's true angle and velocity, from which the answers are made."""
+        parameters = self.parameters
+        self._turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
+        self._turns_s = parameters.sign * velocity_rad_s / TURN_RAD
+
+    def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
+        """Returns the answers that have arrived by now, where they are late; it sends nothing by itself."""
+        longest_s = self.parameters.message_delay_s
+        if not longest_s:
+            return ()
+        answers, self._answers = self._answers, []
+        return self._late.update(answers, now_s, longest_s)

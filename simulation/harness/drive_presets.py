@@ -1,0 +1,35 @@
+"""Turns a configuration into that of the same robot with another type of drive, for benchmarks, tests and experiments.
+
+Only what the types differ in changes: node ids that the other type does not have are shifted, keys that it does not
+know are left out, and buses get a data bit rate where its frames need one.
+"""
+
+from dataclasses import fields
+from typing import Any, get_type_hints
+
+import tomlkit
+
+from control.bounds import Bounds
+from drivers.drive_types import DEFAULT, DRIVE_TYPES
+
+DATA_BIT_RATE_KBIT_S = 5000
+
+
+def with_drive_type(text: str, name: str) -> str:
+    """Returns the text of the configuration with this type for every joint. The default type returns it unchanged."""
+    if name == DEFAULT:
+        return text
+    document: dict[str, Any] = tomlkit.parse(text)
+    parameters = DRIVE_TYPES[name].parameters
+    known = {field.name for field in fields(parameters)} - {"torque_constant_nm_a"}
+    hints = get_type_hints(parameters, include_extras=True)
+    bounds = next(extra for extra in hints["node_id"].__metadata__ if isinstance(extra, Bounds))
+    for joint, table in document["drive"].items():
+        for key in [key for key in table if key not in known]:
+            del document["drive"][joint][key]
+        table["type"] = name
+        table["node_id"] += round(bounds.minimum)
+    if DRIVE_TYPES[name].kind.is_fd:
+        for bus in document["bus"].values():
+            bus["data_bit_rate_kbit_s"] = DATA_BIT_RATE_KBIT_S
+    return tomlkit.dumps(document)
