@@ -22,6 +22,8 @@ systemctl reset-failed
 systemctl start simulated-robot mudskipper
 until mudskipper status --json 2>/dev/null | grep -q closed_loop; do sleep 0.5; done
 mudskipper disarm >/dev/null
+systemctl kill --signal=USR1 simulated-robot
+sleep 0.2
 mudskipper clear >/dev/null 2>&1
 true
 """
@@ -88,6 +90,10 @@ class Robot:
         """Returns the robot to idle without faults, as after a start."""
         self.shell(REST)
         self.wait_until_ready()
+
+    def put_back(self) -> None:
+        """Moves the flippers back from beyond their limits, as an operator does by hand."""
+        self.shell("systemctl kill --signal=USR1 simulated-robot; sleep 0.2")
 
     def torque_is_off(self) -> bool:
         return not any(drive["closed_loop"] for drive in self.status()["drives"])

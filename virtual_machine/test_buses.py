@@ -90,6 +90,7 @@ def test_an_interface_that_goes_down_ends_the_walk_and_comes_back_disarmed(walki
     walking.shell("ip link set vcan0 up; sleep 1")
     inject(walking, RESTARTED)  # instead of a frame from a wire: on vcan all of them come from this very machine
     assert walking.torque_is_off()
+    walking.put_back()  # without the bus a drive keeps its torque until its watchdog ends it
     walking.succeed("clear")
     walking.wait_until_ready()
     assert walking.unit("MainPID") == process

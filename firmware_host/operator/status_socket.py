@@ -28,6 +28,7 @@ from firmware_host.operator.socket_file import SocketFile, operators_path
 MOST_CLIENTS, MOST_OPERATORS = 16, 8  # of the socket for every user, and of the operators' own
 BACKLOG = 4096  # connections that wait to be accepted; the kernel limits it to net.core.somaxconn
 MOST_ACCEPTS, ACCEPTING_S = 32, 0.0004  # in one tick: the time is 15 % of its period
+REMEDY = "make the daemon's user a member of {group}, and permit @chown in the unit's SystemCallFilter="
 MOST_EVENTS = 8  # handled in one tick; the kernel reports the others in the next ones, in turn
 
 Methods = Mapping[str, Callable[[dict[str, Any], Caller], Any]]
@@ -75,7 +76,7 @@ class StatusSocket:
         """Why operators share the socket of all users, if they do."""
         group = self._rights.operators.name
         problem = f"the group {group} cannot be given a socket of its own, so other accounts may delay its commands"
-        return [] if self._for_operators.file.has_group else [f"{problem}: make the daemon's user a member of {group}"]
+        return [] if self._for_operators.file.has_group else [f"{problem}: {REMEDY.format(group=group)}"]
 
     @property
     def counters(self) -> dict[str, int]:

@@ -18,7 +18,7 @@ from control.rate import PERIOD_S
 from firmware_host.configuration.consistency import LONGEST_SOCKET_PATH, LONGEST_STATUS_PATH
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.rights import Peer
-from firmware_host.operator.socket_file import operators_path
+from firmware_host.operator.socket_file import SocketFile, operators_path
 from firmware_host.operator.status_client import StatusClient
 from firmware_host.operator.status_socket import ACCEPTING_S, MOST_ACCEPTS, MOST_CLIENTS, MOST_OPERATORS
 from tests.firmware_host.served_socket import METHODS, OPERATOR, OTHER_USER, Served, connect, is_open, serve
@@ -145,6 +145,20 @@ def test_a_group_that_the_daemon_may_not_use_is_a_warning(short_folder: Path, mo
     made = Served(short_folder / "run")
     assert len(made.warnings) == 1 and "pilots" in made.warnings[0]
     made.close()
+
+
+def test_the_daemon_s_own_group_needs_no_system_call_that_the_unit_forbids(
+    short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr("os.chown", refuse)
+    (short_folder / "run").mkdir()
+    group = (short_folder / "run").stat().st_gid
+    file = SocketFile(short_folder / "run" / "operators.sock", 1, group)
+    assert file.has_group
+    file.close()
 
 
 def test_a_client_prefers_the_operators_socket_and_finds_the_other_one(served: Served) -> None:
