@@ -9,6 +9,8 @@ from command_line import exit_codes
 from command_line.commands import COMMANDS
 from command_line.screen import complaints
 
+MISSING = "the following arguments are required"  # as argparse says it
+
 
 class Parser(argparse.ArgumentParser):
     """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
@@ -25,10 +27,16 @@ class Parser(argparse.ArgumentParser):
             getattr(import_module(f"command_line.options.{module}"), function)(self)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuses unknown arguments, so that a command names its own usage, not that of `mudskipper`."""
         self.add_options()
-        return super().parse_known_args(args, namespace)
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
 
     def error(self, message: str) -> NoReturn:
+        if message.startswith(MISSING):
+            message = f"{message} ('{self.prog} --help' explains them)"
         complaints.append(message)
         super().error(message)
 

@@ -62,6 +62,7 @@ from firmware_host.user_groups import load_rights
 
 ROOT = Path("/")
 MARKS = {Level.OK: ("ok  ", GREEN), Level.WARN: ("warn", YELLOW), Level.FAIL: ("FAIL", RED)}
+MAKE_CONFIGURATION = "'mudskipper install' makes it; or name another one with --config"
 LISTENING_S = 0.6  # six heartbeats
 START = "'systemctl start mudskipper', then 'systemctl status mudskipper'"
 
@@ -70,7 +71,8 @@ def doctor(options: argparse.Namespace) -> int:
     try:
         configuration = load_configuration(options.config)
     except ConfigurationError as problem:
-        failed = [fail("configuration", message, f"edit {options.config}") for message in problem.problems]
+        fix = f"edit {options.config}" if options.config.exists() else MAKE_CONFIGURATION
+        failed = [fail("configuration", message, fix) for message in problem.problems]
         return _show([*failed, *examine_this_python(), _examine_clock()], options.json)
     socket = options.socket or Path(configuration.status.socket)
     findings = [ok("configuration", str(options.config)), *examine_all(configuration, socket, read_links(ROOT))]
@@ -190,7 +192,8 @@ def check_without_daemon(path: Path, why_no_daemon: str) -> list[dict[str, Any]]
     try:
         configuration = load_configuration(path)
     except ConfigurationError as problem:
-        return items + [check_item("configuration", False, message, f"edit {path}") for message in problem.problems]
+        fix = f"edit {path}" if path.exists() else MAKE_CONFIGURATION
+        return items + [check_item("configuration", False, message, fix) for message in problem.problems]
     items.append(check_item("configuration", True, str(path), ""))
     return items + _drive_items(configuration) + _pose_items(configuration) + _host_items(configuration)
 

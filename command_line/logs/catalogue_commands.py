@@ -7,7 +7,8 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.logs.refusals import explain_errors
+from command_line.logs.refusals import UsageError, explain_errors
+from command_line.options.shared import DEFAULT_CONFIG
 from command_line.screen import complain, watched
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
@@ -47,6 +48,9 @@ def _update(catalogue: Any, longest_s: float = inf, broken_again: bool = False) 
 
 
 def configured_folder(path: Path) -> Path:
+    """Raises UsageError where no folder is named at all."""
+    if str(path) == DEFAULT_CONFIG and not path.exists():
+        raise UsageError(f"name the folder of the logs: there is no {path} that names one")
     from firmware_host.configuration.loading import load_configuration  # slow to import
 
     return Path(load_configuration(path).log.directory)

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration
+from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.log_reading.lab.summary import finding_reports, lab_summary
 from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
@@ -26,7 +28,8 @@ from firmware_host.operator.reports import known, map_report, stride_report
 Options = argparse.Namespace
 
 LONGEST_FILM_S = 60.0
-CUT_OFF = "the log is not finished: it is still being written, or was cut off; everything up to there was read"
+BEING_WRITTEN = "the log is still being written: everything up to now was read"
+CUT_OFF = "the log was cut off: everything up to there was read"
 
 
 @explain_errors
@@ -35,11 +38,12 @@ def replay(options: Options) -> int:
     configuration = load_configuration(options.config) if options.config else None
     with watched() as watch:
         replayed = replay_files(options.files, configuration, options.method, watch, options.vertical)
-    _show_replay(options.files[0], replayed, options.json)
+    _show_replay(options.files, replayed, options.json)
     return exit_codes.OK
 
 
-def _show_replay(path: Path, replayed: Replay, as_json: bool) -> None:
+def _show_replay(files: Sequence[Path], replayed: Replay, as_json: bool) -> None:
+    path = files[0]
     chosen_m = replayed.chosen_depths_m or [nan] * len(replayed.strides)
     strides = [
         stride_report(stride) | {"chosen_depth_m": known(depth_m)}
@@ -63,7 +67,11 @@ def _show_replay(path: Path, replayed: Replay, as_json: bool) -> None:
             "the first strides can differ from those computed live"
         )
     if not replayed.complete:
-        complain(CUT_OFF)
+        complain(_why_unfinished(files))
+
+
+def _why_unfinished(files: Sequence[Path]) -> str:
+    return BEING_WRITTEN if any(map(is_being_written, files)) else CUT_OFF
 
 
 @explain_errors
@@ -119,7 +127,7 @@ def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
     if walk.cut:
         complain(f"the walk may have {walk.cut}; give those files too")
     if not walk.complete:
-        complain(CUT_OFF)
+        complain(_why_unfinished(options.files))
     return walk
 
 

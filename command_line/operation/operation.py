@@ -28,6 +28,7 @@ Options = argparse.Namespace
 ARMING_S = 5.0
 CLEARING_S = 1.5
 POLL_S = 0.05
+SIMULATE = "Without a robot, 'mudskipper simulate' makes one."
 MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
 
 
@@ -43,7 +44,7 @@ def with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
         complain(str(problem))
         return exit_codes.NO_DAEMON
     except NoDaemonError as problem:
-        complain(f"{problem}. Start it with 'systemctl start mudskipper', or name its socket with --socket.")
+        complain(f"{problem}. Start it with 'systemctl start mudskipper', or name its socket with --socket. {SIMULATE}")
         return exit_codes.NO_DAEMON
     except NotPermittedError as problem:
         complain(str(problem))
@@ -81,6 +82,10 @@ def walk(options: Options) -> int:
 
 def move(options: Options) -> int:
     """Waits until the joints have arrived; Ctrl-C stops them."""
+    joints = [joint for joint, _ in options.angles]
+    if twice := next((joint for joint in joints if joints.count(joint) > 1), None):
+        complain(f"{twice} is named twice")
+        return exit_codes.USAGE
 
     def act(client: StatusClient) -> int:
         try:

@@ -25,6 +25,7 @@ def add_doctor(doctor: Parser) -> None:
         "--socket",
         type=Path,
         default=Path(socket) if socket else None,
+        metavar="PATH",
         help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else the configured one)",
     )
 

@@ -41,7 +41,12 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
         names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
     )
     _add_report(estimation, "the load cell is virtual", "write JSON and picture there")
-    estimation.add_argument("--setup", choices=("single", "walking", "both"), default="both")
+    estimation.add_argument(
+        "--setup",
+        choices=("single", "walking", "both"),
+        default="both",
+        help="one flipper on a fixed base, the walking robot, or both (default: %(default)s)",
+    )
     estimation.add_argument("--seeds", type=SEEDS, default=10, metavar="N", help="trials of each mud (default: 10)")
     muds = estimation.add_mutually_exclusive_group()
     muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
@@ -108,7 +113,7 @@ def _add_actuator(names: Commands) -> None:
     option("--gravity", type=GRAVITY_M_S2, metavar="M/S2", help="local gravity (default: 9.81)")
     option("--apply", action="store_true", help="write the fitted constants to the configuration, after a prompt")
     option("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
-    option("--seed", type=int, default=1, help="of the simulated motor")
+    option("--seed", type=int, default=1, metavar="N", help="of the simulated motor")
 
 
 def _add_flipper(names: Commands) -> None:

@@ -55,11 +55,11 @@ def add_log(log: Parser) -> None:
     muds.add_argument("--world", type=Path, metavar="FILE", help="of the simulated robot: names the muds")
     _add_export(actions)
     preserve = add(actions, "preserve", "logs.log_folder_commands.preserve_log", "Exclude logs from the quota.")
-    preserve.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    preserve.add_argument("files", type=Path, nargs="+", metavar="FILE", help="log in done/ of a folder of logs")
     preserve.add_argument("--undo", action="store_true", help="include them again")
     _add_catalogue(actions)
     opening = add(actions, "open", "viewers.open_log.open_log", "Open a log in a viewer, with the project's layout.")
-    opening.add_argument("file", type=Path)
+    opening.add_argument("file", type=Path, metavar="FILE", help="log of this project")
     opening.add_argument(
         "--with", choices=VIEWERS, required=True, dest="viewer", help="foxglove: Lichtblick or Foxglove"
     )

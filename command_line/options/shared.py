@@ -36,6 +36,7 @@ def add_socket(parser: argparse.ArgumentParser) -> None:
         "--socket",
         type=Path,
         default=default_socket(),
+        metavar="PATH",
         help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else that of the service or the simulated robot)",
     )
 

@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from command_line import exit_codes
 from command_line.logs.refusals import explain_errors
 from command_line.screen import complain
+from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import why_not_read
 from firmware_host.log_reading.log_reader import DAMAGE, LogError
 
@@ -40,6 +41,8 @@ def _topics(path: Path) -> set[str]:
         raise LogError(why_not_read(path, problem)) from None
     except (*DAMAGE, McapError):
         summary = None
+    if summary is None and is_being_written(path):
+        raise LogError(f"{path}: still being written, which viewers refuse: 'mudskipper live' shows it meanwhile")
     if summary is None:
         raise LogError(f"{path}: not a finished log, which viewers refuse: 'mudskipper log recover' repairs it")
     return {channel.topic for channel in summary.channels.values()}

@@ -68,6 +68,16 @@ def test_json_is_spelled_alike_everywhere() -> None:
     assert {(action.nargs, action.const, action.help) for action in actions} == {(0, True, "print JSON for programs")}
 
 
+def test_every_argument_is_explained_and_every_value_is_named() -> None:
+    parser = build_parser()
+    add_all_options(parser)
+    actions = [action for command in commands_of(parser) for action in command._actions]
+    plain = [each for each in actions if not isinstance(each, argparse._SubParsersAction)]
+    assert [each for each in plain if not each.help] == []
+    with_values = [each for each in plain if each.option_strings and each.nargs != 0 and not each.choices]
+    assert [each for each in with_values if not each.metavar] == []
+
+
 def test_a_command_line_that_names_a_command_is_parsed_as_by_the_complete_parser() -> None:
     complete = build_parser()
     for arguments in (["walk", "--depth", "3"], ["log", "list", "."], ["experiment", "walk", "--mud", "47"]):

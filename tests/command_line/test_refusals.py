@@ -81,6 +81,24 @@ def test_a_file_that_is_not_toml_is_refused_by_name_and_line(
     assert "fix it there: " in reported
 
 
+@pytest.mark.parametrize("command", ["list", "index", "recover"])
+def test_without_a_configuration_a_folder_of_logs_has_to_be_named(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for module in ("command_line.options.shared", "command_line.logs.catalogue_commands"):
+        monkeypatch.setattr(f"{module}.DEFAULT_CONFIG", "/none/mudskipper.toml")
+    assert "name the folder" in refusal(capsys, "log", command)
+
+
+def test_unknown_arguments_are_refused_with_the_usage_of_their_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert refusal(capsys, "stop", "--jsn").startswith("mudskipper stop: error: unrecognized arguments: --jsn")
+    assert "'mudskipper log --help'" in refusal(capsys, "log")
+
+
+def test_a_joint_is_named_once(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "left_sweep is named twice" in refusal(capsys, "move", "left_sweep=5", "left_sweep=10")
+
+
 def test_the_status_names_drives_that_were_not_heard_yet() -> None:
     heard: dict[str, Any] = {"angle_age_s": 0.0, "current_age_s": 0.0, "heartbeat_age_s": 0.1}
     drives = [heard | {"joint": joint} for joint in JOINTS]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from fcntl import LOCK_EX, flock
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,12 @@ def test_what_viewers_cannot_open_is_one_message(
         path.write_bytes(contents)
     assert str(path) in failure(capsys, "log", "open", str(path), "--with", "plotjuggler")
     assert not started
+
+
+def test_a_log_that_is_being_written_needs_no_repair(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "now.mcap"
+    path.write_bytes(Path(LOG).read_bytes()[:-1000])
+    with path.open("rb") as writer:
+        flock(writer.fileno(), LOCK_EX)
+        message = failure(capsys, "log", "open", str(path), "--with", "plotjuggler")
+    assert "still being written" in message and "recover" not in message
