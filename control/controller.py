@@ -19,8 +19,7 @@ from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torq
 from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
 from control.records import (
-    JOINTS,
-    NO_TORQUE,
+    TWO_FLIPPERS,
     DriveStates,
     GaitTarget,
     JointAngles,
@@ -28,9 +27,10 @@ from control.records import (
     JointTarget,
     JointTargets,
     Phase,
+    Rig,
     Torques,
     same_for_all,
-    same_for_both,
+    same_for_each,
 )
 
 
@@ -56,7 +56,6 @@ DAMPING_S = 3.0  # longest damping, for joints that do not come to rest
 SETTLED_S = 0.3  # rest of all joints after which damping ends
 SETTLED_RAD = 0.02  # motion that still counts as rest
 DAMPING_NM = 0.4  # largest damping torque of a joint: half of the motors' limit
-ALL_TRUSTED = same_for_all(True)
 
 
 HoldLaw = Callable[[Torques, DriveStates], Torques]  # from the torques that hold the pose to those wanted instead
@@ -91,7 +90,9 @@ class Controller:
         mass: ArmMass,
         motion: MotionParameters,
         recovery: Recovery,
+        rig: Rig = TWO_FLIPPERS,
     ) -> None:
+        self.rig = rig
         self.gait = Gait(gait, geometry)
         self.geometry = geometry
         self.gains = gains
@@ -100,6 +101,7 @@ class Controller:
         self.recovery = recovery
         self.order = WalkOrder(0.0)
         self.hold_law: HoldLaw | None = None  # an experiment may replace the torques in HOLD
+        self._no_torque: Torques = same_for_all(0.0, rig)
         self.reset()
 
     def reset(self) -> None:
@@ -107,12 +109,12 @@ class Controller:
         self._mode = Mode.IDLE
         self._path: JointPath | None = None
         self._move: JointPath | None = None  # to another pose, in hold
-        self._pose: JointTargets = still(same_for_all(0.0))
+        self._pose: JointTargets = still(same_for_all(0.0, self.rig))
         self._fade = 0.0
         self._up = False
         self._waited_s = 0.0  # since the path that ends a walk arrived
         self.cut_short = False  # the pose that is held is one out of a walk, perhaps in the mud
-        self._stillness = [Stillness(SETTLED_RAD) for _ in JOINTS]
+        self._stillness = [Stillness(SETTLED_RAD) for _ in self.rig.joints]
         self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
         self.joint_targets: JointTargets | None = None  # of the last step with stiffness
@@ -154,7 +156,7 @@ class Controller:
         self._move = None
 
     def move(self, angles: Sequence[float | None]) -> None:
-        """Move the joints slowly to these angles, in the order of JOINTS; None leaves a joint at its held angle."""
+        """Move the joints slowly to these angles, one for each joint; None leaves a joint at its held angle."""
         held = self._pose.map(lambda target: target.angle_rad)
         there = Joints(*(angle if angle is not None else here for angle, here in zip(angles, held, strict=True)))
         self.follow_path([there], self.motion.path_speed_rad_s)
@@ -174,20 +176,21 @@ class Controller:
         return _held_by_the_mud(held, self.recovery.parameters.attempts) if held else None
 
     def is_up(self, states: DriveStates) -> bool:
-        return abs(states.left_adduction.angle_rad) < UP_RAD and abs(states.right_adduction.angle_rad) < UP_RAD
+        return all(abs(adduction.angle_rad) < UP_RAD for _, adduction in states.flippers)
 
     def step(
         self,
         dt_s: float,
         mode: Mode,
         states: DriveStates,
-        trusted: Joints[bool] = ALL_TRUSTED,
+        trusted: Joints[bool] | None = None,
         elapsed_s: float = 0.0,
     ) -> Torques:
         """Return the wanted torques; `target` then holds the gait's target that they belong to.
 
-        Joints whose encoder is not `trusted` are not damped, because their speed may be wrong. `elapsed_s` is the time
-        since the last step if that is more than `dt_s`; paths and gait do not catch up after a gap.
+        Joints whose encoder is not `trusted` are not damped, because their speed may be wrong; None: all are trusted.
+        `elapsed_s` is the time since the last step if that is more than `dt_s`; paths and gait do not catch up after a
+        gap.
         """
         if mode is not self._mode:
             self._enter(mode, states)
@@ -195,9 +198,9 @@ class Controller:
         elapsed_s = max(elapsed_s, dt_s)
         self._since_s += elapsed_s
         if mode not in MOVING:
-            return NO_TORQUE
+            return self._no_torque
         if mode is Mode.DAMPING:
-            return self._damp(elapsed_s, states, trusted)
+            return self._damp(elapsed_s, states, trusted or same_for_all(True, self.rig))
         self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
             self._up = self.is_up(states)
@@ -235,11 +238,11 @@ class Controller:
 
     def _raised(self, angles: JointAngles) -> JointAngles:
         """Return the pose with level arms, in which the lower edge is H - h above the mud."""
-        return angles._replace(left_adduction=0.0, right_adduction=0.0)
+        return Joints(*(value for sweep_rad, _ in angles.flippers for value in (sweep_rad, 0.0)))
 
     def _path_to_start(self, here: JointAngles) -> JointPath:
         front = radians(self.gait.parameters.sweep_angle_deg)
-        way_points = [self._raised(here), same_for_both(front, 0.0)]
+        way_points = [self._raised(here), same_for_each(front, 0.0, self.rig)]
         return JointPath(here, way_points, self.motion.path_speed_rad_s)
 
     def _targets(self, dt_s: float, mode: Mode, states: DriveStates) -> JointTargets:
@@ -269,16 +272,16 @@ class Controller:
         return targets
 
     def _follow(self, target: GaitTarget) -> JointTargets:
-        """Return the joint targets of a gait target, the same for both flippers."""
+        """Return the joint targets of a gait target, the same for all flippers."""
         sweep = JointTarget(target.sweep_rad, target.sweep_velocity_rad_s)
         angle_rad = self.geometry.adduction_rad(target.sweep_rad, target.depth_m)
         velocity_rad_s = self.geometry.adduction_velocity_rad_s(
             target.sweep_rad, angle_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
         )
         adduction = JointTarget(angle_rad, velocity_rad_s)
-        return same_for_both(sweep, adduction)
+        return same_for_each(sweep, adduction, self.rig)
 
 
 def _held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:
-    """The fault of flippers that a recovery has given up; its subject is empty if both are stuck."""
+    """The fault of flippers that a recovery has given up; its subject is empty if several are stuck."""
     return FaultKind.FLIPPER_STUCK.fault(flippers[0] if len(flippers) == 1 else "", attempts=attempts)

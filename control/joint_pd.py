@@ -4,6 +4,7 @@ The drives run in torque mode, so only this law and its limits move the robot.
 """
 
 from dataclasses import dataclass
+from itertools import cycle
 from math import atan2, cos, inf, pi, radians, sin, sqrt
 from typing import Annotated
 
@@ -16,7 +17,6 @@ from control.records import (
     JointTarget,
     JointTargets,
     Torques,
-    same_for_both,
 )
 
 GRAVITY_M_S2 = 9.81
@@ -97,19 +97,23 @@ def joint_torques_nm(
     targets: JointTargets, states: DriveStates, gains: JointGains, mass: ArmMass, fade: float
 ) -> Torques:
     """Return the torques of all joints; `fade` rises from 0 to 1 after arming, so that the joints start smoothly."""
-    left_sweep, left_adduction, right_sweep, right_adduction = states  # cheaper on every tick than `states.left`
-    left = _flipper_torques_nm(targets.left_sweep, targets.left_adduction, left_sweep, left_adduction, gains, mass)
-    right = _flipper_torques_nm(targets.right_sweep, targets.right_adduction, right_sweep, right_adduction, gains, mass)
-    return Joints(fade * left[0], fade * left[1], fade * right[0], fade * right[1])
+    torques_nm: list[float] = []
+    for sweep in range(0, len(states), 2):  # cheaper on every tick than `states.flippers`
+        adduction = sweep + 1
+        sweep_nm, adduction_nm = _flipper_torques_nm(
+            targets[sweep], targets[adduction], states[sweep], states[adduction], gains, mass
+        )
+        torques_nm += fade * sweep_nm, fade * adduction_nm
+    return Joints(*torques_nm)
 
 
 def damping_torques_nm(states: DriveStates, gains: JointGains, trusted: Joints[bool], largest_nm: float) -> Torques:
     """Return braking torques τ = -d ω of at most `largest_nm`, and none for a joint whose encoder is not trusted."""
-    dampings = same_for_both(gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad)
+    dampings = cycle((gains.sweep_damping_nm_s_rad, gains.adduction_damping_nm_s_rad))
     return Joints(
         *(
             min(max(-damping * state.velocity_rad_s, -largest_nm), largest_nm) if trust else 0.0
-            for damping, state, trust in zip(dampings, states, trusted, strict=True)
+            for damping, state, trust in zip(dampings, states, trusted, strict=False)
         )
     )
 

@@ -53,7 +53,7 @@ class JointRange(NamedTuple):
 class LimitedTorques(NamedTuple):
     torques_nm: Torques
     limited: bool  # a torque differs from the wanted one
-    finite: bool  # False: a torque was NaN or infinite, which is a bug; all four are zero
+    finite: bool  # False: a torque was NaN or infinite, which is a bug; all torques are zero
 
 
 def limited_torque_nm(
@@ -95,13 +95,14 @@ def apply_limits(
     ranges: Joints[JointRange],
     dt_s: float,
 ) -> LimitedTorques:
-    """Limit the wanted torques. If one torque, angle or velocity is not finite, all four torques are zero."""
-    a, b, c, d = (
+    """Limit the wanted torques. If one torque, angle or velocity is not finite, all torques are zero."""
+    torques_nm = [
         limited_torque_nm(wanted, previous, state, limits, span, dt_s)
         if isfinite(wanted) and isfinite(state.angle_rad) and isfinite(state.velocity_rad_s)
         else float("nan")
         for wanted, previous, state, span in zip(wanted_nm, previous_nm, states, ranges, strict=True)
-    )
-    if not isfinite(a + b + c + d):
-        return LimitedTorques(Joints(0.0, 0.0, 0.0, 0.0), True, False)
-    return LimitedTorques(Joints(a, b, c, d), (a, b, c, d) != wanted_nm, True)
+    ]
+    if not isfinite(sum(torques_nm)):
+        return LimitedTorques(Joints(*[0.0 for _ in torques_nm]), True, False)
+    limited_nm = Joints(*torques_nm)
+    return LimitedTorques(limited_nm, limited_nm != wanted_nm, True)

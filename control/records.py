@@ -11,15 +11,35 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from math import isfinite
-from typing import Generic, NamedTuple, TypeVar
+from typing import Annotated, Any, Generic, NamedTuple, TypeVar
+
+from control.bounds import Meaning
 
 T = TypeVar("T")
 U = TypeVar("U")
 
-FLIPPERS = ("left", "right")
+FLIPPERS = ("left", "right")  # that a rig may have
 NEVER_S = float("-inf")
 UNKNOWN = float("nan")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The flippers of a robot, each with a sweep and an adduction motor: all that says how many joints there are."""
+
+    flippers: Annotated[tuple[str, ...], Meaning("each with a sweep and an adduction motor")] = FLIPPERS
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """The names of the joints, in the order of every `Joints`."""
+        return tuple(f"{flipper}_{axis}" for flipper in self.flippers for axis in FlipperJoints._fields)
+
+    def joints_of(self, flipper: str) -> slice:
+        """Return which values of a `Joints` belong to a flipper."""
+        first = len(FlipperJoints._fields) * self.flippers.index(flipper)
+        return slice(first, first + len(FlipperJoints._fields))
 
 
 class FlipperJoints(NamedTuple, Generic[T]):
@@ -29,46 +49,43 @@ class FlipperJoints(NamedTuple, Generic[T]):
     adduction: T
 
 
-class Joints(NamedTuple, Generic[T]):
-    """One value for each joint of the robot: `states.left.adduction`, or `states.left_adduction`.
+class Joints(tuple[T, ...], Generic[T]):
+    """One value for each joint of the robot, in the order of its `Rig.joints`: `zip(rig.joints, states)`.
 
-    It iterates in the order of JOINTS. The four values are stored flat and not as two pairs because the loop, the
-    gate and the log iterate over all joints several times a tick.
+    The values are stored flat and not as pairs because the loop, the gate and the log iterate over all joints several
+    times a tick; `flippers` has them as pairs, `states.flippers[0].adduction`.
     """
 
-    left_sweep: T
-    left_adduction: T
-    right_sweep: T
-    right_adduction: T
+    __slots__ = ()
+
+    def __new__(cls, *values: T) -> Joints[T]:
+        return tuple.__new__(cls, values)
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return tuple(self)
 
     @property
-    def left(self) -> FlipperJoints[T]:
-        return FlipperJoints(self.left_sweep, self.left_adduction)
-
-    @property
-    def right(self) -> FlipperJoints[T]:
-        return FlipperJoints(self.right_sweep, self.right_adduction)
+    def flippers(self) -> tuple[FlipperJoints[T], ...]:
+        """The values of one flipper after the other."""
+        return tuple(map(FlipperJoints, self[::2], self[1::2]))
 
     def map(self, function: Callable[[T], U]) -> Joints[U]:
         """Apply a function to the value of each joint."""
         return Joints(*map(function, self))
 
-    def of(self, joint: str) -> T:
-        """Return the value of the joint with this name, one of JOINTS."""
-        return self[JOINTS.index(joint)]
+
+TWO_FLIPPERS = Rig()
+JOINTS = TWO_FLIPPERS.joints  # that a rig may have
 
 
-JOINTS = Joints._fields
-
-
-def same_for_all(value: T) -> Joints[T]:
+def same_for_all(value: T, rig: Rig = TWO_FLIPPERS) -> Joints[T]:
     """Give every joint the same value."""
-    return Joints(value, value, value, value)
+    return Joints(*(value,) * len(rig.joints))
 
 
-def same_for_both(sweep: T, adduction: T) -> Joints[T]:
-    """Give both flippers the same values."""
-    return Joints(sweep, adduction, sweep, adduction)
+def same_for_each(sweep: T, adduction: T, rig: Rig = TWO_FLIPPERS) -> Joints[T]:
+    """Give every flipper the same values."""
+    return Joints(*(sweep, adduction) * len(rig.flippers))
 
 
 class Phase(IntEnum):
@@ -110,7 +127,6 @@ class DriveState(NamedTuple):
 
 DriveStates = Joints[DriveState]
 Torques = Joints[float]  # N·m
-NO_TORQUE: Torques = same_for_all(0.0)
 
 
 class JointTarget(NamedTuple):

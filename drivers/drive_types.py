@@ -42,6 +42,7 @@ def make_drives(
     axes = [
         type_of(parameters[joint]).make_axis(joint, parameters[joint], outlets[parameters[joint].bus], endpoints)
         for joint in JOINTS
+        if joint in parameters
     ]
     return Drives(axes, ports, gate, {name: _other_types(parameters, name) for name in ports})
 

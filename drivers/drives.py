@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain
 
-from control.records import JOINTS, NEVER_S, DriveStates, Joints, Torques
+from control.records import NEVER_S, DriveStates, Joints, Torques
 from drivers.can.can_port import CanPort
 from drivers.can.frames import EXTENDED_MASK, STANDARD_MASK, Frame, MalformedMessageError
 from drivers.drive import FD, DriveAxis, DriveHealth
@@ -32,7 +32,8 @@ class Drives:
         """`others`: by bus and id, what drives of other types send: the joint whose node id it is, and their type."""
         self.ports = dict(ports)  # by the name of the bus
         self.gate = gate
-        self.axes = tuple(axes)  # in the order of JOINTS
+        self.axes = tuple(axes)  # in the order of the rig
+        self._axis_of = {axis.joint: axis for axis in self.axes}
         self._other_protocols: dict[str, str] = {}  # of the joints under whose id another type of drive answers
         self._receivers: list[tuple[CanPort, dict[int, Callable[[bytes, float], None]]]] = []
         for name, port in self.ports.items():
@@ -82,8 +83,7 @@ class Drives:
                     receive(data, _stamp_s(frame, now_s))
                 except MalformedMessageError:
                     self.malformed_frames += 1
-        a, b, c, d = self.axes
-        return Joints(a.state, b.state, c.state, d.state)
+        return Joints(*[axis.state for axis in self.axes])
 
     @property
     def _lost(self) -> int:
@@ -96,8 +96,7 @@ class Drives:
 
     @property
     def health(self) -> Joints[DriveHealth]:
-        a, b, c, d = self.axes
-        health = Joints(a.health, b.health, c.health, d.health)
+        health = Joints(*[axis.health for axis in self.axes])
         if not self._other_protocols:
             return health
         others = self._other_protocols
@@ -125,7 +124,7 @@ class Drives:
 
     def send_torque(self, joint: str, torque_nm: float) -> None:
         """Commands one joint alone, within the step that the last `send` allowed."""
-        self.axes[JOINTS.index(joint)].send_torque(torque_nm)
+        self._axis_of[joint].send_torque(torque_nm)
 
     def arm(self, now_s: float, at_once: bool = False) -> None:
         """Opens the gate and prepares all drives `at_once`; later asks the others for closed loop, every REPEAT_S.

@@ -52,11 +52,11 @@ class FlipperEstimator(StrideEstimator):
         geometry: FlipperGeometry,
         drive: FlipperDrive,
         base: Base = Base.FREE,
-        body_drag_n: float = 0.0,
+        drag_n: float = 0.0,
         surface_error_m: float = 0.001,
     ) -> None:
         self.base = base
-        self.body_drag_n = body_drag_n
+        self.drag_n = drag_n  # of the body on each flipper
         self.surface_error_m = surface_error_m
         self._surfaces = SurfaceMemory(surface_error_m, base is Base.FIXED)
         self._own_surfaces = SurfaceMemory(max(surface_error_m, OWN_ERROR_M), base is Base.FIXED)
@@ -160,7 +160,7 @@ class FlipperEstimator(StrideEstimator):
         if not self._met_mud(stance.batches, extraction.batches):
             no_mud = NOT_THERE._replace(reason=NO_MUD)
             return Learned(k_p=no_mud, k_s=no_mud, k_e=no_mud, surface_m=self.surface_m, extraction_torque_nm=UNKNOWN)
-        shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.body_drag_n)
+        shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.drag_n)
         self.fits = StrideFits(
             self._insertion_samples,
             partial(shear_samples, self.geometry, stance.batches, self.surface_m, shear),

@@ -1,17 +1,18 @@
-"""The estimator that the loop, the replay and the experiments share: both flippers, and the mud from stride to stride.
+"""The estimator that the loop, the replay and the experiments share: all flippers, and the mud from stride to stride.
 
 Its input is drive states, the gait's phase and the body's position, one sample a tick; it uses no bus and no clock. The
 same samples give the same numbers to the last digit, live or from a log. Two methods share its interface: `default`, in
 torque space, and `paper`, the published one, with its biases.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
 from control.bounds import Bounds, Meaning
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, MudEstimate
-from control.records import FLIPPERS, NO_LOAD, BodyPose, DriveStates, FlipperLoad, Phase, StrideEstimate
+from control.records import FLIPPERS, TWO_FLIPPERS, BodyPose, DriveStates, FlipperLoad, Phase, Rig, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import NO_COMMANDS, FlipperDrive
 from estimation.knowledge import MudKnowledge
@@ -42,25 +43,26 @@ class EstimationParameters:
 
 
 class MudReading(NamedTuple):
-    left: FlipperLoad = NO_LOAD
-    right: FlipperLoad = NO_LOAD
+    loads: tuple[FlipperLoad, ...] = ()  # of one flipper after the other
     strides: tuple[StrideEstimate, ...] = ()  # closed by this sample
 
 
 class MudEstimator:
-    """Owns both flippers' estimators, the memory from stride to stride, and the map along the track."""
+    """Owns the flippers' estimators, the memory from stride to stride, and the map along the track."""
 
     def __init__(
         self,
         geometry: FlipperGeometry,
-        drives: tuple[FlipperDrive, FlipperDrive],
+        drives: Sequence[FlipperDrive],
         parameters: EstimationParameters = EstimationParameters(),
         body_drag_n: float = PAPER_DRAG_N,
+        rig: Rig = TWO_FLIPPERS,
     ) -> None:
-        """`drives` are the left and the right flipper's; a thrust below `body_drag_n` cannot move the body."""
-        self.left, self.right = (
-            _flipper_estimator(flipper, geometry, drive, parameters, body_drag_n)
-            for flipper, drive in zip(FLIPPERS, drives, strict=True)
+        """`drives` has one item for each flipper; a thrust below `body_drag_n` cannot move the body."""
+        drag_n = body_drag_n / len(rig.flippers)
+        self.flippers = tuple(
+            _flipper_estimator(flipper, geometry, drive, parameters, drag_n)
+            for flipper, drive in zip(rig.flippers, drives, strict=True)
         )
         self._knowledge = MudKnowledge()
         self._commands_s = NO_COMMANDS  # the loop sends new commands after each sample
@@ -69,8 +71,8 @@ class MudEstimator:
         self.mud_estimate: MudEstimate = NOTHING_KNOWN
 
     def reset(self) -> None:
-        self.left.reset()
-        self.right.reset()
+        for flipper in self.flippers:
+            flipper.reset()
         self._knowledge.reset()
         self._commands_s = NO_COMMANDS
         self._closed.clear()
@@ -79,35 +81,32 @@ class MudEstimator:
 
     def fits_of(self, flipper: str) -> StrideFits:
         """Return the fits of the flipper's last stride, until its next one closes."""
-        return (self.left if flipper == "left" else self.right).fits
+        return next(each.fits for each in self.flippers if each.flipper == flipper)
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> MudReading:
         """Take in the newest state of every drive and the body's pose, in the gait's phase that they belong to."""
         commands_s, self._commands_s = self._commands_s, (self._commands_s[1], now_s)
         body_x_m = body.x_m
-        left, left_stride = self.left.update(
-            now_s, phase, states.left_sweep, states.left_adduction, body_x_m, commands_s
-        )
-        right, right_stride = self.right.update(
-            now_s, phase, states.right_sweep, states.right_adduction, body_x_m, commands_s
-        )
-        if left_stride is not None:
-            self._closed.append(left_stride)
-        if right_stride is not None:
-            self._closed.append(right_stride)
-        if not self._closed or self.left.is_closing or self.right.is_closing:
-            return MudReading(left, right)
+        loads, joint = [], 0
+        for flipper in self.flippers:
+            load, stride = flipper.update(now_s, phase, states[joint], states[joint + 1], body_x_m, commands_s)
+            joint += 2
+            loads.append(load)
+            if stride is not None:
+                self._closed.append(stride)
+        if not self._closed or any([flipper.is_closing for flipper in self.flippers]):
+            return MudReading(tuple(loads))
         strides = tuple(sorted(self._closed, key=lambda stride: (stride.index, FLIPPERS.index(stride.flipper))))
         self._closed.clear()
         self.mud_estimate = self._knowledge.update(strides)
         self.map.update(body_x_m, strides)
-        return MudReading(left, right, strides)
+        return MudReading(tuple(loads), strides)
 
 
 def _flipper_estimator(
-    flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, parameters: EstimationParameters, body_drag_n: float
+    flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, parameters: EstimationParameters, drag_n: float
 ) -> FlipperEstimator | PaperEstimator:
     if parameters.method == "paper":
-        return PaperEstimator(flipper, geometry, drive, body_drag_n if parameters.paper.compensation else 0.0)
+        return PaperEstimator(flipper, geometry, drive, drag_n if parameters.paper.compensation else 0.0)
     base = Base.FIXED if parameters.fixed_base else Base.FREE
-    return FlipperEstimator(flipper, geometry, drive, base, body_drag_n, parameters.surface_error_m)
+    return FlipperEstimator(flipper, geometry, drive, base, drag_n, parameters.surface_error_m)

@@ -29,9 +29,9 @@ ADVANCED_M = 0.002  # from here on the body counts as advancing
 class PaperEstimator(StrideEstimator):
     """Owns the running sums of the stride under way of one flipper."""
 
-    def __init__(self, flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, body_drag_n: float = 0.0) -> None:
-        """`body_drag_n` is added to the thrust of both flippers while the body advances; 0 leaves it as measured."""
-        self.body_drag_n = body_drag_n
+    def __init__(self, flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, drag_n: float = 0.0) -> None:
+        """`drag_n`, the body's drag on each flipper, is added to the thrust while the body advances; 0: as measured."""
+        self.drag_n = drag_n
         self.edge_m2 = geometry.plate_width_m * geometry.plate_thickness_m
         self._penetration, self._shear, self._extraction = LineFit(), LineFit(), LineFit()
         super().__init__(flipper, geometry, drive, motion_at)
@@ -74,7 +74,7 @@ class PaperEstimator(StrideEstimator):
         submerged_m = load.depth_m - self.surface_m
         if submerged_m > 0.0 and abs(sweep_rad) <= self._steady_rad:
             advanced = body_x_m - self._body_at_stance_m > ADVANCED_M
-            force_x_n = load.force_x_n + (self.body_drag_n / 2.0 if advanced else 0.0)
+            force_x_n = load.force_x_n + (self.drag_n if advanced else 0.0)
             self._shear.update(self.geometry.plate_width_m * submerged_m * submerged_m / 2.0, force_x_n)
 
     def _learn_extraction(self, load: FlipperLoad) -> None:

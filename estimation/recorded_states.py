@@ -6,11 +6,12 @@ while the age is at most half of `now_s` (Sterbenz's lemma), and an age of infin
 moments of a clock that starts at zero, as a simulation's does, may the last bit differ.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import repeat
 
 from control.records import DriveState, DriveStates, Joints
 
-NO_AGES_S = (0.0, 0.0, 0.0, 0.0)
+NO_AGES_S = repeat(0.0)
 
 
 def recorded_states(
@@ -18,14 +19,14 @@ def recorded_states(
     angles_rad: Sequence[float],
     velocities_rad_s: Sequence[float],
     currents_a: Sequence[float],
-    angle_ages_s: Sequence[float] = NO_AGES_S,
-    current_ages_s: Sequence[float] = NO_AGES_S,
+    angle_ages_s: Iterable[float] = NO_AGES_S,
+    current_ages_s: Iterable[float] = NO_AGES_S,
 ) -> DriveStates:
-    """Return the states of a row at `now_s`; each sequence has one value for each joint, in the order of JOINTS."""
-    a, b, c, d = (
+    """Return the states of a row at `now_s`; each sequence has one value for each joint, in the order of the rig."""
+    states = (
         DriveState(angle_rad, velocity_rad_s, now_s - angle_age_s, current_a, now_s - current_age_s)
         for angle_rad, velocity_rad_s, current_a, angle_age_s, current_age_s in zip(
-            angles_rad, velocities_rad_s, currents_a, angle_ages_s, current_ages_s, strict=True
+            angles_rad, velocities_rad_s, currents_a, angle_ages_s, current_ages_s, strict=False
         )
     )
-    return Joints(a, b, c, d)
+    return Joints(*states)

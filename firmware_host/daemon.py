@@ -115,7 +115,9 @@ def open_recorder(configuration: Configuration, rights: Rights) -> Recorder | Nu
     run_id = new_run_id(robot)
     metadata = {"robot": robot, "run_id": run_id} | build_metadata()
     stream = StreamSettings(str(stream_path(Path(configuration.status.socket))), rights)
-    return Recorder(first_path(folder, run_id), configuration.text, metadata, configuration.log, stream)
+    return Recorder(
+        first_path(folder, run_id), configuration.text, metadata, configuration.log, stream, configuration.rig
+    )
 
 
 def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:

@@ -6,7 +6,6 @@ It only detects. The latch decides how long a fault is present, and the modes de
 from math import isnan
 from typing import NamedTuple
 
-from control.controller import ALL_TRUSTED
 from control.faults import Fault, FaultKind
 from control.gait.recovery import is_in_mud
 from control.limits import LimitedTorques
@@ -15,7 +14,6 @@ from control.monitors.joint_monitor import JointFacts, JointMonitor
 from control.monitors.motion_monitor import JointDynamics
 from control.rate import PERIOD_S
 from control.records import (
-    JOINTS,
     NEVER_S,
     BodyPose,
     DriveStates,
@@ -24,7 +22,7 @@ from control.records import (
     JointTargets,
     Phase,
     same_for_all,
-    same_for_both,
+    same_for_each,
 )
 from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth
@@ -43,7 +41,6 @@ BROKEN = frozenset(
 )  # detected in single ticks, but lasting until torque is off
 CATCH_UP_S = 0.3  # a sweep that the mud held at the far end of a stance needs 0.15 s for its 1 rad
 IN_MUD = frozenset({Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.PAUSE, Phase.RECOVERY})
-NO_TARGETS: Joints[JointTarget | None] = same_for_all(None)
 BLIND = frozenset({FaultKind.POSITION_STALE, FaultKind.POSITION_SILENT, FaultKind.DRIVE_QUIET, FaultKind.DRIVE_SILENT})
 EXPLAINED = frozenset({FaultKind.DRIVE_ERROR, FaultKind.DRIVE_DISARMED})  # by the drive's own error text
 BUS_FAULTS = {
@@ -76,6 +73,10 @@ class FaultMonitor:
     def __init__(self, configuration: Configuration, drives: Drives, period_s: float = PERIOD_S) -> None:
         self._period_s = period_s
         self._drives = drives
+        self._rig = configuration.rig
+        joints = configuration.rig.joints
+        self._no_targets: Joints[JointTarget | None] = same_for_all(None, configuration.rig)
+        self._all_trusted = same_for_all(True, configuration.rig)
         self.joints = tuple(
             JointMonitor(
                 joint,
@@ -89,7 +90,7 @@ class FaultMonitor:
                 dynamics,
             )
             for joint, joint_range, dynamics in zip(
-                JOINTS, configuration.joint_ranges, _joint_dynamics(configuration), strict=True
+                joints, configuration.joint_ranges, _joint_dynamics(configuration), strict=True
             )
         )
         self._geometry = configuration.geometry
@@ -105,12 +106,12 @@ class FaultMonitor:
         self._restarts = {health.joint: health.restarts for health in self._drives.health}
         self._foreign_commands = {health.joint: health.foreign_commands for health in self._drives.health}
         self._refused_commands = self._drives.refused_commands
-        self._held_back_s = dict.fromkeys(JOINTS, NEVER_S)  # by the mud
-        self._lagging_strides = dict.fromkeys(JOINTS, (-9, -9))  # the last two in which a joint lagged in its swing
-        self._sound: dict[str, DriveHealth | None] = dict.fromkeys(JOINTS)  # the last report in which nothing was wrong
+        self._held_back_s = dict.fromkeys(joints, NEVER_S)  # by the mud
+        self._lagging_strides = dict.fromkeys(joints, (-9, -9))  # the last two in which a joint lagged in its swing
+        self._sound: dict[str, DriveHealth | None] = dict.fromkeys(joints)  # the last report in which nothing was wrong
         self._pose_stamp_s: float | None = None
         self._broken: set[str] = set()  # joints with an invalid encoder, until torque is off
-        self.trusted: Joints[bool] = ALL_TRUSTED  # of the joints' encoders
+        self.trusted: Joints[bool] = self._all_trusted  # of the joints' encoders
 
     @property
     def winding_temperatures_c(self) -> Joints[float]:
@@ -175,13 +176,14 @@ class FaultMonitor:
     ) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
         dt_s = (1 + tick.missed) * self._period_s
-        targets = NO_TARGETS if monitor_input.freeing else monitor_input.targets or NO_TARGETS  # those of a pull lead
+        followed = None if monitor_input.freeing else monitor_input.targets  # those of a pull lead
+        targets = followed or self._no_targets
         energised, moving, damping = mode in ENERGISED, mode in MOVING, mode is Mode.DAMPING
         may_stand_still = monitor_input.freeing or mode not in HELD
         for joint, health, state, torque_nm, target in zip(
             self.joints, drives, monitor_input.states, sent_nm, targets, strict=True
         ):
-            # without keywords, which take twice as long: four of these are made in every tick
+            # without keywords, which take twice as long: one for each joint is made in every tick
             facts = JointFacts(tick.now_s, dt_s, energised, moving, torque_nm, may_stand_still, target, damping)
             for fault in joint.update(facts, state):
                 if fault.kind is FaultKind.FOLLOWING_ERROR and self._is_held_back(fault.subject, tick, monitor_input):
@@ -204,8 +206,7 @@ class FaultMonitor:
 
     def _moves_in_air(self, joint: str, monitor_input: MonitorInput) -> bool:
         """Return whether no mud may hold a joint back: by the phase of the gait, and by the flipper's own angles."""
-        states = monitor_input.states
-        sweep, lift = states.left if joint.startswith("left") else states.right
+        sweep, lift = monitor_input.states[self._rig.joints_of(joint.split("_")[0])]
         in_mud = is_in_mud(self._geometry, sweep.angle_rad, lift.angle_rad)
         return not in_mud and monitor_input.phase not in IN_MUD
 
@@ -214,14 +215,14 @@ class FaultMonitor:
         if mode not in ENERGISED:
             self._broken.clear()
         if not (found or self._broken):
-            self.trusted = ALL_TRUSTED
+            self.trusted = self._all_trusted
             return
         self._broken.update(fault.subject for fault in found if fault.kind in BROKEN)
         blind = self._broken.union(fault.subject for fault in found if fault.kind in BLIND)
-        self.trusted = Joints(*(joint not in blind for joint in JOINTS)) if blind else ALL_TRUSTED
+        self.trusted = Joints(*(joint not in blind for joint in self._rig.joints)) if blind else self._all_trusted
 
     def _check_arming(self, found: list[Fault], states: DriveStates) -> None:
-        idle = (joint for joint, state in zip(JOINTS, states, strict=True) if not state.closed_loop)
+        idle = (joint for joint, state in zip(self._rig.joints, states, strict=True) if not state.closed_loop)
         found += [FaultKind.ARMING_FAILED.fault(joint, longest_s=ARMING_S) for joint in idle]
 
     def _check_gate(self, found: list[Fault]) -> None:
@@ -287,9 +288,10 @@ class FaultMonitor:
 
 def _joint_dynamics(configuration: Configuration) -> Joints[JointDynamics]:
     arm, gains = configuration.arm, configuration.gains
-    return same_for_both(
+    return same_for_each(
         JointDynamics(arm.sweep_inertia_kg_m2, gains.sweep_stiffness_nm_rad),
         JointDynamics(arm.adduction_inertia_kg_m2, gains.adduction_stiffness_nm_rad),
+        configuration.rig,
     )
 
 

@@ -9,7 +9,7 @@ reads takes a snapshot (loop_snapshot.py).
 import time
 from collections.abc import Callable, Mapping
 
-from control.controller import ALL_TRUSTED, RESTING, Controller, WalkOrder
+from control.controller import RESTING, Controller, WalkOrder
 from control.depth.gait_choice import quickest
 from control.fault_latch import FaultLatch
 from control.faults import Fault, Reaction
@@ -18,9 +18,7 @@ from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.rate import PERIOD_S
 from control.records import (
-    JOINTS,
     NEVER_S,
-    NO_TORQUE,
     BodyPose,
     DriveState,
     DriveStates,
@@ -33,7 +31,7 @@ from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.log.recorder import Recording
-from firmware_host.log.rows import STRIDE_KIND, TICK_KIND, stride_row, tick_row
+from firmware_host.log.rows import STRIDE_KIND, TICK_KIND, stride_row, tick_packing
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
@@ -42,7 +40,6 @@ from firmware_host.operator.lease import Lease
 from firmware_host.refusal_texts import refusal_text
 from firmware_host.ticker import Tick
 
-NOTHING_SENT = LimitedTorques(torques_nm=NO_TORQUE, limited=False, finite=True)
 CLEARING_S = 0.5  # for the drives to report that their errors are gone
 LONGEST_STEP_TICKS = 3  # the longest step of the controller: after a longer gap the gait continues where it was
 
@@ -71,10 +68,12 @@ class Loop:
         self.fault_monitor = FaultMonitor(configuration, drives, period_s)
         self.faults = FaultLatch(period_s)
         self.mode = Mode.BOOT
-        self.states: DriveStates = same_for_all(DriveState())
+        self.states: DriveStates = same_for_all(DriveState(), configuration.rig)
         self.body = BodyPose()
         self.target: GaitTarget = RESTING  # commanded while the states of this tick were measured
-        self.sent = NOTHING_SENT
+        no_torque: Torques = same_for_all(0.0, configuration.rig)
+        self.nothing_sent = LimitedTorques(torques_nm=no_torque, limited=False, finite=True)
+        self.sent = self.nothing_sent
         self.health = Health()
         self.missed_ticks = 0  # since the start
         self.ending = False  # the daemon is about to end: nothing is armed any more
@@ -84,6 +83,7 @@ class Loop:
         self._mode_since_s = 0.0
         self._clock, self._wall_clock = clock, wall_clock
         self._joint_ranges = configuration.joint_ranges
+        self._tick_row = tick_packing(configuration.rig)
 
     def tick(self, tick: Tick) -> None:
         """Read the drives, learn from the mud, choose the mode, control the joints, send the torques, and record."""
@@ -205,13 +205,13 @@ class Loop:
     def _control(self, missed_ticks: int) -> Torques:
         step_s = min(1 + missed_ticks, LONGEST_STEP_TICKS) * self.period_s
         elapsed_s = (1 + missed_ticks) * self.period_s
-        trusted = self.fault_monitor.trusted if self.mode is Mode.DAMPING else ALL_TRUSTED
+        trusted = self.fault_monitor.trusted if self.mode is Mode.DAMPING else None
         return self.controller.step(step_s, self.mode, self.states, trusted, elapsed_s)
 
     def _limit(self, wanted: Torques) -> LimitedTorques:
         """Limit the torques; their slew to that of one tick, even after missed ticks."""
         if self.mode not in MOVING:
-            return NOTHING_SENT
+            return self.nothing_sent
         states, limits = self.fault_monitor.with_winding_heat(self.states), self.configuration.limits
         return apply_limits(wanted, self.sent.torques_nm, states, limits, self._joint_ranges, self.period_s)
 
@@ -233,7 +233,7 @@ class Loop:
 
     def _record(self, tick: Tick) -> None:
         tick_s = self._clock() - tick.now_s
-        self.recorder.put(TICK_KIND, tick_row(tick, tick_s, self))
+        self.recorder.put(TICK_KIND, self._tick_row(tick, tick_s, self))
         if self.controller.recovery.events:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
@@ -270,7 +270,7 @@ class Loop:
         path = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
         self.events.report(now_s, f"move {path} by {by}")
         self.events.notice = ""
-        self.controller.move([angles_rad.get(joint) for joint in JOINTS])
+        self.controller.move([angles_rad.get(joint) for joint in self.configuration.rig.joints])
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: bool) -> str | None:
         if self.ending and request in (Request.ARM, Request.WALK):
@@ -289,6 +289,7 @@ def _make_controller(configuration: Configuration) -> Controller:
         configuration.geometry,
         quickest(configuration.adaptation, configuration.geometry, configuration.gait),
         configuration.joint_ranges,
+        configuration.rig,
     )
     return Controller(
         configuration.gait,
@@ -297,4 +298,5 @@ def _make_controller(configuration: Configuration) -> Controller:
         configuration.arm,
         configuration.motion,
         recovery,
+        configuration.rig,
     )

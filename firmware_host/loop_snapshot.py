@@ -103,7 +103,7 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
             for name, port in drives.ports.items()
         ),
         frames=FrameCounts(drives.unknown_frames, drives.malformed_frames, drives.refused_commands),
-        loads={"left": learning.reading.left, "right": learning.reading.right},
+        loads=dict(zip(loop.configuration.rig.flippers, learning.reading.loads, strict=True)),
         body=loop.body,
         pose=loop.pose.report(),
         sent=loop.sent,

@@ -14,7 +14,7 @@ from control.depth.paper_choice import PaperAdaptation
 from control.faults import Fault, FaultKind
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
-from control.records import BodyPose, DriveStates, Estimate, Phase, StrideEstimate
+from control.records import NO_LOAD, BodyPose, DriveStates, Estimate, Phase, Rig, StrideEstimate
 from estimation.mud import MudEstimator, MudReading
 from firmware_host.configuration.configuration import Configuration
 
@@ -22,7 +22,7 @@ FIRM_TICKS = 3  # with a high load until an insertion ends: one outlier does not
 STORED_STRIDES = 200  # for clients of the status socket
 LARGEST_N_M3 = 1e10  # 10 kN/cm³, a thousand times the stiffest mud
 
-METHODS: dict[Method, Callable[[AdaptationParameters, FlipperGeometry, GaitParameters], Adaptation]] = {
+METHODS: dict[Method, Callable[[AdaptationParameters, FlipperGeometry, GaitParameters, Rig], Adaptation]] = {
     "default": DepthAdaptation,
     "paper": PaperAdaptation,
     "gait": GaitAdaptation,
@@ -32,7 +32,7 @@ METHODS: dict[Method, Callable[[AdaptationParameters, FlipperGeometry, GaitParam
 class ClosedStride(NamedTuple):
     """A finished stride of one flipper, with the depth that was chosen after it."""
 
-    number: int  # since the start, counting both flippers
+    number: int  # since the start, counting all flippers
     estimate: StrideEstimate
     chosen_depth_m: float
 
@@ -46,10 +46,13 @@ class MudLearning:
             configuration.flipper_drives,
             configuration.estimation,
             configuration.adaptation.body_drag_n,
+            configuration.rig,
         )
         method = METHODS[configuration.adaptation.method]
-        self.adaptation = method(configuration.adaptation, configuration.geometry, configuration.gait)
-        self.reading = MudReading()
+        self.adaptation = method(
+            configuration.adaptation, configuration.geometry, configuration.gait, configuration.rig
+        )
+        self.reading = MudReading(tuple(NO_LOAD for _ in configuration.rig.flippers))
         self.strides: list[ClosedStride] = []
         self.strides_closed = 0  # since the start
         self.depth_reason = ""  # of the next stride
@@ -97,8 +100,8 @@ class MudLearning:
 
     def _is_firm(self, controller: Controller) -> bool:
         """Whether an insertion of an adaptive walk has met solid mud."""
-        limit_nm, reading = self.adaptation.largest_insertion_nm, self.reading
-        firm = reading.left.adduction_torque_nm > limit_nm or reading.right.adduction_torque_nm > limit_nm
+        limit_nm = self.adaptation.largest_insertion_nm
+        firm = any([load.adduction_torque_nm > limit_nm for load in self.reading.loads])
         inserting = controller.order.adaptive and controller.target.phase is Phase.INSERTION
         self._firm_ticks = self._firm_ticks + 1 if firm and inserting else 0
         return self._firm_ticks >= FIRM_TICKS

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from control.records import Rig
 from estimation.mud import Method
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
-from firmware_host.log.rows import EVENT, STRIDE, TICK
+from firmware_host.log.rows import EVENT, STRIDE, tick_kind
 from firmware_host.log_reading.log_reader import read_logs
 from firmware_host.log_reading.replay import Replay, configuration_of, replay_files
 from firmware_host.open_data.flat_columns import stack_rows
@@ -20,7 +21,7 @@ class OpenedLog:
     """One log, or the joined segments of one run. Field names end with the unit; docs/reference/log.md lists them."""
 
     paths: tuple[Path, ...]
-    ticks: Rows  # one row per tick; arrays over joints in the order left sweep, left adduction, right sweep, ...
+    ticks: Rows  # one row per tick; arrays have one value for each of `rig.joints` or `rig.flippers`
     strides: Rows  # one row per closed stride of a flipper
     events: Rows  # changes of mode, faults and requests
     metadata: dict[str, str]  # robot, run_id, version, commit, ...
@@ -28,6 +29,7 @@ class OpenedLog:
     complete: bool  # False where the writer was cut off
     unknown_fields: tuple[str, ...]  # of a later version; they are in the arrays too
     missing_fields: tuple[str, ...]  # of an earlier version; they are NaN, 0, False or empty
+    rig: Rig  # the flippers of the robot; `rig.joints` are the names of its joints
 
     @property
     def configuration(self) -> Configuration:
@@ -40,7 +42,7 @@ def open_log(path: Paths) -> OpenedLog:
     paths = _as_paths(path)
     log = read_logs(paths)
     arrays = {
-        "ticks": Rows.of(log.ticks, TICK),
+        "ticks": Rows.of(log.ticks, tick_kind(log.rig)),
         "strides": Rows.of(stack_rows(log.strides, STRIDE), STRIDE),
         "events": Rows.of(stack_rows(log.events, EVENT), EVENT),
     }

@@ -11,7 +11,6 @@ from benchmarks.speed.wirings import Wiring
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.rate import RATE_HZ
-from control.records import JOINTS
 from drivers.drive_types import make_drives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
@@ -85,7 +84,7 @@ class TimedWalk:
             plant_of(configuration),
             paper_track(),
             drives_of(configuration),
-            {joint: configuration.drive[joint].bus for joint in JOINTS},
+            {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
             wiring.robot,
         )
         drives = make_drives(configuration.drive, wiring.loop, configuration.limits, configuration.watchdog_endpoints)

@@ -19,7 +19,6 @@ from benchmarks.example_robot import load_example
 from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.stress.resources import resident_kib
 from control.modes import Mode
-from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.odrive import codec
@@ -122,7 +121,7 @@ class Fuzzing:
         self.mode = mode
         self.walk = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]), seed)
         self.nodes = [open_third_node(self.walk, bus) for bus in configuration.bus]
-        node_ids = [configuration.drive[joint].node_id for joint in JOINTS]
+        node_ids = [configuration.drive[joint].node_id for joint in configuration.rig.joints]
         missing = arbitration_id(node_ids[0], codec.HEARTBEAT) if mode is Mode.BOOT else -1
         self.source = malformed_frames(node_ids, Random(seed), missing)
         if mode is Mode.IDLE:

@@ -14,7 +14,6 @@ from typing import Any
 
 from benchmarks.local_robot import LONGEST_WAIT_S, LocalRobot
 from benchmarks.report import evaluated, run_benchmark, show_progress
-from control.records import JOINTS
 from drivers.odrive import codec
 from firmware_host.buses import open_ports
 from firmware_host.configuration.configuration import Configuration
@@ -35,13 +34,15 @@ class Listener:
 
     def __init__(self, configuration: Configuration) -> None:
         self._ports = open_ports(configuration.bus)
-        self._joints = {(configuration.drive[joint].bus, configuration.drive[joint].node_id): joint for joint in JOINTS}
+        drives = [(joint, configuration.drive[joint]) for joint in configuration.rig.joints]
+        self._joints = {(drive.bus, drive.node_id): joint for joint, drive in drives}
         self.reset()
 
     def reset(self) -> None:
-        self.reported = dict.fromkeys(JOINTS, 0)  # messages of current
-        self.pushed = dict.fromkeys(JOINTS, 0)  # of these, until the last one that was not of zero
-        self.closed_loop = dict.fromkeys(JOINTS, True)
+        joints = self._joints.values()
+        self.reported = dict.fromkeys(joints, 0)  # messages of current
+        self.pushed = dict.fromkeys(joints, 0)  # of these, until the last one that was not of zero
+        self.closed_loop = dict.fromkeys(joints, True)
 
     def listen(self) -> None:
         """Listens for WINDOW_S of the drives' own time, which their messages measure."""

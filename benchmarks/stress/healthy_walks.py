@@ -19,7 +19,6 @@ from benchmarks.report import evaluated, run_benchmark, show_progress
 from control.controller import WalkOrder
 from control.faults import Reaction
 from control.modes import Mode, Request
-from control.records import JOINTS
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE, drive_changes
@@ -72,7 +71,7 @@ def _operate(robot: Lockstep, chance: Random, order: WalkOrder) -> None:
     if loop.mode is Mode.HOLD and not loop.controller.moving and chance.random() < 0.01:
         if chance.random() < 0.3:
             held_rad = [state.angle_rad for state in loop.states]
-            moved = chance.randrange(0, len(JOINTS), 2)  # a sweep
+            moved = chance.randrange(0, len(held_rad), 2)  # a sweep
             held_rad[moved] = chance.uniform(-MOVE_RAD, MOVE_RAD)
             loop.controller.move(held_rad)
         else:

@@ -18,7 +18,6 @@ from typing import Any
 from command_line import exit_codes
 from command_line.json_output import print_value
 from command_line.screen import GREEN, RED, YELLOW, coloured
-from control.records import JOINTS
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PoseSourceError
 from firmware_host.buses import BusError, open_ports
@@ -212,7 +211,7 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
     fix = "check its power, wiring, node id and cyclic message periods"
     items = [
         check_item(f"drive.{joint}", state.heard, "heard" if state.heard else "not heard", fix)
-        for joint, state in zip(JOINTS, states, strict=True)
+        for joint, state in zip(configuration.rig.joints, states, strict=True)
     ]
     drives.close()
     return items

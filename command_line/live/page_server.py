@@ -19,7 +19,7 @@ from typing import Any
 from command_line.operation.confirmation import end_motion
 from control.geometry import FlipperGeometry
 from control.modes import Mode
-from control.records import Phase
+from control.records import TWO_FLIPPERS, Phase
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.rows import STRIDE, TICK
@@ -137,12 +137,13 @@ class PageServer:
 
 def robot_facts(configuration_text: str) -> dict[str, Any]:
     """Return what the page draws the robot with; the defaults where the configuration is of another version."""
-    name, geometry = "", FlipperGeometry()
+    name, geometry, rig = "", FlipperGeometry(), TWO_FLIPPERS
     with suppress(ConfigurationError):
         configuration = parse_configuration(configuration_text)
-        name, geometry = configuration.robot.name, configuration.geometry
+        name, geometry, rig = configuration.robot.name, configuration.geometry, configuration.rig
     return {
         "name": name,
+        "flippers": rig.flippers,
         "flipper_length_m": geometry.flipper_length_m,
         "drop_m": geometry.drop_m,
         "axis_height_m": geometry.axis_height_m,

@@ -15,7 +15,7 @@ from foxglove import Channel, Schema
 from control.geometry import FlipperGeometry
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.rows import EVENT, STRIDE
+from firmware_host.log.rows import EVENT, STRIDE, TICK_KIND, rig_of
 from firmware_host.log_reading.live_rows import LiveRow, LiveRows
 from firmware_host.open_data.ros_definitions import full_definition, schema_name
 from firmware_host.open_data.ros_messages import TOPICS
@@ -44,7 +44,9 @@ class ViewerServer:
         for kind in source.kinds:
             if kind.topic not in self._channels:
                 self._add_channel(kind.topic, kind.schema_name, kind.definition)
-        self._standard = StandardMessages(geometry_of(source.configuration_text))
+        self._standard = StandardMessages(
+            geometry_of(source.configuration_text), rig_of(source.kinds[TICK_KIND].definition)
+        )
         self._server.clear_session()
 
     def take(self, rows: Sequence[LiveRow], lost: int) -> None:

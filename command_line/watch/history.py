@@ -8,7 +8,6 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-FLIPPERS = ("left", "right")
 FORCES = ("force_x_n", "force_z_n")
 MOST_SAMPLES = 400  # of a force: as many as the widest terminal shows
 MOST_STRIDES = 400  # of single flippers
@@ -39,7 +38,7 @@ class History:
         if report["strides_closed"] < self.next_stride:
             self.forget()
         self.status, self.heard_s, self.problem = report, now_s, ""
-        for flipper in FLIPPERS:
+        for flipper in self.flippers:
             for force in FORCES:
                 samples = self.forces.setdefault(f"{flipper} {force}", deque(maxlen=MOST_SAMPLES))
                 samples.append(report["loads"][flipper][force])
@@ -47,6 +46,11 @@ class History:
             self.positions.append(Position(report["now_s"], report["body_x_m"]))
         while self.positions and self.positions[0].time_s < report["now_s"] - SPEED_S:
             self.positions.popleft()
+
+    @property
+    def flippers(self) -> list[str]:
+        """The names of the robot's flippers."""
+        return list(self.status["loads"])
 
     def add_strides(self, strides: list[Report]) -> None:
         for stride in strides:

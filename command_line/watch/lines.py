@@ -40,10 +40,17 @@ def fit(line: Line, width: int) -> Line:
     return (*pieces, ("…", "dim")) if width > 0 else ()
 
 
-def side_by_side(left: Line, right: Line, width: int) -> Line:
-    """Put two lines next to each other, each on its half."""
-    half = (width - 2) // 2
-    return (*fit(left, half), ("  ", ""), *fit(right, width - 2 - half))
+def column_width(columns: int, width: int) -> int:
+    return (width - 2 * (columns - 1)) // columns
+
+
+def side_by_side(lines: Sequence[Line], width: int) -> Line:
+    """Put lines next to each other, each in its column; the last one gets the rest."""
+    column = column_width(len(lines), width)
+    pieces: list[Piece] = []
+    for line in lines[:-1]:
+        pieces += [*fit(line, column), ("  ", "")]
+    return (*pieces, *fit(lines[-1], width - (column + 2) * (len(lines) - 1)))
 
 
 def wrapped(text: str, style: str, width: int, indent: int = 0, longest: int = 2) -> list[Line]:

@@ -1,12 +1,12 @@
-"""What the robot feels: each coefficient of both flippers, the forces, and the mud along the way."""
+"""What the robot feels: each coefficient of each flipper, the forces, and the mud along the way."""
 
 from collections.abc import Sequence
 from math import log
 from typing import Any
 
 from command_line.drive_state import is_stale
-from command_line.watch.history import FLIPPERS, History
-from command_line.watch.lines import Line, Piece, aged, fit, side_by_side, sparkline
+from command_line.watch.history import History
+from command_line.watch.lines import Line, Piece, aged, column_width, fit, side_by_side, sparkline
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
 
@@ -18,10 +18,10 @@ Report = dict[str, Any]
 
 
 def coefficient_lines(history: History, width: int) -> list[Line]:
-    """Return a head and one line for each coefficient, with both flippers side by side."""
-    head: list[Line] = [((f"{flipper} (N/cm³)", "title"),) for flipper in FLIPPERS]
-    rows = [[_coefficient(history, flipper, name) for flipper in FLIPPERS] for name in COEFFICIENTS]
-    return [side_by_side(left, right, width) for left, right in [head, *rows]]
+    """Return a head and one line for each coefficient, with the flippers side by side."""
+    head: list[Line] = [((f"{flipper} (N/cm³)", "title"),) for flipper in history.flippers]
+    rows = [[_coefficient(history, flipper, name) for flipper in history.flippers] for name in COEFFICIENTS]
+    return [side_by_side(parts, width) for parts in [head, *rows]]
 
 
 def _coefficient(history: History, flipper: str, name: str) -> Line:
@@ -59,9 +59,9 @@ def trend(readings: Sequence[Report]) -> str:
 def force_lines(history: History, width: int) -> list[Line]:
     """Return a line for each direction: forward, and up."""
     rows = (("forward", "force_x_n"), ("up", "force_z_n"))
-    half = (width - 2) // 2
-    pairs = [[_force(history, flipper, title, force, half) for flipper in FLIPPERS] for title, force in rows]
-    return [side_by_side(left, right, width) for left, right in pairs]
+    part = column_width(len(history.flippers), width)
+    lines = [[_force(history, flipper, title, force, part) for flipper in history.flippers] for title, force in rows]
+    return [side_by_side(parts, width) for parts in lines]
 
 
 def _force(history: History, flipper: str, title: str, force: str, width: int) -> Line:

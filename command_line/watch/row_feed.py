@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from control.modes import Mode
-from control.records import FLIPPERS, Phase
+from control.records import Phase
 from firmware_host.log.row_stream import stream_path
 from firmware_host.log.rows import ROW_KINDS, TICK_KIND
 from firmware_host.log_reading.live_rows import LiveRow
@@ -63,7 +63,7 @@ def updated(status: Mapping[str, Any], tick: Mapping[str, Any]) -> dict[str, Any
     ]
     loads = {
         flipper: {name: known(float(tick[field][index])) for name, field in LOADS.items()}
-        for index, flipper in enumerate(FLIPPERS)
+        for index, flipper in enumerate(status["loads"])
     }
     return {
         **status,

@@ -29,7 +29,7 @@ from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, moti
 from control.gait.gait import GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
-from control.records import StrideEstimate
+from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 Method = Literal["default", "paper", "gait"]
 
@@ -143,16 +143,18 @@ class DepthAdaptation:
         parameters: AdaptationParameters,
         geometry: FlipperGeometry,
         gait: GaitParameters,
+        rig: Rig = TWO_FLIPPERS,
         candidates: Sequence[Candidate] = (),
     ) -> None:
         """`candidates`, if given, replace those of the depth grid: narrow before wide and shallow before deep."""
         self.parameters = parameters
         self.geometry = geometry
         self.gait = gait
+        self._flippers = len(rig.flippers)
         depths_m = depth_grid(parameters, geometry, gait)
         self.candidates = candidates or tuple(make_candidate(geometry, gait, depth_m) for depth_m in depths_m)
         self._depths_m = sorted({each.depth_m for each in self.candidates})
-        self.forecast = DepthForecast(geometry, gait, parameters.motor_force_n)
+        self.forecast = DepthForecast(geometry, gait, parameters.motor_force_n, rig)
         self.reset(parameters.initial_depth_m)
 
     def reset(self, depth_m: float) -> None:
@@ -184,7 +186,8 @@ class DepthAdaptation:
 
         The thrust is that in the middle of the sweep: a gait that reaches a depth at the ends reaches it there too.
         """
-        drag, stiffness_n_m = body_drag(self.parameters, self.forecast), 2.0 * self.parameters.mobilisation_n_m
+        drag = body_drag(self.parameters, self.forecast)
+        stiffness_n_m = self._flippers * self.parameters.mobilisation_n_m
         self.forecast.gait = self.candidates[0].gait
         tractions = dict[float, Traction]()
         for depth_m in self._depths_m:

@@ -24,7 +24,7 @@ from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.plate import stroke_moment_m4, submerged_plate
-from control.records import StrideEstimate
+from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 SHEAR_RATIO = 0.55  # k_s over k_p before any mud gave both
 RATIO_UNCERTAINTY = 0.2
@@ -47,8 +47,11 @@ class DepthForecast:
     either.
     """
 
-    def __init__(self, geometry: FlipperGeometry, gait: GaitParameters, motor_force_n: float) -> None:
+    def __init__(
+        self, geometry: FlipperGeometry, gait: GaitParameters, motor_force_n: float, rig: Rig = TWO_FLIPPERS
+    ) -> None:
         self.geometry = geometry
+        self._flippers = len(rig.flippers)
         self.gait = gait
         self.motor_force_n = motor_force_n
         self.reset()
@@ -110,11 +113,11 @@ class DepthForecast:
         return min(commanded_m + self._sag_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
 
     def thrust_n(self, commanded_m: float) -> float | None:
-        """Return the thrust of both flippers; None if the mud's shear resistance is unknown."""
+        """Return the thrust of all flippers; None if the mud's shear resistance is unknown."""
         depth_m = self.reached_m(commanded_m)
         reported = [self._thrust_n(stride, depth_m) for stride in self._strides]
         known = [thrust_n for thrust_n in reported if thrust_n is not None]
-        return 2.0 * sum(known) / len(known) if known else None
+        return self._flippers * sum(known) / len(known) if known else None
 
     def _thrust_n(self, stride: StrideEstimate, depth_m: float) -> float | None:
         surface_m = _known(stride.surface_m)

@@ -32,7 +32,7 @@ from control.depth.depth_choice import (
 from control.gait.gait import GaitParameters, swing_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
-from control.records import StrideEstimate
+from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 SWEEP_STEP_DEG = 5.0  # 8 mm of step
 EASY_FRACTION = 0.7  # of the lifting torque: an extraction below it allows a wider sweep
@@ -73,8 +73,14 @@ def covers(stride: Candidate, other: Candidate) -> bool:
 class GaitAdaptation(DepthAdaptation):
     """Searches depth and sweep together. Owns the stride under way, and the strides that stuck in this mud."""
 
-    def __init__(self, parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> None:
-        super().__init__(parameters, geometry, gait, gait_candidates(parameters, geometry, gait))
+    def __init__(
+        self,
+        parameters: AdaptationParameters,
+        geometry: FlipperGeometry,
+        gait: GaitParameters,
+        rig: Rig = TWO_FLIPPERS,
+    ) -> None:
+        super().__init__(parameters, geometry, gait, rig, gait_candidates(parameters, geometry, gait))
 
     def reset(self, depth_m: float) -> None:
         super().reset(depth_m)

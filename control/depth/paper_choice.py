@@ -20,7 +20,7 @@ from control.depth.forecast import GRID_M
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
-from control.records import Estimate, StrideEstimate
+from control.records import TWO_FLIPPERS, Estimate, Rig, StrideEstimate
 
 NOT_REPORTED = Estimate(0.0, 0.0, 0, False)
 
@@ -28,10 +28,17 @@ NOT_REPORTED = Estimate(0.0, 0.0, 0, False)
 class PaperAdaptation:
     """Owns the last coefficients that were valid, and the depth of the next stride."""
 
-    def __init__(self, parameters: AdaptationParameters, geometry: FlipperGeometry, gait: GaitParameters) -> None:
+    def __init__(
+        self,
+        parameters: AdaptationParameters,
+        geometry: FlipperGeometry,
+        gait: GaitParameters,
+        rig: Rig = TWO_FLIPPERS,
+    ) -> None:
         self.parameters = parameters
         self.geometry = geometry
         self.gait = gait
+        self._flippers = len(rig.flippers)
         self.grid_m = depth_grid(parameters, geometry, gait)
         self.reset(parameters.initial_depth_m)
 
@@ -76,7 +83,7 @@ class PaperAdaptation:
         if not self._k_s.valid:
             return False
         thrust_n = self._k_s.value * self.geometry.plate_width_m * depth_m * depth_m / 2.0
-        return 2.0 * thrust_n <= self._resistance_n()
+        return self._flippers * thrust_n <= self._resistance_n()
 
     def _resistance_n(self) -> float:
         """Return f_r + f_a, with f_a = m α l / (t_acc t_s) and the stance time t_s = 2 α l / v."""

@@ -35,7 +35,7 @@ class BodyDrag(NamedTuple):
 
 
 class Traction(NamedTuple):
-    """The thrust and stiffness of both flippers together."""
+    """The thrust and stiffness of all flippers together."""
 
     thrust_n: float  # at which the mud yields, or the motors do
     stiffness_n_m: float  # until then

@@ -33,7 +33,16 @@ from control.gait.gait import RAMP_S, GaitParameters, swing_duration_s
 from control.gait.joint_path import still
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
-from control.records import FLIPPERS, DriveStates, Joints, JointTarget, JointTargets, same_for_all, same_for_both
+from control.records import (
+    TWO_FLIPPERS,
+    DriveStates,
+    Joints,
+    JointTarget,
+    JointTargets,
+    Rig,
+    same_for_all,
+    same_for_each,
+)
 
 OUT_M = 0.003  # depth of the plate's lowest point up to which a flipper counts as out of the mud
 RISE_S = 0.2  # to reach the height of the swing
@@ -95,12 +104,15 @@ class Recovery:
         geometry: FlipperGeometry,
         gait: GaitParameters,
         ranges: Joints[JointRange],
+        rig: Rig = TWO_FLIPPERS,
     ) -> None:
         self.parameters = parameters
+        self.rig = rig
         self.geometry = geometry
         self._ranges = ranges
+        self._sweep_range, self._adduction_range = ranges.flippers[0]  # the same for all flippers
         swing_s = swing_duration_s(gait, geometry)
-        self._fade_s = same_for_both(swing_s, min(RISE_S, swing_s))
+        self._fade_s = same_for_each(swing_s, min(RISE_S, swing_s), rig)
         self.reset()
 
     def reset(self) -> None:
@@ -109,7 +121,7 @@ class Recovery:
         self.events = ""  # of this step, for the log
         self._waits = False
         self._time_s = 0.0  # since the wait, the attempt or the following swing began
-        self._targets: JointTargets = still(same_for_all(0.0))
+        self._targets: JointTargets = still(same_for_all(0.0, self.rig))
         self._direction = -1.0  # of the rocking sweep: 1 forward, -1 to the rear
         self._gaps: tuple[Gap, ...] = ()
 
@@ -119,7 +131,7 @@ class Recovery:
             return ()
         return tuple(
             flipper
-            for flipper, (sweep, lift) in zip(FLIPPERS, (states.left, states.right), strict=True)
+            for flipper, (sweep, lift) in zip(self.rig.flippers, states.flippers, strict=True)
             if is_in_mud(self.geometry, sweep.angle_rad, lift.angle_rad)
         )
 
@@ -150,8 +162,8 @@ class Recovery:
         self._time_s = 0.0
         angles_rad = states.map(lambda state: state.angle_rad)
         self._targets = still(angles_rad)
-        positions_rad = {"left": angles_rad.left_sweep, "right": angles_rad.right_sweep}
-        self._direction = -1.0 if self.attempt == 1 else copysign(1.0, sum(positions_rad[name] for name in stuck))
+        sweeps_rad = [angles_rad[self.rig.joints_of(name)][0] for name in stuck]
+        self._direction = -1.0 if self.attempt == 1 else copysign(1.0, sum(sweeps_rad))
         self.events = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
     def _pull(self, dt_s: float, stuck: Sequence[str], states: DriveStates) -> JointTargets:
@@ -162,25 +174,22 @@ class Recovery:
         direction = self._direction if pulled_s / self.parameters.rock_s % 1.0 < AWAY_FRACTION else -self._direction
         speed_rad_s = min(pulled_s / RAMP_S, 1.0) * self.parameters.lift_rad_s
         step_rad, targets = dt_s * speed_rad_s, self._targets
-        self._targets = Joints(
-            self._ahead(direction, states.left_sweep.angle_rad) if "left" in stuck else targets.left_sweep,
-            self._raised(step_rad, dt_s, targets.left_adduction, states.left_adduction.angle_rad),
-            self._ahead(direction, states.right_sweep.angle_rad) if "right" in stuck else targets.right_sweep,
-            self._raised(step_rad, dt_s, targets.right_adduction, states.right_adduction.angle_rad),
-        )
+        pulled: list[JointTarget] = []
+        for name, target, state in zip(self.rig.flippers, targets.flippers, states.flippers, strict=True):
+            pulled.append(self._ahead(direction, state.sweep.angle_rad) if name in stuck else target.sweep)
+            pulled.append(self._raised(step_rad, dt_s, target.adduction, state.adduction.angle_rad))
+        self._targets = Joints(*pulled)
         return self._targets
 
     def _ahead(self, direction: float, here_rad: float) -> JointTarget:
         """Return a target far enough ahead for full torque, within the joint's limits."""
-        return JointTarget(
-            _within(here_rad + direction * radians(self.parameters.lead_deg), *self._ranges.left_sweep), 0.0
-        )
+        return JointTarget(_within(here_rad + direction * radians(self.parameters.lead_deg), *self._sweep_range), 0.0)
 
     def _raised(self, step_rad: float, dt_s: float, target: JointTarget, here_rad: float) -> JointTarget:
         """Return the next target towards a level arm, close to the joint's angle and within its limits."""
         lead_rad = radians(self.parameters.lead_deg)
         angle_rad = _within(0.0, target.angle_rad - step_rad, target.angle_rad + step_rad)
-        angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._ranges.left_adduction)
+        angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._adduction_range)
         return JointTarget(angle_rad, _within((angle_rad - target.angle_rad) / dt_s, -step_rad / dt_s, step_rad / dt_s))
 
     def _end(self, wanted: JointTargets) -> None:

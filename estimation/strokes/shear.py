@@ -51,15 +51,15 @@ class Shear(NamedTuple):
 
 
 def find_shear(
-    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, base: Base, body_drag_n: float
+    geometry: FlipperGeometry, batches: Sequence[Batch], surface_m: float, base: Base, drag_n: float
 ) -> Shear:
-    """Fit k_s, or find a lower bound, from the batches of one stance."""
+    """Fit k_s, or find a lower bound, from the batches of one stance; `drag_n` is the body's drag on each flipper."""
     moments = [_moment_m4(geometry, batch, surface_m) for batch in batches]
     if not any(moment > 0.0 for moment in moments):
         return Shear(None, False, "unknown", 0, "no depth in any batch")
     slips = slips_m(geometry, batches, base)
     if slips is None:
-        return _without_pose(geometry, batches, moments, body_drag_n)
+        return _without_pose(geometry, batches, moments, drag_n)
     steady = _yielding(geometry, batches, slips)
     if len(steady) >= MIN_BATCHES:
         return _value(_case(geometry, batches, slips), steady, batches, moments)
@@ -120,7 +120,7 @@ def _without_pose(
     geometry: FlipperGeometry, batches: Sequence[Batch], moments: Sequence[float], drag_n: float
 ) -> Shear:
     """Fit or bound k_s without a pose: flippers that push less than the body's drag cannot have moved it."""
-    thrusts_n = [2.0 * cos(b.sweep_rad) * b.sweep_nm / geometry.flipper_length_m for b in batches]
+    thrusts_n = [cos(b.sweep_rad) * b.sweep_nm / geometry.flipper_length_m for b in batches]
     if len(batches) > HELD[0] and sorted(thrusts_n)[-HELD[0]] < STANDS * drag_n:
         steady = _yielding(geometry, batches, slips_m(geometry, batches, Base.FIXED))
         if len(steady) >= MIN_BATCHES:

@@ -20,7 +20,6 @@ from math import ceil, degrees, radians, sqrt
 from statistics import fmean, pstdev
 from typing import Any, NamedTuple
 
-from control.records import JOINTS
 from experiments.robot.bench_robot import BenchError, BenchRobot, move, require_hold
 
 OFF_RAD = radians(1.0)  # to the side, before an approach
@@ -91,7 +90,7 @@ class HeldJoint:
     def __init__(self, robot: BenchRobot, joint: str) -> None:
         self._robot = robot
         self._joint = joint
-        self._index = JOINTS.index(joint)
+        self._index = robot.configuration.rig.joints.index(joint)
         self._warm_c = robot.configuration.limits.temperature_warm_c
         self.held_rad = self.sample().angle_rad  # arming holds the pose that it finds
 

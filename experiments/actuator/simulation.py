@@ -20,7 +20,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
 
-from control.records import JOINTS
 from experiments.actuator.fit import JointFit
 from experiments.actuator.plan import Plan, Step
 from experiments.reports.value_text import miss_text
@@ -94,7 +93,7 @@ class SimulatedWeights:
         for arm in self._arms:
             arm.mount = BenchMount(on_side=joint.endswith("sweep"), held=True)
             arm.put_back()
-        mount = self._arms[JOINTS.index(joint) // 2].mount
+        mount = self._arms[lockstep.loop.configuration.rig.joints.index(joint) // 2].mount
         assert mount is not None
         self.mount = mount
 

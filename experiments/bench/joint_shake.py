@@ -16,8 +16,8 @@ leave a speed as well, and ends the shake.
 from math import nan
 
 from control.rate import PERIOD_S
-from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
-from experiments.bench.test_rig import TestRig, torque_on
+from control.records import DriveStates, Torques
+from experiments.bench.test_rig import TestRig, idle, torque_on
 from experiments.robot.bench_robot import BenchError
 
 FIRST_NM, GROWTH = 0.02, 1.5
@@ -63,14 +63,14 @@ class Shake:
         self._ticks += 1
         self.answer_rad = max(self.answer_rad, abs(angle_rad - self._from_rad))
         if self.done or tick >= SHAKE_TICKS:
-            return NO_TORQUE
+            return idle(held, states)
         torque_nm = -self._torque_nm if HALF_TICKS <= tick < 3 * HALF_TICKS else self._torque_nm
-        return torque_on(self._index, torque_nm)
+        return torque_on(held, self._index, torque_nm)
 
 
 def shake_joint(test_rig: TestRig, joint: str) -> Shake:
     """Shake a joint of an armed robot. Raises BenchError where a fault or a late computer ends it."""
-    index, kind = JOINTS.index(joint), joint.split("_")[1]
+    index, kind = test_rig.index_of(joint), joint.split("_")[1]
     test_rig.controller.hold_law = idle
     for _ in range(TRIES):
         at_rest = [sample.states[index].angle_rad for sample in test_rig.run_for(REST_TICKS * PERIOD_S)]
@@ -86,8 +86,3 @@ def _is_punctual(test_rig: TestRig, joint: str, law: Shake) -> bool:
     samples = test_rig.run_until(lambda at: law.done or at.tick.missed > 0, LONGEST_S, f"The end of shaking {joint}")
     test_rig.controller.hold_law = idle
     return not samples[-1].tick.missed
-
-
-def idle(held: Torques, states: DriveStates) -> Torques:
-    """A hold law: no torque, in closed loop."""
-    return NO_TORQUE

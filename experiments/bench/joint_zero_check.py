@@ -1,9 +1,10 @@
 """Checks encoder zeros and limits without torque: against the geometry, flippers held level by hand, and the stops."""
 
+from itertools import pairwise
 from math import degrees, inf
 
 from control.controller import measured_angles
-from control.records import JOINTS, JointAngles, Joints
+from control.records import JointAngles, Joints
 from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.stroke_tracking import WALK_DEPTH_M
 from experiments.bench.test_rig import POLL_S, Sample, TestRig
@@ -18,20 +19,22 @@ ZERO = "set drive.{joint}.zero_turn so that the joint reads 0 with the flipper s
 
 def check_rest_pose(test_rig: TestRig) -> Readings:
     """Check that idle flippers are within the limits, low enough for strides in air, and equally low."""
-    angles = _mean_angles(test_rig.run_for(LOOKING_S))
-    for joint, angle_rad, span in zip(JOINTS, angles, test_rig.configuration.joint_ranges, strict=True):
+    rig, angles = test_rig.configuration.rig, _mean_angles(test_rig.run_for(LOOKING_S))
+    for joint, angle_rad, span in zip(rig.joints, angles, test_rig.configuration.joint_ranges, strict=True):
         advice = f"lay the flipper within its limits (on blocks, or a lower support); else {ZERO.format(joint=joint)}"
         low_deg, high_deg = degrees(span.min_rad), degrees(span.max_rad)
         yield Reading(f"{joint}: at rest", degrees(angle_rad), "deg", low_deg, high_deg, advice)
     geometry = test_rig.configuration.geometry
     stride_m = geometry.axis_height_m + WALK_DEPTH_M
-    left_m, right_m = (geometry.edge_position(*angles[index : index + 2])[2] for index in (0, 2))
-    for side, height_m in (("left", left_m), ("right", right_m)):
+    heights_m = [geometry.edge_position(*pose)[2] for pose in angles.flippers]
+    for side, height_m in zip(rig.flippers, heights_m, strict=True):
         low = "put the robot on blocks: its strides in air go as low"
         advice = f"{low}; where the flipper lies low enough, {ZERO.format(joint=f'{side}_adduction')}"
         yield Reading(f"{side} flipper: edge above the axis, at rest", height_m, "m", -inf, -stride_m, advice)
     advice = "lay both on the same level; else set the zeros of the adduction joints again"
-    yield Reading("left flipper lies above the right one by", left_m - right_m, "m", -LYING_M, LYING_M, advice)
+    for (side, above_m), (other, below_m) in pairwise(zip(rig.flippers, heights_m, strict=True)):
+        what = f"{side} flipper lies above the {other} one by"
+        yield Reading(what, above_m - below_m, "m", -LYING_M, LYING_M, advice)
 
 
 def check_level_pose(test_rig: TestRig) -> Readings:
@@ -41,7 +44,7 @@ def check_level_pose(test_rig: TestRig) -> Readings:
         return
     angles = _mean_angles(test_rig.run_for(LOOKING_S))
     test_rig.operator.release_flippers()
-    for joint, angle_rad in zip(JOINTS, angles, strict=True):
+    for joint, angle_rad in zip(test_rig.configuration.rig.joints, angles, strict=True):
         what = f"{joint}: held level and straight out"
         yield Reading(what, degrees(angle_rad), "deg", -LEVEL_DEG, LEVEL_DEG, ZERO.format(joint=joint))
 
@@ -54,9 +57,9 @@ def check_turning(test_rig: TestRig, joint: str) -> Readings:
         return
     test_rig.operator.release_flippers()
     turns_deg = [degrees(max(angles) - min(angles)) for angles in zip(*seen, strict=True)]
-    index = JOINTS.index(joint)
+    joints, index = test_rig.configuration.rig.joints, test_rig.index_of(joint)
     turn_deg = turns_deg.pop(index)
-    other_deg, other = max(zip(turns_deg, [other for other in JOINTS if other != joint], strict=True))
+    other_deg, other = max(zip(turns_deg, [other for other in joints if other != joint], strict=True))
     mixed = f"{other} turned instead: exchange the node ids (or the bus) of the two"
     advice = mixed if other_deg > turn_deg else "turn it farther"
     yield Reading(f"{joint}: turned by hand", turn_deg, "deg", LEAST_TURN_DEG, inf, advice)
@@ -74,5 +77,4 @@ def _angles(sample: Sample) -> JointAngles:
 
 
 def _mean_angles(samples: list[Sample]) -> JointAngles:
-    a, b, c, d = (sum(angles) / len(samples) for angles in zip(*map(_angles, samples), strict=True))
-    return Joints(a, b, c, d)
+    return Joints(*(sum(angles) / len(samples) for angles in zip(*map(_angles, samples), strict=True)))

@@ -11,7 +11,6 @@ from math import radians
 
 from control.controller import UP_RAD
 from control.rate import PERIOD_S
-from control.records import JOINTS
 from experiments.bench.rig import SimulatedRig
 from experiments.robot.bench_robot import CLEAR, LEAVE
 from experiments.robot.prompt import GO_ON, Operator
@@ -118,6 +117,7 @@ class SimulatedBenchOperator(BenchOperator):
 
     def __init__(self, rig: SimulatedRig) -> None:
         self._plant = rig.robot.plant
+        self._joints = rig.configuration.rig.joints
         self._from_rad = self._farthest_rad = self._plant.angles_rad
         self._held_rad: list[float] | None = None
         self._turning = 0  # index of the joint that is turned along the profile
@@ -135,17 +135,17 @@ class SimulatedBenchOperator(BenchOperator):
         seen = [index for index, path_rad in enumerate(moved_rad) if abs(path_rad) > SEEN_RAD]
         if not seen:
             return Observation.NOTHING
-        if seen != [JOINTS.index(joint)]:
+        if seen != [self._joints.index(joint)]:
             return Observation.OTHER
         return Observation.RIGHT if moved_rad[seen[0]] > 0.0 else Observation.OPPOSITE
 
     def hold_level(self, meanwhile: Callable[[], None]) -> bool:
-        self._held_rad = [0.0] * len(JOINTS)
+        self._held_rad = [0.0] * len(self._joints)
         return True
 
     def turn_joint(self, joint: str, meanwhile: Callable[[], None]) -> bool:
-        self._held_rad = [0.0, UP_RAD, 0.0, UP_RAD]
-        self._turning = JOINTS.index(joint)
+        self._held_rad = [0.0, UP_RAD] * len(self._plant.arms)
+        self._turning = self._joints.index(joint)
         stop_rad = END_STOPS_RAD[self._turning % 2]
         steps = round(TURNING_S / PERIOD_S)
         there_and_back = (*range(0, -steps, -1), *range(-steps, steps), *range(steps, -1, -1))
@@ -164,7 +164,6 @@ class SimulatedBenchOperator(BenchOperator):
             return
         if self._profile:
             self._held_rad[self._turning] = self._profile.popleft()
-        left, right = self._plant.arms
-        left.sweep_rad, left.adduction_rad, right.sweep_rad, right.adduction_rad = self._held_rad
-        for arm in self._plant.arms:
+        for number, arm in enumerate(self._plant.arms):
+            arm.sweep_rad, arm.adduction_rad = self._held_rad[2 * number : 2 * number + 2]
             arm.sweep_velocity_rad_s = arm.adduction_velocity_rad_s = 0.0

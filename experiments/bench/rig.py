@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from control.rate import PERIOD_S
-from control.records import JOINTS
 from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
@@ -141,7 +140,7 @@ class SimulatedRig:
             world.plant(built),
             world.track,
             drives or world.drives(built),
-            {joint: built.drive[joint].bus for joint in JOINTS},
+            {joint: built.drive[joint].bus for joint in built.rig.joints},
             {name: bus.open() for name, bus in self.buses.items()},
             seed,
         )

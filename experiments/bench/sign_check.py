@@ -10,11 +10,11 @@ from math import nan, radians
 
 from control.controller import measured_angles
 from control.rate import PERIOD_S
-from control.records import JOINTS, NO_TORQUE, DriveStates, Joints, Torques
-from experiments.bench.joint_shake import ADVICE, idle, shake_joint
+from control.records import DriveStates, Joints, Rig, Torques
+from experiments.bench.joint_shake import ADVICE, shake_joint
 from experiments.bench.operator import MOTIONS, Observation
 from experiments.bench.reading import Reading, Readings, left_out
-from experiments.bench.test_rig import Sample, TestRig, torque_on
+from experiments.bench.test_rig import Sample, TestRig, idle, torque_on
 
 STEP_NM = 0.01  # a fifth of the torque that holds an arm of the default mass level
 STEP_S = 0.03  # for the joint to start moving before the next step
@@ -40,16 +40,16 @@ class Nudge:
         self.moved = self.moved or abs(states[self.index].angle_rad - self._from_rad) > MOVED_RAD
         self.done = self.moved or self.torque_nm > MOST_NM - STEP_NM / 2.0
         if self.done:
-            return NO_TORQUE
+            return idle(held, states)
         if self._ticks % round(STEP_S / PERIOD_S) == 0:
             self.torque_nm += STEP_NM
         self._ticks += 1
-        return torque_on(self.index, self.torque_nm)
+        return torque_on(held, self.index, self.torque_nm)
 
 
 def check_nudge(test_rig: TestRig, joint: str) -> Readings:
     """Check the motion of one joint. Raises BenchError where a fault ends it."""
-    index = JOINTS.index(joint)
+    index = test_rig.index_of(joint)
     test_rig.arm(idle)
     shaken = shake_joint(test_rig, joint)
     yield Reading(f"{joint}: answer to a shake", shaken.answer_rad, "rad", shaken.least_rad, 1.0, ADVICE)
@@ -60,12 +60,12 @@ def check_nudge(test_rig: TestRig, joint: str) -> Readings:
     nudge = Nudge(index, begun)
     test_rig.controller.hold_law = nudge
     samples = test_rig.run_until(lambda sample: nudge.done, 10.0, f"A motion of {joint}")
-    yield from _agreement(joint, begun, samples, nudge)
+    yield from _agreement(test_rig.configuration.rig, joint, begun, samples, nudge)
     test_rig.run_for(0.3)  # it falls back
     test_rig.switch_off()
 
 
-def _agreement(joint: str, begun: DriveStates, samples: list[Sample], nudge: Nudge) -> Readings:
+def _agreement(rig: Rig, joint: str, begun: DriveStates, samples: list[Sample], nudge: Nudge) -> Readings:
     index = nudge.index
     moved_rad = [
         end - start for start, end in zip(measured_angles(begun), measured_angles(samples[-1].states), strict=True)
@@ -85,7 +85,7 @@ def _agreement(joint: str, begun: DriveStates, samples: list[Sample], nudge: Nud
     late = samples[-round(STEP_S / PERIOD_S) :]
     mean_a = sum(sample.states[index].current_a for sample in late) / len(late)
     yield Reading(f"{joint}: current with it", mean_a, "A", FEWEST_A, 20.0, f"{contrary}, or its current sensor is off")
-    for other, other_rad in zip(JOINTS, moved_rad, strict=True):
+    for other, other_rad in zip(rig.joints, moved_rad, strict=True):
         if other != joint:
             advice = f"commands to {joint} reach {other}, or something couples them: check node ids and mechanics"
             yield Reading(f"{joint}: {other} meanwhile", other_rad, "rad", -OTHERS_RAD, OTHERS_RAD, advice)
@@ -93,13 +93,12 @@ def _agreement(joint: str, begun: DriveStates, samples: list[Sample], nudge: Nud
 
 def hold_gently(held: Torques, states: DriveStates) -> Torques:
     """A hold law: holds the pose with a limited torque."""
-    a, b, c, d = (min(max(torque_nm, -MOST_NM), MOST_NM) for torque_nm in held)
-    return Joints(a, b, c, d)
+    return held.map(lambda torque_nm: min(max(torque_nm, -MOST_NM), MOST_NM))
 
 
 def check_shown_motion(test_rig: TestRig, joint: str) -> Readings:
     """Check that the operator sees the motion that the encoders report."""
-    index, bench_operator = JOINTS.index(joint), test_rig.operator
+    index, bench_operator = test_rig.index_of(joint), test_rig.operator
     test_rig.arm(hold_gently)
     here = measured_angles(test_rig.run_for(test_rig.configuration.motion.fade_in_s)[-1].states)
     bench_operator.start_observing()

@@ -11,9 +11,9 @@ from random import Random
 from statistics import median
 from typing import NamedTuple
 
-from control.records import JOINTS, NO_TORQUE, DriveStates, Torques
+from control.records import DriveStates, Torques
 from experiments.bench.reading import Reading, Readings
-from experiments.bench.test_rig import Sample, TestRig, torque_on
+from experiments.bench.test_rig import Sample, TestRig, idle, torque_on
 
 PULSE_NM = 0.08  # a tenth of the torque limit, and about ten times the noise of the current
 QUARTER_TICKS = 4  # 11 ms: the joint reaches 2 rad/s and moves by 2 degrees
@@ -48,7 +48,7 @@ class Pulses:
     def __call__(self, held: Torques, states: DriveStates) -> Torques:
         pulse_nm = self._pulse_nm(self._tick)
         self._tick += 1
-        return torque_on(self.index, pulse_nm)
+        return torque_on(held, self.index, pulse_nm)
 
     def _pulse_nm(self, tick: int) -> float:
         for begins, sign in self.schedule:
@@ -60,8 +60,8 @@ class Pulses:
 
 def check_step_response(test_rig: TestRig, joint: str, seed: int = 1) -> Readings:
     """Check the delay and size of one joint's current. Raises BenchError where a fault ends it."""
-    pulses = Pulses(JOINTS.index(joint), Random(f"{joint} {seed}"))
-    test_rig.arm(lambda held, states: NO_TORQUE)
+    pulses = Pulses(test_rig.index_of(joint), Random(f"{joint} {seed}"))
+    test_rig.arm(idle)
     test_rig.controller.hold_law = pulses
     samples = [test_rig.tick_checked() for _ in range(pulses.ticks)]
     test_rig.switch_off()

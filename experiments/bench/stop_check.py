@@ -11,17 +11,16 @@ last tick before the request, because the torque does not change in a missed tic
 from collections.abc import Sequence
 from math import degrees, nan, radians
 
-from control.controller import ALL_TRUSTED, DAMPING_NM, RAISING_S, SOFT_STOP_S, HoldLaw, measured_angles
+from control.controller import DAMPING_NM, RAISING_S, SOFT_STOP_S, HoldLaw, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS, JointAngles, Joints, Phase
+from control.records import FlipperJoints, JointAngles, Phase, Rig, same_for_all, same_for_each
 from drivers.drive import DriveParameters
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.stroke_tracking import FAST_RAD_S, order_strides
 from experiments.bench.test_rig import Sample, TestRig, first_lasting
 
-SWEEPS = (0, 2)  # places in JOINTS
 FULL_FRACTION = 0.9  # of the commanded speed: more counts as full speed
 REST_RAD_S = 0.2
 REST_TICKS = 20  # of slow motion in a row: no turning point
@@ -34,7 +33,7 @@ DAMPED_TRAVEL_DEG = 8.0  # at 4 rad/s with 0.06 N·m s/rad and an arm of 0.0004 
 OFF_TICKS = 4  # for command, decay of the current, and its message
 QUIET_TICKS = 5  # in a row
 QUIET_A = 0.4  # smaller currents are noise
-STARTING = tuple(radians(angle_deg) for angle_deg in (-20.0, -10.0))  # sweep and adduction
+STARTING = FlipperJoints(radians(-20.0), radians(-10.0))
 PUSH_A = 1.5  # in each motor until torque is off: at 0.083 N·m/A more than twice the weight of an arm
 PUSH_TICKS = 5  # in which a sweep reaches 4 rad/s and moves 2 degrees
 COASTING_S = 1.5
@@ -44,6 +43,7 @@ BRAKES = "raise the damping in [gains], and see what drives the joints on"
 
 def check_soft_stop(test_rig: TestRig) -> Readings:
     """Check the soft stop. The robot is idle before and after, as in all checks."""
+    rig = test_rig.configuration.rig
     with test_rig.flippers_raised():
         order_strides(test_rig, 2)
         last = test_rig.run_until(lambda sample: _in_full_stance(test_rig, sample), 20.0, "The full speed of a stance")[
@@ -54,7 +54,7 @@ def check_soft_stop(test_rig: TestRig) -> Readings:
         samples = test_rig.run_until(
             lambda sample: sample.mode is Mode.HOLD, SOFT_STOP_S + 1.0, "The end of a soft stop"
         )
-    yield from _sweep_readings("soft stop", last, samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
+    yield from _sweep_readings(rig, "soft stop", last, samples, begun, SOFT_REST_S, SOFT_TRAVEL_DEG)
     whole_s = PERIOD_S * ticks_until(samples[-1], last)
     advice = "something holds the flippers down: see that they hang free"
     yield Reading("soft stop: until the flippers are up", whole_s, "s", 0.0, SOFT_WHOLE_S, advice)
@@ -67,43 +67,46 @@ def _in_full_stance(test_rig: TestRig, sample: Sample) -> bool:
 
 
 def check_damping(test_rig: TestRig) -> Readings:
+    rig = test_rig.configuration.rig
     with test_rig.flippers_raised():
-        test_rig.move([_swept(SWING_RAD)])
-        test_rig.controller.follow_path([_swept(-SWING_RAD)], FAST_RAD_S)
+        test_rig.move([same_for_each(SWING_RAD, 0.0, rig)])
+        test_rig.controller.follow_path([same_for_each(-SWING_RAD, 0.0, rig)], FAST_RAD_S)
         last = test_rig.run_until(
             lambda sample: _is_fast(sample, FULL_FRACTION * FAST_RAD_S), 2.0, "The full speed of a sweep"
         )[-1]
         begun = measured_angles(test_rig.loop.states)
-        gains = test_rig.configuration.gains
-        test_rig.controller.hold_law = lambda held, states: damping_torques_nm(states, gains, ALL_TRUSTED, DAMPING_NM)
+        gains, trusted = test_rig.configuration.gains, same_for_all(True, rig)
+        test_rig.controller.hold_law = lambda held, states: damping_torques_nm(states, gains, trusted, DAMPING_NM)
         samples = test_rig.run_for(2.0 * DAMPED_REST_S)
         test_rig.hold_present_pose()
-    yield from _sweep_readings("damping", last, samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
+    yield from _sweep_readings(rig, "damping", last, samples, begun, DAMPED_REST_S, DAMPED_TRAVEL_DEG)
 
 
 def check_torque_off(test_rig: TestRig) -> Readings:
+    rig = test_rig.configuration.rig
     test_rig.raise_flippers()
-    sweep, adduction = STARTING
-    test_rig.move([Joints(sweep, adduction, sweep, adduction)])
+    test_rig.move([same_for_each(*STARTING, rig)])
     test_rig.controller.hold_law = push(test_rig)
     pushed = test_rig.run_for(PUSH_TICKS * PERIOD_S)
     begun = measured_angles(test_rig.loop.states)
     test_rig.loop.request(Request.DISARM, test_rig.rig.now_s)
     samples = [test_rig.tick() for _ in range(round(COASTING_S / PERIOD_S))]
-    for index, joint in enumerate(JOINTS):
-        yield from _off_readings(test_rig.configuration.drive[joint], pushed, samples, index)
+    for index, joint in enumerate(rig.joints):
+        yield from _off_readings(joint, test_rig.configuration.drive[joint], pushed, samples, index)
     advice = "see what drives it on"
-    yield from _sweep_readings("torque off", pushed[-1], samples, begun, COASTING_S, COASTING_DEG, advice)
+    yield from _sweep_readings(rig, "torque off", pushed[-1], samples, begun, COASTING_S, COASTING_DEG, advice)
 
 
 def push(test_rig: TestRig) -> HoldLaw:
     """Return a hold law that pushes forward and up with the same current in each motor."""
-    a, b, c, d = (PUSH_A * constant_nm_a for constant_nm_a in test_rig.configuration.torque_constants_nm_a)
-    return lambda held, states: Joints(a, b, c, d)
+    pushing_nm = test_rig.configuration.torque_constants_nm_a.map(lambda constant_nm_a: PUSH_A * constant_nm_a)
+    return lambda held, states: pushing_nm
 
 
-def _off_readings(drive: DriveParameters, pushed: Sequence[Sample], samples: Sequence[Sample], index: int) -> Readings:
-    joint, flowed_a = JOINTS[index], max(abs(sample.states[index].current_a) for sample in pushed)
+def _off_readings(
+    joint: str, drive: DriveParameters, pushed: Sequence[Sample], samples: Sequence[Sample], index: int
+) -> Readings:
+    flowed_a = max(abs(sample.states[index].current_a) for sample in pushed)
     few = f"{PUSH_A:g} A were commanded: see stage 4"
     yield Reading(f"{joint}: torque off, current before", flowed_a, "A", 2.0 * QUIET_A, 100.0, few)
     quiet = first_lasting([abs(sample.states[index].current_a) < QUIET_A for sample in samples], QUIET_TICKS)
@@ -116,15 +119,12 @@ def _off_readings(drive: DriveParameters, pushed: Sequence[Sample], samples: Seq
     yield Reading(f"{joint}: torque off, until it says so", idle_s, "s", 0.0, latest_s, advice)
 
 
-def _swept(sweep_rad: float) -> JointAngles:
-    return Joints(sweep_rad, 0.0, sweep_rad, 0.0)
-
-
 def _is_fast(sample: Sample, speed_rad_s: float) -> bool:
-    return all(abs(sample.states[index].velocity_rad_s) > speed_rad_s for index in SWEEPS)
+    return all(abs(sweep.velocity_rad_s) > speed_rad_s for sweep, _ in sample.states.flippers)
 
 
 def _sweep_readings(
+    rig: Rig,
     name: str,
     last: Sample,
     samples: Sequence[Sample],
@@ -133,13 +133,14 @@ def _sweep_readings(
     farthest_deg: float,
     advice: str = BRAKES,
 ) -> Readings:
-    slow = [all(abs(sample.states[index].velocity_rad_s) < REST_RAD_S for index in SWEEPS) for sample in samples]
+    slow = [all(abs(sweep.velocity_rad_s) < REST_RAD_S for sweep, _ in sample.states.flippers) for sample in samples]
     first = first_lasting(slow, REST_TICKS)
     rest_s = PERIOD_S * ticks_until(None if first is None else samples[first], last)
     yield Reading(f"{name}: until the sweep rests", rest_s, "s", 0.0, longest_s, advice)
-    for index, side in zip(SWEEPS, ("left", "right"), strict=True):
+    for flipper in rig.flippers:
+        index = rig.joints_of(flipper).start
         path_deg = degrees(max(abs(sample.states[index].angle_rad - begun[index]) for sample in samples))
-        yield Reading(f"{name}: travel of the {side} sweep", path_deg, "deg", 0.0, farthest_deg, advice)
+        yield Reading(f"{name}: travel of the {flipper} sweep", path_deg, "deg", 0.0, farthest_deg, advice)
 
 
 def ticks_until(sample: Sample | None, last: Sample) -> float:

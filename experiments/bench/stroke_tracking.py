@@ -15,7 +15,7 @@ from control.controller import WalkOrder
 from control.gait.gait import stride_duration_s
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS, JointAngles, Joints
+from control.records import FlipperJoints, JointAngles, Rig, same_for_each
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, TestRig
@@ -24,7 +24,7 @@ from firmware_host.operator.fault_texts import fault_message
 
 Vector = NDArray[np.float64]
 
-STROKE = tuple(radians(angle_deg) for angle_deg in (25.0, 15.0))  # sweep to either side, adduction up and down
+STROKE = FlipperJoints(radians(25.0), radians(15.0))  # sweep to either side, adduction up and down
 FAST_RAD_S = 4.0  # of the stance of a usual walk
 SLOW_RAD_S = 0.5
 STROKES = 2  # there and back
@@ -51,19 +51,18 @@ class Tracking(NamedTuple):
 
 def stroke(test_rig: TestRig, speed_rad_s: float) -> list[Sample]:
     """Move all joints to and fro about level."""
-    sweep, adduction = STROKE
-    front: JointAngles = Joints(sweep, adduction, sweep, adduction)
-    back: JointAngles = Joints(-sweep, -adduction, -sweep, -adduction)
-    samples = test_rig.move([front, back] * STROKES + [Joints(0.0, 0.0, 0.0, 0.0)], speed_rad_s)
+    front: JointAngles = same_for_each(*STROKE, test_rig.configuration.rig)
+    back = front.map(lambda angle_rad: -angle_rad)
+    samples = test_rig.move([front, back] * STROKES + [test_rig.level], speed_rad_s)
     test_rig.run_for(0.3)
     return samples
 
 
-def tracking(samples: Sequence[Sample]) -> dict[str, Tracking]:
+def tracking(rig: Rig, samples: Sequence[Sample]) -> dict[str, Tracking]:
     """Return the tracking of each joint."""
     aimed = [(sample.aim, sample.states) for sample in samples if sample.aim is not None]
     result = {}
-    for index, joint in enumerate(JOINTS):
+    for index, joint in enumerate(rig.joints):
         aims = np.array([aim[index] for aim, _ in aimed])
         angles = np.array([states[index].angle_rad for _, states in aimed])
         errors_rad = aims[:, 0] - angles
@@ -98,11 +97,11 @@ def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: flo
     with test_rig.flippers_raised():
         samples = stroke(test_rig, speed_rad_s)
     gains = "check stiffness and damping in [gains], the drives' limits, and friction of the joint"
-    yield from _tracking_readings(f"{name} stroke", samples, most_deg, gains)
+    yield from _tracking_readings(test_rig.configuration.rig, f"{name} stroke", samples, most_deg, gains)
 
 
-def _tracking_readings(motion: str, samples: Sequence[Sample], most_deg: float, advice: str) -> Readings:
-    for joint, (max_deg, rms_deg, lag_ms) in tracking(samples).items():
+def _tracking_readings(rig: Rig, motion: str, samples: Sequence[Sample], most_deg: float, advice: str) -> Readings:
+    for joint, (max_deg, rms_deg, lag_ms) in tracking(rig, samples).items():
         yield Reading(f"{joint}: {motion}, largest error", max_deg, "deg", 0.0, most_deg, advice)
         yield Reading(f"{joint}: {motion}, error (RMS)", rms_deg, "deg", 0.0, most_deg / 2.0, advice)
         yield Reading(f"{joint}: {motion}, lag", lag_ms, "ms", -LAG_MS, LAG_MS, advice)
@@ -142,8 +141,10 @@ def _walk_readings(test_rig: TestRig, walked: Sequence[Sample]) -> Readings:
     yield Reading("walk: ticks with limited torque", limited, "%", 0.0, 100.0 * MOST_LIMITED_FRACTION, narrow)
     most_nm = max(abs(torque_nm) for sample in walked for torque_nm in sample.sent_nm)
     yield Reading("walk: largest torque", most_nm, "N·m", 0.0, test_rig.configuration.limits.torque_nm, narrow)
-    yield from _tracking_readings("walk", walked, WALK_DEG, "compare with the strokes before: mechanics or gains")
-    for index, (joint, span) in enumerate(zip(JOINTS, test_rig.configuration.joint_ranges, strict=True)):
+    rig, worse = test_rig.configuration.rig, "compare with the strokes before: mechanics or gains"
+    yield from _tracking_readings(rig, "walk", walked, WALK_DEG, worse)
+    spans = zip(rig.joints, test_rig.configuration.joint_ranges, strict=True)
+    for index, (joint, span) in enumerate(spans):
         angles = [sample.states[index].angle_rad for sample in walked]
         room_deg = degrees(min(span.max_rad - max(angles), min(angles) - span.min_rad))
         yield Reading(f"{joint}: walk, room to the limits", room_deg, "deg", 1.0, 180.0, "widen [limits] or sweep less")

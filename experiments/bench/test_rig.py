@@ -6,13 +6,14 @@ the held pose in HOLD may be replaced: by another path, or by a hold law of the 
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import compress
 from typing import NamedTuple
 
 from control.controller import HoldLaw, measured_angles
 from control.faults import Fault, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS, DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
+from control.records import DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from experiments.bench.lateness import Lateness
@@ -26,7 +27,6 @@ ARMING_S = 5.0  # longest time for earlier faults to end, and for the drives to 
 IDLING_S = 2.0
 POLL_S = 0.1  # interval at which a prompt is checked for an answer
 IDLE_COMMANDS = 5  # to each drive, in case some are lost
-LEVEL: JointAngles = same_for_all(0.0)
 
 
 class Sample(NamedTuple):
@@ -52,7 +52,7 @@ class TestRig:
         self.loop = rig.loop
         self.drives = rig.loop.drives
         self.controller = rig.loop.controller
-        self._rest: JointAngles = LEVEL  # joint angles in which the flippers lie without torque
+        self._rest = self.level  # joint angles in which the flippers lie without torque
         self.lateness = Lateness()  # of one measurement, while torque is on
         self.lateness_so_far = Lateness()  # of all measurements
 
@@ -136,7 +136,7 @@ class TestRig:
             self.loop.request(Request.CLEAR, self.rig.now_s)
             if self._is_armable_soon():
                 return
-        silent = ", ".join(joint for joint, state in zip(JOINTS, self.loop.states, strict=True) if not state.heard)
+        silent = self._joints_with([not state.heard for state in self.loop.states])
         unheard = f"{silent}: nothing is heard; check power, wiring and node ids."
         mode = f"it is in {self.loop.mode.name.lower()}."
         raise BenchError(f"The robot cannot be armed: {faults or (unheard if silent else mode)}")
@@ -160,11 +160,19 @@ class TestRig:
         self.controller.follow_path(way_points, speed_rad_s or self.configuration.motion.path_speed_rad_s)
         return self.run_until(lambda sample: not self.controller.moving, 60.0, "The end of a path")
 
+    def index_of(self, joint: str) -> int:
+        """Return the place of a joint in the records of this rig."""
+        return self.configuration.rig.joints.index(joint)
+
+    @property
+    def level(self) -> JointAngles:
+        return same_for_all(0.0, self.configuration.rig)
+
     def raise_flippers(self) -> None:
         """Arm, and raise the flippers until they are level and straight out."""
         self.arm()
         self.run_for(self.configuration.motion.fade_in_s)
-        self.move([LEVEL])
+        self.move([self.level])
         self.run_for(0.3)
 
     @contextmanager
@@ -179,7 +187,7 @@ class TestRig:
         except BaseException:
             self.switch_off()
             raise
-        self.move([LEVEL, self._rest])
+        self.move([self.level, self._rest])
         self.switch_off()
 
     def hold_present_pose(self) -> None:
@@ -195,8 +203,11 @@ class TestRig:
             sample = self.tick()
             if sample.mode not in ENERGISED and not any(state.closed_loop for state in sample.states):
                 return
-        busy = ", ".join(joint for joint, state in zip(JOINTS, self.loop.states, strict=True) if state.closed_loop)
+        busy = self._joints_with([state.closed_loop for state in self.loop.states])
         raise BenchError(f"{busy}: still in closed loop {IDLING_S:g} s after the command to go idle: cut the power.")
+
+    def _joints_with(self, flags: Sequence[bool]) -> str:
+        return ", ".join(compress(self.configuration.rig.joints, flags))
 
     def clear_fault(self) -> None:
         """Clear a fault that a check has caused."""
@@ -214,10 +225,14 @@ def first_lasting(flags: Sequence[bool], ticks: int) -> int | None:
     return next((first for first in range(len(flags) - ticks + 1) if all(flags[first : first + ticks])), None)
 
 
-def torque_on(index: int, torque_nm: float) -> Torques:
-    """Return a torque for one joint, and none for the others."""
-    a, b, c, d = (torque_nm if other == index else 0.0 for other in range(len(JOINTS)))
-    return Joints(a, b, c, d)
+def torque_on(held: Torques, index: int, torque_nm: float) -> Torques:
+    """Return a torque for one joint of those that are `held`, and none for the others."""
+    return Joints(*(torque_nm if other == index else 0.0 for other in range(len(held))))
+
+
+def idle(held: Torques, states: DriveStates) -> Torques:
+    """A hold law: no torque, in closed loop."""
+    return held.map(lambda _: 0.0)
 
 
 def _advice(faults: Sequence[Fault]) -> str:

@@ -29,7 +29,7 @@ GONE_TICKS = 5  # in a row, with less than that
 
 def press(held: Torques, states: DriveStates) -> Torques:
     """A hold law: down, with the adduction motors alone."""
-    return Joints(0.0, -PRESSING_NM, 0.0, -PRESSING_NM)
+    return Joints(*(0.0, -PRESSING_NM) * len(held.flippers))
 
 
 Others = Sequence[tuple[CanPort, Frame]]  # frames of another program in every tick, and their ports

@@ -10,7 +10,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from control.mud_estimate import MudEstimate
-from control.records import FLIPPERS
 from experiments.trials.load_cell_truth import LoadCellTruth
 from experiments.trials.trial import Trial, mud_estimates
 from simulation.body.reference_sensor import StrideTruth
@@ -40,7 +39,9 @@ class BoundaryRow:
 
 def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[Transition]:
     estimates = mud_estimates(trial, trial.configuration.estimation)
-    return [each for flipper in FLIPPERS for each in _transitions(flipper, trial, truths, estimates)]
+    return [
+        each for flipper in trial.configuration.rig.flippers for each in _transitions(flipper, trial, truths, estimates)
+    ]
 
 
 def _transitions(

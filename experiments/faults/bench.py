@@ -11,7 +11,6 @@ from random import Random
 
 from control.monitors.winding import Winding
 from control.rate import PERIOD_S
-from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.fault_injection.failures import Failures, end_text
 from firmware_host.configuration.configuration import Configuration
@@ -98,15 +97,18 @@ class FaultBench(Lockstep):
         """Sends a frame on the bus of a joint's drive that is from neither drive nor loop."""
         self._foreign_ports[self.loop.configuration.drive[joint].bus].send(frame)
 
+    def index_of(self, joint: str) -> int:
+        return self.loop.configuration.rig.joints.index(joint)
+
     def drive(self, joint: str) -> SimulatedDrive:
-        return self.robot.drives[JOINTS.index(joint)]
+        return self.robot.drives[self.index_of(joint)]
 
     def arm_of(self, joint: str) -> Arm:
-        return self.robot.plant.arms[JOINTS.index(joint) // 2]
+        return self.robot.plant.arms[self.index_of(joint) // 2]
 
     def winding(self, joint: str) -> Winding:
         """The loop's thermal model of the winding, which takes seconds to warm up."""
-        return self.loop.fault_monitor.joints[JOINTS.index(joint)].winding
+        return self.loop.fault_monitor.joints[self.index_of(joint)].winding
 
     def add_duplicate(self, joint: str, angle_rad: float) -> Act:
         """Connect a second drive with the joint's node id to its bus. Return its work in one step."""

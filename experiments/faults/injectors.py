@@ -11,7 +11,6 @@ from math import copysign
 from typing import Any
 
 from control.modes import Mode
-from control.records import JOINTS
 from experiments.faults.bench import FaultBench
 from simulation.devices.drive import DriveError, Forgery
 from simulation.devices.foreign_master import ForeignMaster
@@ -229,5 +228,5 @@ def recovery_given_up(bench: FaultBench, joint: str) -> None:
 @in_every_step
 def current_reversed(bench: FaultBench, joint: str) -> None:
     """Report a current against the commanded torque."""
-    drive, sent_nm = bench.drive(joint), bench.loop.sent.torques_nm[JOINTS.index(joint)]
+    drive, sent_nm = bench.drive(joint), bench.loop.sent.torques_nm[bench.index_of(joint)]
     bench.send_foreign(joint, drive.forge_current(-copysign(4.0, sent_nm) * drive.parameters.sign))

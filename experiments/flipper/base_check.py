@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.modes import Mode
-from control.records import FLIPPERS, JOINTS, Phase
+from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 
@@ -42,14 +42,14 @@ def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[s
     if not (len(before) and len(after)):
         return []
     remarks = []
-    sweep = 2 * FLIPPERS.index(flipper)
+    sweep = log.rig.joints_of(flipper).start
     for joint, bound_nm in ((sweep, SWEEP_NM), (sweep + 1, ADDUCTION_NM)):
         constant_nm_a = configuration.torque_constants_nm_a[joint]
         change_nm = constant_nm_a * float(after["current_a"][:, joint].mean() - before["current_a"][:, joint].mean())
         if isfinite(change_nm) and abs(change_nm) > bound_nm:
             remarks.append(
-                f"the load of {JOINTS[joint]} in free air changed by {abs(change_nm):.2f} N·m during the stride: "
-                "clean the flipper, check that the base is firm, and measure again"
+                f"the load of {log.rig.joints[joint]} in free air changed by {abs(change_nm):.2f} N·m during the"
+                " stride: clean the flipper, check that the base is firm, and measure again"
             )
     return remarks
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from control.records import FLIPPERS, StrideEstimate
+from control.records import StrideEstimate
 from estimation.mud import Method
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
@@ -31,15 +31,15 @@ Floats = NDArray[np.float64]
 
 
 class Recording(ABC):
-    """The columns of one run: n rows, joints in the order of JOINTS."""
+    """The columns of one run: n rows, joints in the order of the rig's."""
 
     flippers: tuple[str, ...]
     fixed_base: bool
     findings: tuple[str, ...] = ()  # peculiarities that the reader noticed
     stamp_s: Floats
     phase: NDArray[Any]
-    angle_rad: Floats  # (n, 4)
-    current_a: Floats  # (n, 4)
+    angle_rad: Floats  # (n, joints)
+    current_a: Floats  # (n, joints)
     torque_scale: float = 1.0  # torque constant over that of the authors' motors
 
     @abstractmethod
@@ -104,7 +104,7 @@ class OwnRecording(Recording):
         """Raises LogError."""
         self._path, self._log = path, log
         self._configuration = configuration_of(path, log.configuration_text)
-        self.flippers, self.fixed_base = FLIPPERS, self._configuration.estimation.fixed_base
+        self.flippers, self.fixed_base = log.rig.flippers, self._configuration.estimation.fixed_base
         self.stamp_s, self.phase = log.ticks["stamp_s"], log.ticks["phase"]
         self.angle_rad, self.current_a = log.ticks["angle_rad"], log.ticks["current_a"]
         self.torque_scale = self._configuration.flipper_drives[0].sweep_constant_nm_a / PAPER_CONSTANT_NM_A

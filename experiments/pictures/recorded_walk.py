@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.modes import Mode
-from control.records import FLIPPERS, FlipperLoad, StrideEstimate
+from control.records import FLIPPERS, FlipperLoad, Rig, StrideEstimate
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import STRIDE, stride_row
 from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
@@ -175,7 +175,7 @@ def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: f
     strides = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
     events = [event for event in log.events if start_s <= event["stamp_s"] < until_s]
     summary = log_summary(log)
-    series = tuple(_series_of(ticks, number) for number in range(len(FLIPPERS)))
+    series = tuple(_series_of(ticks, log.rig, flipper) for flipper in log.rig.flippers)
     return RecordedWalk(
         title=f"{summary['robot']}  {summary['started']}",
         geometry=configuration.geometry,
@@ -191,9 +191,10 @@ def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: f
     )
 
 
-def _series_of(ticks: Ticks, number: int) -> FlipperSeries:
+def _series_of(ticks: Ticks, rig: Rig, flipper: str) -> FlipperSeries:
+    number = rig.flippers.index(flipper)
     return FlipperSeries(
-        flipper=FLIPPERS[number],
+        flipper=flipper,
         sweep_angle_rad=ticks["angle_rad"][:, 2 * number],
         adduction_angle_rad=ticks["angle_rad"][:, 2 * number + 1],
         depth_m=ticks["depth_m"][:, number],
@@ -209,7 +210,7 @@ def _since(start_s: float, stride: dict[str, Any]) -> dict[str, Any]:
 class _LabReading(NamedTuple):
     """The estimator's results for one of the authors' runs."""
 
-    loads: list[tuple[FlipperLoad, FlipperLoad]]  # left and right, a row each
+    loads: list[tuple[FlipperLoad, ...]]  # left and right, a row each
     strides: list[StrideEstimate]
     noticed_s: list[float]
 
@@ -218,7 +219,7 @@ def _read_lab(lab: LabLog) -> _LabReading:
     """Estimate one run as `replay_lab` does."""
     estimator, reading = lab_estimator(lab), _LabReading([], [], [])
     for now_s, reported in lab_readings(estimator, lab):
-        reading.loads.append((reported.left, reported.right))
+        reading.loads.append(reported.loads)
         reading.strides.extend(stride for stride in reported.strides if stride.flipper in lab.flippers)
         if reported.strides and estimator.mud_estimate.boundary:
             reading.noticed_s.append(now_s)

@@ -28,7 +28,6 @@ PUSHED_BACK_M = 0.01  # a flipper that comes out of the mud moves the body by le
 AFTER_STANCE = frozenset({Phase.EXTRACTION, Phase.SWING})
 SEEN_FRACTION = 0.9  # of the ticks after a stance: with fewer poses, a push back may have been missed
 NO_MUD = ""  # of a stride whose position is not known
-LEFT_SWEEP, RIGHT_SWEEP = 0, 2  # in the order of JOINTS
 
 
 class WalkedStride(NamedTuple):
@@ -164,7 +163,7 @@ def logged_strides(log: Log, configuration: Configuration, mud_at: Callable[[flo
     The row of a tick holds what was commanded before it, so the command of a tick is in the next row.
     """
     now, commanded = log.ticks[:-1], log.ticks[1:]
-    sweep_sines = np.sin(now["angle_rad"][:, [LEFT_SWEEP, RIGHT_SWEEP]]).mean(axis=1)
+    sweep_sines = np.sin(now["angle_rad"][:, ::2]).mean(axis=1)
     columns = (
         now["stamp_s"],
         np.where(now["mode"] == Mode.WALKING, commanded["stride"], -1),

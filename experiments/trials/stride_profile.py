@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.modes import Mode
-from control.records import FLIPPERS, Phase
+from control.records import Phase, Rig
 from firmware_host.log_reading.log_reader import Log
 
 Floats = NDArray[np.float64]
@@ -46,17 +46,17 @@ def profile_of(log: Log, flipper: str, start_s: float) -> StrideProfile:
     ticks = log.ticks[log.ticks["mode"] == Mode.WALKING]
     later = np.flatnonzero(ticks["stamp_s"] >= start_s)
     rows = ticks[ticks["stride"] == ticks["stride"][later[0]]] if len(later) else ticks[:0]
-    profile = _profile_of_rows(rows[rows["stride"] >= 0], flipper)
+    profile = _profile_of_rows(rows[rows["stride"] >= 0], log.rig, flipper)
     return profile._replace(time_s=profile.time_s - profile.time_s[:1])
 
 
 def profile_of_walk(log: Log, flipper: str) -> StrideProfile:
     """Return the rows of all strides, thinned for a picture."""
-    return _profile_of_rows(log.ticks[log.ticks["mode"] == Mode.WALKING][::WALK_PERIOD], flipper)
+    return _profile_of_rows(log.ticks[log.ticks["mode"] == Mode.WALKING][::WALK_PERIOD], log.rig, flipper)
 
 
-def _profile_of_rows(rows: NDArray[np.void], flipper: str) -> StrideProfile:
-    side = FLIPPERS.index(flipper)
+def _profile_of_rows(rows: NDArray[np.void], rig: Rig, flipper: str) -> StrideProfile:
+    side = rig.flippers.index(flipper)
     return StrideProfile(
         time_s=rows["stamp_s"],
         phase=rows["phase"].astype(np.int64),

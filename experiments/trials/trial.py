@@ -48,7 +48,7 @@ WALKING = Setup("walking", GaitParameters(), fixed_base=False, row_period_s=1.0 
 @dataclass(frozen=True)
 class Trial:
     configuration: Configuration
-    drives: tuple[FlipperDrive, FlipperDrive]  # as the estimator knows them
+    drives: tuple[FlipperDrive, ...]  # as the estimator knows them
     samples: Sequence[Sample]
     truths: Sequence[StrideTruth]
 
@@ -104,16 +104,15 @@ def rows_of(first: Sample, samples: Sequence[Sample], row_period_s: float) -> li
     return rows
 
 
-def _known_drives(configuration: Configuration, torque_error: float, seed: int) -> tuple[FlipperDrive, FlipperDrive]:
+def _known_drives(configuration: Configuration, torque_error: float, seed: int) -> tuple[FlipperDrive, ...]:
     random = Random(seed)
-    left, right = (
+    return tuple(
         drive._replace(
             sweep_constant_nm_a=drive.sweep_constant_nm_a * (1.0 + random.gauss(0.0, torque_error)),
             adduction_constant_nm_a=drive.adduction_constant_nm_a * (1.0 + random.gauss(0.0, torque_error)),
         )
         for drive in configuration.flipper_drives
     )
-    return left, right
 
 
 def _sample_of(lockstep: Lockstep) -> Sample:
@@ -123,7 +122,7 @@ def _sample_of(lockstep: Lockstep) -> Sample:
 
 def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:
     """Return an estimator's strides of the trial."""
-    estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
+    estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters, rig=trial.configuration.rig)
     strides: list[StrideEstimate] = []
     for sample in trial.samples:
         known = sample if with_pose else sample._replace(body=BodyPose())
@@ -133,7 +132,7 @@ def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool =
 
 def mud_estimates(trial: Trial, parameters: EstimationParameters) -> dict[int, MudEstimate]:
     """Return the estimate after each stride, by the stride's index."""
-    estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters)
+    estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters, rig=trial.configuration.rig)
     estimates: dict[int, MudEstimate] = {}
     for sample in trial.samples:
         for stride in estimator.update(*sample).strides:

@@ -19,7 +19,7 @@ from control.joint_pd import ArmMass, JointGains
 from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import FaultBounds
 from control.monitors.winding import WindingParameters
-from control.records import JOINTS, Joints, same_for_both
+from control.records import Joints, Rig, same_for_each
 from drivers.can.bus_load import BitRates
 from drivers.drive import DriveParameters, WatchdogEndpoints
 from drivers.fault_injection.failures import FailureParameters
@@ -109,6 +109,7 @@ class Configuration:
     bus: dict[str, BusParameters]
     drive: dict[str, DriveParameters]
     robot: RobotIdentity = RobotIdentity()
+    rig: Rig = Rig()
     geometry: FlipperGeometry = FlipperGeometry()
     arm: ArmMass = ArmMass()
     gait: GaitParameters = GaitParameters()
@@ -132,13 +133,13 @@ class Configuration:
 
     @property
     def torque_constants_nm_a(self) -> Joints[float]:
-        return Joints(*(self.drive[joint].torque_constant_nm_a for joint in JOINTS))
+        return Joints(*(self.drive[joint].torque_constant_nm_a for joint in self.rig.joints))
 
     @property
-    def flipper_drives(self) -> tuple[FlipperDrive, FlipperDrive]:
-        """The estimator's description of the left and the right flipper's motors."""
-        left, right = (self._flipper_drive(*JOINTS[first : first + 2]) for first in (0, 2))
-        return left, right
+    def flipper_drives(self) -> tuple[FlipperDrive, ...]:
+        """The estimator's description of each flipper's motors."""
+        rig = self.rig
+        return tuple(self._flipper_drive(*rig.joints[rig.joints_of(flipper)]) for flipper in rig.flippers)
 
     def _flipper_drive(self, sweep: str, adduction: str) -> FlipperDrive:
         drives = (self.drive[sweep], self.drive[adduction])
@@ -157,4 +158,4 @@ class Configuration:
         limits = self.limits
         sweep = JointRange(radians(limits.sweep_min_deg), radians(limits.sweep_max_deg))
         adduction = JointRange(radians(limits.adduction_min_deg), radians(limits.adduction_max_deg))
-        return same_for_both(sweep, adduction)
+        return same_for_each(sweep, adduction, self.rig)

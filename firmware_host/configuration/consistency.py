@@ -20,7 +20,7 @@ from control.joint_pd import (
 )
 from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
 from firmware_host.configuration.configuration import Configuration, PoseParameters
-from firmware_host.configuration.drive_consistency import bus_problems, drive_problems
+from firmware_host.configuration.drive_consistency import bus_problems, drive_problems, rig_problems
 from firmware_host.configuration.toml_records import shown
 
 LONGEST_INTERFACE = 15  # IFNAMSIZ with its final zero
@@ -39,6 +39,7 @@ ORDERED = (  # pairs of keys, the first of which must be at most the second
 def contradictions(configuration: Configuration) -> Iterator[str]:
     """Yields a message with key, value and bound for each contradiction."""
     yield from _text_problems(configuration)
+    yield from rig_problems(configuration)
     yield from _pose_problems(configuration.pose)
     yield from drive_problems(configuration)
     yield from bus_problems(configuration)

@@ -3,20 +3,35 @@
 import re
 from collections.abc import Iterator
 
-from control.records import JOINTS
+from control.records import FLIPPERS
 from drivers.can.can_fd import CLASSIC_INTERFACES
 from drivers.drive_types import type_of
 from firmware_host.configuration.configuration import Configuration
 
 
+def rig_problems(configuration: Configuration) -> Iterator[str]:
+    """Checks that every joint of the rig has a drive, and nothing is configured for a joint that it lacks."""
+    flippers, joints = list(configuration.rig.flippers), configuration.rig.joints
+    if not flippers or flippers != [flipper for flipper in FLIPPERS if flipper in flippers]:
+        yield f"rig.flippers = {flippers}: must be {[FLIPPERS[0]]}, {[FLIPPERS[1]]} or {list(FLIPPERS)}"
+        return
+    found = ", ".join(configuration.drive) or "none"
+    for joint in joints:
+        if joint not in configuration.drive:
+            yield (
+                f"drive.{joint} is missing: rig.flippers = {flippers} needs a drive for each of {', '.join(joints)},"
+                f" and there is {found}; add [drive.{joint}], or take its flipper out of rig.flippers"
+            )
+    for section, table in (("drive", configuration.drive), ("friction", configuration.friction)):
+        for joint in (joint for joint in table if joint not in joints):
+            yield (
+                f"{section}.{joint}: there is no such joint; with rig.flippers = {flippers}"
+                f" the joints are {', '.join(joints)}"
+            )
+
+
 def drive_problems(configuration: Configuration) -> Iterator[str]:
     joint_at: dict[tuple[str, int], str] = {}
-    for joint in JOINTS:
-        if joint not in configuration.drive:
-            yield f"drive.{joint} is missing: all of {', '.join(JOINTS)} are needed"
-    for section, table in (("drive", configuration.drive), ("friction", configuration.friction)):
-        for joint in (joint for joint in table if joint not in JOINTS):
-            yield f"{section}.{joint}: there is no such joint; the joints are {', '.join(JOINTS)}"
     for joint, drive in configuration.drive.items():
         if drive.bus not in configuration.bus:
             known = ", ".join(configuration.bus) or "none"

@@ -127,14 +127,23 @@ def _checked_hint(hint: Any) -> Any:
         if changes:
             return Annotated[_model_of(changes.record, changes.without), AfterValidator(_given_fields)]
         bounds = next((extra for extra in extras if isinstance(extra, Bounds)), None)
+        kind = _checked_hint(kind)
         return Annotated[kind, Field(ge=bounds.minimum, le=bounds.maximum)] if bounds else kind
     if get_origin(hint) is dict:
         return dict[str, _checked_hint(get_args(hint)[1])]  # type: ignore[misc]
+    if get_origin(hint) is tuple:
+        return _checked_tuple(get_args(hint))
     if get_origin(hint) is list:
         return list[_checked_hint(get_args(hint)[0])]  # type: ignore[misc]
     if not (is_dataclass(hint) and isinstance(hint, type)):
         return hint
     return Annotated[_model_of(hint), AfterValidator(lambda checked: hint(**dict(checked)))]
+
+
+def _checked_tuple(items: tuple[Any, ...]) -> Any:
+    """Returns the type of an array in the file that becomes a tuple of any length, or of as many items as named."""
+    inner, length = _checked_hint(items[0]), None if items[-1] is ... else len(items)
+    return Annotated[list[inner], Field(min_length=length or 0, max_length=length), AfterValidator(tuple)]  # type: ignore[valid-type]
 
 
 @dataclass(frozen=True)

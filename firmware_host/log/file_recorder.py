@@ -23,6 +23,7 @@ class FileRecorder(NullRecorder):
             "wall_minus_monotonic_ns": time.time_ns(),  # its loop's clock begins at zero
             "configuration_text": configuration.text,
             "metadata": known,
+            "flippers": configuration.rig.flippers,
         }
         self.path = path
         self._file = LogFile(path, opening)

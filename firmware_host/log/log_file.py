@@ -21,7 +21,7 @@ from typing import Any
 from mcap.writer import CompressionType, Writer
 
 from firmware_host.log.log_folder import copy_owner, finished_path, make_folder, synchronise_folder
-from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.rows import opening_kinds
 from firmware_host.log.schema import RowKind
 
 CHUNK_BYTES = 64 * 1024
@@ -56,8 +56,9 @@ class _Buffer:
 class LogFile:
     """Owns a new, locked file. Every method may raise OSError; after that only `abandon` may be called."""
 
-    def __init__(self, path: Path, opening: Mapping[str, Any], kinds: Sequence[RowKind] = ROW_KINDS) -> None:
-        """`kinds` describes the rows; a recovered log keeps the description that it had."""
+    def __init__(self, path: Path, opening: Mapping[str, Any], kinds: Sequence[RowKind] = ()) -> None:
+        """`kinds`, if given, describe the rows: a recovered log keeps the description that it had."""
+        kinds = kinds or opening_kinds(opening)
         make_folder(path.parent)
         self.path = path
         self.rows = self.safe_rows = 0

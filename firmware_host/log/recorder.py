@@ -23,6 +23,7 @@ from fcntl import F_SETPIPE_SZ, fcntl
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from control.records import TWO_FLIPPERS, Rig
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
 from firmware_host.log.log_folder import present_path
 from firmware_host.log.row_records import HEADER, pack_record
@@ -104,6 +105,7 @@ class Recorder:
         metadata: dict[str, str],
         parameters: LogParameters = ONE_FILE,
         stream: StreamSettings | None = None,
+        rig: Rig = TWO_FLIPPERS,
     ) -> None:
         self.path = path  # the file that is being written, or was written last
         self.dropped = 0
@@ -120,7 +122,12 @@ class Recorder:
         os.set_blocking(self._reports, False)
         with suppress(PermissionError):  # beyond the user's limit: the pipe keeps its 64 KiB
             fcntl(self._pipe, F_SETPIPE_SZ, PIPE_BYTES)
-        opening = {"configuration_text": configuration_text, "metadata": metadata, "parameters": asdict(parameters)}
+        opening = {
+            "configuration_text": configuration_text,
+            "metadata": metadata,
+            "parameters": asdict(parameters),
+            "flippers": rig.flippers,
+        }
         self._send_opening(opening if stream is None else opening | {"stream": stream._asdict()})
         os.set_blocking(self._pipe, False)
 

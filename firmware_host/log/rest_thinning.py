@@ -15,8 +15,7 @@ from typing import NamedTuple
 from control.modes import ENERGISED
 from control.rate import RATE_HZ
 from firmware_host.log.rows import TICK, TICK_KIND
-
-MODE, NUMBER = TICK.offset_of("mode"), TICK.offset_of("tick")
+from firmware_host.log.schema import RowKind
 
 
 class Thinned(NamedTuple):
@@ -27,7 +26,8 @@ class Thinned(NamedTuple):
 class RestThinning:
     """Owns the ticks that are held back."""
 
-    def __init__(self, rest_hz: float, full_s: float) -> None:
+    def __init__(self, rest_hz: float, full_s: float, ticks: RowKind = TICK) -> None:
+        self._mode_at, self._number_at = ticks.offset_of("mode"), ticks.offset_of("tick")
         self._every = max(1, round(RATE_HZ / rest_hz)) if rest_hz > 0.0 else 1
         self._full_ticks = round(full_s * RATE_HZ)
         self._held: deque[tuple[int, bytes]] = deque(maxlen=self._full_ticks)
@@ -42,14 +42,14 @@ class RestThinning:
         written: list[tuple[int, bytes]] = []
         notice = ""
         for row in rows:
-            if row[0] == TICK_KIND and len(row[1]) > MODE:
+            if row[0] == TICK_KIND and len(row[1]) > self._mode_at:
                 notice = self._add_tick(row, written) or notice
             else:
                 written.append(row)
         return Thinned(written, notice)
 
     def _add_tick(self, row: tuple[int, bytes], written: list[tuple[int, bytes]]) -> str:
-        mode = row[1][MODE]
+        mode = row[1][self._mode_at]
         active = mode in ENERGISED or mode != self._mode
         self._mode = mode
         self._rested = 0 if active else self._rested + 1
@@ -59,7 +59,7 @@ class RestThinning:
             written += held
             written.append(row)
             return f"end of the rest: the {len(held)} ticks held back before this one are written after all"
-        (number,) = struct.unpack_from("<I", row[1], NUMBER)
+        (number,) = struct.unpack_from("<I", row[1], self._number_at)
         (self._held if self._resting and number % self._every else written).append(row)
         begins = self._resting and not was_resting
         return f"at rest: of the ticks, one in {self._every} is written from here on" if begins else ""

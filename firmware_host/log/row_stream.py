@@ -22,6 +22,7 @@ from typing import Any
 
 from firmware_host.log.row_records import Record, pack_record
 from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.schema import RowKind
 from firmware_host.operator.rights import Group, Level, Peer, Rights, read_peer
 from firmware_host.operator.socket_file import AlreadyServedError, SocketFile
 
@@ -77,12 +78,13 @@ class RowStream:
         rights: Rights,
         metadata: dict[str, Any],
         configuration_text: str = "",
+        kinds: Sequence[RowKind] = ROW_KINDS,
         peer_of: Callable[[socket.socket], Peer] = read_peer,
     ) -> None:
         self.problem = ""
         self._rights, self._peer_of = rights, peer_of
-        kinds = [{"topic": k.topic, "schema": k.schema_name, "definition": k.definition} for k in ROW_KINDS]
-        opening = {"kinds": kinds, "metadata": metadata, "configuration_text": configuration_text}
+        served = [{"topic": k.topic, "schema": k.schema_name, "definition": k.definition} for k in kinds]
+        opening = {"kinds": served, "metadata": metadata, "configuration_text": configuration_text}
         self._opening = pack_record(OPENING, json.dumps(opening).encode())
         self._subscribers: list[Subscriber] = []
         self._file: SocketFile | None = None

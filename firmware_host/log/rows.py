@@ -1,55 +1,68 @@
 """The three kinds of row in a log. A new field is one line here: name with unit, type, source and meaning.
 
-The source of a field is the Python expression that gives its value; it uses the names that `tick_row` and `stride_row`
-define.
+The source of a field is the Python expression that gives its value; it uses the names that `tick_packing` and
+`stride_row` define.
 Wide types come first, so that a row needs no padding between its fields.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import IntEnum
+from functools import cache
+from typing import Any
 
 from control.modes import Mode
-from control.records import FLIPPERS, JOINTS, Phase, StrideEstimate
+from control.records import FLIPPERS, TWO_FLIPPERS, Phase, Rig, StrideEstimate
 from firmware_host.log.schema import TEXT, Field, RowKind
 
 MESSAGES = "mudskipper_msgs/msg"
-JOINT_ORDER = "left sweep, left adduction, right sweep, right adduction"
 
 
 def _numbered(values: type[IntEnum]) -> str:
     return ", ".join(f"{value} {value.name.lower()}" for value in values)
 
 
-TICK = RowKind(
-    "/tick",
-    f"{MESSAGES}/Tick",
-    (
-        Field("stamp_s", "float64", "now_s", "monotonic clock when the tick began"),
-        Field("wake_late_s", "float64", "tick.late_s", "how long after its deadline the tick began"),
-        Field("tick_s", "float64", "tick_s", "from the wake-up until the commands were sent"),
-        Field("angle_rad", "float64", "{}.angle_rad", JOINT_ORDER, JOINTS),
-        Field("velocity_rad_s", "float64", "{}.velocity_rad_s", JOINT_ORDER, JOINTS),
-        Field("current_a", "float64", "{}.current_a", "measured q current", JOINTS),
-        Field("angle_age_s", "float64", "now_s - {}.angle_stamp_s", "since the position arrived", JOINTS),
-        Field("current_age_s", "float64", "now_s - {}.current_stamp_s", "since the current arrived", JOINTS),
-        Field("torque_command_nm", "float64", "{}_nm", "after the limits, as sent", JOINTS),
-        Field("sweep_load_nm", "float64", "{}.sweep_torque_nm", "of the mud on the joint; left, right", FLIPPERS),
-        Field("adduction_load_nm", "float64", "{}.adduction_torque_nm", "of the mud on the joint", FLIPPERS),
-        Field("force_x_n", "float64", "{}.force_x_n", "forward", FLIPPERS),
-        Field("force_z_n", "float64", "{}.force_z_n", "up", FLIPPERS),
-        Field("depth_m", "float64", "{}.depth_m", "measured, below the nominal surface", FLIPPERS),
-        Field("depth_command_m", "float64", "target.depth_m", "below the nominal surface"),
-        Field("stride_depth_m", "float64", "loop.stride_depth_m", "insertion depth chosen for this stride"),
-        Field("body_x_m", "float64", "body.x_m", "position along the track; NaN without a pose"),
-        Field("temperature_c", "float64", "{}.temperature_c", "of the motor", JOINTS),
-        Field("tick", "uint32", "tick.number", "ticks since the start, missed ones included"),
-        Field("missed_ticks", "uint32", "loop.missed_ticks", "since the start"),
-        Field("stride", "int32", "target.stride", "-1 outside of a walk"),
-        Field("mode", "uint8", "loop.mode", _numbered(Mode)),
-        Field("phase", "uint8", "target.phase", _numbered(Phase)),
-        Field("limited", "bool", "sent.limited", "the limits cut a torque"),
-    ),
-)
+@cache
+def tick_kind(rig: Rig) -> RowKind:
+    """The ticks of a rig: arrays have one value for each of its joints or flippers, whose names are in the meanings."""
+    joint_order = ", ".join(joint.replace("_", " ") for joint in rig.joints)
+    flipper_order = f"of the mud on the joint; {', '.join(rig.flippers)}"
+    return RowKind(
+        "/tick",
+        f"{MESSAGES}/Tick",
+        (
+            Field("stamp_s", "float64", "now_s", "monotonic clock when the tick began"),
+            Field("wake_late_s", "float64", "tick.late_s", "how long after its deadline the tick began"),
+            Field("tick_s", "float64", "tick_s", "from the wake-up until the commands were sent"),
+            Field("angle_rad", "float64", "{}.angle_rad", joint_order, rig.joints),
+            Field("velocity_rad_s", "float64", "{}.velocity_rad_s", joint_order, rig.joints),
+            Field("current_a", "float64", "{}.current_a", "measured q current", rig.joints),
+            Field("angle_age_s", "float64", "now_s - {}.angle_stamp_s", "since the position arrived", rig.joints),
+            Field("current_age_s", "float64", "now_s - {}.current_stamp_s", "since the current arrived", rig.joints),
+            Field("torque_command_nm", "float64", "{}_nm", "after the limits, as sent", rig.joints),
+            Field("sweep_load_nm", "float64", "{}.sweep_torque_nm", flipper_order, rig.flippers),
+            Field("adduction_load_nm", "float64", "{}.adduction_torque_nm", "of the mud on the joint", rig.flippers),
+            Field("force_x_n", "float64", "{}.force_x_n", "forward", rig.flippers),
+            Field("force_z_n", "float64", "{}.force_z_n", "up", rig.flippers),
+            Field("depth_m", "float64", "{}.depth_m", "measured, below the nominal surface", rig.flippers),
+            Field("depth_command_m", "float64", "target.depth_m", "below the nominal surface"),
+            Field("stride_depth_m", "float64", "loop.stride_depth_m", "insertion depth chosen for this stride"),
+            Field("body_x_m", "float64", "body.x_m", "position along the track; NaN without a pose"),
+            Field("temperature_c", "float64", "{}.temperature_c", "of the motor", rig.joints),
+            Field("tick", "uint32", "tick.number", "ticks since the start, missed ones included"),
+            Field("missed_ticks", "uint32", "loop.missed_ticks", "since the start"),
+            Field("stride", "int32", "target.stride", "-1 outside of a walk"),
+            Field("mode", "uint8", "loop.mode", _numbered(Mode)),
+            Field("phase", "uint8", "target.phase", _numbered(Phase)),
+            Field("limited", "bool", "sent.limited", "the limits cut a torque"),
+        ),
+    )
+
+
+def rig_of(definition: str) -> Rig:
+    """Return the rig whose joints a definition of ticks names; where none is named, a rig with two flippers."""
+    named = tuple(flipper for flipper in FLIPPERS if f"{flipper} sweep" in definition)
+    return Rig(named or FLIPPERS)
+
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 COEFFICIENT_UNIT = "N/m^3"
@@ -102,16 +115,32 @@ EVENT = RowKind(
     ),
 )
 
-ROW_KINDS = (TICK, STRIDE, EVENT)
+
+def row_kinds(rig: Rig) -> tuple[RowKind, RowKind, RowKind]:
+    return tick_kind(rig), STRIDE, EVENT
+
+
+def opening_kinds(opening: Mapping[str, Any]) -> tuple[RowKind, RowKind, RowKind]:
+    """Return the kinds of a log's rows by the opening that its loop sends: it names the flippers, or there are two."""
+    return row_kinds(Rig(tuple(opening.get("flippers", FLIPPERS))))
+
+
+TICK = tick_kind(TWO_FLIPPERS)
+ROW_KINDS = row_kinds(TWO_FLIPPERS)
 TICK_KIND, STRIDE_KIND, EVENT_KIND = range(len(ROW_KINDS))  # a row's kind on its way into a file
 
-tick_row: Callable[..., bytes] = TICK.compile(  # of a tick, its duration in s, and the loop after it
-    "tick, tick_s, loop",
-    "now_s, target, body, sent = tick.now_s, loop.target, loop.body, loop.sent",
-    f"{', '.join(JOINTS)} = loop.states",
-    f"{', '.join(f'{joint}_nm' for joint in JOINTS)} = sent.torques_nm",
-    f"{', '.join(FLIPPERS)}, _ = loop.learning.reading",
-)
+
+@cache
+def tick_packing(rig: Rig) -> Callable[..., bytes]:
+    """Make the function that packs the row of a tick from the tick, its duration in s, and the loop after it."""
+    return tick_kind(rig).compile(
+        "tick, tick_s, loop",
+        "now_s, target, body, sent = tick.now_s, loop.target, loop.body, loop.sent",
+        f"{', '.join(rig.joints)} = loop.states",
+        f"{', '.join(f'{joint}_nm' for joint in rig.joints)} = sent.torques_nm",
+        f"{', '.join(rig.flippers)}, = loop.learning.reading.loads",
+    )
+
 
 stride_row: Callable[[float, StrideEstimate, float], bytes] = STRIDE.compile(
     "now_s, stride, chosen_depth_m",

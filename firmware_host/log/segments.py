@@ -31,7 +31,7 @@ from firmware_host.log.log_folder import (
     unfinished_files,
 )
 from firmware_host.log.rest_thinning import RestThinning
-from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS
+from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS, TICK_KIND, opening_kinds
 
 RETRY_S = 3.0  # between two attempts at a disk that refuses
 QUOTA_INTERVAL_S = 10.0
@@ -47,7 +47,7 @@ class LogSegments:
         self.slowest_s = 0.0  # write since this was last set to zero
         self._first, self._opening, self._parameters = first, opening, parameters
         self._folder = first.parent.parent if first.parent.name == ACTIVE else None
-        self._thinning = RestThinning(parameters.rest_hz, parameters.rest_full_s)
+        self._thinning = RestThinning(parameters.rest_hz, parameters.rest_full_s, opening_kinds(opening)[TICK_KIND])
         self._file: LogFile | None = None
         self._segment = 0
         self._missing = 0  # rows that the next file has to report
@@ -132,7 +132,7 @@ class LogSegments:
             "rest_hz": f"{self._parameters.rest_hz:g}",
             "rest_full_s": f"{self._parameters.rest_full_s:g}",
         }
-        return {
+        return self._opening | {
             "configuration_text": text,
             "metadata": self._opening["metadata"] | metadata,
             "wall_minus_monotonic_ns": time.time_ns() - time.monotonic_ns(),

@@ -25,7 +25,7 @@ from firmware_host.log.log_folder import FreeSpace, free_space
 from firmware_host.log.recorder import PIPE_BYTES, STAMP, LogReport
 from firmware_host.log.row_records import Record, split_records
 from firmware_host.log.row_stream import RowStream, read_rights
-from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.rows import ROW_KINDS, opening_kinds
 from firmware_host.log.segments import LogSegments
 
 GATHER_S = 0.05  # asleep between batches, so that not every row wakes the writer, which would slow the loop
@@ -95,7 +95,11 @@ def _open_stream(opening: dict[str, Any]) -> RowStream | None:
     if wanted is None:
         return None
     stream = RowStream(
-        Path(wanted["path"]), read_rights(wanted["rights"]), opening["metadata"], opening["configuration_text"]
+        Path(wanted["path"]),
+        read_rights(wanted["rights"]),
+        opening["metadata"],
+        opening["configuration_text"],
+        opening_kinds(opening),
     )
     if stream.problem:
         print(f"warning: {stream.problem}", file=sys.stderr, flush=True)

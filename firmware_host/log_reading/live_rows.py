@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from firmware_host.log.row_records import split_records
 from firmware_host.log.row_stream import BUFFER_BYTES, LOST, OPENING, REFUSAL
-from firmware_host.log.rows import ROW_KINDS
+from firmware_host.log.rows import TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from firmware_host.operator.status_client import NoDaemonError, NotPermittedError
 
@@ -98,14 +98,15 @@ class LiveRows:
 
     def _open(self, opening: dict[str, Any]) -> None:
         self.metadata, self.configuration_text = opening["metadata"], opening["configuration_text"]
-        self.kinds = [_kind(own, served) for own, served in zip(ROW_KINDS, opening["kinds"], strict=False)]
+        self.kinds = _kinds([served["definition"] for served in opening["kinds"]])
 
     def close(self) -> None:
         self._socket.close()
 
 
-def _kind(own: RowKind, served: dict[str, str]) -> RowKind:
+def _kinds(definitions: list[str]) -> list[RowKind]:
+    own = row_kinds(rig_of(definitions[TICK_KIND]))
     try:
-        return read_definition(own, served["definition"])
+        return list(map(read_definition, own, definitions))
     except LayoutError as problem:
         raise NoDaemonError(f"the daemon is of another version: {problem}") from problem

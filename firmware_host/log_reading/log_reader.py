@@ -22,9 +22,10 @@ from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metada
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
+from control.records import TWO_FLIPPERS, Rig
 from firmware_host.log.log_file import ATTACHMENT, METADATA
 from firmware_host.log.log_folder import why_not_read
-from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND
+from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from firmware_host.log_reading.chunks import Row, open_chunk, split_records
 from firmware_host.log_reading.log_error import DAMAGE as DAMAGE
@@ -49,6 +50,7 @@ class Log(NamedTuple):
     complete: bool  # False where the writer was cut off; everything before that is here
     unknown_fields: tuple[str, ...] = ()  # such as "/tick battery_v", which this version does not know
     missing_fields: tuple[str, ...] = ()  # which the version that wrote the log did not know
+    rig: Rig = TWO_FLIPPERS  # whose joints and flippers the arrays of a tick have, in its order
 
 
 def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Log:
@@ -75,6 +77,7 @@ def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Log:
         complete,
         tuple(name for name in present if name not in own),
         tuple(name for name in described if name not in present),
+        rig_of(found.kinds.get(TICK_KIND, TICK).definition),
     )
 
 
@@ -176,7 +179,8 @@ def described_kind(number: int, schema: Schema | None) -> RowKind:
     """Returns the row kind of one of our topics as a file describes it. Raises LayoutError."""
     if schema is None:
         raise LayoutError(f"{ROW_KINDS[number].topic} is not described")
-    return read_definition(ROW_KINDS[number], schema.data.decode(errors="replace"))
+    definition = schema.data.decode(errors="replace")
+    return read_definition(row_kinds(rig_of(definition))[number], definition)
 
 
 def _field_names(kinds: Mapping[int, RowKind]) -> list[str]:

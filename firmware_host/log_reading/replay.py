@@ -12,7 +12,7 @@ from pathlib import Path
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.modes import Mode
-from control.records import FLIPPERS, BodyPose, Phase, StrideEstimate
+from control.records import FLIPPERS, JOINTS, BodyPose, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
 from estimation.mud_map import MapRow
@@ -41,7 +41,7 @@ WEIGHTLESS = ArmMass(
     arm_mass_kg=0.0, center_of_mass_m=0.0, sweep_inertia_kg_m2=0.0, adduction_inertia_kg_m2=0.0
 )  # the assumption of the authors' method; the masses of their arm are unknown
 LAB_DRIVE = FlipperDrive(WEIGHTLESS, PAPER_CONSTANT_NM_A, PAPER_CONSTANT_NM_A)
-NO_VELOCITY = (nan, nan, nan, nan)
+NO_VELOCITY = (nan,) * len(JOINTS)
 PHASES = tuple(Phase)
 WATCHED_TICKS = 1000  # between two reports of progress
 TICK_FIELDS = (
@@ -98,12 +98,15 @@ def replay_log(
     """Replays with the configuration that the log carries, unless another one is given."""
     configuration = configuration or configuration_of(path, log.configuration_text)
     parameters = replace(configuration.estimation, method=method or configuration.estimation.method)
-    drag_n = configuration.adaptation.body_drag_n
-    estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n)
+    drag_n, rig = configuration.adaptation.body_drag_n, configuration.rig
+    if rig != log.rig:
+        own, given = list(log.rig.flippers), list(rig.flippers)
+        raise LogError(f"{path}: is of a robot with rig.flippers = {own}, not {given} as in the configuration")
+    estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n, rig)
     found = list(_strides_of_log(estimator, log, watch))
     return Replay(
         [stride for stride, _ in found],
-        FLIPPERS,
+        rig.flippers,
         estimator.map.rows(),
         log.complete,
         segment_of(log),
@@ -170,15 +173,17 @@ def lab_estimator(
 
     A single flipper was mounted on a fixed bench; two flippers carried a body.
     """
-    geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters()
+    geometry, drives, parameters = FlipperGeometry(), (LAB_DRIVE,) * len(FLIPPERS), EstimationParameters()
     parameters = replace(parameters, surface_error_m=LEVELLED_M if len(lab.flippers) == 1 else UNEVEN_M)
     if configuration:
-        geometry, drives, parameters = configuration.geometry, configuration.flipper_drives, configuration.estimation
-    left, right = (drive._replace(current_limit_a=min(lab.current_limit_a, drive.current_limit_a)) for drive in drives)
+        geometry, parameters = configuration.geometry, configuration.estimation
+        own = dict(zip(configuration.rig.flippers, configuration.flipper_drives, strict=True))
+        drives = tuple(own.get(flipper, configuration.flipper_drives[0]) for flipper in FLIPPERS)
+    limited = [drive._replace(current_limit_a=min(lab.current_limit_a, drive.current_limit_a)) for drive in drives]
     fixed_base = parameters.fixed_base or len(lab.flippers) == 1
     parameters = replace(parameters, method=method or parameters.method, fixed_base=fixed_base)
     drag_n = configuration.adaptation.body_drag_n if configuration else PAPER_DRAG_N
-    return MudEstimator(geometry, (left, right), parameters, drag_n)
+    return MudEstimator(geometry, limited, parameters, drag_n)
 
 
 def lab_readings(estimator: MudEstimator, lab: LabLog) -> Iterator[tuple[float, MudReading]]:

@@ -5,7 +5,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.log.rows import TICK
+from firmware_host.log.rows import TICK, rig_of, tick_kind
 from firmware_host.log.schema import FORMAT_OF, RowKind
 
 Ticks: TypeAlias = NDArray[np.void]
@@ -28,14 +28,15 @@ def stack_ticks(kind: RowKind, rows: list[bytes]) -> Ticks:
         if not kind.fits(row):
             raise ValueError(f"row {number} of {kind.topic} has {len(row)} bytes, not {kind.layout.size}")
     ticks = np.frombuffer(b"".join(row[: kind.layout.size] for row in rows), dtype=tick_type(kind))
-    return sort_ticks(ticks if tick_type(kind) == tick_type() else _with_own_fields(ticks))
+    own = tick_kind(rig_of(kind.definition))
+    return sort_ticks(ticks if tick_type(kind) == tick_type(own) else _with_own_fields(ticks, own))
 
 
-def _with_own_fields(ticks: Ticks) -> Ticks:
-    types, names = tick_type(), ticks.dtype.names or ()
+def _with_own_fields(ticks: Ticks, own: RowKind) -> Ticks:
+    types, names = tick_type(own), ticks.dtype.names or ()
     unknown = [(name, ticks.dtype[name]) for name in names if name not in (types.names or ())]
-    full = np.empty(len(ticks), [*((field.name, types[field.name]) for field in TICK.fields), *unknown])
-    missing = {field.name: field.missing for field in TICK.fields}
+    full = np.empty(len(ticks), [*((field.name, types[field.name]) for field in own.fields), *unknown])
+    missing = {field.name: field.missing for field in own.fields}
     for name in full.dtype.names or ():
         full[name] = ticks[name] if name in names else missing[name]
     return full

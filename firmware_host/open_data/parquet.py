@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from firmware_host.log.log_file import ATTACHMENT
-from firmware_host.log.rows import EVENT, STRIDE, TICK
+from firmware_host.log.rows import EVENT, STRIDE, tick_kind
 from firmware_host.log.schema import RowKind
 from firmware_host.log.whole_files import whole_files
 from firmware_host.log_reading.log_reader import Log, Watch, unwatched
@@ -29,7 +29,7 @@ class _Part(NamedTuple):
 def write_parquet(log: Log, folder: Path, stem: str, watch: Watch = unwatched) -> list[Path]:
     """Writes STEM-ticks.parquet, STEM-strides.parquet and STEM-events.parquet: all, or none. Raises OSError."""
     parts = [
-        _Part("ticks", log.ticks, TICK),
+        _Part("ticks", log.ticks, tick_kind(log.rig)),
         _Part("strides", stack_rows(log.strides, STRIDE), STRIDE),
         _Part("events", stack_rows(log.events, EVENT), EVENT),
     ]

@@ -13,14 +13,15 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from control.geometry import FlipperGeometry
+from control.records import Rig
 from firmware_host.log.log_file import ATTACHMENT, EXPORTED, METADATA
-from firmware_host.log.rows import EVENT, ROW_KINDS, STRIDE, TICK
+from firmware_host.log.rows import EVENT, STRIDE, TICK, row_kinds, tick_kind
 from firmware_host.log.schema import CDR_HEADER
 from firmware_host.log.whole_files import whole_file
 from firmware_host.log_reading.log_reader import Log, Watch, unwatched
-from firmware_host.log_reading.tick_array import Ticks, tick_type
+from firmware_host.log_reading.tick_array import tick_type
 from firmware_host.open_data.ros_definitions import full_definition, schema_name
-from firmware_host.open_data.ros_messages import TOPICS
+from firmware_host.open_data.ros_messages import topics_of
 from firmware_host.open_data.standard_messages import StandardMessages
 
 LATEST_NS = (1 << 31) * 1_000_000_000 - 1
@@ -41,7 +42,7 @@ def write_ros_log(log: Log, geometry: FlipperGeometry, path: Path, watch: Watch 
         writer.start(profile="ros2", library="mudskipper")
         writer.add_metadata(METADATA, log.metadata | {EXPORTED: "ros"})
         writer.add_attachment(0, 0, ATTACHMENT, "application/toml", log.configuration_text.encode())
-        channels = _register(writer)
+        channels = _register(writer, log.rig)
         messages = heapq.merge(_own_rows(log), _standard(log, geometry, offset_ns), key=lambda message: message.stamp_s)
         for number, message in enumerate(messages):
             if number % WATCHED_ROWS == 0:
@@ -51,10 +52,10 @@ def write_ros_log(log: Log, geometry: FlipperGeometry, path: Path, watch: Watch 
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-def _register(writer: Writer) -> dict[str, int]:
+def _register(writer: Writer, rig: Rig) -> dict[str, int]:
     """Returns the channel of each topic."""
-    kinds = {kind.topic: (kind.schema_name, kind.definition) for kind in ROW_KINDS}
-    standard = {topic: (schema_name(message), full_definition(message)) for topic, message in TOPICS.items()}
+    kinds = {kind.topic: (kind.schema_name, kind.definition) for kind in row_kinds(rig)}
+    standard = {topic: (schema_name(message), full_definition(message)) for topic, message in topics_of(rig).items()}
     schemas = {
         name: writer.register_schema(name, "ros2msg", text.encode()) for name, text in (kinds | standard).values()
     }
@@ -71,14 +72,14 @@ def _wall_ns(stamp_s: float, offset_ns: int) -> int:
 
 def _own_rows(log: Log) -> Iterator[_Message]:
     stamps_s = log.ticks["stamp_s"].tolist()
-    ticks = (_Message(stamp_s, TICK.topic, row) for stamp_s, row in zip(stamps_s, _encoded(log.ticks), strict=True))
+    ticks = (_Message(stamp_s, TICK.topic, row) for stamp_s, row in zip(stamps_s, _encoded(log), strict=True))
     strides = (_Message(row["stamp_s"], STRIDE.topic, STRIDE.encode_named(**row)) for row in log.strides)
     events = (_Message(row["stamp_s"], EVENT.topic, EVENT.encode_named(**row)) for row in log.events)
     return heapq.merge(ticks, strides, events, key=lambda message: message.stamp_s)
 
 
-def _encoded(ticks: Ticks) -> Iterator[bytes]:
-    rows = np.zeros(len(ticks), tick_type())
+def _encoded(log: Log) -> Iterator[bytes]:
+    ticks, rows = log.ticks, np.zeros(len(log.ticks), tick_type(tick_kind(log.rig)))
     for name in rows.dtype.names or ():
         rows[name] = ticks[name]
     stored, size = rows.tobytes(), rows.dtype.itemsize
@@ -86,7 +87,7 @@ def _encoded(ticks: Ticks) -> Iterator[bytes]:
 
 
 def _standard(log: Log, geometry: FlipperGeometry, offset_ns: int) -> Iterator[_Message]:
-    standard = StandardMessages(geometry)
+    standard = StandardMessages(geometry, log.rig)
     coming = sorted([*log.strides, *log.events], key=lambda row: float(row["stamp_s"]), reverse=True)
     for tick in log.ticks:
         if not standard.is_due(int(tick["tick"])):

@@ -12,25 +12,32 @@ from typing import Any, NamedTuple
 
 from control.geometry import FlipperGeometry
 from control.modes import Mode
-from control.records import FLIPPERS, JOINTS
+from control.records import TWO_FLIPPERS, Rig
 from firmware_host.log.rows import COEFFICIENTS, TICK
 from firmware_host.open_data.cdr import CdrMessage
 
 TRACK, BASE = "track", "base_link"
 DIAGNOSTICS = "/diagnostics"
-TOPICS = {  # topic -> message
-    "/joint_states": "sensor_msgs/JointState",
-    "/tf": "tf2_msgs/TFMessage",
-    **{f"/{flipper}/pose": "geometry_msgs/PoseStamped" for flipper in FLIPPERS},
-    **{f"/{flipper}/force": "geometry_msgs/WrenchStamped" for flipper in FLIPPERS},
-    DIAGNOSTICS: "diagnostic_msgs/DiagnosticArray",
-}
 OK, WARN, ERROR = range(3)
 STRIDE_VALUES = ("index", *(f"{k}{part}" for k in COEFFICIENTS for part in ("", "_std_error")), "depth_m", "step_m")
 JOINT_VALUES = ("current_a", "temperature_c", "angle_age_s", "current_age_s")
 WORDS = {field.name: field.words for field in TICK.fields}
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 Row = Any  # one element of the array of ticks, or a mapping with its fields
+
+
+def topics_of(rig: Rig) -> dict[str, str]:
+    """Returns the message of each topic."""
+    return {
+        "/joint_states": "sensor_msgs/JointState",
+        "/tf": "tf2_msgs/TFMessage",
+        **{f"/{flipper}/pose": "geometry_msgs/PoseStamped" for flipper in rig.flippers},
+        **{f"/{flipper}/force": "geometry_msgs/WrenchStamped" for flipper in rig.flippers},
+        DIAGNOSTICS: "diagnostic_msgs/DiagnosticArray",
+    }
+
+
+TOPICS = topics_of(TWO_FLIPPERS)  # that a rig may have
 
 
 class FlipperPose(NamedTuple):
@@ -47,14 +54,14 @@ def flipper_pose(geometry: FlipperGeometry, flipper: str, sweep_rad: float, addu
     return FlipperPose((x_m, side * y_m, z_m), (sin_b * cos_a, -sin_b * sin_a, cos_b * sin_a, cos_b * cos_a))
 
 
-def tick_messages(stamp_ns: int, tick: Row, geometry: FlipperGeometry) -> dict[str, bytes]:
+def tick_messages(stamp_ns: int, tick: Row, geometry: FlipperGeometry, rig: Rig) -> dict[str, bytes]:
     """Returns the messages of one tick by topic, all but the diagnostics."""
     angles = tick["angle_rad"]
     poses = {
         flipper: flipper_pose(geometry, flipper, float(angles[2 * number]), float(angles[2 * number + 1]))
-        for number, flipper in enumerate(FLIPPERS)
+        for number, flipper in enumerate(rig.flippers)
     }
-    messages = {"/joint_states": _joint_state(stamp_ns, tick), "/tf": _frames(stamp_ns, tick, geometry, poses)}
+    messages = {"/joint_states": _joint_state(stamp_ns, tick, rig), "/tf": _frames(stamp_ns, tick, geometry, poses)}
     for number, (flipper, pose) in enumerate(poses.items()):
         posed = CdrMessage(BASE, stamp_ns)
         posed.numbers(*pose.position_m, *pose.quaternion)
@@ -64,10 +71,10 @@ def tick_messages(stamp_ns: int, tick: Row, geometry: FlipperGeometry) -> dict[s
     return messages
 
 
-def _joint_state(stamp_ns: int, tick: Row) -> bytes:
+def _joint_state(stamp_ns: int, tick: Row, rig: Rig) -> bytes:
     message = CdrMessage(BASE, stamp_ns)
-    message.count(len(JOINTS))
-    for joint in JOINTS:
+    message.count(len(rig.joints))
+    for joint in rig.joints:
         message.text(joint)
     for name in ("angle_rad", "velocity_rad_s", "torque_command_nm"):
         message.sequence(tick[name])
@@ -94,15 +101,15 @@ def _add_transform(message: CdrMessage, stamp_ns: int, frames: tuple[str, str], 
     message.numbers(*numbers)
 
 
-def diagnostics(stamp_ns: int, tick: Row, strides: Mapping[str, Mapping[str, Any]], event: str) -> bytes:
+def diagnostics(stamp_ns: int, tick: Row, strides: Mapping[str, Mapping[str, Any]], event: str, rig: Rig) -> bytes:
     """Returns the state of the robot, of each joint, and of the mud at each flipper; `strides` are the latest ones."""
     mode = _word("mode", tick)
     level = ERROR if tick["mode"] in (Mode.FAULT, Mode.DAMPING) else OK
     message = CdrMessage("", stamp_ns)
-    message.count(1 + len(JOINTS) + len(strides))
+    message.count(1 + len(rig.joints) + len(strides))
     numbers = {name: tick[name] for name in ("stride", "stride_depth_m", "missed_ticks", "limited")}
     _add_status(message, level, "robot", event or mode, {"mode": mode, "phase": _word("phase", tick), **numbers})
-    for number, joint in enumerate(JOINTS):
+    for number, joint in enumerate(rig.joints):
         _add_status(message, OK, joint, "", {name: tick[name][number] for name in JOINT_VALUES})
     for flipper, stride in strides.items():
         valid = all(stride[f"{name}_valid"] for name in COEFFICIENTS)

@@ -10,7 +10,7 @@ from typing import Any
 
 from control.geometry import FlipperGeometry
 from control.rate import RATE_HZ
-from control.records import FLIPPERS
+from control.records import FLIPPERS, TWO_FLIPPERS, Rig
 from firmware_host.open_data.ros_messages import DIAGNOSTICS, Row, diagnostics, tick_messages
 
 MESSAGE_HZ = 95.0
@@ -21,7 +21,8 @@ DIAGNOSTICS_S = 1.0  # between two of them
 class StandardMessages:
     """Owns the latest stride of each flipper and the latest event."""
 
-    def __init__(self, geometry: FlipperGeometry) -> None:
+    def __init__(self, geometry: FlipperGeometry, rig: Rig = TWO_FLIPPERS) -> None:
+        self._rig = rig
         self._geometry = geometry
         self._strides: dict[str, Mapping[str, Any]] = {}
         self._event = ""
@@ -41,8 +42,8 @@ class StandardMessages:
     def of_tick(self, stamp_ns: int, tick: Row) -> dict[str, bytes]:
         """Returns the messages of a tick that is due, by topic."""
         self._last_tick, stamp_s = int(tick["tick"]), float(tick["stamp_s"])
-        messages = tick_messages(stamp_ns, tick, self._geometry)
+        messages = tick_messages(stamp_ns, tick, self._geometry, self._rig)
         if stamp_s >= self._diagnosed_s + DIAGNOSTICS_S:
             self._diagnosed_s = stamp_s
-            messages[DIAGNOSTICS] = diagnostics(stamp_ns, tick, self._strides, self._event)
+            messages[DIAGNOSTICS] = diagnostics(stamp_ns, tick, self._strides, self._event, self._rig)
         return messages

@@ -11,7 +11,7 @@ from typing import Any
 
 from control.fault_causes import AgedFault, group_by_cause
 from control.faults import Blocks, Fault, FaultKind
-from control.records import JOINTS, DriveState
+from control.records import DriveState
 from drivers.drive import DriveHealth
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.loop import Loop
@@ -47,7 +47,8 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
     for fault in faults:
         faults_of.setdefault(fault.check_line, []).append(fault)
     lines = lines | {identity: "" for identity in faults_of if identity not in lines}
-    unheard = {f"drive.{joint}" for joint, state in zip(JOINTS, now.states, strict=True) if not state.heard}
+    joints = loop.configuration.rig.joints
+    unheard = {f"drive.{joint}" for joint, state in zip(joints, now.states, strict=True) if not state.heard}
     cause_lines = _cause_lines(now.faults, loop.configuration)
     items = []
     for identity, text in lines.items():
@@ -59,7 +60,7 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
 
 def _cause_lines(faults: Sequence[AgedFault], configuration: Configuration) -> dict[Fault, str]:
     """Return the line of the cause of each fault."""
-    bus_of = {joint: configuration.drive[joint].bus for joint in JOINTS}
+    bus_of = {joint: configuration.drive[joint].bus for joint in configuration.rig.joints}
     return {
         each.fault: cause.root.check_line
         for cause in group_by_cause(faults, bus_of)

@@ -48,9 +48,11 @@ class OperatorCalls:
         self._clock = clock
         self._version = software_version()
         drives = loop.configuration.drive
-        self._bus_of = {joint: drives[joint].bus for joint in JOINTS}
+        self._rig = loop.configuration.rig
+        self._bus_of = {joint: drives[joint].bus for joint in self._rig.joints}
         self._drive_settings = {
-            joint: {"bus": drives[joint].bus, "current_limit_a": drives[joint].current_limit_a} for joint in JOINTS
+            joint: {"bus": drives[joint].bus, "current_limit_a": drives[joint].current_limit_a}
+            for joint in self._rig.joints
         }
 
     @property
@@ -103,11 +105,11 @@ class OperatorCalls:
             "body_x_m": known(now.body.x_m),
             "pose": now.pose._asdict(),
             "drives": [
-                _drive_report(now, index, self._clock()) | self._drive_settings[joint]
-                for index, joint in enumerate(JOINTS)
+                {"joint": joint} | _drive_report(now, index, self._clock()) | self._drive_settings[joint]
+                for index, joint in enumerate(self._rig.joints)
             ],
             "strides_closed": now.strides_closed,
-            "mud": mud_estimate_report(now.mud),
+            "mud": mud_estimate_report(now.mud, self._rig),
             "loads": {flipper: load_report(load) for flipper, load in now.loads.items()},
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
@@ -149,12 +151,15 @@ class OperatorCalls:
 
     def move(self, params: dict[str, Any], caller: Caller) -> str:
         loop = self._loop
+        joints = self._rig.joints
         angles_rad = {joint: params[f"{joint}_rad"] for joint in JOINTS if params[f"{joint}_rad"] is not None}
         if not angles_rad:
-            raise RefusedError(f"no joint is named: at least one of {', '.join(f'{joint}_rad' for joint in JOINTS)}")
+            raise RefusedError(f"no joint is named: at least one of {', '.join(f'{joint}_rad' for joint in joints)}")
+        for joint in angles_rad.keys() - set(joints):
+            raise RefusedError(f"this robot has no {joint}: its joints are {', '.join(joints)}")
         if loop.mode is not Mode.HOLD:
             raise RefusedError(f"cannot move joints in mode {loop.mode.name.lower()}: only in hold, so arm first")
-        ranges = dict(zip(JOINTS, loop.configuration.joint_ranges, strict=True))
+        ranges = dict(zip(joints, loop.configuration.joint_ranges, strict=True))
         for joint, angle_rad in angles_rad.items():
             if not ranges[joint].min_rad <= angle_rad <= ranges[joint].max_rad:
                 low_deg, high_deg = degrees(ranges[joint].min_rad), degrees(ranges[joint].max_rad)
@@ -238,7 +243,6 @@ def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:
 def _drive_report(now: LoopSnapshot, index: int, now_s: float) -> dict[str, Any]:
     state, health = now.states[index], now.drives[index]
     return {
-        "joint": JOINTS[index],
         "angle_rad": known(state.angle_rad),
         "velocity_rad_s": known(state.velocity_rad_s),
         "current_a": known(state.current_a),

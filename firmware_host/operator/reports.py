@@ -11,7 +11,7 @@ from typing import Any
 from control.fault_causes import Cause
 from control.faults import FaultKind
 from control.mud_estimate import Coefficient, MudEstimate
-from control.records import FLIPPERS, Estimate, FlipperLoad, StrideEstimate
+from control.records import Estimate, FlipperLoad, Rig, StrideEstimate
 from estimation.mud_map import Mapped, MapRow
 from firmware_host.operator.fault_texts import fault_message, what_to_do
 
@@ -49,9 +49,9 @@ def _coefficient_reports(record: object) -> dict[str, Any]:
     return {name: estimate and estimate_report(estimate) for name, estimate in found.items()}
 
 
-def mud_estimate_report(mud_estimate: MudEstimate) -> dict[str, Any]:
-    """Return the estimate of both flippers together, and of each."""
-    apart = {flipper: _coefficient_reports(mud_estimate.of(flipper)) for flipper in FLIPPERS}
+def mud_estimate_report(mud_estimate: MudEstimate, rig: Rig) -> dict[str, Any]:
+    """Return the estimate of all flippers together, and of each."""
+    apart = {flipper: _coefficient_reports(mud_estimate.of(flipper)) for flipper in rig.flippers}
     return _coefficient_reports(mud_estimate) | apart | {"boundary": mud_estimate.boundary}
 
 

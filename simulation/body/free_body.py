@@ -35,6 +35,7 @@ from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
 from control.joint_pd import GRAVITY_M_S2
+from control.records import FLIPPERS, TWO_FLIPPERS, Rig
 from simulation.body.rail_body import BodyMotion, DragPad, DryDrag, Pusher
 from simulation.mud.carriage import Carriage, Vector, cross, dot, plate_directions
 from simulation.mud.clay import ADHESION, BEARING_FACTOR, UNIT_WEIGHT_N_M3, Clay, rate_factor
@@ -44,6 +45,7 @@ from simulation.mud.track import Track
 YIELD_M = 0.003  # a twentieth of a belly's width, after which footings on soft clay have failed
 LARGEST_RAD_S = 600.0  # the fastest ringing of the body on its belly that steps of 1 ms resolve
 SIDES = (1.0, -1.0)  # fore, aft; left, right
+SIDE_OF = dict(zip(FLIPPERS, SIDES, strict=True))
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,10 @@ def axes_of(roll_rad: float, pitch_rad: float) -> Axes:
     return Axes((cp, sp * sr, sp * cr), (0.0, cr, -sr), (-sp, cp * sr, cp * cr))
 
 
-def mirrored(axes: Axes) -> Axes:
-    """Returns the axes of the right flipper, whose y points to the right."""
+def own_axes(axes: Axes, side: float) -> Axes:
+    """Returns the axes of the flipper on the left (1) or on the right (-1), whose y points to the right."""
+    if side > 0.0:
+        return axes
     (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
     return Axes((fx, -fy, fz), (0.0, ay, -az), (ux, -uy, uz))
 
@@ -159,7 +163,7 @@ class BellyQuarter:
 class FreeBody:
     """Owns the body's position and attitude, and the mud's memory of its belly."""
 
-    def __init__(self, mass_kg: float, shape: BodyShape, pad: DragPad, track: Track) -> None:
+    def __init__(self, mass_kg: float, shape: BodyShape, pad: DragPad, track: Track, rig: Rig = TWO_FLIPPERS) -> None:
         self.mass_kg = mass_kg
         self.shape = shape
         self.pad = pad
@@ -173,6 +177,7 @@ class FreeBody:
         moved_kg = min(mass_kg / 4.0, pitched_kg, rolled_kg)  # of the four corners together, the lightest motion
         self._quarters = tuple(BellyQuarter(area_m2 / 4.0, moved_kg) for _ in self._corners)
         self._joint = (shape.axis_forward_m, shape.width_m / 2.0, 0.0)  # of either flipper, in its own axes
+        self._sides = tuple(SIDE_OF[flipper] for flipper in rig.flippers)
         self._drag = DryDrag()
         self.reset()
 
@@ -193,9 +198,9 @@ class FreeBody:
         )
 
     @property
-    def carriages(self) -> tuple[Carriage, Carriage]:
+    def carriages(self) -> tuple[Carriage, ...]:
         axes = axes_of(self.roll_rad, self.pitch_rad)
-        return self._carriage(axes, self.roll_rad_s), self._carriage(mirrored(axes), -self.roll_rad_s)
+        return tuple(self._carriage(own_axes(axes, side), side * self.roll_rad_s) for side in self._sides)
 
     def _carriage(self, axes: Axes, roll_rad_s: float) -> Carriage:
         """Returns the carriage in the flipper's own axes: on the right a roll has the opposite sign."""
@@ -210,10 +215,10 @@ class FreeBody:
         )
         return Carriage(self.height_m + dot(axes.up, self._joint), axes.up, velocity_m_s, turning)
 
-    def step(self, dt_s: float, left: Pusher, right: Pusher) -> None:
+    def step(self, dt_s: float, *flippers: Pusher) -> None:
         axes = axes_of(self.roll_rad, self.pitch_rad)
         forward_n = upward_n = roll_nm = pitch_nm = 0.0
-        for load in (*self.flipper_loads(axes, left, right), *self._belly_loads(dt_s, axes)):
+        for load in (*self.flipper_loads(axes, *flippers), *self._belly_loads(dt_s, axes)):
             forward_n += load.forward_n
             upward_n += load.upward_n
             roll_nm += load.roll_nm
@@ -227,11 +232,11 @@ class FreeBody:
         self.roll_rad += dt_s * self.roll_rad_s
         self.pitch_rad += dt_s * self.pitch_rad_s
 
-    def flipper_loads(self, axes: Axes, left: Pusher, right: Pusher) -> Iterator[BodyLoad]:
+    def flipper_loads(self, axes: Axes, *flippers: Pusher) -> Iterator[BodyLoad]:
         """Yields the loads of the flippers that touch the mud."""
-        for flipper, own_axes, side in ((left, axes, 1.0), (right, mirrored(axes), -1.0)):
+        for flipper, side in zip(flippers, self._sides, strict=True):
             if flipper.force is not NO_CONTACT:
-                yield load_of_flipper(own_axes, self._joint, flipper, side)
+                yield load_of_flipper(own_axes(axes, side), self._joint, flipper, side)
 
     def _belly_loads(self, dt_s: float, axes: Axes) -> Iterator[BodyLoad]:
         lever_m = in_world(axes, self._belly)

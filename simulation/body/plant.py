@@ -1,4 +1,4 @@
-"""The robot's mechanics: two arms with two joints each, and a body on a rail, on a fixed base or free.
+"""The robot's mechanics: arms with two joints each, and a body on a rail, on a fixed base or free.
 
 Arms have a constant inertia about each joint, the gravity of a level body, and friction. Their mass is small compared
 with the body's, so their acceleration does not move the body. Viscous friction grows with speed. Coulomb friction, off
@@ -11,6 +11,7 @@ swing at about 400 rad/s.
 """
 
 from dataclasses import dataclass
+from itertools import chain
 from math import copysign, radians, sin
 from operator import add
 from random import Random
@@ -19,7 +20,7 @@ from typing import Annotated
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.records import JointAngles, Joints, Torques
+from control.records import TWO_FLIPPERS, JointAngles, Joints, Rig, Torques
 from simulation.body.bench_mount import BenchMount
 from simulation.body.free_body import BodyShape, FreeBody
 from simulation.body.rail_body import Body, BodyMotion, DragPad, RailBody
@@ -43,6 +44,7 @@ END_STOPS_RAD = (radians(100.0), radians(85.0))  # sweep, adduction: the arm mee
 
 @dataclass(frozen=True)
 class PlantParameters:
+    rig: Rig = TWO_FLIPPERS
     geometry: FlipperGeometry = FlipperGeometry()
     arm_mass: ArmMass = ArmMass()
     joint_friction_nm_s: Annotated[float, Bounds(0.0, 0.1)] = 0.002
@@ -209,8 +211,9 @@ def _moved(angle_rad: float, velocity_rad_s: float, dt_s: float, stop_rad: float
 def body_of(parameters: PlantParameters, track: Track) -> Body:
     mass_kg, pad = parameters.body_mass_kg, DragPad(parameters.pad_width_m, parameters.pad_depth_m)
     if parameters.free_body:
-        return FreeBody(mass_kg, parameters.body, pad, track)
-    return RailBody(mass_kg, parameters.rail_drag_n, parameters.rail_damping_n_s_m, pad, track)
+        return FreeBody(mass_kg, parameters.body, pad, track, parameters.rig)
+    damping_n_s_m = parameters.rail_damping_n_s_m
+    return RailBody(mass_kg, parameters.rail_drag_n, damping_n_s_m, pad, track, parameters.rig)
 
 
 class Plant:
@@ -220,10 +223,9 @@ class Plant:
         self.parameters = parameters
         self.track = track
         random = random or Random(1)
-        seeds = random.getrandbits(32), random.getrandbits(32)
+        seeds = tuple(random.getrandbits(32) for _ in parameters.rig.flippers)
         surface_m = Random(f"surface {seeds}").gauss(0.0, parameters.disturbances.trial_surface_sd_m)
-        left, right = (Arm(parameters, track, seed, surface_m) for seed in seeds)
-        self.arms = (left, right)
+        self.arms = tuple(Arm(parameters, track, seed, surface_m) for seed in seeds)
         self.body = body_of(parameters, track)
         self.reset()
 
@@ -247,24 +249,17 @@ class Plant:
 
     @property
     def angles_rad(self) -> JointAngles:
-        left, right = self.arms
-        return Joints(left.sweep_rad, left.adduction_rad, right.sweep_rad, right.adduction_rad)
+        return Joints(*chain.from_iterable([(arm.sweep_rad, arm.adduction_rad) for arm in self.arms]))
 
     @property
     def velocities_rad_s(self) -> JointAngles:
-        left, right = self.arms
-        return Joints(
-            left.sweep_velocity_rad_s,
-            left.adduction_velocity_rad_s,
-            right.sweep_velocity_rad_s,
-            right.adduction_velocity_rad_s,
-        )
+        velocities_rad_s = [(arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s) for arm in self.arms]
+        return Joints(*chain.from_iterable(velocities_rad_s))
 
     def step(self, dt_s: float, torques_nm: Torques) -> None:
-        (left, right), body = self.arms, self.body
-        left_carriage, right_carriage = body.carriages
-        left_sweep_nm, left_lift_nm, right_sweep_nm, right_lift_nm = torques_nm
-        left.step(dt_s, body.forward_m, body.forward_m_s, left_sweep_nm, left_lift_nm, left_carriage)
-        right.step(dt_s, body.forward_m, body.forward_m_s, right_sweep_nm, right_lift_nm, right_carriage)
+        body, joint = self.body, 0
+        for arm, carriage in zip(self.arms, body.carriages, strict=True):
+            arm.step(dt_s, body.forward_m, body.forward_m_s, torques_nm[joint], torques_nm[joint + 1], carriage)
+            joint += 2
         if not self.parameters.fixed_base:
-            body.step(dt_s, left, right)
+            body.step(dt_s, *self.arms)

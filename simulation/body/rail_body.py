@@ -4,8 +4,10 @@ The drags of the rail and of the pad in the mud add up to one yield force. Below
 damping of half of critical for the paper's body, so that nothing rings. While the body slides, drag grows with speed.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
+from control.records import TWO_FLIPPERS, Rig
 from simulation.mud.carriage import Carriage, Vector
 from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.flipper_contact import ContactForce
@@ -46,13 +48,13 @@ class Body(Protocol):
     def reset(self) -> None: ...
 
     @property
-    def carriages(self) -> tuple[Carriage | None, Carriage | None]:
-        """How it carries the (left, right) flipper; None for a body that only moves forward."""
+    def carriages(self) -> Sequence[Carriage | None]:
+        """How it carries each flipper; None for a body that only moves forward."""
 
     @property
     def motion(self) -> BodyMotion: ...
 
-    def step(self, dt_s: float, left: Pusher, right: Pusher) -> None: ...
+    def step(self, dt_s: float, *flippers: Pusher) -> None: ...
 
 
 class DryDrag:
@@ -87,11 +89,16 @@ class DragPad(NamedTuple):
 class RailBody:
     """Owns the body's position on the rail."""
 
-    carriages = (None, None)
-
     def __init__(
-        self, mass_kg: float, rail_drag_n: float, rail_damping_n_s_m: float, pad: DragPad, track: Track
+        self,
+        mass_kg: float,
+        rail_drag_n: float,
+        rail_damping_n_s_m: float,
+        pad: DragPad,
+        track: Track,
+        rig: Rig = TWO_FLIPPERS,
     ) -> None:
+        self.carriages = (None,) * len(rig.flippers)
         self.mass_kg = mass_kg
         self.rail_drag_n = rail_drag_n
         self.rail_damping_n_s_m = rail_damping_n_s_m
@@ -110,8 +117,10 @@ class RailBody:
     def motion(self) -> BodyMotion:
         return BodyMotion((self.forward_m_s, 0.0, 0.0))
 
-    def step(self, dt_s: float, left: Pusher, right: Pusher) -> None:
-        thrust_n = left.force.thrust_n + right.force.thrust_n
+    def step(self, dt_s: float, *flippers: Pusher) -> None:
+        thrust_n = 0.0
+        for flipper in flippers:
+            thrust_n += flipper.force.thrust_n
         clay = self.track.clay_at(self.forward_m)
         if clay is not self._pad_clay:
             self._pad_clay, self._pad_n = clay, self.pad.yield_n(clay)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import NamedTuple
 
-from control.records import FLIPPERS, UNKNOWN, Phase
+from control.records import TWO_FLIPPERS, UNKNOWN, Phase, Rig
 from simulation.body.plant import Arm, Plant
 from simulation.mud.clay import Clay
 
@@ -131,8 +131,8 @@ class FlipperReference:
 class StrokeReference:
     """Owns the count of strides, and the phases of the current stride so far."""
 
-    def __init__(self) -> None:
-        self._flippers = [FlipperReference(flipper) for flipper in FLIPPERS]
+    def __init__(self, rig: Rig = TWO_FLIPPERS) -> None:
+        self._flippers = [FlipperReference(flipper) for flipper in rig.flippers]
         self.reset()
 
     def reset(self) -> None:

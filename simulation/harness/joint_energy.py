@@ -8,7 +8,7 @@ onset: it neither hides behind earlier braking nor grows while the joint is brak
 from dataclasses import dataclass, field
 
 from control.limits import JointRange
-from control.records import JOINTS, JointAngles, Joints, Torques
+from control.records import JointAngles, Joints, Torques
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness.robot import SimulatedRobot
 
@@ -45,7 +45,7 @@ class JointEnergy:
     def begin(self) -> None:
         """Start again from zero: the onset of a failure."""
         self._before_rad: JointAngles = self._plant.angles_rad
-        self.joints: Joints[JointWork] = Joints(*(JointWork() for _ in JOINTS))
+        self.joints: Joints[JointWork] = self._ranges.map(lambda _: JointWork())
 
     @property
     def energy_j(self) -> float:
@@ -65,14 +65,14 @@ class JointEnergy:
         return max(joint.pushed_s for joint in self.joints)
 
     def _update(self, dt_s: float, torques_nm: Torques) -> None:
-        plant, stops_rad = self._plant, 2 * END_STOPS_RAD
+        plant = self._plant
         angles_rad, velocities_rad_s = plant.angles_rad, plant.velocities_rad_s
         for index, joint in enumerate(self.joints):
             angle_rad, torque_nm, span = angles_rad[index], torques_nm[index], self._ranges[index]
             joint.add(torque_nm * (angle_rad - self._before_rad[index]))
             joint.peak_speed_rad_s = max(joint.peak_speed_rad_s, abs(velocities_rad_s[index]))
             joint.beyond_rad = max(joint.beyond_rad, angle_rad - span.max_rad, span.min_rad - angle_rad)
-            at_stop = abs(angle_rad) > stops_rad[index] - AT_STOP_RAD
+            at_stop = abs(angle_rad) > END_STOPS_RAD[index % 2] - AT_STOP_RAD
             if at_stop and abs(torque_nm) > PUSHING_NM and (torque_nm > 0.0) == (angle_rad > 0.0):
                 joint.pushed_s += dt_s
         self._before_rad = angles_rad

@@ -10,7 +10,6 @@ from typing import Any
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS
 from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
 from drivers.fault_injection.failing_port import failing_ports
@@ -45,6 +44,7 @@ def plant_of(
 ) -> PlantParameters:
     """Returns mechanics that fit a configuration, with changes by name."""
     fitting: dict[str, Any] = {
+        "rig": configuration.rig,
         "geometry": configuration.geometry,
         "arm_mass": configuration.arm,
         "disturbances": disturbances,
@@ -84,7 +84,7 @@ class Lockstep:
             plant or plant_of(configuration, disturbances, fixed_base),
             track,
             drives or drives_of(configuration, **drive_changes(disturbances)),
-            {joint: configuration.drive[joint].bus for joint in JOINTS},
+            {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
             {name: bus.open() for name, bus in self.buses.items()},
             seed,
         )

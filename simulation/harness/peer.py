@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from control.records import JOINTS
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
@@ -45,7 +44,7 @@ class Peer:
             world.plant(configuration),
             world.track,
             world.drives(configuration, watchdog_s=WATCHDOG_S),
-            {joint: configuration.drive[joint].bus for joint in JOINTS},
+            {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
             self._ports,
             seed,
             start_s=self.ticker.wait().now_s,

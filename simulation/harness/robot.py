@@ -7,7 +7,7 @@ the tick's time. The same seed gives the same result.
 from collections.abc import Callable, Mapping
 from random import Random
 
-from control.records import JOINTS, Joints, Torques
+from control.records import Joints, Torques
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from simulation.body.plant import STEP_S, Plant, PlantParameters
@@ -32,8 +32,9 @@ class SimulatedRobot:
     ) -> None:
         random = Random(seed)
         self.plant = Plant(plant, track, Random(f"mud {seed}"))  # independent of the drives' draws
-        self.drives: Joints[SimulatedDrive] = Joints(*(make_simulated_drive(drives[joint], random) for joint in JOINTS))
-        self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in JOINTS)
+        joints = plant.rig.joints
+        self.drives: Joints[SimulatedDrive] = Joints(*(make_simulated_drive(drives[joint], random) for joint in joints))
+        self._port_of_drive = tuple(ports[bus_of_joint[joint]] for joint in joints)
         self._drives_on = [
             (port, [drive for drive, own in zip(self.drives, self._port_of_drive, strict=True) if own is port])
             for port in ports.values()
@@ -53,11 +54,10 @@ class SimulatedRobot:
             self._put_back_requested = False
             for arm in self.plant.arms:
                 arm.put_back()
-        a, b, c, d = self.drives
         wires = tuple(zip(self.drives, self._port_of_drive, strict=True))
         while self.now_s + STEP_S <= until_s:
             self.now_s = now_s = self.now_s + STEP_S
-            torques: Torques = Joints(a.torque_nm(now_s), b.torque_nm(now_s), c.torque_nm(now_s), d.torque_nm(now_s))
+            torques: Torques = Joints(*[drive.torque_nm(now_s) for drive in self.drives])
             self.plant.step(STEP_S, torques)
             self._measure()
             for observe in self.observers:
@@ -71,7 +71,7 @@ class SimulatedRobot:
         self._put_back_requested = True
 
     def restart_drive(self, joint: int) -> None:
-        """Interrupts the supply of one drive for a moment. `joint`: its index in JOINTS."""
+        """Interrupts the supply of one drive for a moment. `joint`: its index in the rig's joints."""
         self.drives[joint].restart(self.now_s)
 
     def _execute_frames(self) -> None:
@@ -94,9 +94,8 @@ class SimulatedRobot:
 
     def _measure(self) -> None:
         """Gives each drive its joint's true motion; without records in between, as this runs in every step."""
-        left, right = self.plant.arms
-        left_sweep, left_adduction, right_sweep, right_adduction = self.drives
-        left_sweep.measure(left.sweep_rad, left.sweep_velocity_rad_s)
-        left_adduction.measure(left.adduction_rad, left.adduction_velocity_rad_s)
-        right_sweep.measure(right.sweep_rad, right.sweep_velocity_rad_s)
-        right_adduction.measure(right.adduction_rad, right.adduction_velocity_rad_s)
+        drives, joint = self.drives, 0
+        for arm in self.plant.arms:
+            drives[joint].measure(arm.sweep_rad, arm.sweep_velocity_rad_s)
+            drives[joint + 1].measure(arm.adduction_rad, arm.adduction_velocity_rad_s)
+            joint += 2

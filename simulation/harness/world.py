@@ -33,7 +33,7 @@ from simulation.mud.track import LEVEL, UNIFORM, RandomStrength, Ridges, Track
 STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's stiffest mud
 SAME_POSITION_M = 1e-9
 
-FIXED_OF_ROBOT = frozenset({"geometry", "arm_mass", "disturbances", "fixed_base"})
+FIXED_OF_ROBOT = frozenset({"rig", "geometry", "arm_mass", "disturbances", "fixed_base"})
 FIXED_OF_DRIVE = frozenset({"type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a"})
 
 
@@ -44,7 +44,7 @@ class World:
     track: Track
     disturbances: Disturbances = NONE
     robot_changes: Mapping[str, Any] = field(default_factory=dict)  # fields of PlantParameters
-    drive_changes: Mapping[str, Any] = field(default_factory=dict)  # of SimulatedDriveParameters, for all four
+    drive_changes: Mapping[str, Any] = field(default_factory=dict)  # of SimulatedDriveParameters, for all of them
     warnings: tuple[str, ...] = ()  # about keys that the file gives under their former names
 
     def plant(self, configuration: Configuration) -> PlantParameters:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from control.records import DriveState, DriveStates, JointAngles, Joints
+from control.records import DriveState, DriveStates, JointAngles, Torques, same_for_all
+
+NO_TORQUE: Torques = same_for_all(0.0)
 
 
 def states_at(pose: JointAngles) -> DriveStates:
-    a, b, c, d = (DriveState(angle_rad=angle, velocity_rad_s=0.0) for angle in pose)
-    return Joints(a, b, c, d)
+    return pose.map(lambda angle_rad: DriveState(angle_rad=angle_rad, velocity_rad_s=0.0))

@@ -5,7 +5,6 @@ from math import nan, radians
 import pytest
 
 from control.controller import (
-    ALL_TRUSTED,
     DAMPING_NM,
     DAMPING_S,
     RAISING_S,
@@ -23,8 +22,8 @@ from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import MOVING, Mode
 from control.rate import PERIOD_S
-from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_both
-from tests.control.synthetic_states import states_at
+from control.records import DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_each
+from tests.control.synthetic_states import NO_TORQUE, states_at
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 POSE = Joints(0.2, -0.4, 0.3, -0.5)
@@ -32,7 +31,7 @@ RAISED = Joints(0.2, 0.0, 0.3, 0.0)
 FRONT = Joints(radians(30.0), 0.0, radians(30.0), 0.0)
 SPRING = JointGains(1.0, 0.0, 1.0, 0.0)  # torque = wanted angle - measured angle
 DAMPER = JointGains(0.0, 1.0, 0.0, 1.0)  # torque = wanted velocity - measured velocity
-RANGES = same_for_both(JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0)))
+RANGES = same_for_each(JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0)))
 STILL_MODES = sorted(set(Mode) - MOVING)
 
 
@@ -252,7 +251,7 @@ def turning_at(velocities: tuple[float, ...], for_s: float = 0.0) -> DriveStates
     return Joints(a, b, c, d)
 
 
-def ticks_until_settled(velocities: tuple[float, ...], trusted: Joints[bool] = ALL_TRUSTED) -> int:
+def ticks_until_settled(velocities: tuple[float, ...], trusted: Joints[bool] | None = None) -> int:
     controller = weightless()
     for tick in range(1, 2000):
         controller.step(PERIOD_S, Mode.DAMPING, turning_at(velocities, tick * PERIOD_S), trusted)

@@ -21,8 +21,8 @@ from control.joint_pd import (
     pd_torque_nm,
     phase_margin_rad,
 )
-from control.records import NO_TORQUE, DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
-from tests.control.synthetic_states import states_at
+from control.records import DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
+from tests.control.synthetic_states import NO_TORQUE, states_at
 
 WEIGHTLESS = ArmMass(arm_mass_kg=0.0)
 angles = st.floats(-pi / 2, pi / 2)

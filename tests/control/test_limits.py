@@ -16,7 +16,8 @@ from control.limits import (
     limited_torque_nm,
 )
 from control.rate import PERIOD_S
-from control.records import NO_TORQUE, DriveState, DriveStates, Joints, Torques, same_for_all
+from control.records import DriveState, DriveStates, Joints, Torques, same_for_all
+from tests.control.synthetic_states import NO_TORQUE
 
 LIMITS = JointLimits()
 SLEW_NM = LIMITS.torque_rate_nm_s * PERIOD_S

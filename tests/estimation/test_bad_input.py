@@ -11,7 +11,7 @@ from control.gait.gait import Gait, GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.rate import PERIOD_S
-from control.records import NO_LOAD, BodyPose, Estimate, Phase, StrideEstimate
+from control.records import BodyPose, Estimate, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, Method, MudEstimator, MudReading
 from estimation.recorded_states import recorded_states
@@ -81,7 +81,7 @@ def test_the_walk_below_is_a_good_one(method: Method) -> None:
 
 
 def test_an_estimator_without_samples_knows_nothing() -> None:
-    assert MudReading() == MudReading(NO_LOAD, NO_LOAD, ())
+    assert MudReading() == MudReading((), ())
 
 
 @pytest.mark.parametrize("phase", Phase)

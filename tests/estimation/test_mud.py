@@ -13,7 +13,7 @@ import pytest
 from control.joint_pd import ArmMass
 from control.mud_estimate import NOTHING_KNOWN
 from control.rate import PERIOD_S
-from control.records import FLIPPERS, NO_LOAD, BodyPose, Joints, Phase, StrideEstimate
+from control.records import FLIPPERS, BodyPose, Joints, Phase, StrideEstimate
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
 from estimation.mud import (
@@ -26,7 +26,7 @@ from estimation.mud import (
 )
 from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
-from estimation.recorded_states import NO_AGES_S, recorded_states
+from estimation.recorded_states import recorded_states
 from estimation.strokes.shear import Base
 from tests.estimation.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
 
@@ -73,7 +73,7 @@ def test_each_flipper_gets_the_samples_that_it_would_get_alone(method: Method) -
     for a, b, earlier_s, later_s in zip(left, right, times_s, times_s[1:], strict=False):
         reading = update(mud, a, b)
         reported = [alone[flipper].update(*row, (earlier_s, later_s)) for flipper, row in (("left", a), ("right", b))]
-        assert repr(reading[:2]) == repr((reported[0][0], reported[1][0]))
+        assert repr(reading.loads) == repr((reported[0][0], reported[1][0]))
         assert repr(reading.strides) == repr(tuple(stride for _, stride in reported if stride is not None))
 
 
@@ -116,13 +116,13 @@ def test_each_joint_has_its_own_torque_constant(method: Method) -> None:
     mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method=method))
     states = recorded_states(0.0, (0.0,) * 4, (0.0,) * 4, (1.0, 2.0, 3.0, 4.0))
     reading = mud.update(0.0, Phase.REST, states, BodyPose(0.0, 0.0))
-    torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
+    torques = [getattr(load, name) for load in reading.loads for name in ("sweep_torque_nm", "adduction_torque_nm")]
     assert torques == pytest.approx([-0.05, -0.12, -0.21, -0.32])
 
 
 def test_without_any_sample_the_reading_is_empty() -> None:
     reading = MudReading()
-    assert (reading.left, reading.right, reading.strides) == (NO_LOAD, NO_LOAD, ())
+    assert (reading.loads, reading.strides) == ((), ())
     assert estimator().mud_estimate == NOTHING_KNOWN
 
 
@@ -131,26 +131,26 @@ def test_without_any_sample_the_reading_is_empty() -> None:
 
 def test_the_method_paper_gives_the_papers_estimators() -> None:
     mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), EstimationParameters(method="paper"), 7.0)
-    for flipper, name in ((mud.left, "left"), (mud.right, "right")):
+    for flipper, name in zip(mud.flippers, FLIPPERS, strict=True):
         assert isinstance(flipper, PaperEstimator)
-        assert (flipper.flipper, flipper.body_drag_n) == (name, 0.0)
+        assert (flipper.flipper, flipper.drag_n) == (name, 0.0)
 
 
 def test_the_paper_adds_the_drag_only_if_configured() -> None:
     parameters = EstimationParameters(method="paper", paper=PaperEstimationParameters(compensation=True))
-    left = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0).left
+    left = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0).flippers[0]
     assert isinstance(left, PaperEstimator)
-    assert left.body_drag_n == 7.0
+    assert left.drag_n == 3.5
 
 
 @pytest.mark.parametrize(("fixed_base", "base"), [(False, Base.FREE), (True, Base.FIXED)])
 def test_the_default_gets_base_drag_and_surface_error(fixed_base: bool, base: Base) -> None:
     parameters = EstimationParameters(fixed_base=fixed_base, surface_error_m=0.004)
     mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), parameters, 7.0)
-    for flipper, name in ((mud.left, "left"), (mud.right, "right")):
+    for flipper, name in zip(mud.flippers, FLIPPERS, strict=True):
         assert isinstance(flipper, FlipperEstimator)
         assert (flipper.flipper, flipper.base) == (name, base)
-        assert (flipper.body_drag_n, flipper.surface_error_m) == (7.0, 0.004)
+        assert (flipper.drag_n, flipper.surface_error_m) == (3.5, 0.004)
 
 
 # what is known from stride to stride
@@ -256,21 +256,22 @@ def load_of_a_free_arm_nm(angle_ages_s: Four, current_ages_s: Four, reported: bo
         currents = [
             inertia * swayed(tick, age_s)[2] / 0.083 for inertia, age_s in zip(inertias, current_ages_s, strict=True)
         ]
-        ages = (angle_ages_s, current_ages_s) if reported else (NO_AGES_S, NO_AGES_S)
+        ages = (angle_ages_s, current_ages_s) if reported else (FRESH, FRESH)
         states = recorded_states(now_s, angles, speeds, currents, *ages)
         reading = mud.update(now_s, Phase.REST, states, BodyPose(now_s, 0.0))
-        loads = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
+        loads = [getattr(load, name) for load in reading.loads for name in ("sweep_torque_nm", "adduction_torque_nm")]
         if tick > 1:  # two samples tell an acceleration
             largest_nm = [max(a, abs(b)) for a, b in zip(largest_nm, loads, strict=True)]
     return largest_nm
 
 
-ANGLES_OLD: tuple[Four, Four] = ((0.001, 0.0005, 0.0, 0.002), NO_AGES_S)
-CURRENTS_OLD: tuple[Four, Four] = (NO_AGES_S, (0.001, 0.0, 0.0005, 0.002))
+FRESH: Four = (0.0, 0.0, 0.0, 0.0)
+ANGLES_OLD: tuple[Four, Four] = ((0.001, 0.0005, 0.0, 0.002), FRESH)
+CURRENTS_OLD: tuple[Four, Four] = (FRESH, (0.001, 0.0, 0.0005, 0.002))
 BOTH_OLD: tuple[Four, Four] = ((0.0, 0.002, 0.001, 0.0005), (0.002, 0.0005, 0.0, 0.001))
 
 
-@pytest.mark.parametrize("ages", [(NO_AGES_S, NO_AGES_S), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
+@pytest.mark.parametrize("ages", [(FRESH, FRESH), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
 def test_messages_of_any_age_give_the_load_of_fresh_ones(ages: tuple[Four, Four]) -> None:
     assert max(load_of_a_free_arm_nm(*ages, reported=True)) < 1e-9 * LARGEST_NM
 
@@ -292,4 +293,4 @@ def test_ages_change_nothing_where_nothing_moves() -> None:
     mud.reset()
     old = mud.update(0.0, Phase.REST, recorded_states(0.0, *standing, (0.01,) * 4, (0.02,) * 4), BodyPose())
     assert old == fresh
-    assert isfinite(sum(fresh.left + fresh.right))
+    assert all(isfinite(value) for load in fresh.loads for value in load)

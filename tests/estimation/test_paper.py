@@ -388,7 +388,7 @@ def test_half_of_the_drag_is_added_while_the_body_advances() -> None:
     samples, drag_n = triggered(motion(), MUD), 2.5
     plain = one(samples)
     reported = one(advancing(samples, 0.2), PaperEstimator("left", GEOMETRY, DRIVE, drag_n))
-    added_n_m3 = drag_n / 2.0 / (WIDTH_M * plain.depth_m**2 / 2.0)
+    added_n_m3 = drag_n / (WIDTH_M * plain.depth_m**2 / 2.0)
     assert reported.k_s.value == pytest.approx(
         MUD.k_s + added_n_m3, rel=1e-3
     )  # the deepest sample is 1 µm below the rest
@@ -617,5 +617,5 @@ def test_each_joint_has_its_own_torque_constant() -> None:
     mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method="paper"))
     states = same_for_all(DriveState(angle_rad=0.0, velocity_rad_s=0.0, current_a=1.0))
     reading = mud.update(0.0, Phase.REST, states, BodyPose())
-    torques = [getattr(load, name) for load in reading[:2] for name in ("sweep_torque_nm", "adduction_torque_nm")]
+    torques = [getattr(load, name) for load in reading.loads for name in ("sweep_torque_nm", "adduction_torque_nm")]
     assert torques == [-constant for constant in constants]

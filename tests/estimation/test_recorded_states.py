@@ -21,8 +21,8 @@ def test_each_signal_goes_to_its_joint_and_an_infinite_age_means_never() -> None
     ages_s = (0.0, inf, 0.5, 0.25)
     states = recorded_states(1.0, (1.0, 2.0, 3.0, 4.0), (0.1, 0.2, 0.3, 0.4), (5.0, 6.0, 7.0, 8.0), ages_s)
     assert states == Joints(
-        left_sweep=DriveState(1.0, 0.1, 1.0, 5.0, 1.0),
-        left_adduction=DriveState(2.0, 0.2, NEVER_S, 6.0, 1.0),
-        right_sweep=DriveState(3.0, 0.3, 0.5, 7.0, 1.0),
-        right_adduction=DriveState(4.0, 0.4, 0.75, 8.0, 1.0),
+        DriveState(1.0, 0.1, 1.0, 5.0, 1.0),
+        DriveState(2.0, 0.2, NEVER_S, 6.0, 1.0),
+        DriveState(3.0, 0.3, 0.5, 7.0, 1.0),
+        DriveState(4.0, 0.4, 0.75, 8.0, 1.0),
     )

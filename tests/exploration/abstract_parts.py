@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from control.controller import ALL_TRUSTED, DAMPING_S, RESTING, SOFT_STOP_S, Controller, WalkOrder
+from control.controller import DAMPING_S, RESTING, SOFT_STOP_S, Controller, WalkOrder
 from control.faults import Fault, FaultKind
 from control.modes import ENERGISED, MOVING, Mode
 from control.records import DriveStates, Joints, JointTargets, Torques, same_for_all
@@ -73,7 +73,7 @@ class AbstractController(Controller):
         dt_s: float,
         mode: Mode,
         states: DriveStates,
-        trusted: Joints[bool] = ALL_TRUSTED,
+        trusted: Joints[bool] | None = None,
         elapsed_s: float = 0.0,
     ) -> Torques:
         if mode is not self._mode:
@@ -89,7 +89,7 @@ class AbstractMonitor(FaultMonitor):
     """Detects what the world says, what the drives report, and what the lease and the arming come to."""
 
     def __init__(self) -> None:
-        self.trusted = ALL_TRUSTED
+        self.trusted = same_for_all(True)
         self.world = World()
         self.found: list[Fault] = []
 

@@ -15,7 +15,7 @@ from control.records import NEVER_S
 from drivers.pose.pose_port import NO_SOURCE
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.recorder import NullRecorder
-from firmware_host.loop import CLEARING_S, NOTHING_SENT, Loop
+from firmware_host.loop import CLEARING_S, Loop
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rpc import RefusedError
 from firmware_host.ticker import Tick
@@ -121,7 +121,7 @@ class AbstractRobot:
         )  # fmt: skip
         loop._mode_since_s = NOW_S - memory.mode_ticks * PERIOD_S
         loop._clearing_until_s = CALL_S + CLEARING_S if memory.clearing else NEVER_S
-        loop.sent = NOTHING_SENT
+        loop.sent = loop.nothing_sent
         self.controller.restore(memory)
         self.drives.obedient.restore(memory.obedient)
         self.drives.other.restore(memory.other)

@@ -12,7 +12,7 @@ from control.faults import FAULT_KINDS, Fault, FaultKind
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
 from control.rate import PERIOD_S
-from control.records import JOINTS, NO_TORQUE, BodyPose, DriveState, DriveStates, Joints, same_for_all
+from control.records import JOINTS, BodyPose, DriveState, DriveStates, Joints, same_for_all
 from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.drive import DriveHealth
@@ -28,6 +28,7 @@ from firmware_host.fault_monitor import (
 )
 from firmware_host.log.recorder import HEALTHY
 from firmware_host.ticker import Tick
+from tests.control.synthetic_states import NO_TORQUE
 
 START_S = 100.0
 

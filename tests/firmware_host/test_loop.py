@@ -10,7 +10,7 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import NO_TORQUE, Phase, same_for_all
+from control.records import Phase, same_for_all
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import SET_INPUT_TORQUE
@@ -26,6 +26,7 @@ from simulation.devices.drive import DriveError, SimulatedDrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
+from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
 from tests.recorded_events import EventRecorder
 

@@ -14,7 +14,7 @@ from control.controller import SOFT_STOP_S, WalkOrder
 from control.faults import FAULT_KINDS, Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode, Request
 from control.rate import PERIOD_S
-from control.records import JOINTS, NO_TORQUE, Phase
+from control.records import JOINTS, Phase
 from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockPort
 from drivers.odrive import codec
@@ -27,6 +27,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
+from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
 from tests.recorded_events import EventRecorder
 

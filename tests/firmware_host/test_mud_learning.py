@@ -113,7 +113,7 @@ def firm_ticks(learning: MudLearning, order: WalkOrder, phase: Phase, loads: lis
     reported = []
     for firm in loads:
         load = NO_LOAD._replace(adduction_torque_nm=limit_nm + 0.01 if firm else limit_nm)
-        learning.reading = MudReading(left=NO_LOAD, right=load)
+        learning.reading = MudReading((NO_LOAD, load))
         before = controller.gait.ended
         step(learning, controller)
         reported.append(controller.gait.ended > before)
@@ -137,7 +137,7 @@ def test_only_adaptive_insertions_end_early(learning: MudLearning, adaptive: boo
 def test_the_early_end_of_an_insertion_is_logged_once(learning: MudLearning) -> None:
     controller = FakeController(WalkOrder(0.03))
     load = NO_LOAD._replace(adduction_torque_nm=10.0)
-    learning.reading = MudReading(left=load, right=load)
+    learning.reading = MudReading((load, load))
     reported = [message for _ in range(10) for message in step(learning, controller)[1]]
     assert reported == ["insertion ended at 0.0300 m: solid mud"]
 

@@ -7,7 +7,7 @@ import pytest
 
 from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
-from control.records import NO_TORQUE, Joints
+from control.records import Joints
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
 from simulation.harness.lockstep import Lockstep
@@ -17,6 +17,7 @@ from simulation.mud.flipper_contact import ContactForce, attitude_of
 from simulation.mud.rigid_plate import lowest_point_m
 from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, RandomStrength, Ridges, Track
+from tests.control.synthetic_states import NO_TORQUE
 
 
 def press(plant: Plant, lift_nm: float) -> Plant:

@@ -6,13 +6,14 @@ import pytest
 
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
-from control.records import NO_TORQUE, Phase
+from control.records import Phase
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import END_STOPS_RAD
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
 from tests.recorded_events import EventRecorder
 

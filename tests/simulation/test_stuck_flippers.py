@@ -14,7 +14,7 @@ from control.gait.gait import stride_duration_s
 from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
-from control.records import NO_TORQUE, Phase
+from control.records import Phase
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
@@ -22,6 +22,7 @@ from firmware_host.log_reading.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track
+from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
 from tests.recorded_events import EventRecorder
 

@@ -7,7 +7,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from control.records import Phase
+from control.records import JOINTS, Phase
 from firmware_host.log_reading.lab.columns import (
     BODY_COLUMNS,
     DEPTH_COLUMN,
@@ -56,10 +56,16 @@ def _columns(log: Log) -> dict[str, Floats]:
     state_of = np.array([STATE_OF_PHASE[phase] for phase in Phase])
     columns = {"time": stamp_s - stamp_s[:1], "turtle_state": state_of[log.ticks["phase"]]}
     for joint in WRITTEN_ORDER:
-        columns[f"{JOINT_COLUMNS[joint]}_pos"] = log.ticks["angle_rad"][:, joint] / math.tau
+        columns[f"{JOINT_COLUMNS[joint]}_pos"] = _of_joint(log, "angle_rad", JOINTS[joint]) / math.tau
     for joint in WRITTEN_ORDER:
-        columns[f"{JOINT_COLUMNS[joint]}_curr"] = log.ticks["current_a"][:, joint]
+        columns[f"{JOINT_COLUMNS[joint]}_curr"] = _of_joint(log, "current_a", JOINTS[joint])
     columns[DEPTH_COLUMN] = log.ticks["stride_depth_m"]
     if np.any(np.isfinite(log.ticks["body_x_m"])):
         columns[BODY_COLUMNS[0]] = log.ticks["body_x_m"]
     return columns
+
+
+def _of_joint(log: Log, name: str, joint: str) -> Floats:
+    """Returns the values of one joint; zeros for an absent motor, as the authors log it."""
+    values: Floats = log.ticks[name]
+    return values[:, log.rig.joints.index(joint)] if joint in log.rig.joints else np.zeros(len(values))

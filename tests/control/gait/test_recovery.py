@@ -30,7 +30,7 @@ from control.records import (
     JointTargets,
     Phase,
     same_for_all,
-    same_for_both,
+    same_for_each,
 )
 from tests.control.synthetic_states import states_at
 
@@ -38,7 +38,7 @@ DEPTH_M = 0.04
 GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), RecoveryParameters()
 REAR_RAD = -radians(GAIT.sweep_angle_deg)
 SWEEPS, ADDUCTIONS = JointRange(radians(-60.0), radians(60.0)), JointRange(radians(-75.0), radians(45.0))
-RANGES = same_for_both(SWEEPS, ADDUCTIONS)
+RANGES = same_for_each(SWEEPS, ADDUCTIONS)
 BOTH = ("left", "right")
 LONGEST_S = PARAMETERS.grace_s + PARAMETERS.attempts * (PARAMETERS.pause_s + PARAMETERS.attempt_s)
 
@@ -323,10 +323,10 @@ def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
     sweeps = JointRange(radians(-30.0 - margin_deg), radians(30.0 + margin_deg))
     lifts = JointRange(radians(-75.0), 0.0)
     wild = RecoveryParameters(lift_rad_s=5.0, rock_s=2.0, lead_deg=45.0)
-    robot = SyntheticRobot(until_attempt(3), wild, same_for_both(sweeps, lifts)).walk(LONGEST_S + 1.0)
+    robot = SyntheticRobot(until_attempt(3), wild, same_for_each(sweeps, lifts)).walk(LONGEST_S + 1.0)
     assert "the flippers came out after 3 attempts" in robot.events
     for moment in robot.moments:
-        for joint, span in zip(moment.joints, same_for_both(sweeps, lifts), strict=True):
+        for joint, span in zip(moment.joints, same_for_each(sweeps, lifts), strict=True):
             assert span.min_rad - 1e-9 <= joint.angle_rad <= span.max_rad + 1e-9
 
 

@@ -30,7 +30,7 @@ from estimation.strokes.stroke import Batch
 
 GEOMETRY = FlipperGeometry()
 LENGTH_M, FRONT_RAD, STEP_RAD = 0.12, radians(30.0), 0.05
-DEPTH_M, K_S, DRAG_N = 0.03, 0.6e6, 2.5
+DEPTH_M, K_S, DRAG_N = 0.03, 0.6e6, 1.25
 COUNT = 21
 EXACT = 1e-9  # rounding
 
@@ -227,7 +227,7 @@ def test_between_bound_and_value_lie_the_pieces_that_a_fit_needs() -> None:
 
 def test_below_the_bodys_drag_the_body_cannot_have_moved() -> None:
     """Both flippers together: 2 cos α τ / l is under 2 N everywhere for the strength of a third of that."""
-    weak = 0.33 * STANDS * DRAG_N / 2.0 * LENGTH_M / moment_m4(poses()[COUNT // 2])
+    weak = 0.33 * STANDS * DRAG_N * LENGTH_M / moment_m4(poses()[COUNT // 2])
     shear = found(blind(sheared(poses(), weak)))
     assert (shear.case, shear.at_least, shear.reason) == ("yield", False, "")
     assert k_of(shear) == pytest.approx(weak, rel=EXACT)
@@ -242,7 +242,7 @@ def test_above_the_bodys_drag_it_may_have_moved() -> None:
 
 @pytest.mark.parametrize(("fraction", "case"), [(0.79, "yield"), (0.81, "unknown")])
 def test_four_fifths_of_the_drag_is_the_border(fraction: float, case: str) -> None:
-    batches = [batch._replace(sweep_nm=fraction * DRAG_N / 2.0 * LENGTH_M / cos(batch.sweep_rad)) for batch in poses()]
+    batches = [batch._replace(sweep_nm=fraction * DRAG_N * LENGTH_M / cos(batch.sweep_rad)) for batch in poses()]
     assert found(blind(batches)).case == case
 
 

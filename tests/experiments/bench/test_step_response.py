@@ -8,10 +8,11 @@ import pytest
 
 from control.modes import Mode
 from control.rate import PERIOD_S
-from control.records import NO_TORQUE, DriveState, Joints, Torques
+from control.records import DriveState, Joints, Torques
 from experiments.bench.step_response import LONGEST_TICKS, PULSE_NM, delay_ticks
 from experiments.bench.test_rig import Sample
 from firmware_host.ticker import Tick
+from tests.control.synthetic_states import NO_TORQUE
 
 CONSTANT_NM_A = 0.083
 STEP = 2  # the sample that sends it

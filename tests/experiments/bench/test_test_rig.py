@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from control.records import JOINTS, NO_TORQUE, Joints
+from control.records import JOINTS, Joints
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from experiments.bench.joint_zero_check import check_level_pose, check_turning
@@ -23,6 +23,7 @@ from firmware_host.configuration.configuration import Configuration
 from simulation.devices.drive import DriveError
 from tests.bench.bench_table import HEADS, table_lines
 from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
+from tests.control.synthetic_states import NO_TORQUE
 from tests.scripted_operator import ScriptedOperator
 
 

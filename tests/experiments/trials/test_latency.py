@@ -31,7 +31,7 @@ def swinging(ticks: int = 400) -> list[Sample]:
 
 def latency_of(samples: list[Sample]) -> float:
     """How much later the current is than the angle: I - 2 θ = -2 θ' δ, by least squares."""
-    states = [sample.states.right.adduction for sample in samples[10:]]
+    states = [sample.states.flippers[1].adduction for sample in samples[10:]]
     slopes = [-2.0 * state.velocity_rad_s for state in states]
     lags = [state.current_a - 2.0 * state.angle_rad for state in states]
     return fmean(a * b for a, b in zip(slopes, lags, strict=True)) / fmean(slope * slope for slope in slopes)
@@ -55,7 +55,7 @@ def test_late_signals_bear_the_time_of_their_arrival_and_the_others_stay(
     before, after = swinging(), with_latency(swinging(), late_s)
     for number in range(2, len(before)):
         was, earlier, now = (
-            samples.states.left.sweep for samples in (before[number], before[number - 2], after[number])
+            samples.states.flippers[0].sweep for samples in (before[number], before[number - 2], after[number])
         )
         assert all(now[field] == was[field] for field in prompt)
         assert now[late[0]] == earlier[late[0]]

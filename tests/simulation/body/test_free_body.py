@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
-from control.records import NO_TORQUE, Joints
+from control.records import Joints
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.free_body import (
     YIELD_M,
@@ -32,6 +32,7 @@ from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, attitude_of, contact_force, twist_of
 from simulation.mud.rigid_plate import Wrench
 from simulation.mud.track import Track
+from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
 
 GEOMETRY, SHAPE, MASS_KG = FlipperGeometry(), BodyShape(), 1.02

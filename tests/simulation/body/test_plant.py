@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from control.joint_pd import ArmMass
-from control.records import NO_TORQUE, Joints
+from control.records import Joints
 from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant, PlantParameters
 from simulation.body.rail_body import DRAG_STIFFNESS_N_M
 from simulation.mud.carriage import Carriage
@@ -16,6 +16,7 @@ from simulation.mud.disturbances import LAB, Disturbances
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, ContactForce, FlipperContact
 from simulation.mud.rigid_plate import Attitude
 from simulation.mud.track import Track
+from tests.control.synthetic_states import NO_TORQUE
 
 TRACK = Track([(1.0, MUDS["48.5"])])
 WITHOUT_FRICTION = PlantParameters(joint_friction_nm_s=0.0)

@@ -40,19 +40,19 @@ def test_energy_of_a_free_joint_is_its_kinetic_energy() -> None:
     lockstep, energy = make_weightless_robot()
     energy.begin()
     push(lockstep, energy, 0.05, 100)
-    speed_rad_s = lockstep.robot.plant.velocities_rad_s.left_sweep
-    joint = energy.joints.left_sweep
+    speed_rad_s = lockstep.robot.plant.velocities_rad_s[0]
+    joint = energy.joints[0]
     assert joint.peak_speed_rad_s == speed_rad_s == pytest.approx(12.5)
     assert joint.energy_j == pytest.approx(0.5 * INERTIA_KG_M2 * speed_rad_s**2, rel=0.02)
     assert energy.energy_j == joint.energy_j
-    assert energy.joints.right_sweep.energy_j == 0.0
+    assert energy.joints[2].energy_j == 0.0
 
 
 def test_a_motor_that_pushes_against_its_stop_does_no_work_and_is_seen_there() -> None:
     lockstep, energy = make_weightless_robot()
     push(lockstep, energy, 0.5, 2000)
-    assert energy.joints.left_sweep.pushed_s > 1.9
-    assert energy.joints.left_sweep.energy_j < 0.9  # 0.5 N·m over the path to the stop at 100°
+    assert energy.joints[0].pushed_s > 1.9
+    assert energy.joints[0].energy_j < 0.9  # 0.5 N·m over the path to the stop at 100°
     assert energy.beyond_rad == pytest.approx(1.745 - 1.047, abs=0.01)
     energy.begin()
     assert energy.beyond_rad == energy.pushed_s == energy.energy_j == 0.0

@@ -7,7 +7,7 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode, Request
 from control.rate import RATE_HZ
-from control.records import JOINTS, NO_TORQUE
+from control.records import JOINTS
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.fault_texts import fault_message
@@ -17,6 +17,7 @@ from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
+from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
 
 TRACK = Track([(1.0, MUDS["48.5"])])
