@@ -1,7 +1,9 @@
-"""The robot that the benchmarks run: the one of the example configuration, with drives of any type."""
+"""The robots that the benchmarks run: of the example configuration, and its right flipper alone; with any drives."""
 
+from dataclasses import replace
 from pathlib import Path
 
+from control.records import Rig
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
@@ -12,3 +14,11 @@ EXAMPLE = Path(__file__).parent.parent / "systemd" / "mudskipper.toml"
 
 def load_example(drive: str = DEFAULT) -> Configuration:
     return parse_configuration(with_drive_type(EXAMPLE.read_text(encoding="utf-8"), drive), EXAMPLE)
+
+
+def load_one_flipper(drive: str = DEFAULT) -> Configuration:
+    """The right flipper of the example: two motors on one bus."""
+    example, rig = load_example(drive), Rig(("right",))
+    drives = {joint: example.drive[joint] for joint in rig.joints}
+    buses = {drive.bus: example.bus[drive.bus] for drive in drives.values()}
+    return replace(example, rig=rig, drive=drives, bus=buses, friction={})

@@ -93,6 +93,7 @@ class Controller:
         rig: Rig = TWO_FLIPPERS,
     ) -> None:
         self.rig = rig
+        self._flippers = len(rig.flippers)
         self.gait = Gait(gait, geometry)
         self.geometry = geometry
         self.gains = gains
@@ -279,7 +280,7 @@ class Controller:
             target.sweep_rad, angle_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
         )
         adduction = JointTarget(angle_rad, velocity_rad_s)
-        return same_for_each(sweep, adduction, self.rig)
+        return Joints(*(sweep, adduction) * self._flippers)
 
 
 def _held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:

@@ -87,10 +87,9 @@ class MudEstimator:
         """Take in the newest state of every drive and the body's pose, in the gait's phase that they belong to."""
         commands_s, self._commands_s = self._commands_s, (self._commands_s[1], now_s)
         body_x_m = body.x_m
-        loads, joint = [], 0
+        loads, joints = [], iter(states)
         for flipper in self.flippers:
-            load, stride = flipper.update(now_s, phase, states[joint], states[joint + 1], body_x_m, commands_s)
-            joint += 2
+            load, stride = flipper.update(now_s, phase, next(joints), next(joints), body_x_m, commands_s)
             loads.append(load)
             if stride is not None:
                 self._closed.append(stride)

@@ -100,10 +100,12 @@ class MudLearning:
 
     def _is_firm(self, controller: Controller) -> bool:
         """Whether an insertion of an adaptive walk has met solid mud."""
+        if not controller.order.adaptive or controller.target.phase is not Phase.INSERTION:
+            self._firm_ticks = 0
+            return False
         limit_nm = self.adaptation.largest_insertion_nm
         firm = any([load.adduction_torque_nm > limit_nm for load in self.reading.loads])
-        inserting = controller.order.adaptive and controller.target.phase is Phase.INSERTION
-        self._firm_ticks = self._firm_ticks + 1 if firm and inserting else 0
+        self._firm_ticks = self._firm_ticks + 1 if firm else 0
         return self._firm_ticks >= FIRM_TICKS
 
     @property

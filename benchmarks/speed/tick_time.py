@@ -5,7 +5,8 @@ buses. The robot computes between the ticks and outside of every figure; no tick
 and caches are warmer than on a robot (benchmarks.speed.loop_jitter shows ticks that begin asleep). Five kinds of
 buses carry the frames: python-can's in-process `virtual` interface, our `mock` bus without python-can, the `local`
 bus's sockets, and SocketCAN on pairs of sockets, by the socket's own frames (`socketcan`) and by python-can's send and
-recv (`python-can`). `--bus` measures only one of them.
+recv (`python-can`). `--bus` measures only one of them. A rig of one flipper with two motors on one bus walks in turn
+with the robot, and `two_motors` compares its ticks.
 
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
 of one mark, some 0.2 us; whole ticks carry one reading of the clock.
@@ -16,29 +17,41 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from benchmarks.example_robot import load_example
+from benchmarks.example_robot import load_example, load_one_flipper
 from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.speed.timed_walk import TimedWalk
 from benchmarks.speed.wirings import VARIANTS, make_wiring
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
 
 BAR_US = 200.0
 
 
 def measure_variant(variant: str, seconds: int, folder: Path) -> dict[str, Any]:
-    configuration = load_example()
     with ExitStack() as stack:
-        wiring = make_wiring(variant, configuration.bus, folder)
-        for port in (*wiring.robot.values(), *wiring.loop.values()):
-            stack.callback(port.close)
-        recorder = Recorder(folder / "walk.mcap", configuration.text, {})
-        stack.callback(recorder.close, timeout_s=10.0)
-        walk = TimedWalk(configuration, wiring, recorder)
-        walk.warm_up()
+        walks = [
+            _walk(stack, configuration, variant, folder / str(len(configuration.drive)))
+            for configuration in (load_example(), load_one_flipper())
+        ]
         for second in range(seconds):
             show_progress(second, seconds, f"{variant} bus")
-            walk.run_blocks()
-        return walk.report()
+            for walk in walks:
+                walk.run_blocks()
+        report, two_motors = (walk.report() for walk in walks)
+        ratio = two_motors["whole_us"]["median"] / report["whole_us"]["median"]
+        return report | {"two_motors": {"whole_us": two_motors["whole_us"], "ratio": round(ratio, 3)}}
+
+
+def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: Path) -> TimedWalk:
+    folder.mkdir()
+    wiring = make_wiring(variant, configuration.bus, folder)
+    for port in (*wiring.robot.values(), *wiring.loop.values()):
+        stack.callback(port.close)
+    recorder = Recorder(folder / "walk.mcap", configuration.text, {}, rig=configuration.rig)
+    stack.callback(recorder.close, timeout_s=10.0)
+    walk = TimedWalk(configuration, wiring, recorder)
+    walk.warm_up()
+    return walk
 
 
 def measure(folder: Path, *, seconds: int = 20, bus: str = "") -> dict[str, Any]:

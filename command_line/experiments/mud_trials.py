@@ -23,6 +23,7 @@ def run_flipper(options: argparse.Namespace) -> int:
         strides=options.strides,
         flipper=options.flipper,
         simulated=options.simulated,
+        motors=options.motors,
     )
     refused = why_not_simulated(plan.muds) if options.simulated else None
     if refused:

@@ -130,6 +130,7 @@ def _add_flipper(names: Commands) -> None:
     option("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
     option("--strides", type=TRIALS, default=1, metavar="N", help="of each trial (default: 1)")
     option("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
+    option("--motors", type=int, choices=(2, 4), default=4, help="of the simulated robot: 2 for that flipper alone")
     option("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
 
 

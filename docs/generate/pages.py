@@ -40,6 +40,8 @@ def _key_row(key: Key) -> tuple[str, str, str, str, str]:
 def _toml(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
     return f'"{value}"' if isinstance(value, str) else f"{value:.10g}"
 
 

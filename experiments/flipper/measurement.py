@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from control.records import Phase
+from control.records import TWO_FLIPPERS, Phase, Rig
 from experiments.flipper.base_check import INVALID_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from experiments.robot.bench_robot import BenchError, arm, rest, walk
 from experiments.trials.estimation_methods import DEFAULT, PAPER, configured_method, strides_by_method
@@ -39,17 +39,23 @@ class Plan:
     strides: int = 1
     flipper: str = "right"
     simulated: bool = False
+    motors: int = len(TWO_FLIPPERS.joints)  # of the simulated robot; with 2, `flipper` is its only one
+
+    @property
+    def simulated_rig(self) -> Rig:
+        return TWO_FLIPPERS if self.motors == len(TWO_FLIPPERS.joints) else Rig((self.flipper,))
 
     @property
     def identity(self) -> dict[str, Any]:
         """The settings that must not change when an experiment is continued; muds and trials may be added."""
+        rig = {} if self.simulated_rig == TWO_FLIPPERS else {"motors": self.motors}
         return {
             "experiment": "flipper",
             "depth_m": self.depth_m,
             "strides": self.strides,
             "flipper": self.flipper,
             "simulated": self.simulated,
-        }
+        } | rig
 
     @property
     def planned(self) -> list[PlannedTrial]:
@@ -72,9 +78,17 @@ def require_fixed_base(configuration: Configuration) -> None:
         )
 
 
+def require_flipper(configuration: Configuration, flipper: str) -> None:
+    """Raises BenchError where the robot has no such flipper."""
+    own = configuration.rig.flippers
+    if flipper not in own:
+        raise BenchError(f"the robot has no {flipper} flipper, rig.flippers is {list(own)}: give --flipper {own[0]}")
+
+
 def run(bench: Bench, plan: Plan, show: Show) -> None:
     """Make every trial that is not in the notebook yet. Raises BenchError."""
     require_fixed_base(bench.robot.configuration)
+    require_flipper(bench.robot.configuration, plan.flipper)
     conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from control.records import TWO_FLIPPERS, Rig
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.trials.mud_trials import PlannedTrial
 from experiments.trials.simulated_bed import CarriedBed, simulated_bench
@@ -33,15 +34,17 @@ lead_deg = 12.0  # reaches that torque with the default stiffness
 DRIVE = f"current_limit_a = {BENCH_CURRENT_A}"
 
 
-def bench_configuration() -> Configuration:
-    return simulated_configuration(SECTIONS, DRIVE)
+def bench_configuration(rig: Rig = TWO_FLIPPERS) -> Configuration:
+    return simulated_configuration(SECTIONS, DRIVE, rig=rig)
 
 
-def flipper_bench(folder: Path, muds: Sequence[str], seed: int) -> tuple[LockstepRobot, CarriedBed]:
+def flipper_bench(
+    folder: Path, muds: Sequence[str], seed: int, rig: Rig = TWO_FLIPPERS
+) -> tuple[LockstepRobot, CarriedBed]:
     """Make a robot over strips of muds, named after their water content. Raises ValueError for an unknown mud."""
     track = Track([(STRIP_M, clay_of_water(float(mud))) for mud in muds])
 
     def position_m(trial: PlannedTrial, prepared: int) -> float:
         return STRIP_M * list(muds).index(trial.group) + TRIAL_M * (prepared + 1)
 
-    return simulated_bench(folder, bench_configuration(), track, seed, position_m, AT_EVERY_TICK)
+    return simulated_bench(folder, bench_configuration(rig), track, seed, position_m, AT_EVERY_TICK)

@@ -74,7 +74,7 @@ MODELLED_PAPER = (
 def run_flipper(plan: Plan, session: Session, truth_path: Path | None) -> Finding:
     """Make the trials and report them. Raises BenchError."""
     truth = load_truth(truth_path) if truth_path else None
-    simulated = partial(flipper_bench, session.folder, plan.muds, SEED)
+    simulated = partial(flipper_bench, session.folder, plan.muds, SEED, plan.simulated_rig)
     bench = open_bench(session, plan.identity, lambda trial: INSTRUCTIONS, simulated)
     configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
     report = report_of(plan, entries, configuration, truth, bench.notebook.left_out)

@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from control.records import TWO_FLIPPERS, Rig
 from drivers.drive_types import DEFAULT
 from experiments.robot.log_copies import cut_log
 from firmware_host.configuration.configuration import Configuration
@@ -17,18 +18,20 @@ from firmware_host.operator.rights import Level, Peer
 from firmware_host.operator.rpc import RefusedError
 from firmware_host.operator.status_client import CallRefusedError
 from simulation.harness.drive_presets import with_drive_type
-from simulation.harness.local_setup import CONFIGURATION
+from simulation.harness.local_setup import configuration_template
 from simulation.harness.lockstep import Lockstep
 
 CALLER = Caller(1, Peer(os.getpid(), os.geteuid(), frozenset()), Level.DRIVE)
 
 
-def simulated_configuration(sections: str = "", drive: str = "", drive_type: str = DEFAULT) -> Configuration:
+def simulated_configuration(
+    sections: str = "", drive: str = "", drive_type: str = DEFAULT, rig: Rig = TWO_FLIPPERS
+) -> Configuration:
     """Return the simulated robot's configuration with more sections, and more lines for each drive, as TOML.
 
     It is parsed from text, so that the log contains it. Raises ConfigurationError.
     """
-    text = CONFIGURATION.format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
+    text = configuration_template(rig).format(left='"left"', right='"right"', logs='"logs"', status='"s"', pose='""')
     lines = [f"{line}\n{drive}" if drive and line.startswith("[drive.") else line for line in text.splitlines()]
     return parse_configuration(with_drive_type("\n".join([*lines, "", sections]), drive_type))
 

@@ -36,7 +36,7 @@ class ReferenceLockstep(Lockstep):
 
     def __init__(self, configuration: Configuration, track: Track, seed: int, **rest: Any) -> None:
         super().__init__(configuration, track, seed, **rest)
-        self._reference = StrokeReference()
+        self._reference = StrokeReference(configuration.rig)
         self._walked = False
         self.truths: list[StrideTruth] = []
 

@@ -83,9 +83,9 @@ def run_trial(
     lockstep = Lockstep(configuration, track, seed, disturbances=disturbances, fixed_base=setup.fixed_base)
     lockstep.arm()
     lockstep.walk(WalkOrder(setup.depth_m, adaptive=False))
-    reference, samples, truths = StrokeReference(), list[Sample](), list[StrideTruth]()
+    reference, samples, truths = StrokeReference(configuration.rig), list[Sample](), list[StrideTruth]()
     first, end_s = _sample_of(lockstep), lockstep.now_s + strides * LONGEST_STRIDE_S
-    while len(truths) < 2 * strides and lockstep.now_s < end_s:
+    while len(truths) < len(configuration.rig.flippers) * strides and lockstep.now_s < end_s:
         lockstep.step()
         samples.append(_sample_of(lockstep))
         truths += reference.step(PERIOD_S, lockstep.robot.plant, samples[-1].phase)

@@ -52,8 +52,8 @@ def _key(section: str, name: str, hint: Any, default: Any) -> Key:
 def _kind_text(kind: Any) -> str:
     if get_origin(kind) is Literal:
         return ", ".join(repr(word) for word in get_args(kind))
-    if get_origin(kind) is dict:
-        return "table"
+    if get_origin(kind) in (dict, tuple):
+        return "table" if get_origin(kind) is dict else "array"
     return "str or list" if kind is object else kind.__name__
 
 

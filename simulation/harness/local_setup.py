@@ -8,59 +8,36 @@ all processes share, signals arrive less punctually than on a robot, so their bo
 import json
 from pathlib import Path
 
+from control.records import TWO_FLIPPERS, Rig
 from drivers.can.run_folder import make_own_folder, run_folder, write_private_file
 
-CONFIGURATION = """\
+HEAD = """\
 # A robot whose drives are simulated on local buses.
 
 [robot]
 name = "simulated"
 
-[bus.left]
+"""
+BUS = """\
+[bus.{name}]
 interface = "mudskipper_local"
-channel = {left}
+channel = {channel}
 
-[bus.right]
-interface = "mudskipper_local"
-channel = {right}
-
-[drive.left_sweep]
-bus = "left"
-node_id = 0
-sign = 1
+"""
+DRIVE = """\
+[drive.{joint}]
+bus = "{bus}"
+node_id = {node_id}
+sign = {sign}
 command_delay_s = 0.25
 
-[drive.left_adduction]
-bus = "left"
-node_id = 1
-sign = -1
-command_delay_s = 0.25
-
-[drive.right_sweep]
-bus = "right"
-node_id = 3
-sign = -1
-command_delay_s = 0.25
-
-[drive.right_adduction]
-bus = "right"
-node_id = 2
-sign = 1
-command_delay_s = 0.25
-
-# As a calibration of these joints would show.
-[friction.left_sweep]
+"""
+FRICTION = """\
+[friction.{joint}]
 viscous_nm_s = 0.002
 
-[friction.left_adduction]
-viscous_nm_s = 0.002
-
-[friction.right_sweep]
-viscous_nm_s = 0.002
-
-[friction.right_adduction]
-viscous_nm_s = 0.002
-
+"""
+TAIL = """\
 # The endpoints of the watchdogs in the simulated drives.
 [[watchdog_endpoints]]
 firmware = "0.6.11"
@@ -92,6 +69,27 @@ socket = {pose}
 [failures]
 allowed = true
 """
+WIRED = {"left_sweep": (0, 1), "left_adduction": (1, -1), "right_sweep": (3, -1), "right_adduction": (2, 1)}
+
+
+def configuration_template(rig: Rig = TWO_FLIPPERS) -> str:
+    """Returns the configuration of a simulated rig, each flipper on a bus of its name; paths are still to be filled in.
+
+    `WIRED` has node id and sign of each joint.
+    """
+    parts = [HEAD]
+    if rig != TWO_FLIPPERS:
+        parts.append(f"[rig]\nflippers = {json.dumps(rig.flippers)}\n\n")
+    parts += [BUS.format(name=flipper, channel=f"{{{flipper}}}") for flipper in rig.flippers]
+    for joint in rig.joints:
+        node_id, sign = WIRED[joint]
+        parts.append(DRIVE.format(joint=joint, bus=joint.split("_")[0], node_id=node_id, sign=sign))
+    parts.append("# As a calibration of these joints would show.\n")
+    parts += [FRICTION.format(joint=joint) for joint in rig.joints]
+    return "".join([*parts, TAIL])
+
+
+CONFIGURATION = configuration_template()
 
 
 def named_folder(name: str) -> Path:
