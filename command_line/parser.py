@@ -1,7 +1,10 @@
 """The parser of the command line. The options of a command are added when the command is used: `status` starts fast."""
 
 import argparse
+import os
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -12,12 +15,28 @@ from command_line.screen import complaints
 MISSING = "the following arguments are required"  # as argparse says it
 
 
+class Formatter(argparse.HelpFormatter):
+    """Finds the terminal's width without shutil, whose compression libraries take longer to load than the parser."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=_columns() - 2)
+
+
+def _columns() -> int:
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal() and int(given):
+        return int(given)
+    with suppress(AttributeError, ValueError, OSError):  # no standard output, or it is no terminal
+        return os.get_terminal_size(sys.__stdout__.fileno()).columns  # type: ignore[union-attr]
+    return 80
+
+
 class Parser(argparse.ArgumentParser):
     """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
 
     def __init__(self, *arguments: Any, options: str = "", **keywords: Any) -> None:
         """`options` names the function that adds the options, as `module.function` below command_line.options."""
-        super().__init__(*arguments, **keywords | {"allow_abbrev": False})
+        super().__init__(*arguments, **keywords | {"allow_abbrev": False, "formatter_class": Formatter})
         self._options = options
 
     def add_options(self) -> None:
