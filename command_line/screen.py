@@ -122,5 +122,11 @@ def stride_line(stride: dict[str, Any], start_s: float = 0.0) -> str:
     )
 
 
+def other_surface(stride: dict[str, Any]) -> str:
+    """Returns a note on a stride of a trial that has two surfaces; empty for the others."""
+    other_m = stride.get("other_surface_m")
+    return "" if other_m is None else f"  other surface {100.0 * other_m:.1f} cm"
+
+
 def _in_cm(value_m: float | None) -> float | None:
     return None if value_m is None else 100.0 * value_m

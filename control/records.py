@@ -163,7 +163,7 @@ NO_LOAD = FlipperLoad(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN)
 
 
 class Estimate(NamedTuple):
-    """One coefficient with its standard error. `reason` says why it is invalid or only a lower bound."""
+    """One coefficient with its standard error. `reason` says why it is invalid, only a lower bound, or ambiguous."""
 
     value: float  # N/m³
     std_error: float  # N/m³
@@ -195,6 +195,7 @@ class StrideEstimate:
     extraction_force_n: float  # most negative upward force in extraction
     step_m: float  # the body's advance since the stride before; NaN without a pose
     surface_std_error_m: float = UNKNOWN
+    other_surface_m: float = UNKNOWN  # where the strokes of the trial find two, as in and next to a hole; else NaN
     position_m: float = UNKNOWN  # of the body along the track when the insertion ended; NaN without a pose
     stance: str = "unknown"  # yield, body, mixed, saturated or unknown: whether the mud sheared or the body moved
     tare_n: float = UNKNOWN  # weight of what clings to the flipper

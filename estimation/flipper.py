@@ -9,7 +9,7 @@ force component, which two torques cannot determine; forces are mapped for displ
 
 from collections.abc import Sequence
 from functools import partial
-from math import cos, hypot, sin
+from math import cos, hypot, isfinite, sin
 
 from control.geometry import FlipperGeometry
 from control.records import UNKNOWN, Estimate, FlipperLoad, Phase
@@ -38,6 +38,7 @@ from estimation.strokes.tare import Tare
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.001}
 OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a stroke's own force begins
+TWO_SURFACES = "the strokes find two surfaces"
 NO_MUD = "no evidence of mud: the torques are those of friction"
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
 CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
@@ -167,16 +168,22 @@ class FlipperEstimator(StrideEstimator):
             partial(extraction_samples, self.geometry, extraction.moving(), self._surface, extraction.first_m),
         )
         return Learned(
-            k_p=self._k_p,
-            k_s=self._shear_estimate(shear),
-            k_e=self._learn_extraction(extraction),
+            k_p=self._named(self._k_p),
+            k_s=self._named(self._shear_estimate(shear)),
+            k_e=self._named(self._learn_extraction(extraction)),
             surface_m=self.surface_m,
             extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
             surface_std_error_m=self._surface.std_error_m,
+            other_surface_m=self._surface.other_m,
             stance=shear.case,
             tare_n=self._tare.zero.weight_n,
             tare_drift_n=self._tare.drift_n,
         )
+
+    def _named(self, estimate: Estimate) -> Estimate:
+        """Add that the trial has two surfaces as the reason of an estimate that has none."""
+        is_ambiguous = isfinite(self._surface.other_m) and not estimate.reason
+        return estimate._replace(reason=TWO_SURFACES) if is_ambiguous else estimate
 
     def _met_mud(self, stance: Sequence[Batch], extraction: Sequence[Batch]) -> bool:
         """Return whether the stance or the extraction needs more torque than friction."""

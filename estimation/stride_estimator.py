@@ -29,6 +29,7 @@ class Learned(NamedTuple):
     surface_m: float
     extraction_torque_nm: float
     surface_std_error_m: float = UNKNOWN
+    other_surface_m: float = UNKNOWN
     stance: str = "unknown"
     tare_n: float = UNKNOWN
     tare_drift_n: float = UNKNOWN
@@ -142,6 +143,7 @@ class StrideEstimator(ABC):
             k_e=learned.k_e,
             surface_m=learned.surface_m,
             surface_std_error_m=learned.surface_std_error_m,
+            other_surface_m=learned.other_surface_m,
             depth_m=self._deepest_m - learned.surface_m,
             released=not self._stuck,
             insertion_force_n=self._insertion_n,

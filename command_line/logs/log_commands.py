@@ -10,7 +10,7 @@ from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import chosen_vertical, complain_of, show_lab_log
 from command_line.logs.refusals import UsageError, explain_errors
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, stride_line, watched
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
 from experiments.reports.shown_values import value_shown
@@ -58,7 +58,7 @@ def _show_replay(files: Sequence[Path], replayed: Replay, as_json: bool) -> None
     print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):
         forces = f"{stride.insertion_force_n:7.1f} {stride.stance_force_n:6.1f} {stride.extraction_force_n:7.1f}"
-        print(f"{stride_line(report, replayed.begin_s)}  {forces}")
+        print(f"{stride_line(report, replayed.begin_s)}  {forces}{other_surface(report)}")
     if not strides:
         complain("no complete stride in this log")
     if replayed.segment:

@@ -39,6 +39,7 @@ class Surface(NamedTuple):
     level_std_error_n: float
     found: bool
     law_error_m: float = 0.0  # if the force below grows otherwise than in proportion to depth
+    other_m: float = UNKNOWN  # the trial's other surface, where its strokes find two (surface_memory.py)
 
 
 NO_SURFACE = Surface(UNKNOWN, UNKNOWN, 0.0, inf, False)

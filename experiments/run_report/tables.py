@@ -1,7 +1,7 @@
 """The tables of a report about runs, as rows of text with the head first."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import isfinite, nan
 
 from experiments.pictures.stride_choice import Outcome
 from experiments.reports.coefficient_table import GatheredCoefficient
@@ -106,7 +106,9 @@ def stride_rows(run: Run) -> Table:
 def _stride_row(stride: ReportedStride) -> list[str]:
     lengths_cm = [number(length_m / CM, 1) for length_m in (stride.depth_m, stride.step_m)]
     mud = stride.mud or "at a border"
-    return [str(stride.walk), str(stride.index), mud, f"{stride.start_s:.2f}", *lengths_cm, str(stride.outcome)]
+    two = any(isfinite(row.get("other_surface_m", nan)) for row in stride.rows.values())
+    outcome = f"{stride.outcome}, two surfaces" if two else str(stride.outcome)
+    return [str(stride.walk), str(stride.index), mud, f"{stride.start_s:.2f}", *lengths_cm, outcome]
 
 
 def estimate_rows(run: Run, name: str) -> Table:

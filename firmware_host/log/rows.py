@@ -84,6 +84,7 @@ STRIDE = RowKind(
         *COEFFICIENT_FIELDS,
         Field("surface_m", "float64", "stride.surface_m", "depth of the mud's surface below its nominal height"),
         Field("surface_std_error_m", "float64", "stride.surface_std_error_m"),
+        Field("other_surface_m", "float64", "stride.other_surface_m", "where a trial's strokes find two; else NaN"),
         Field("depth_m", "float64", "stride.depth_m", "deepest point below that surface"),
         Field("insertion_force_n", "float64", "stride.insertion_force_n", "largest upward force"),
         Field("stance_force_n", "float64", "stride.stance_force_n", "largest forward force"),

@@ -26,7 +26,9 @@ def test_the_replay_of_a_log_of_version_0_1_gives_the_same_numbers(capsys: pytes
     assert main.main(["replay", str(OLD_LOG), "--method", "paper", "--json"]) == 0
     replayed = json.loads(capsys.readouterr().out)
     expected = json.loads(OLD_LOG.with_name("walk_0_1_replay.json").read_text(encoding="utf-8"))
-    assert all(stride.pop("chosen_depth_m") is not None for stride in replayed["strides"])  # a key that is new
+    strides = replayed["strides"]
+    assert all(stride.pop("chosen_depth_m") is not None for stride in strides)  # keys that are new
+    assert all(stride.pop("other_surface_m") is None for stride in strides)
     assert {name: replayed[name] for name in expected} == expected
 
 
