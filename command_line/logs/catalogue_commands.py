@@ -14,6 +14,7 @@ from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
 from firmware_host.catalogue.entry import LogEntry
 from firmware_host.log_reading.log_error import LogError
+from firmware_host.operator.counted_nouns import counted
 
 Options = argparse.Namespace
 LISTING_READS_S = 1.0  # new logs that `log list` reads; it describes the others by the summary at their end
@@ -43,7 +44,7 @@ def _update(catalogue: Any, longest_s: float = inf, broken_again: bool = False) 
         complain(f"the catalogue {catalogue.path} cannot be stored: {problem.strerror or problem}")
         return False
     if unread:
-        complain(f"{unread} new logs are not in the catalogue yet: 'mudskipper log index' reads them")
+        complain(f"{counted(unread, 'new log')} not in the catalogue yet: 'mudskipper log index' reads them")
     return True
 
 
@@ -75,7 +76,7 @@ def index(options: Options) -> int:
     if options.json:
         print_json("log-index", report)
     else:
-        print(f"{report['catalogue']}: {report['logs']} logs, {report['broken']} of them broken")
+        print(f"{report['catalogue']}: {counted(len(states), 'log')}, {report['broken']} broken")
     return exit_codes.OK if stored else exit_codes.UNHEALTHY
 
 
