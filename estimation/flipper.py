@@ -17,7 +17,7 @@ from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_between
 from estimation.stride_estimator import Learned, StrideEstimator, larger
 from estimation.strokes.air import AirSwing
-from estimation.strokes.fit_samples import NO_FITS, StrideFits, no_samples
+from estimation.strokes.fit_samples import NO_FITS, StrideFits
 from estimation.strokes.origin_fit import median
 from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.shear import Base, Shear, find_shear, shear_samples
@@ -82,7 +82,6 @@ class FlipperEstimator(StrideEstimator):
             stroke.reset()
         self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
-        self._insertion_samples = no_samples
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         sweep_rad, adduction_rad, depth_m = load[:3]
@@ -148,7 +147,7 @@ class FlipperEstimator(StrideEstimator):
         below = level_free(batches, -corrected_n * length_m)
         own = self._own_surfaces.update(found, 0.0)
         self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
-        self._insertion_samples = partial(insertion_samples, self.geometry, below, own)
+        self.fits = StrideFits(k_p=partial(insertion_samples, self.geometry, below, own))
 
     @property
     def surface_m(self) -> float:
@@ -157,15 +156,14 @@ class FlipperEstimator(StrideEstimator):
 
     def _learned(self) -> Learned:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
-        self.fits = NO_FITS
         if not self._met_mud(stance.batches, extraction.batches):
+            self.fits = NO_FITS
             no_mud = NOT_THERE._replace(reason=NO_MUD)
             return Learned(k_p=no_mud, k_s=no_mud, k_e=no_mud, surface_m=self.surface_m, extraction_torque_nm=UNKNOWN)
         shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.drag_n)
-        self.fits = StrideFits(
-            self._insertion_samples,
-            partial(shear_samples, self.geometry, stance.batches, self.surface_m, shear),
-            partial(extraction_samples, self.geometry, extraction.moving(), self._surface, extraction.first_m),
+        self.fits = self.fits._replace(
+            k_s=partial(shear_samples, self.geometry, stance.batches, self.surface_m, shear),
+            k_e=partial(extraction_samples, self.geometry, extraction.moving(), self._surface, extraction.first_m),
         )
         return Learned(
             k_p=self._named(self._k_p),

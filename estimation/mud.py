@@ -80,7 +80,7 @@ class MudEstimator:
         self.mud_estimate = NOTHING_KNOWN
 
     def fits_of(self, flipper: str) -> StrideFits:
-        """Return the fits of the flipper's last stride, until its next one closes."""
+        """Return the fits of the flipper's last stride, until its next insertion ends."""
         return next(each.fits for each in self.flippers if each.flipper == flipper)
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> MudReading:

@@ -47,7 +47,7 @@ class StrideEstimator(ABC):
     ) -> None:
         self.flipper = flipper
         self.geometry = geometry
-        self.fits: StrideFits = NO_FITS  # of the stride that closed last
+        self.fits: StrideFits = NO_FITS  # of the stride that closed last, until its next insertion
         self._loads = JointLoads(geometry, drive, motion)
         self._clock = StrideClock()
         self.reset()
