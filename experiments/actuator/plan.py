@@ -106,6 +106,11 @@ def needed_nm(plan: Plan, configuration: Configuration, weight_g: float) -> floa
 
 
 def _problems(plan: Plan, configuration: Configuration) -> Iterator[str]:
+    own = configuration.rig.joints
+    missing = [joint for joint in plan.joints if joint not in own]
+    if missing:
+        yield f"this robot has no {' and no '.join(missing)}: give --joint, one of {', '.join(own)}"
+        return
     limit_nm, heaviest_g = configuration.limits.torque_nm, max(plan.weights_g)
     least_nm = needed_nm(plan, configuration, heaviest_g)
     if least_nm > limit_nm:

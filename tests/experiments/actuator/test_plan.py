@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from control.records import Rig
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step, in_turn, require_possible, stays_cool, steps_of
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_robot import BenchError
+from experiments.robot.lockstep_robot import simulated_configuration
 from firmware_host.configuration.configuration import Configuration
 
 
@@ -59,3 +61,9 @@ def test_a_warm_winding_bears_less_than_a_cool_one() -> None:
     assert not stays_cool(configuration, 13.0, 35.0, 20.0)
     assert not stays_cool(configuration, 13.0, 60.0, 10.0)
     assert stays_cool(configuration, 5.0, 60.0, 10.0)
+
+
+def test_a_joint_that_the_rig_lacks_is_refused() -> None:
+    alone = simulated_configuration(rig=Rig(("left",)))
+    with pytest.raises(BenchError, match="no right_sweep: give --joint, one of left_sweep, left_adduction"):
+        require_possible(Plan(("right_sweep",)), alone)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.records import Phase
+from control.records import Phase, Rig
 from experiments.flipper import measurement as flipper
 from experiments.flipper.measurement import Plan, require_fixed_base, require_mud
 from experiments.flipper.report import FlipperReport, report_of
@@ -248,3 +248,22 @@ def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> Non
     assert reported.settings["method"] == "paper"
     assert KNOWN_BIAS not in tables_of(reported)[0][0]
     assert (reported.misfit_n[MUD]["insertion"] or 0.0) > 0.0
+
+
+def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
+    """The paper's own bench has one flipper (section II-C)."""
+    plan = replace(SHORT, motors=2)
+    robot, bed = flipper_bench(tmp_path, [MUD], 1, plan.simulated_rig)
+    assert robot.configuration.rig.joints == ("right_sweep", "right_adduction")
+    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, plan.identity))
+    flipper.run(bench, plan, lambda done, of: None)
+    (entry,) = bench.notebook.entries.values()
+    (stride,) = entry["strides"][DEFAULT]
+    (truth,) = entry["truths"].values()
+    assert all(stride[name]["valid"] for name in ("k_p", "k_s", "k_e"))
+    assert stride["k_s"]["value"] == pytest.approx(truth["k_s"], rel=0.15)
+
+
+def test_a_flipper_that_the_rig_lacks_is_refused() -> None:
+    with pytest.raises(BenchError, match="--flipper right"):
+        flipper.require_flipper(bench_configuration(Rig(("right",))), "left")
