@@ -6,6 +6,7 @@ that is not there yet, and for one that restarts.
 """
 
 import argparse
+import signal
 import time
 from collections.abc import Sequence
 from typing import NoReturn, Protocol
@@ -46,6 +47,7 @@ def live(options: argparse.Namespace) -> int:
         complain(str(problem))
         return exit_codes.NOT_PERMITTED
     except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C would interrupt the end of the server's threads
         return exit_codes.OK
 
 
