@@ -5,8 +5,8 @@ buses. The robot computes between the ticks and outside of every figure; no tick
 and caches are warmer than on a robot (benchmarks.speed.loop_jitter shows ticks that begin asleep). Five kinds of
 buses carry the frames: python-can's in-process `virtual` interface, our `mock` bus without python-can, the `local`
 bus's sockets, and SocketCAN on pairs of sockets, by the socket's own frames (`socketcan`) and by python-can's send and
-recv (`python-can`). `--bus` measures only one of them. A rig of one flipper with two motors on one bus walks in turn
-with the robot, and `two_motors` compares its ticks.
+recv (`python-can`). `--bus` measures only one of them; `--drive` chooses the type of the drives. A rig of one flipper
+with two motors on one bus walks in turn with the robot, and `two_motors` compares its ticks.
 
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
 of one mark, some 0.2 us; whole ticks carry one reading of the clock.
@@ -21,17 +21,18 @@ from benchmarks.example_robot import load_example, load_one_flipper
 from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.speed.timed_walk import TimedWalk
 from benchmarks.speed.wirings import VARIANTS, make_wiring
+from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
 
 BAR_US = 200.0
 
 
-def measure_variant(variant: str, seconds: int, folder: Path) -> dict[str, Any]:
+def measure_variant(variant: str, seconds: int, folder: Path, drive: str) -> dict[str, Any]:
     with ExitStack() as stack:
         walks = [
             _walk(stack, configuration, variant, folder / str(len(configuration.drive)))
-            for configuration in (load_example(), load_one_flipper())
+            for configuration in (load_example(drive), load_one_flipper(drive))
         ]
         for second in range(seconds):
             show_progress(second, seconds, f"{variant} bus")
@@ -54,14 +55,14 @@ def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: 
     return walk
 
 
-def measure(folder: Path, *, seconds: int = 20, bus: str = "") -> dict[str, Any]:
+def measure(folder: Path, *, seconds: int = 20, bus: str = "", drive: str = DEFAULT) -> dict[str, Any]:
     """The verdict is that of the virtual bus, or of the only one that was measured."""
     measured = {}
     for variant in [bus] if bus else VARIANTS:
         (folder / variant).mkdir()
-        measured[variant] = measure_variant(variant, seconds, folder / variant)
+        measured[variant] = measure_variant(variant, seconds, folder / variant, drive)
     bus = bus or "virtual"
-    report = {"seconds": seconds, "variants": measured, "bar_us": BAR_US}
+    report = {"seconds": seconds, "drive": drive, "variants": measured, "bar_us": BAR_US}
     reached = measured[bus]["whole_us"]["median"] <= BAR_US
     return evaluated(report, f"median whole tick over the {bus} bus at most {BAR_US:.0f} us", reached)
 

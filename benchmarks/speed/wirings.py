@@ -5,7 +5,7 @@ kernel's CAN code and the driver is in no figure. The options of a CAN_RAW socke
 """
 
 import socket
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +17,7 @@ from can.interfaces.socketcan import SocketcanBus, constants, socketcan
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.mock_bus import MockBus
 from drivers.can.socketcan_port import SocketcanPort
+from firmware_host.configuration.configuration import BusParameters
 
 
 class CanSocket(socket.socket):
@@ -46,9 +47,9 @@ def in_place_of_can(near: socket.socket) -> Iterator[None]:
         yield
 
 
-def open_bus(near: socket.socket) -> SocketcanBus:
+def open_bus(near: socket.socket, fd: bool = False) -> SocketcanBus:
     with in_place_of_can(near):
-        bus = can.Bus(interface="socketcan", channel="can0")
+        bus = can.Bus(interface="socketcan", channel="can0", fd=fd)
     assert isinstance(bus, SocketcanBus)
     return bus
 
@@ -63,31 +64,31 @@ class Wiring(NamedTuple):
 PortPair = tuple[CanPort, CanPort]  # the robot's end and the loop's
 
 
-def python_can_pair(interface: str, channel: Path) -> PortPair:
-    return open_port(interface, str(channel), {}), open_port(interface, str(channel), {})
+def python_can_pair(interface: str, channel: Path, fd: bool) -> PortPair:
+    return open_port(interface, str(channel), {}, fd), open_port(interface, str(channel), {}, fd)
 
 
-def mock_pair(channel: Path) -> PortPair:
+def mock_pair(channel: Path, fd: bool) -> PortPair:
     bus = MockBus()
     return bus.open(), bus.open()
 
 
-def socketcan_pair(kind: type[PythonCanPort] | type[SocketcanPort]) -> PortPair:
+def socketcan_pair(kind: type[PythonCanPort] | type[SocketcanPort], fd: bool) -> PortPair:
     far, near = open_pair()
-    return SocketcanPort(open_bus(far)), kind(open_bus(near))
+    return SocketcanPort(open_bus(far, fd)), kind(open_bus(near, fd))
 
 
-VARIANTS: dict[str, Callable[[Path], PortPair]] = {
-    "virtual": lambda channel: python_can_pair("virtual", channel),
+VARIANTS: dict[str, Callable[[Path, bool], PortPair]] = {
+    "virtual": lambda channel, fd: python_can_pair("virtual", channel, fd),
     "mock": mock_pair,
-    "local": lambda channel: python_can_pair("mudskipper_local", channel),
-    "socketcan": lambda channel: socketcan_pair(SocketcanPort),
-    "python-can": lambda channel: socketcan_pair(PythonCanPort),
+    "local": lambda channel, fd: python_can_pair("mudskipper_local", channel, fd),
+    "socketcan": lambda channel, fd: socketcan_pair(SocketcanPort, fd),
+    "python-can": lambda channel, fd: socketcan_pair(PythonCanPort, fd),
 }
 
 
-def make_wiring(variant: str, buses: Iterable[str], folder: Path) -> Wiring:
-    pairs = {name: VARIANTS[variant](folder / name) for name in buses}
+def make_wiring(variant: str, buses: Mapping[str, BusParameters], folder: Path) -> Wiring:
+    pairs = {name: VARIANTS[variant](folder / name, bus.data_bit_rate_kbit_s > 0) for name, bus in buses.items()}
     return Wiring(
         {name: robot for name, (robot, _) in pairs.items()}, {name: loop for name, (_, loop) in pairs.items()}
     )

@@ -1,8 +1,8 @@
 """One moteus as one joint: the newest reply, what it says of the drive, and the frames that command it.
 
 The drive sends nothing unless it is asked, so every frame to it asks for all signals, and the reply to the frame of one
-tick is read in the next. A drive answers before it executes the command of the same frame: the signals have the time of
-the question as their stamp, and their current is still that of the command before. While the drive is idle the frames
+tick is read in the next. A drive answers before it executes the command of the same frame: the current is still that of
+the command before, so it has the time of the question as its stamp. While the drive is idle the frames
 only ask, because a torque command of zero would let it follow torque. A joint's sign inverts angle, velocity, current
 and torque of a mirrored motor alike.
 
@@ -84,16 +84,14 @@ class MoteusAxis:
     def _receive_signals(self, data: bytes, now_s: float) -> None:
         mode, turns, turns_s, current_a, temperature_c, voltage_v, fault, control_nm, _ = codec.decode_reply(data)
         self._count_answer()
-        asked_s = self._read_before_s  # every tick asks after it has read
-        if NEVER_S < asked_s < now_s:
-            now_s = asked_s
         if turns - turns == 0.0 == turns_s - turns_s:  # finite
             self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
             self._velocity_rad_s = turns_s * self._rad_per_turn
             self._angle_stamp_s = now_s
         if current_a - current_a == 0.0:
             self._current_a = self.parameters.sign * current_a
-            self._current_stamp_s = now_s
+            asked_s = self._read_before_s  # every tick asks after it has read
+            self._current_stamp_s = asked_s if NEVER_S < asked_s < now_s else now_s
         if temperature_c != 0.0 and temperature_c == temperature_c:  # zero where no thermistor is configured
             self._temperature_c, self._temperature_stamp_s = temperature_c, now_s
         if voltage_v == voltage_v:

@@ -6,8 +6,8 @@ runs in position mode only and is fed by commands alone. Once it expires, the mo
 the drive does what `servo.timeout_mode` says: 12 damps with the scale of kd of the last command, as the firmware does
 (ISR_DoZeroVelocity of fw/bldc_servo_control.h), 15 shorts the windings, 10 holds the position, 0 lets go.
 
-It sends nothing unless it is asked: the answer to a frame leaves with the values of that moment. Between the drive and
-the joint lie the same imperfections as in simulation/devices/odrive.py.
+It sends nothing unless it is asked. An answer has the current, mode and torque of before the frame's command. Between
+the drive and the joint lie the same imperfections as in simulation/devices/odrive.py.
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,28 +26,12 @@ from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParamete
 from simulation.devices.late_messages import LateMessages
 from simulation.devices.moteus.console import MoteusConsole
 from simulation.devices.moteus.forgeries import answer_frame, command_frame, forged_frame
-from simulation.devices.moteus.torque import position_mode_nm, timeout_nm
+from simulation.devices.moteus.torque import DEFAULTS, PURE_TORQUE, position_mode_nm, timeout_nm
 
 TURN_RAD = 2.0 * pi
 BOOT_S = 0.5  # silence of a drive that restarts
 FIRMWARE = 0x010100  # 1.1.0
 FAULTS = {DriveError.OVERCURRENT: 33, DriveError.OVERSPEED: 50}
-DEFAULTS = {  # of the registers that a command does not write
-    Register.COMMAND_POSITION: 0.0,
-    Register.COMMAND_VELOCITY: 0.0,
-    Register.COMMAND_TORQUE: 0.0,
-    Register.KP_SCALE: 1.0,
-    Register.KD_SCALE: 1.0,
-    Register.MAX_TORQUE: nan,
-    Register.WATCHDOG: 0.0,
-    Register.ILIMIT_SCALE: 1.0,
-}
-PURE_TORQUE = {  # what codec.encode_torque writes besides the torque
-    Register.COMMAND_POSITION: nan,
-    Register.KP_SCALE: 0.0,
-    Register.KD_SCALE: 0.0,
-    Register.ILIMIT_SCALE: 0.0,
-}
 
 
 class SimulatedMoteus:
@@ -86,13 +70,12 @@ class SimulatedMoteus:
         """Executes one frame of the bus and returns the answer to it, if it wants one and is not late."""
         if frame.arbitration_id not in self._ids or not frame.is_fd or now_s < self._boots_until_s:
             return []
-        try:
+        data = b""
+        with suppress(MalformedMessageError):  # a drive ignores malformed frames
             data = self._usual_answer(frame.data, now_s) or self._any_answer(frame.data, now_s)
-        except MalformedMessageError:  # a drive ignores malformed frames
-            return []
         if not data or not frame.arbitration_id & codec.REPLY_WANTED:
             return []
-        answer = answer_frame(self.parameters.node_id, self._new_or_repeated(data), now_s)
+        answer = answer_frame(self.parameters.node_id, data, now_s)
         if not self.parameters.message_delay_s:
             return [answer]
         self._answers.append(answer)
@@ -110,22 +93,23 @@ class SimulatedMoteus:
         torque_nm = codec.decode_torque(data)
         if isnan(torque_nm) and data != codec.QUERY_ALONE:
             return b""
+        parameters = self.parameters
         answer = codec.encode_reply(
             Reply(
                 self.mode,
                 self._value(Register.POSITION),
                 self._value(Register.VELOCITY),
                 self._measured_current_a(),
-                self.parameters.temperature_c,
-                self.parameters.bus_voltage_v,
+                parameters.temperature_c,
+                parameters.bus_voltage_v,
                 self.fault,
                 self._setpoint_nm,
-                self.parameters.temperature_c,
+                parameters.temperature_c,
             )
         )
         if data != codec.QUERY_ALONE:
             self._follow(PURE_TORQUE | {Register.COMMAND_TORQUE: torque_nm}, now_s)
-        return answer
+        return self._new_or_repeated(answer)
 
     def _execute(self, subframes: Iterable[Subframe], now_s: float) -> None:
         """Writes the registers; the mode comes first, and all that a command does not write is at its default."""
@@ -214,11 +198,9 @@ class SimulatedMoteus:
 
     def _new_or_repeated(self, data: bytes) -> bytes:
         fraction = self.parameters.repeated_fraction
-        if not fraction or len(data) != codec.REPLY_BYTES or data[0] != codec.FIRST_REPLY_BYTE:
-            return data
         if self._repeated is None or self._random.random() >= fraction:
             self._repeated = data
-        return self._repeated
+        return self._repeated if fraction else data
 
     @property
     def energised(self) -> bool:
@@ -247,7 +229,9 @@ class SimulatedMoteus:
         return answer_frame(self.parameters.node_id, registers.padded(b""))
 
     def forge_torque(self, torque_nm: float) -> Frame:
-        return command_frame(self.parameters.node_id, codec.encode_torque(self.parameters.sign * torque_nm))
+        """Asks for nothing: the stranger's answers would not be this program's."""
+        data = codec.encode_torque(self.parameters.sign * torque_nm).removesuffix(codec.QUERY)
+        return command_frame(self.parameters.node_id, registers.padded(data))
 
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""

@@ -4,7 +4,7 @@ Sources: ISR_DoPosition, ISR_DoZeroVelocity and ISR_DoPositionTimeout of fw/bldc
 """
 
 from collections.abc import Mapping
-from math import isnan
+from math import isnan, nan
 
 from drivers.moteus.codec import Mode
 from drivers.moteus.registers import Register
@@ -12,6 +12,23 @@ from drivers.moteus.registers import Register
 KP_NM_TURN, KD_NM_S_TURN = 4.0, 0.05  # moteus's defaults, before their scales
 BRAKE_NM_S_TURN = 0.06  # of shorted windings, some k_t² / R
 TIMEOUT_TORQUE_NM = 5.0  # servo.timeout_max_torque_Nm
+
+DEFAULTS = {  # of the registers that a command does not write
+    Register.COMMAND_POSITION: 0.0,
+    Register.COMMAND_VELOCITY: 0.0,
+    Register.COMMAND_TORQUE: 0.0,
+    Register.KP_SCALE: 1.0,
+    Register.KD_SCALE: 1.0,
+    Register.MAX_TORQUE: nan,
+    Register.WATCHDOG: 0.0,
+    Register.ILIMIT_SCALE: 1.0,
+}
+PURE_TORQUE = {  # what codec.encode_torque writes besides the torque
+    Register.COMMAND_POSITION: nan,
+    Register.KP_SCALE: 0.0,
+    Register.KD_SCALE: 0.0,
+    Register.ILIMIT_SCALE: 0.0,
+}
 
 
 def position_mode_nm(command: Mapping[Register, float], turns: float, turns_s: float, held_turns: float) -> float:

@@ -1,0 +1,261 @@
+"""One moteus as a joint: what its answers mean, what is asked, and what is noticed."""
+
+from dataclasses import replace
+from math import isfinite, nan, pi
+from random import Random
+from typing import Any
+
+import pytest
+
+from control.rate import PERIOD_S
+from control.records import JOINTS, NO_TORQUE, DriveStates, Joints
+from drivers.can.mock_bus import MockBus
+from drivers.drive import DriveHealth
+from drivers.drive_types import make_drives
+from drivers.moteus import codec
+from drivers.moteus.codec import Mode
+from drivers.moteus.parameters import MoteusParameters
+from drivers.odrive.drive_type import Odrive
+from simulation.devices.drive import DriveError, SimulatedDriveParameters
+from simulation.devices.moteus.device import SimulatedMoteus
+from simulation.devices.moteus.forgeries import command_frame
+
+STEP = Joints(0.1, 0.0, 0.0, 0.0)
+
+
+class Bench:
+    """Four simulated drives on one bus, of which node 1 is looked at; each tick reads, then asks or commands."""
+
+    def __init__(self, duplicate: bool = False, **changes: Any) -> None:
+        bus = MockBus()
+        self.far, self.stranger = bus.open(), bus.open()
+        self.parameters = {
+            joint: MoteusParameters("one", node, current_limit_a=12.0) for node, joint in enumerate(JOINTS, 1)
+        }
+        self.drives = make_drives(self.parameters, {"one": bus.open()})
+        ideal = SimulatedDriveParameters(1, type="moteus", torque_constant_nm_a=0.0719, current_noise_a=0.0)
+        nodes = [1, 2, 3, 4] + duplicate * [1]
+        self.devices = [SimulatedMoteus(replace(ideal, node_id=node, **changes), Random(node)) for node in nodes]
+        self.now_s, self.silent = 0.0, False
+
+    def tick(self, torques_nm: Joints[float] | None = None, settings: bool = False) -> DriveStates:
+        self.now_s += PERIOD_S
+        for frame in self.far.receive():
+            for device in self.devices:
+                for answer in () if self.silent else device.receive(frame, self.now_s):
+                    self.far.send(answer)
+        for device in self.devices:
+            device.torque_nm(self.now_s)
+        states = self.drives.read(self.now_s)
+        if settings:
+            self.drives.request_settings(self.now_s)
+        if torques_nm is None:
+            self.drives.poll()
+        else:
+            self.drives.send(torques_nm, PERIOD_S)
+        return states
+
+    def run(self, duration_s: float, torques_nm: Joints[float] | None = None, settings: bool = False) -> DriveStates:
+        for _ in range(round(duration_s / PERIOD_S)):
+            states = self.tick(torques_nm, settings)
+        return states
+
+    def arm(self) -> None:
+        self.run(0.05)
+        self.drives.arm(self.now_s, at_once=True)
+        self.run(0.01, NO_TORQUE)
+        self.drives.arm(self.now_s + 1.0)
+        self.run(0.02, NO_TORQUE)
+
+    @property
+    def health(self) -> DriveHealth:
+        return self.drives.health[0]
+
+
+def test_nothing_is_heard_until_it_is_asked() -> None:
+    bench = Bench()
+    assert not bench.drives.heard
+    bench.tick()
+    bench.tick()
+    assert bench.drives.heard
+    assert bench.drives.gate.refused == 0
+
+
+def test_idle_drives_are_asked_and_never_commanded() -> None:
+    bench = Bench()
+    bench.run(1.0, NO_TORQUE, settings=True)
+    assert all(device.mode is Mode.STOPPED for device in bench.devices)
+    assert (bench.drives.gate.refused, bench.drives.malformed_frames, bench.drives.unknown_frames) == (0, 0, 0)
+
+
+def test_arming_lets_the_drives_follow_torque_and_disarming_stops_them() -> None:
+    bench = Bench()
+    bench.arm()
+    assert all(state.closed_loop for state in bench.tick(NO_TORQUE))
+    states = bench.run(0.02, STEP)
+    assert states[0].current_a == pytest.approx(0.1 / 0.0719, rel=1e-3)
+    bench.drives.disarm(bench.now_s, at_once=True)
+    assert not any(state.closed_loop for state in bench.run(0.02, NO_TORQUE))
+    assert all(device.mode is Mode.STOPPED for device in bench.devices)
+
+
+def test_a_drive_that_restarts_under_torque_is_not_commanded_back_into_it() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.devices[0].mode = Mode.STOPPED  # as after a short dip of its supply
+    bench.tick(NO_TORQUE)
+    bench.devices[0].mode = Mode.STOPPED
+    bench.run(0.05, NO_TORQUE)
+    assert bench.devices[0].mode is Mode.STOPPED and bench.devices[1].mode is Mode.POSITION
+
+
+def test_a_drive_that_another_program_energises_is_stopped_at_once() -> None:
+    bench = Bench()
+    bench.run(0.05, NO_TORQUE)
+    bench.stranger.send(command_frame(1, codec.encode_torque(0.2)))
+    bench.run(0.02, NO_TORQUE)
+    assert bench.devices[0].mode is Mode.STOPPED and bench.health.foreign_commands == 1
+
+
+@pytest.mark.parametrize("data", [codec.QUERY_ALONE, codec.STOP_AND_QUERY, codec.STOP])
+def test_questions_and_stops_of_others_are_no_foreign_commands(data: bytes) -> None:
+    bench = Bench()
+    for _ in range(50):
+        bench.stranger.send(command_frame(1, data))
+        bench.tick(NO_TORQUE)
+    assert bench.health.foreign_commands == 0 and not bench.health.duplicate_id
+
+
+def test_two_drives_with_one_id_are_noticed_and_one_is_not() -> None:
+    for duplicate in (False, True):
+        bench = Bench(duplicate=duplicate)
+        bench.run(0.2, NO_TORQUE, settings=True)
+        assert bench.health.duplicate_id is duplicate
+        assert not bench.drives.health[1].duplicate_id
+
+
+def test_an_expired_watchdog_is_an_error_until_it_is_cleared() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.now_s += 0.2  # in which this program hangs
+    for device in bench.devices:
+        device.torque_nm(bench.now_s)
+    bench.run(0.02, NO_TORQUE)
+    assert bench.health.watchdog_expired and bench.health.active_errors == "watchdog expired"
+    assert bench.tick(NO_TORQUE)[0].error_flags == codec.TIMEOUT_FLAG
+    bench.drives.disarm(bench.now_s, at_once=True)
+    bench.drives.clear_errors()
+    bench.run(0.02, NO_TORQUE)
+    assert bench.health.active_errors == ""
+
+
+def test_a_fault_is_named() -> None:
+    bench = Bench()
+    bench.devices[0].trip(DriveError.OVERCURRENT)
+    bench.run(0.02, NO_TORQUE)
+    assert bench.health.active_errors == "motor driver fault"
+
+
+def test_a_silence_is_a_restart_and_a_pause_of_this_program_is_none() -> None:
+    bench = Bench()
+    bench.run(0.1)
+    bench.now_s += 2.0
+    bench.run(0.1)
+    assert bench.health.restarts == 0
+    bench.silent = True
+    bench.run(0.5)
+    bench.silent = False
+    bench.run(0.1)
+    assert bench.health.restarts == 1
+
+
+def test_settings_are_read_back_and_again_after_a_change() -> None:
+    bench = Bench(serial_number="0123456789abcdef00112233")
+    bench.run(1.0, NO_TORQUE, settings=True)
+    health = bench.health
+    assert (health.firmware, health.firmware_supported, health.watchdog_s) == ("1.1.0", True, 0.1)
+    assert health.serial_number == "0123456789abcdef00112233" and health.setting_problem == ""
+    bench.devices[0].console.settings["servo.default_timeout_s"] = nan
+    bench.run(2.5, NO_TORQUE, settings=True)
+    assert bench.health.watchdog_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("servo.max_current_A", 5.0, "servo.max_current_A is 5 and current_limit_a = 12"),
+        ("motor.Kv", 300.0, "torque_constant_nm_a = 0.0719"),
+        ("motor.Kv", 0.0, "torque_constant_nm_a = 0.0719"),
+        ("motor_position.rotor_to_output_ratio", 0.25, "must be 1"),
+        ("servo.timeout_mode", 10.0, "servo.timeout_mode is 10"),
+    ],
+)
+def test_a_setting_that_differs_is_named_with_what_was_found(key: str, value: float, words: str) -> None:
+    bench = Bench()
+    bench.devices[0].console.settings[key] = value
+    bench.run(1.0, NO_TORQUE, settings=True)
+    assert words in bench.health.setting_problem
+    assert bench.drives.health[1].setting_problem == ""
+
+
+def test_a_console_that_does_not_answer_leaves_the_watchdog_unknown() -> None:
+    bench = Bench()
+    for device in bench.devices:
+        device.console.write = lambda text: None  # type: ignore[method-assign]
+    bench.run(3.0, NO_TORQUE, settings=True)
+    assert not isfinite(bench.health.watchdog_s) and bench.health.firmware_supported
+
+
+def test_old_output_of_the_console_is_no_answer() -> None:
+    bench = Bench()
+    bench.devices[0].console.write(b"conf get motor.Kv\n" * 40)
+    bench.run(1.0, NO_TORQUE, settings=True)
+    assert bench.health.watchdog_s == 0.1 and bench.health.setting_problem == ""
+
+
+def test_a_signal_that_a_drive_does_not_know_keeps_its_old_stamp() -> None:
+    bench = Bench()
+    bench.run(0.05)
+    before = bench.tick()[0]
+    reply = codec.decode_reply(bench.devices[0].receive(command_frame(1, codec.QUERY_ALONE), 0.0)[0].data)
+    for name in ("position_turn", "q_current_a"):
+        data = codec.encode_reply(codec.Reply(**(reply._asdict() | {name: nan})))
+        axis = bench.drives.axes[0]
+        axis.receivers[next(iter(axis.receivers))](data, bench.now_s + 1.0)
+        state = axis.state
+        assert (state.angle_stamp_s > before.angle_stamp_s) is (name != "position_turn")
+        assert isfinite(state.angle_rad + state.current_a)
+        bench.tick()
+        before = bench.tick()[0]
+
+
+def test_a_motor_without_thermistor_has_no_temperature() -> None:
+    assert not isfinite(Bench(temperature_c=0.0).run(0.05)[0].temperature_c)
+    assert Bench(temperature_c=40.0).run(0.05)[0].temperature_c == 40.0
+
+
+def test_a_sign_and_a_zero_turn_the_angle() -> None:
+    bench = Bench()
+    bench.devices[0].measure(1.0, 0.0)
+    assert bench.run(0.05)[0].angle_rad == pytest.approx(1.0, abs=2.0 * pi / 16384)
+
+
+def test_an_odrive_under_the_id_of_a_moteus_is_noticed() -> None:
+    bench = Bench()
+    bench.silent = True
+    bench.stranger.send(Odrive().announces(1))
+    bench.tick()
+    assert bench.health.other_protocol == "odrive" and not bench.drives.heard
+    assert bench.drives.health[1].other_protocol == ""
+
+
+def test_malformed_answers_are_counted_and_never_raise() -> None:
+    bench, random = Bench(), Random(3)
+    good = codec.encode_reply(codec.Reply(0, 0.0, 0.0, 0.0, 30.0, 24.0, 0, 0.0))
+    announced = bench.devices[0].forge_current(0.0)
+    for _ in range(2000):
+        data = bytearray(good if random.random() < 0.5 else random.randbytes(random.choice((8, 32, 48))))
+        data[random.randrange(len(data))] ^= 1 << random.randrange(8)
+        bench.stranger.send(announced._replace(data=bytes(data)))
+    bench.tick()
+    assert bench.drives.malformed_frames > 0
