@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from control.rate import PERIOD_S
-from control.records import JOINTS, NO_TORQUE, DriveStates, Joints
+from control.records import JOINTS, DriveStates, Joints
 from drivers.can.mock_bus import MockBus
 from drivers.drive import DriveHealth
 from drivers.drive_types import make_drives
@@ -20,7 +20,7 @@ from simulation.devices.drive import DriveError, SimulatedDriveParameters
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.moteus.forgeries import command_frame
 
-STEP = Joints(0.1, 0.0, 0.0, 0.0)
+NO_TORQUE, STEP = Joints(0.0, 0.0, 0.0, 0.0), Joints(0.1, 0.0, 0.0, 0.0)
 
 
 class Bench:
