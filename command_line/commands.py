@@ -22,6 +22,7 @@ COMMANDS = {  # module of options/ -> command -> function, help
     "computer": {
         "live": ("live.live.live", "Pass the robot's rows on to Foxglove, Lichtblick or a browser."),
         "doctor": ("doctor.doctor.doctor", "Check this computer and its buses, line by line."),
+        "init": ("init.init.init", "Write a configuration for a new robot, from questions or options."),
         "install": ("install.installation.install", "Set up the service, network and users of this computer."),
         "uninstall": (
             "install.installation.uninstall",

@@ -3,9 +3,11 @@
 import argparse
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import fields
 from math import inf, isfinite, nan
 from pathlib import Path
 
+from control.geometry import FlipperGeometry
 from control.records import JOINTS
 
 
@@ -60,6 +62,25 @@ def joint_angle(text: str) -> tuple[str, float]:
         if joint and isfinite(float(angle_deg)):
             return joint, float(angle_deg)
     raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, such as left_sweep=10")
+
+
+def node_id(text: str) -> tuple[str, int]:
+    joint, _, number = text.partition("=")
+    if joint not in JOINTS or not number.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text}: must be a joint and its id, such as {JOINTS[0]}=0")
+    return joint, int(number)
+
+
+def geometry_value(text: str) -> tuple[str, float]:
+    """Parses a key of [geometry] with its value in m; the reader checks its bounds."""
+    key, _, value = text.partition("=")
+    names = [field.name for field in fields(FlipperGeometry)]
+    with suppress(ValueError):
+        if key in names and isfinite(float(value)):
+            return key, float(value)
+    raise argparse.ArgumentTypeError(
+        f"{text}: must be one of {', '.join(names)} with its value in m, as in drop_m=0.05"
+    )
 
 
 def mud_length(text: str) -> tuple[str, float]:

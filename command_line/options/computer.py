@@ -4,8 +4,9 @@ import argparse
 import os
 from pathlib import Path
 
-from command_line.option_types import whole
+from command_line.option_types import geometry_value, node_id, whole
 from command_line.options.shared import add_config, add_json, add_socket
+from drivers.drive_types import DRIVE_TYPES
 
 Parser = argparse.ArgumentParser
 
@@ -28,6 +29,23 @@ def add_doctor(doctor: Parser) -> None:
         metavar="PATH",
         help="Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else the configured one)",
     )
+
+
+def add_init(init: Parser) -> None:
+    """Without an option the question is asked; without a terminal, or with --defaults, the default is the answer."""
+    option = init.add_argument
+    option(
+        "file", type=Path, nargs="?", default=Path("mudskipper.toml"), help="new file (default: %(default)s); -: print"
+    )
+    option("--defaults", action="store_true", help="ask nothing")
+    option("--name", help="of the robot, in its logs")
+    option("--flippers", choices=("left", "right", "both"), help="one with two motors, or both with four")
+    option("--base", choices=("fixed", "moves"), help="a bench, or a body that the flippers move")
+    option("--drive", choices=tuple(DRIVE_TYPES), help="protocol of the drives")
+    option("--interface", help="of python-can, such as socketcan")
+    option("--channel", action="append", help="such as can0; twice: the left and the right flipper's own")
+    option("--node", type=node_id, action="append", metavar="JOINT=ID", help="right_sweep=3, repeatable")
+    option("--set", type=geometry_value, action="append", metavar="KEY=M", help="geometry: drop_m=0.05, repeatable")
 
 
 def add_install(install: Parser) -> None:

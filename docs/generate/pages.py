@@ -13,7 +13,7 @@ from control.gait.gait import PROTOCOLS
 from docs.generate.command_line import commands, exit_statuses
 from docs.generate.faults import energies, failures, faults, modes, reactions
 from docs.generate.markdown import code, table
-from firmware_host.configuration.key_reference import Key, configuration_keys, is_required
+from firmware_host.configuration.key_reference import Key, configuration_keys, is_required, toml_value
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import Field
 from firmware_host.operator.socket_methods import METHODS, Level, Parameter, SocketMethod
@@ -33,16 +33,8 @@ def sections() -> Iterator[str]:
 
 def _key_row(key: Key) -> tuple[str, str, str, str, str]:
     bounds = f"{key.bounds.minimum:.10g} to {key.bounds.maximum:.10g}" if key.bounds else key.kind
-    default = "required" if is_required(key) else "" if key.default is MISSING else code(_toml(key.default))
+    default = "required" if is_required(key) else "" if key.default is MISSING else code(toml_value(key.default))
     return code(key.name), key.unit, bounds, default, key.meaning
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return f'"{value}"' if isinstance(value, str) else f"{value:.10g}"
 
 
 def topics() -> Iterator[str]:

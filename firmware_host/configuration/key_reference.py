@@ -3,6 +3,7 @@
 The documentation's reference is generated from this list, so it cannot differ from what the reader enforces.
 """
 
+import json
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
@@ -59,3 +60,12 @@ def _kind_text(kind: Any) -> str:
 
 def is_required(key: Key) -> bool:
     return key.default is MISSING and key.kind != "table"
+
+
+def toml_value(value: object) -> str:
+    """Returns a value as the file states it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else f"{value:.10g}"

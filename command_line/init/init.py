@@ -1,0 +1,95 @@
+"""`mudskipper init`: writes a configuration for a new robot, from questions on a terminal or from options."""
+
+import argparse
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+from command_line import exit_codes
+from command_line.init.questions import Ask, ask, number, one_of, whole_number
+from command_line.screen import complain
+from control.geometry import FlipperGeometry
+from control.records import FLIPPERS, Rig
+from drivers.drive_types import DRIVE_TYPES
+from firmware_host.configuration.key_reference import Key, configuration_keys
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.new_file import NewRobot, drive_keys, new_file
+from firmware_host.configuration.toml_records import ConfigurationError
+
+PRINTED = Path("-")
+
+
+def init(options: argparse.Namespace) -> int:
+    can_ask = sys.stdin.isatty() and not options.defaults
+    if options.file != PRINTED and options.file.exists():
+        complain(f"{options.file} exists: name another file, or move it away")
+        return exit_codes.USAGE
+    try:
+        text = new_file(answers(options, input if can_ask else None))
+        parse_configuration(text)
+    except ConfigurationError as problem:
+        complain(*problem.problems)
+        return exit_codes.CONFIGURATION
+    except EOFError:
+        return exit_codes.INTERRUPTED
+    if options.file == PRINTED:
+        print(text, end="")
+        return exit_codes.OK
+    with options.file.open("x", encoding="utf-8") as file:
+        file.write(text)
+    print(f"written  {options.file}\ncheck it with: mudskipper doctor --config {options.file}")
+    return exit_codes.OK
+
+
+def answers(options: argparse.Namespace, read: Ask | None) -> NewRobot:
+    """Returns the robot of the options; `read` asks for what they leave open. Raises ConfigurationError."""
+    default = NewRobot()
+    name = options.name or ask("name of the robot", default.name, str, read)
+    wanted = options.flippers or ask("flippers: left, right or both", "both", one_of((*FLIPPERS, "both")), read)
+    rig = Rig(FLIPPERS if wanted == "both" else (wanted,))
+    base = options.base or ask("base: fixed or moves", "moves", one_of(("fixed", "moves")), read)
+    types = tuple(DRIVE_TYPES)
+    drive_type = options.drive or ask(f"drives: {' or '.join(types)}", default.drive_type, one_of(types), read)
+    interface = options.interface or ask("interface of python-can", default.interface, str, read)
+    robot = NewRobot(name, rig, base == "fixed", drive_type, interface, _channels(options, rig, read))
+    return robot._replace(node_ids=_node_ids(options, robot, read), geometry=_geometry(options, read))
+
+
+def _channels(options: argparse.Namespace, rig: Rig, read: Ask | None) -> tuple[str, ...]:
+    """Raises ConfigurationError."""
+    text = "its channels, one for all flippers or one for each" if len(rig.flippers) > 1 else "its channel"
+    channels = tuple(options.channel or ask(text, "can0", str, read).replace(",", " ").split())
+    if len(channels) not in (1, len(rig.flippers)):
+        possible = " or ".join(map(str, sorted({1, len(rig.flippers)})))
+        raise ConfigurationError([f"{len(channels)} channels, {', '.join(channels)}: must be {possible} for this rig"])
+    return channels
+
+
+def _node_ids(options: argparse.Namespace, robot: NewRobot, read: Ask | None) -> dict[str, int]:
+    """Raises ConfigurationError."""
+    given = dict(options.node or ())
+    for joint in given.keys() - set(robot.rig.joints):
+        raise ConfigurationError([f"--node {joint}: this rig has {', '.join(robot.rig.joints)}"])
+    bounds = next(key.bounds for key in drive_keys(robot.drive_type) if key.name == "node_id")
+    assert bounds is not None
+    return {
+        joint: given[joint]
+        if joint in given
+        else ask(f"node id of {joint}", robot.node_id(joint), whole_number(*bounds), read)
+        for joint in robot.rig.joints
+    }
+
+
+def _geometry(options: argparse.Namespace, read: Ask | None) -> FlipperGeometry:
+    given = dict(options.set or ())
+    keys = {key.name: key for key in configuration_keys(FlipperGeometry, "geometry")}
+    values = {
+        field.name: given[field.name] if field.name in given else _ask_value(keys[field.name], read)
+        for field in fields(FlipperGeometry)
+    }
+    return FlipperGeometry(**values)
+
+
+def _ask_value(key: Key, read: Ask | None) -> float:
+    assert key.bounds is not None
+    return ask(f"{key.name}: {key.meaning} ({key.unit})", float(key.default), number(*key.bounds), read)

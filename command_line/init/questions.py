@@ -1,0 +1,55 @@
+"""Asks the questions of a new configuration: a default in brackets, and again after an answer that does not fit."""
+
+from collections.abc import Callable, Collection
+from typing import TypeVar
+
+T = TypeVar("T")
+Ask = Callable[[str], str]  # prints a prompt and returns a line
+
+
+def ask(prompt: str, default: T, parse: Callable[[str], T], read: Ask | None) -> T:
+    """Returns the parsed answer; the default for an empty line, or where nobody can be asked."""
+    while read is not None:
+        line = read(f"{prompt} [{shown(default)}]: ").strip()
+        if not line:
+            break
+        try:
+            return parse(line)
+        except ValueError as problem:
+            print(f"  {problem}")
+    return default
+
+
+def shown(default: object) -> str:
+    return f"{default:.10g}" if isinstance(default, float) else str(default)
+
+
+def one_of(words: Collection[str]) -> Callable[[str], str]:
+    def parse(line: str) -> str:
+        if line not in words:
+            raise ValueError(f"{line}: must be one of {', '.join(words)}")
+        return line
+
+    return parse
+
+
+def number(least: float, most: float) -> Callable[[str], float]:
+    def parse(line: str) -> float:
+        try:
+            value = float(line)
+        except ValueError:
+            raise ValueError(f"{line}: must be a number") from None
+        if not least <= value <= most:
+            raise ValueError(f"{line}: must be from {least:.10g} to {most:.10g}")
+        return value
+
+    return parse
+
+
+def whole_number(least: float, most: float) -> Callable[[str], int]:
+    def parse(line: str) -> int:
+        if not line.isdecimal() or not least <= int(line) <= most:
+            raise ValueError(f"{line}: must be a whole number from {least:.10g} to {most:.10g}")
+        return int(line)
+
+    return parse

@@ -1,0 +1,149 @@
+"""`mudskipper init` writes files that the daemon accepts, and none that it would refuse."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.init.init import answers
+from command_line.main import main
+from command_line.parser import build_parser
+from control.geometry import FlipperGeometry
+from control.records import JOINTS
+from drivers.drive_types import DRIVE_TYPES
+from firmware_host.configuration.loading import load_configuration, parse_configuration
+from firmware_host.configuration.new_file import NewRobot, new_file
+
+
+def options_of(*arguments: str) -> argparse.Namespace:
+    return build_parser(["init"]).parse_args(["init", *arguments])
+
+
+def answered(lines: Sequence[str], *arguments: str) -> tuple[NewRobot, list[str]]:
+    """The robot that these lines describe, and what was asked."""
+    asked: list[str] = []
+    replies: Iterator[str] = iter(lines)
+
+    def read(prompt: str) -> str:
+        asked.append(prompt)
+        return next(replies, "")
+
+    return answers(options_of(*arguments), read), asked
+
+
+@pytest.mark.parametrize("flippers", ["left", "right", "both"])
+@pytest.mark.parametrize("drive", list(DRIVE_TYPES))
+@pytest.mark.parametrize("base", ["fixed", "moves"])
+def test_every_rig_with_every_drive_is_accepted(tmp_path: Path, flippers: str, drive: str, base: str) -> None:
+    path = tmp_path / "robot.toml"
+    assert main(["init", str(path), "--flippers", flippers, "--drive", drive, "--base", base]) == exit_codes.OK
+    configuration = load_configuration(path)
+    assert configuration.rig.flippers == (("left", "right") if flippers == "both" else (flippers,))
+    assert tuple(configuration.drive) == configuration.rig.joints
+    assert {each.type for each in configuration.drive.values()} == {drive}
+    assert configuration.estimation.fixed_base is (base == "fixed")
+
+
+def test_each_key_of_the_file_has_a_comment() -> None:
+    lines = [line for line in new_file(NewRobot()).splitlines() if " = " in line and not line.startswith("#")]
+    assert len(lines) > 40
+    assert [line for line in lines if " # " not in line and not line.startswith("protocol")] == []
+    assert "(m, 0 to 0.5)" in next(line for line in lines if line.startswith("drop_m"))
+
+
+def test_without_a_terminal_nothing_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["init", "-", "--name", "mudcat"]) == exit_codes.OK
+    assert parse_configuration(capsys.readouterr().out).robot.name == "mudcat"
+
+
+def test_empty_answers_are_the_defaults() -> None:
+    robot, asked = answered([])
+    assert parse_configuration(new_file(robot)).geometry == FlipperGeometry()
+    assert len(asked) == 6 + len(JOINTS) + 6
+    assert robot == NewRobot(node_ids={joint: number for number, joint in enumerate(JOINTS)})
+
+
+def test_a_wrong_answer_is_asked_again(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [
+        "mudcat",
+        "middle",
+        "right",
+        "fixed",
+        "odrive",
+        "socketcan",
+        "can7",
+        "63",
+        "5",
+        "6",
+        "long",
+        "0.001",
+        "0.115",
+    ]
+    robot, asked = answered(lines)
+    printed = capsys.readouterr().out
+    assert (robot.name, robot.rig.flippers, robot.channels) == ("mudcat", ("right",), ("can7",))
+    assert robot.node_ids == {"right_sweep": 5, "right_adduction": 6}
+    assert robot.geometry == FlipperGeometry(flipper_length_m=0.115)
+    assert printed.splitlines() == [
+        "  middle: must be one of left, right, both",
+        "  63: must be a whole number from 0 to 62",
+        "  long: must be a number",
+        "  0.001: must be from 0.02 to 1",
+    ]
+
+
+def test_an_option_answers_its_question() -> None:
+    _, asked = answered([], "--flippers", "left", "--set", "drop_m=0.04", "--node", "left_sweep=7", "--channel", "can3")
+    assert not [prompt for prompt in asked if prompt.startswith(("flippers", "drop_m", "node id of left_sweep", "its"))]
+
+
+def test_each_flipper_may_have_its_own_bus() -> None:
+    robot, _ = answered([], "--channel", "can0", "--channel", "can1")
+    configuration = parse_configuration(new_file(robot))
+    assert {joint: configuration.bus[each.bus].channel for joint, each in configuration.drive.items()} == {
+        joint: "can0" if joint.startswith("left") else "can1" for joint in JOINTS
+    }
+
+
+@pytest.mark.parametrize("length_m", [0.08, 0.2, 0.5])
+def test_depths_and_force_follow_the_geometry(length_m: float) -> None:
+    robot = NewRobot(geometry=FlipperGeometry(flipper_length_m=length_m))
+    assert parse_configuration(new_file(robot)).geometry.flipper_length_m == length_m
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (("--set", "drop_m=0.07"), exit_codes.CONFIGURATION, "geometry.axis_height_m"),
+        (("--set", "drop_m=0.6"), exit_codes.CONFIGURATION, "geometry.drop_m = 0.6: must be at most 0.5"),
+        (("--channel", "a", "--channel", "b", "--channel", "c"), exit_codes.CONFIGURATION, "must be 1 or 2"),
+        (("--flippers", "right", "--node", "left_sweep=1"), exit_codes.CONFIGURATION, "right_sweep, right_adduction"),
+        (("--node", "left_sweep=1", "--node", "right_sweep=1"), exit_codes.CONFIGURATION, "has the same on bus"),
+    ],
+)
+def test_what_the_daemon_would_refuse_is_not_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], status: int, words: str
+) -> None:
+    path = tmp_path / "robot.toml"
+    assert main(["init", str(path), *arguments]) == status
+    assert words in capsys.readouterr().err and not path.exists()
+
+
+def test_a_file_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text("mine")
+    assert main(["init", str(path)]) == exit_codes.USAGE
+    assert path.read_text() == "mine" and "exists" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "wrong", ["--set=length=1", "--set=drop_m=deep", "--set=drop_m=nan", "--node=tail=1", "--node=left_sweep"]
+)
+def test_a_wrong_option_is_refused(wrong: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["init", "-", wrong])
+    assert ended.value.code == exit_codes.USAGE
