@@ -16,8 +16,9 @@ def print_lines(feed: Feed, period_s: float) -> None:
     while True:
         feed.poll(time.monotonic())
         print(f"{time.strftime('%H:%M:%S')} {plain_line(feed.history, time.monotonic())}", flush=True)
-        due_s = max(due_s + period_s, time.monotonic())
-        time.sleep(due_s - time.monotonic())
+        now_s = time.monotonic()
+        due_s = max(due_s + period_s, now_s)
+        time.sleep(due_s - now_s)
 
 
 def plain_line(history: History, now_s: float) -> str:
