@@ -206,6 +206,7 @@ def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
     deadline_s = time.monotonic() + LISTENING_S
     states = drives.read(time.monotonic())
     while not drives.heard and time.monotonic() < deadline_s:
+        drives.poll()
         time.sleep(0.01)
         states = drives.read(time.monotonic())
     fix = "check its power, wiring, node id and cyclic message periods"

@@ -53,7 +53,7 @@ class MoteusAxis:
         self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
         self._read_s = self._read_before_s = NEVER_S
         self._mode = int(Mode.STOPPED)
-        self._error_flags = 0
+        self._error_flags = self._reason = 0  # active, and the last one, which a stop clears in the drive
         self.closed_loop = False  # by the drive's newest reply
         self._following = False  # commanded by this program
         self._foreign_commands = self._restarts = 0
@@ -106,6 +106,7 @@ class MoteusAxis:
         flags = codec.error_flags(mode, fault)
         if mode != self._mode or flags != self._error_flags:
             self._mode, self._error_flags, self._health = mode, flags, None
+            self._reason = flags or self._reason
         if self.closed_loop and mode != Mode.POSITION:
             self._following = False
         self.closed_loop = mode == Mode.POSITION
@@ -193,7 +194,7 @@ class MoteusAxis:
             firmware_supported=settings.supported,
             watchdog_s=settings.watchdog_s,
             watchdog_advice="the drive did not answer on its console: is another program connected to it?",
-            watchdog_expired=self._mode == Mode.TIMEOUT,
+            watchdog_expired=self._reason == codec.TIMEOUT_FLAG,
             restarts=self._restarts,
             duplicate_id=self.duplicates,
             foreign_commands=self._foreign_commands,
@@ -203,7 +204,7 @@ class MoteusAxis:
             expected_serial_number=self.parameters.serial_number,
             busy_state="" if self._mode in QUIET_MODES else f"mode {self._mode}",
             active_errors=codec.error_text(self._error_flags),
-            errors=codec.error_text(self._error_flags),
+            errors=codec.error_text(self._reason),
         )
 
     def _setpoint_text(self) -> str:
@@ -232,7 +233,7 @@ class MoteusAxis:
 
     def close_loop(self) -> None:
         """Lets the torque commands that follow, and not the questions, leave."""
-        self._following = True
+        self._following, self._reason, self._health = True, 0, None
 
     def disarm(self) -> None:
         self._following = False
@@ -240,6 +241,7 @@ class MoteusAxis:
 
     def clear_errors(self) -> None:
         """Stops the drive, which clears a fault and the latched time-out."""
+        self._reason, self._health = 0, None
         self._transmit(codec.STOP_AND_QUERY)
 
     def request_settings(self, now_s: float) -> None:

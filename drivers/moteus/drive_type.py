@@ -68,9 +68,10 @@ class Moteus:
         return FrameContent(source)
 
     def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
-        """Only a command feeds the watchdog of a moteus."""
+        """Only a command feeds its watchdog. Questions want no answer: it would look like a second drive's."""
+        unanswered = self.query(node_id)._replace(arbitration_id=node_id, is_extended=False)
         return {
-            "questions for the signals": self.query(node_id),
+            "questions for the signals": unanswered,
             "answers of another drive": self.announces(UNUSED_NODE),
         }
 

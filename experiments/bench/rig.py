@@ -22,7 +22,8 @@ from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.drive_types import make_drives
+from drivers.drive import DriveParameters
+from drivers.drive_types import make_drives, type_of
 from drivers.pose.pose_port import NoPose
 from experiments.robot.bench_robot import BenchError
 from firmware_host.buses import BusError, lock_buses, open_ports
@@ -61,7 +62,7 @@ class HardwareRig:
             except BusError as problem:
                 raise BenchError(f"{problem}.") from problem
             self._locks = stack.pop_all()
-        self.overheard = listen(ports, time.monotonic(), _wait_briefly)
+        self.overheard = listen(ports, configuration.drive, time.monotonic(), _wait_briefly)
         drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
         self.loop = Loop(configuration, drives, NoPose(), NullRecorder())
         self._processors = os.sched_getaffinity(0)
@@ -99,13 +100,22 @@ def refuse_beside_daemon(socket: Path) -> None:
     raise BenchError(why)
 
 
-def listen(ports: Mapping[str, CanPort], now_s: float, wait: Callable[[], float]) -> Overheard:
-    """Record all frames for LISTENING_S. `wait` lets a moment pass and returns the time."""
+def listen(
+    ports: Mapping[str, CanPort], drives: Mapping[str, DriveParameters], now_s: float, wait: Callable[[], float]
+) -> Overheard:
+    """Record all frames for LISTENING_S. `wait` lets a moment pass and returns the time.
+
+    Drives that report only when asked are asked in every moment; this commands nothing.
+    """
+    queries = [(ports[drive.bus], type_of(drive).query(drive.node_id)) for drive in drives.values()]
     frames: dict[str, list[Frame]] = {name: [] for name in ports}
     begun_s = now_s
     for port in ports.values():
         port.receive()  # discard older frames
     while now_s - begun_s < LISTENING_S:
+        for port, query in queries:
+            if query is not None:
+                port.send(query)
         now_s = wait()
         for name, port in ports.items():
             frames[name] += port.receive()
@@ -147,7 +157,7 @@ class SimulatedRig:
         self.others = list(others)
         self._tick_number = 0
         ears = {name: bus.open() for name, bus in self.buses.items()}
-        self.overheard = listen(ears, 0.0, lambda: self.wait().now_s)
+        self.overheard = listen(ears, configuration.drive, 0.0, lambda: self.wait().now_s)
         for ear in ears.values():
             ear.close()
         wires = {name: bus.open() for name, bus in self.buses.items()}

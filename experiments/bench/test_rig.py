@@ -90,6 +90,7 @@ class TestRig:
         for port, frame in others:
             port.send(frame)
         states = self.drives.read(tick.now_s)
+        self.drives.poll()  # which commands nothing, and feeds no watchdog
         if self._torque_on():
             self._update_lateness(tick, states)
         return Sample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)

@@ -28,9 +28,10 @@ RATES = {  # signal and its least rate: a new position and current in each tick
     "temperatures": ("temperature", SLOW_LEAST_HZ),
     "voltages": ("voltage", SLOW_LEAST_HZ),
 }
+ANSWERED_HZ = 0.95 * RATE_HZ  # of drives that are asked in every tick
 HEARTBEAT_FRACTION = 0.3  # by which a rate of some ten in a second may be off; two drives of one id send twice as many
 MOST_MISSED_FRACTION = 0.01  # of ticks: more, and this computer is too slow or too busy to measure with
-SETTING_UP = "see docs/how-to/odrive.md"
+SETTING_UP = "see the guide to set up its type of drive (docs/how-to)"
 
 
 def check_ids(test_rig: TestRig) -> Readings:
@@ -89,6 +90,10 @@ def _name_of(test_rig: TestRig, bus: str, frame: Frame) -> str:
 def check_message_rates(test_rig: TestRig) -> Readings:
     """Check that position and current are new in each tick, and other messages frequent enough for monitoring."""
     for joint, drive in test_rig.configuration.drive.items():
+        if type_of(drive).query(drive.node_id) is not None:
+            advice = f"look for lost frames and late answers; {SETTING_UP}"
+            yield Reading(f"{joint}: answers", _rate_hz(test_rig, drive, "position"), "Hz", ANSWERED_HZ, inf, advice)
+            continue
         for name, (signal, least_hz) in RATES.items():
             advice = f"set the drive's message period; {SETTING_UP}"
             yield Reading(f"{joint}: {name}", _rate_hz(test_rig, drive, signal), "Hz", least_hz, inf, advice)
@@ -126,11 +131,11 @@ def check_firmware(test_rig: TestRig) -> Readings:
     """Check that the firmware version is supported."""
     _ask(test_rig, lambda health: bool(health.firmware))
     for health in test_rig.drives.health:
-        # 0.6 of version 0.6.11; NaN where it is unknown
-        version = float(".".join(health.firmware.split(".")[:2])) if health.firmware else nan
-        supported = float(health.supported_firmware)
-        advice = f"install firmware {supported}; where it is unknown, see whether requests arrive"
-        yield Reading(f"{health.joint}: firmware", version, "", supported, supported, advice)
+        supported = float(health.firmware_supported) if health.firmware else nan
+        advice = (
+            f"it is {health.firmware or 'unknown'}: install {health.supported_firmware}, or see whether requests arrive"
+        )
+        yield Reading(f"{health.joint}: firmware supported", supported, "", 1, 1, advice)
 
 
 def _ask(test_rig: TestRig, known: Callable[[DriveHealth], bool]) -> None:

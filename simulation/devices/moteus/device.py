@@ -70,6 +70,8 @@ class SimulatedMoteus:
         """Executes one frame of the bus and returns the answer to it, if it wants one and is not late."""
         if frame.arbitration_id not in self._ids or not frame.is_fd or now_s < self._boots_until_s:
             return []
+        if self.parameters.any_frame_feeds:
+            self._fed_s = now_s
         data = b""
         with suppress(MalformedMessageError):  # a drive ignores malformed frames
             data = self._usual_answer(frame.data, now_s) or self._any_answer(frame.data, now_s)
@@ -120,8 +122,6 @@ class SimulatedMoteus:
                     self.console.write(each.text)
             elif each.kind == registers.WRITE:
                 written |= {each.register + index: value for index, value in enumerate(each.values)}
-        if self.parameters.any_frame_feeds:
-            self._fed_s = now_s
         mode = written.pop(Register.MODE, None)
         if mode == Mode.STOPPED:
             self.mode, self.fault = Mode.STOPPED, 0

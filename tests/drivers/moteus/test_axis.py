@@ -144,9 +144,14 @@ def test_an_expired_watchdog_is_an_error_until_it_is_cleared() -> None:
     assert bench.health.watchdog_expired and bench.health.active_errors == "watchdog expired"
     assert bench.tick(NO_TORQUE)[0].error_flags == codec.TIMEOUT_FLAG
     bench.drives.disarm(bench.now_s, at_once=True)
+    bench.run(0.02, NO_TORQUE)
+    assert (bench.health.active_errors, bench.health.errors) == (
+        "",
+        "watchdog expired",
+    )  # a stop clears it in the drive
     bench.drives.clear_errors()
     bench.run(0.02, NO_TORQUE)
-    assert bench.health.active_errors == ""
+    assert bench.health.errors == "" and not bench.health.watchdog_expired
 
 
 def test_a_fault_is_named() -> None:
