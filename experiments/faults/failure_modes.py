@@ -185,8 +185,8 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode(
         "setpoint_mismatch", commanded_by_another(-0.4, every=2, heard=False), 1.0, MOVING, "every second command"
     ),
-    FailureMode("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",)),
-    FailureMode("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance")),
+    FailureMode("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",), drive="odrive"),
+    FailureMode("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance"), drive="odrive"),
     # buses
     FailureMode("bus_warning", failing("bus.BUS", "warning")),
     FailureMode("bus_passive", failing("bus.BUS", "passive")),
