@@ -5,7 +5,7 @@ buses. The robot computes between the ticks and outside of every figure; no tick
 and caches are warmer than on a robot (benchmarks.speed.loop_jitter shows ticks that begin asleep). Five kinds of
 buses carry the frames: python-can's in-process `virtual` interface, our `mock` bus without python-can, the `local`
 bus's sockets, and SocketCAN on pairs of sockets, by the socket's own frames (`socketcan`) and by python-can's send and
-recv (`python-can`). `--bus` measures only one of them; `--drive` chooses the type of the drives. A rig of one flipper
+recv (`python-can`). `--bus` measures only one of them; `--drive` chooses the type of its drives. A rig of one flipper
 with two motors on one bus walks in turn with the robot, and `two_motors` compares its ticks.
 
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
@@ -32,7 +32,7 @@ def measure_variant(variant: str, seconds: int, folder: Path, drive: str) -> dic
     with ExitStack() as stack:
         walks = [
             _walk(stack, configuration, variant, folder / str(len(configuration.drive)))
-            for configuration in (load_example(drive), load_one_flipper(drive))
+            for configuration in (load_example(drive), load_one_flipper())
         ]
         for second in range(seconds):
             show_progress(second, seconds, f"{variant} bus")

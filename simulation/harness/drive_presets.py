@@ -14,9 +14,9 @@ from control.bounds import Bounds
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 
 DATA_BIT_RATE_KBIT_S = 5000
-# Answers to questions are a whole tick old. With the default of 0.08 the adduction joints oscillate after a flipper has
-# broken free at full torque.
-DAMPING_NM_S_RAD = 0.1
+# Answers to questions are a whole tick old. With the default damping (0.06 and 0.08) joints oscillate after a flipper
+# has broken free at full torque.
+DAMPING = {"sweep_damping_nm_s_rad": 0.075, "adduction_damping_nm_s_rad": 0.1}
 
 
 def with_drive_type(text: str, name: str) -> str:
@@ -38,5 +38,6 @@ def with_drive_type(text: str, name: str) -> str:
             bus["data_bit_rate_kbit_s"] = DATA_BIT_RATE_KBIT_S
     if DRIVE_TYPES[name].query(round(bounds.minimum)) is not None:
         gains = document.setdefault("gains", tomlkit.table())
-        gains.setdefault("adduction_damping_nm_s_rad", DAMPING_NM_S_RAD)
+        for key, damping_nm_s_rad in DAMPING.items():
+            gains.setdefault(key, damping_nm_s_rad)
     return tomlkit.dumps(document)
