@@ -38,12 +38,12 @@ def add_init(init: Parser) -> None:
         "file", type=Path, nargs="?", default=Path("mudskipper.toml"), help="new file (default: %(default)s); -: print"
     )
     option("--defaults", action="store_true", help="ask nothing")
-    option("--name", help="of the robot, in its logs")
+    option("--name", metavar="NAME", help="of the robot, in its logs")
     option("--flippers", choices=("left", "right", "both"), help="one with two motors, or both with four")
     option("--base", choices=("fixed", "moves"), help="a bench, or a body that the flippers move")
     option("--drive", choices=tuple(DRIVE_TYPES), help="protocol of the drives")
-    option("--interface", help="of python-can, such as socketcan")
-    option("--channel", action="append", help="such as can0; twice: the left and the right flipper's own")
+    option("--interface", metavar="NAME", help="of python-can, such as socketcan")
+    option("--channel", action="append", metavar="NAME", help="such as can0; twice: the left and the right flipper's own")
     option("--node", type=node_id, action="append", metavar="JOINT=ID", help="right_sweep=3, repeatable")
     option("--set", type=geometry_value, action="append", metavar="KEY=M", help="geometry: drop_m=0.05, repeatable")
 

@@ -13,6 +13,7 @@ import pytest
 
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
+from control.records import JOINTS
 from experiments.faults.bench import FaultBench
 from experiments.faults.injectors import Injector, damped_against_command, drive_with, failing, jammed
 from experiments.faults.phases import bench_for, enter_phase
@@ -59,7 +60,7 @@ def test_a_motor_that_does_not_obey_puts_little_energy_into_its_joint(
         assert bench.run_until(lambda: fault in faults_of(bench), 5.0)
         assert bench.run_until(lambda: bench.loop.mode not in ENERGISED, 3.2)
         bench.run_for(0.5)
-    assert getattr(energy.joints, joint).energy_j < energy_j
+    assert energy.joints[JOINTS.index(joint)].energy_j < energy_j
     assert energy.pushed_s < 0.05
 
 
