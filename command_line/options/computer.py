@@ -43,7 +43,9 @@ def add_init(init: Parser) -> None:
     option("--base", choices=("fixed", "moves"), help="a bench, or a body that the flippers move")
     option("--drive", choices=tuple(DRIVE_TYPES), help="protocol of the drives")
     option("--interface", metavar="NAME", help="of python-can, such as socketcan")
-    option("--channel", action="append", metavar="NAME", help="such as can0; twice: the left and the right flipper's own")
+    option(
+        "--channel", action="append", metavar="NAME", help="such as can0; twice: the left and the right flipper's own"
+    )
     option("--node", type=node_id, action="append", metavar="JOINT=ID", help="right_sweep=3, repeatable")
     option("--set", type=geometry_value, action="append", metavar="KEY=M", help="geometry: drop_m=0.05, repeatable")
 

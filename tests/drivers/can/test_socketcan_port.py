@@ -25,6 +25,7 @@ from drivers.can.port_health import MOST_FRAMES_PER_READ, BusState
 from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPort
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
+from drivers.moteus import codec as moteus
 from firmware_host.configuration.configuration import Configuration
 
 ENCODER = Frame(0x009, bytes(range(8)))
@@ -237,6 +238,8 @@ def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(c
         }
         reports, commands = 9, 16  # of each drive; emergency stops are nobody's alone
         assert len(wanted) == 2 * (reports + commands)
+        nodes = [drive.node_id for drive in configuration.drive.values() if drive.bus == name]
+        wanted |= {moteus.reply_id(node_id) for node_id in nodes}  # a drive of that type would answer so
         assert {word for word in range(0x800) if passes(filters, word)} == wanted
         for identifier in wanted:
             assert not passes(filters, identifier | constants.CAN_RTR_FLAG)
