@@ -12,12 +12,13 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import FD, DriveParameters, DriveType, FrameContent, WatchdogEndpoints
 from drivers.drives import Drives
+from drivers.mit.drive_type import Mit
 from drivers.moteus.drive_type import Moteus
 from drivers.odrive.drive_type import Odrive
 from drivers.transmit_gate import TransmitGate
 
 DEFAULT = "odrive"
-DRIVE_TYPES: Mapping[str, DriveType] = {"odrive": Odrive(), "moteus": Moteus()}
+DRIVE_TYPES: Mapping[str, DriveType] = {"odrive": Odrive(), "moteus": Moteus(), "mit": Mit()}
 
 
 def type_of(parameters: DriveParameters) -> DriveType:

@@ -38,8 +38,11 @@ class Drives:
         self._receivers: list[tuple[CanPort, dict[int, Callable[[bytes, float], None]]]] = []
         for name, port in self.ports.items():
             tables = (axis.receivers.items() for axis in self.axes if axis.parameters.bus == name)
+            own: dict[int, Callable[[bytes, float], None]] = {}
+            for key, receive in chain.from_iterable(tables):
+                own[key] = _both(own[key], receive) if key in own else receive
             strange = {key: self._note(*other) for key, other in (others or {}).get(name, {}).items()}
-            self._receivers.append((port, strange | dict(chain.from_iterable(tables))))
+            self._receivers.append((port, strange | own))
             port.listen_to(key & EXTENDED_MASK for key in self._receivers[-1][1])
         self.reset()
 
@@ -178,6 +181,18 @@ class Drives:
     def close(self) -> None:
         for port in self.ports.values():
             port.close()
+
+
+def _both(
+    first: Callable[[bytes, float], None], second: Callable[[bytes, float], None]
+) -> Callable[[bytes, float], None]:
+    """Makes the handler of an id that drives share; each finds its own frames by their payload."""
+
+    def receive(data: bytes, now_s: float) -> None:
+        first(data, now_s)
+        second(data, now_s)
+
+    return receive
 
 
 def _stamp_s(frame: Frame, now_s: float) -> float:

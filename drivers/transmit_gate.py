@@ -5,8 +5,9 @@ reading of a parameter), payloads that may leave while the gate is open (followi
 decoded. Where all of them share one arbitration id, their payloads distinguish them. A torque must be finite, within
 the limit, and within one slew step of the torque that left before for that drive; a torque towards zero is always
 allowed. It must be exactly zero while the gate is closed, and where a torque command alone lets a drive follow torque,
-none may leave then. The gate examines the bytes as they leave, so it covers signs and encodings. control/limits.py
-enforces the same limits earlier and more gently; this check is the last one and relies on nothing before it.
+none may leave then. Where a protocol rounds torques to coarse codes, a torque may exceed limit and slew by that
+rounding. The gate examines the bytes as they leave, so it covers signs and encodings. control/limits.py enforces the
+same limits earlier and more gently; this check is the last one and relies on nothing before it.
 
 A refused frame is not sent. It is counted, and its reason is recorded as a message, since a refusal always is a bug. In
 place of a refused torque the gate sends zero torque: the drive's watchdog stays fed and its motor without torque, until
@@ -48,6 +49,7 @@ class GateTable(NamedTuple):
     requests: frozenset[Frame]  # remote frames that may always leave
     kind: FrameKind = FrameKind()
     idle: bytes = b""  # replaces a torque while the gate is closed, where even zero torque ends a drive's idleness
+    torque_step_nm: float = 0.0  # between two codes of torque, of which the nearest is sent
 
 
 class TransmitGate:
@@ -83,15 +85,19 @@ class TransmitGate:
         """Sets the largest step of the next torques: the slew rate times `elapsed_s`, the time since the last ones."""
         self._step_nm = self._torque_rate_nm_s * elapsed_s + ROUNDING_NM
 
-    def torque_problem(self, torque_nm: float, before_nm: float) -> str:
-        """Returns why a torque may not follow the one before; empty where it may. NaN is beyond every bound."""
+    def torque_problem(self, torque_nm: float, before_nm: float, code_step_nm: float = 0.0) -> str:
+        """Returns why a torque may not follow the one before; empty where it may. NaN is beyond every bound.
+
+        Both were rounded to codes that are `code_step_nm` apart: by half of it, or by all of it where a code is zero.
+        """
         if torque_nm == 0.0:
             return ""
         if not self.is_open:
             return NOT_ARMED
-        if not -self._largest_nm <= torque_nm <= self._largest_nm:
+        largest_nm, step_nm = self._largest_nm + 0.5 * code_step_nm, self._step_nm + 1.5 * code_step_nm
+        if not -largest_nm <= torque_nm <= largest_nm:
             return f"the limit is {self._largest_nm:.4g} N·m"
-        if not min(before_nm - self._step_nm, 0.0) <= torque_nm <= max(before_nm + self._step_nm, 0.0):
+        if not min(before_nm - step_nm, 0.0) <= torque_nm <= max(before_nm + step_nm, 0.0):
             return f"too far from the {before_nm:.4g} N·m before"
         return ""
 
@@ -114,7 +120,8 @@ class GatedPort:
         self._checks: dict[int, Callable[[bytes], bool]] = {}
         self._requests: set[Frame] = set()
         for table in self._tables.values():
-            self._always.update(table.always)
+            for identifier, payloads in table.always.items():  # drives may share an id that addresses by payload
+                self._always[identifier] = self._always.get(identifier, frozenset()) | payloads
             self._while_open.update(table.while_open)
             self._checks.update(table.checks)
             self._requests.update(table.requests)
@@ -144,7 +151,9 @@ class GatedPort:
         identifier = table.torque_id
         torque_nm = table.decode_torque(frame.data)
         idle = b"" if self._gate.is_open else table.idle
-        problem = NOT_ARMED if idle else self._gate.torque_problem(torque_nm, self._sent_nm[identifier])
+        problem = (
+            NOT_ARMED if idle else self._gate.torque_problem(torque_nm, self._sent_nm[identifier], table.torque_step_nm)
+        )
         if problem:
             what = f"The torque command of {torque_nm:.4g} N·m to node {table.node_id}"
             self._gate.refuse(f"{what} was replaced by zero torque: {problem}.")

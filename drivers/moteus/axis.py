@@ -6,15 +6,16 @@ the command before, so it has the time of the question as its stamp. While the d
 only ask, because a torque command of zero would let it follow torque. A joint's sign inverts angle, velocity, current
 and torque of a mirrored motor alike.
 
-A drive counts as restarted when it answers again after RESTART_SILENCE_S of unanswered questions. More answers than
-questions come from a second drive with this id. A command for this drive that arrives here comes from another program,
-because a port does not receive its own frames. Stops and questions are no such commands: any program may send them.
+drivers/answer_counter.py finds restarts and a second drive with this id. A command for this drive that arrives here
+comes from another program, because a port does not receive its own frames. Stops and questions are no such commands:
+any program may send them.
 """
 
 from collections.abc import Callable
 from math import isfinite, nan, pi
 
 from control.records import NEVER_S, UNKNOWN, DriveState
+from drivers.answer_counter import AnswerCounter
 from drivers.can.frames import Frame
 from drivers.drive import FD, DriveHealth, Outlet
 from drivers.moteus import codec, registers
@@ -24,10 +25,6 @@ from drivers.moteus.registers import Register
 from drivers.moteus.settings import REGISTER_MAP, MoteusSettings
 from drivers.setpoint_monitor import SetpointMonitor
 
-RESTART_SILENCE_S = 0.3
-MOST_UNANSWERED = 4  # questions; more were lost, and a second drive's answers must not be taken for theirs
-SURPLUS_ANSWERS = 8  # in a row, none SURPLUS_S apart: a second drive
-SURPLUS_S = 1.0
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
 QUIET_MODES = (Mode.STOPPED, Mode.FAULT, Mode.POSITION, Mode.TIMEOUT)  # in which nothing runs by itself
@@ -44,6 +41,7 @@ class MoteusAxis:
         self._rad_per_turn = parameters.sign * TURN_RAD
         self.settings = MoteusSettings(parameters)
         self.setpoints = SetpointMonitor(parameters.command_delay_s)
+        self._answers = AnswerCounter()
         self.reset()
 
     def reset(self) -> None:
@@ -57,8 +55,7 @@ class MoteusAxis:
         self.closed_loop = False  # by the drive's newest reply
         self._following = False  # commanded by this program
         self._foreign_commands = self._restarts = 0
-        self._unanswered = self._surplus = 0
-        self._asked_s = self._surplus_s = NEVER_S  # when the oldest unanswered question was asked
+        self._answers.reset()
         self.settings.reset()
         self.setpoints.reset()
         self._health: DriveHealth | None = None
@@ -127,34 +124,23 @@ class MoteusAxis:
         """Counts commands of another program; its questions get answers too."""
         subframes = list(registers.decode_frame(data))
         if any(each.kind == registers.READ and each.register == Register.MODE for each in subframes):
-            self._count_question()
+            self._answers.on_question(self._read_s)
         stops = [each for each in subframes if each.register == Register.MODE and each.values == (Mode.STOPPED,)]
         commands = [each for each in subframes if each.kind in (registers.WRITE, registers.CONSOLE_INPUT)]
         if len(commands) > len(stops):
             self._foreign_commands += 1
             self._health = None
 
-    def _count_question(self) -> None:
-        if not self._unanswered:
-            self._asked_s = self._read_s
-        self._unanswered = min(self._unanswered + 1, MOST_UNANSWERED)
-
     def _count_answer(self) -> None:
-        if self._read_before_s - self._asked_s > RESTART_SILENCE_S and isfinite(self._mode_stamp_s):
+        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._mode_stamp_s):
             self._restarts += 1
             self.settings.forget()
             self._health = None
-        self._asked_s = self._read_s
-        if self._unanswered:
-            self._unanswered -= 1
-            return
-        self._surplus = self._surplus + 1 if self._read_s - self._surplus_s < SURPLUS_S else 1
-        self._surplus_s = self._read_s
 
     @property
     def duplicates(self) -> bool:
         """Returns whether two drives seem to share this id."""
-        return self._surplus >= SURPLUS_ANSWERS and self._read_s - self._surplus_s < SURPLUS_S
+        return self._answers.duplicates(self._read_s)
 
     @property
     def state(self) -> DriveState:
@@ -250,5 +236,5 @@ class MoteusAxis:
             self._outlet.send(Frame(self._id, request, is_extended=True, is_fd=True, bit_rate_switch=True))
 
     def _transmit(self, data: bytes) -> None:
-        self._count_question()
+        self._answers.on_question(self._read_s)
         self._outlet.send(Frame(self._id, data, is_extended=True, is_fd=True, bit_rate_switch=True))

@@ -47,6 +47,8 @@ class SimulatedDriveParameters:
     timeout_mode: Annotated[int, Bounds(0, 15)] = 12  # moteus: what it does once its watchdog has expired
     serial_number: str = ""
     type: str = "odrive"
+    model: str = ""  # of the motor, where the ranges of the drive's codes depend on it
+    torque_range_nm: Annotated[float, Bounds(0.0, 500.0)] = 0.0  # of these codes; 0: that of the model
 
 
 class Forgery(Enum):

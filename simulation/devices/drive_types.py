@@ -4,12 +4,14 @@ from collections.abc import Callable, Mapping
 from random import Random
 
 from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
+from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.odrive import SimulatedOdrive
 
 SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
     "odrive": SimulatedOdrive,
     "moteus": SimulatedMoteus,
+    "mit": SimulatedMit,
 }
 
 

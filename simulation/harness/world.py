@@ -34,7 +34,9 @@ STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's sti
 SAME_POSITION_M = 1e-9
 
 FIXED_OF_ROBOT = frozenset({"rig", "geometry", "arm_mass", "disturbances", "fixed_base"})
-FIXED_OF_DRIVE = frozenset({"type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a"})
+FIXED_OF_DRIVE = frozenset(
+    {"type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a", "model", "torque_range_nm"}
+)
 
 
 @dataclass(frozen=True)

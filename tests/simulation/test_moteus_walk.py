@@ -59,7 +59,7 @@ def mud() -> Mapping[str, float]:
     return walked("odrive")
 
 
-@pytest.mark.parametrize("drives", ["moteus", "mixed"])
+@pytest.mark.parametrize("drives", ["moteus", "mit", "mixed"])
 def test_the_mud_is_the_same_whatever_the_drives(drives: str, mud: Mapping[str, float]) -> None:
     assert walked(drives) == pytest.approx(dict(mud), rel=0.02)
 

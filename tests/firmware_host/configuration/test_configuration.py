@@ -70,14 +70,24 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
         "drive.left_sweep.current_limit_a = 5.0: must be at least 9.04 for limits.torque_nm = 0.75"
     ]),
     ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "vesc"', [
-        "drive.left_sweep.type = 'vesc': must be one of odrive, moteus"
+        "drive.left_sweep.type = 'vesc': must be one of odrive, moteus, mit"
     ]),
     ("[drive.left_sweep]", "[drive.left_sweep]\ntype = 7", [
-        "drive.left_sweep.type = 7: must be one of odrive, moteus"
+        "drive.left_sweep.type = 7: must be one of odrive, moteus, mit"
     ]),
     ("[drive.left_sweep]", '[drive.left_sweep]\ntype = "moteus"', ["drive.left_sweep.node_id = 0: must be at least 1"]),
     ("node_id = 0", 'node_id = 5\ntype = "moteus"', [
         "drive.left_sweep.type = 'moteus': uses CAN FD, which disturbs drive.left_adduction (odrive) on the same bus"
+    ]),
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-10"', [
+        "drive.left_sweep.model = 'AK80-10': must be one of AK10-9, AK60-6"
+    ]),
+    ("node_id = 0", 'node_id = 16\ntype = "mit"', ["drive.left_sweep.node_id = 16: must be at most 15"]),
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\ntorque_range_nm = 9.0', [
+        "drive.left_sweep.torque_range_nm = 9: must be 0: that of an AK80-9 is fixed"
+    ]),
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\ntorque_range_nm = 0.5', [
+        "drive.left_sweep.torque_range_nm = 0.5: its codes end at 0.5 N·m, and limits.torque_nm = 0.75"
     ]),
     ("[drive.right_sweep]", "[drive.right_swep]", [
         "drive.right_sweep is missing: ", "drive.right_swep: there is no such joint"

@@ -1,0 +1,218 @@
+"""One drive in MIT mode as one joint: the newest answer, what it says of the drive, and the frames that command it.
+
+The drive sends nothing but one answer to each command, made before it executes it, so the signals have the time of the
+command as their stamp and their torque is that of the command before. No code is zero torque, so a drive that is to be
+idle is asked by the command to leave the mode, in every tick: whatever was lost, the next tick repeats it.
+
+A Damiao's answer says whether it follows torque. A CubeMars's does not: it counts as following from its first answer
+without a fault after the command to enter, until the command to leave or a restart. drivers/answer_counter.py finds
+restarts and a second drive with this id. A command that arrives here comes from another program. The torque of the
+answers is measured, so they cannot show that the drive follows another program's command that was not seen.
+"""
+
+from collections.abc import Callable
+from math import isfinite, pi
+
+from control.records import NEVER_S, UNKNOWN, DriveState
+from drivers.answer_counter import AnswerCounter
+from drivers.can.frames import Frame, MalformedMessageError
+from drivers.drive import DriveHealth, Outlet
+from drivers.mit import codec
+from drivers.mit.parameters import MitParameters
+from drivers.mit.settings import MitSettings
+
+MASTER_ID = 0  # under which older CubeMars answer, all of a bus
+TURN_RAD = 2.0 * pi
+HARMLESS = frozenset({codec.LEAVE, codec.CLEAR})  # commands that any program may send
+
+
+class MitAxis:
+    """Owns everything that is known about one drive, and whether it is to follow torque."""
+
+    def __init__(self, joint: str, parameters: MitParameters, outlet: Outlet) -> None:
+        self.joint = joint
+        self.parameters = parameters
+        self._outlet = outlet
+        self._ranges = parameters.ranges
+        self._zero_rad = TURN_RAD * parameters.zero_turn
+        self._amperes_per_nm = parameters.sign / parameters.reported_constant_nm_a
+        self.settings = MitSettings(parameters)
+        self._answers = AnswerCounter()
+        self.reset()
+
+    def reset(self) -> None:
+        self._angle_rad = self._velocity_rad_s = self._current_a = self._temperature_c = UNKNOWN
+        self._stamp_s = self._temperature_stamp_s = self._read_s = self._read_before_s = NEVER_S
+        self._status = self._error_flags = 0
+        self.closed_loop = False  # by the drive's newest answer
+        self._following = False  # commanded by this program
+        self._foreign_commands = self._restarts = 0
+        self._answers.reset()
+        self.settings.reset()
+        self._health: DriveHealth | None = None
+
+    def begin_read(self, now_s: float) -> None:
+        self._read_before_s, self._read_s = self._read_s, now_s
+
+    @property
+    def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
+        node_id = self.parameters.node_id
+        if self._ranges.has_registers:
+            return {
+                codec.feedback_id(node_id, self._ranges): self._receive,
+                node_id: self._receive_foreign,
+                codec.REGISTER_ID: self._receive_foreign_register,
+            }
+        return {node_id: self._receive_shared, MASTER_ID: self._receive_master}
+
+    def _receive(self, data: bytes, now_s: float) -> None:
+        """Handles what arrives under a Damiao's MST_ID. Only an idle drive is asked for registers."""
+        if codec.is_register_answer(data, self.parameters.node_id):
+            _, _, register, value = codec.decode_register(data)
+            self.settings.on_register(register, value)
+            self._health = None
+        else:
+            self._receive_answer(data, now_s)
+
+    def _receive_shared(self, data: bytes, now_s: float) -> None:
+        """Handles what arrives under a CubeMars's id, of which its answers begin with that id."""
+        if len(data) == codec.ANSWER_BYTES and data[0] != self.parameters.node_id:
+            self._receive_foreign(data, now_s)
+        else:
+            self._receive_answer(data, now_s)
+
+    def _receive_master(self, data: bytes, now_s: float) -> None:
+        if data[:1] == bytes([self.parameters.node_id]):
+            self._receive_answer(data, now_s)
+
+    def _receive_answer(self, data: bytes, now_s: float) -> None:
+        answer = codec.decode_answer(data, self._ranges)
+        if answer.node_id != self.parameters.node_id:
+            raise MalformedMessageError(f"an answer of node {answer.node_id}")
+        self._count_answer()
+        asked_s = self._read_before_s  # every tick asks after it has read
+        self._stamp_s = asked_s if NEVER_S < asked_s < now_s else now_s
+        sign = self.parameters.sign
+        self._angle_rad = sign * (answer.position_rad - self._zero_rad)
+        self._velocity_rad_s = sign * answer.velocity_rad_s
+        self._current_a = self._amperes_per_nm * answer.torque_nm
+        has_registers = self._ranges.has_registers
+        temperature_c = float(answer.last) if has_registers else answer.temperature_c
+        if temperature_c:  # zero where no sensor is connected
+            self._temperature_c, self._temperature_stamp_s = temperature_c, self._stamp_s
+        if has_registers:
+            faulty = answer.status not in (codec.DISABLED, codec.ENABLED)
+            self._receive_status(answer.status, answer.status if faulty else 0)
+        else:
+            follows = self._following and not answer.fault
+            self._receive_status(codec.ENABLED if follows else codec.DISABLED, answer.fault)
+
+    def _receive_status(self, status: int, flags: int) -> None:
+        """Handles status and fault. A drive that left the mode by itself is not commanded back into it."""
+        if status != self._status or flags != self._error_flags:
+            self._status, self._error_flags, self._health = status, flags, None
+        if flags or self.closed_loop and status != codec.ENABLED:
+            self._following = False
+        self.closed_loop = status == codec.ENABLED
+
+    def _receive_foreign(self, data: bytes, now_s: float) -> None:
+        """Counts commands of another program, which the drive answers too."""
+        self._answers.on_question(self._read_s)
+        if data not in HARMLESS:
+            self._foreign_commands += 1
+            self._health = None
+
+    def _receive_foreign_register(self, data: bytes, now_s: float) -> None:
+        node_id, kind, _, _ = codec.decode_register(data)
+        if node_id == self.parameters.node_id and kind in (codec.WRITE, codec.STORE):
+            self._foreign_commands += 1
+            self._health = None
+
+    def _count_answer(self) -> None:
+        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._stamp_s):
+            self._restarts += 1
+            self._following = False
+            self.settings.forget()
+            self._health = None
+
+    @property
+    def state(self) -> DriveState:
+        stamp_s = self._stamp_s
+        return DriveState(
+            self._angle_rad,
+            self._velocity_rad_s,
+            stamp_s,
+            self._current_a,
+            stamp_s,
+            self.closed_loop,
+            self._error_flags,
+            stamp_s,
+            self._temperature_c,
+            self._temperature_stamp_s,
+        )
+
+    @property
+    def health(self) -> DriveHealth:
+        """The drive's report about itself, built again only when it has changed."""
+        health = self._health
+        if health is None or health.duplicate_id is not self._answers.duplicates(self._read_s):
+            self._health = health = self._build_health()
+        return health
+
+    def _build_health(self) -> DriveHealth:
+        settings = self.settings
+        return DriveHealth(
+            joint=self.joint,
+            firmware=settings.firmware,
+            supported_firmware="one that answers the reading of register 14",
+            firmware_supported=settings.supported,
+            watchdog_s=settings.watchdog_s,
+            watchdog_advice=settings.watchdog_advice,
+            watchdog_expired=self._error_flags == codec.LOST_COMMANDS,
+            restarts=self._restarts,
+            duplicate_id=self._answers.duplicates(self._read_s),
+            foreign_commands=self._foreign_commands,
+            setting_problem=settings.problem,
+            serial_number=settings.serial_number,
+            expected_serial_number=self.parameters.serial_number,
+            active_errors=codec.error_text(self._error_flags),
+            errors=codec.error_text(self._error_flags),
+        )
+
+    def poll(self) -> None:
+        self._transmit(codec.LEAVE)
+
+    def send_torque(self, torque_nm: float) -> None:
+        """Commands torque; to a drive that is to be idle zero torque is no command, but the one to leave the mode."""
+        if self._following or torque_nm != 0.0:
+            self._transmit(codec.encode_torque(self.parameters.sign * torque_nm, self._ranges.torque_nm))
+        else:
+            self._transmit(codec.LEAVE)
+
+    def forget_commands(self) -> None:
+        """Does nothing: the answers state no torque that was commanded."""
+
+    def prepare(self) -> None:
+        """Replaces the command that the drive remembers, which it would follow as soon as it enters the mode."""
+        self._transmit(codec.encode_torque(0.0, self._ranges.torque_nm))
+
+    def close_loop(self) -> None:
+        self._following = True
+        self._transmit(codec.ENTER)
+
+    def disarm(self) -> None:
+        self._following = False
+        self._transmit(codec.LEAVE)
+
+    def clear_errors(self) -> None:
+        """Clears a Damiao's errors; those of a CubeMars end with their cause or with its supply."""
+        self._transmit(codec.CLEAR if self._ranges.has_registers else codec.LEAVE)
+
+    def request_settings(self, now_s: float) -> None:
+        request = self.settings.due_request(now_s)
+        if request:
+            self._outlet.send(Frame(codec.REGISTER_ID, request))
+
+    def _transmit(self, data: bytes) -> None:
+        self._answers.on_question(self._read_s)
+        self._outlet.send(Frame(self.parameters.node_id, data))

@@ -1,0 +1,150 @@
+"""MIT mode, as the MIT mini cheetah's motors, CubeMars and Damiao speak it: commands and answers of eight bytes.
+
+A command goes to the drive's own id and packs position (16 bits), velocity, kp, kd and torque (12 bits each) as codes
+of a model's ranges, big-endian. Four payloads of FF and one last byte are other commands: FC enters the mode, FD leaves
+it, FE makes the present position zero, FB clears a Damiao's errors. A drive only sends one answer to each command.
+
+A code is (x + range) · (2ⁿ - 1) / (2 · range), so zero lies in the middle of two codes and no command has zero torque.
+Its code here is the nearest one, of the two the upper: the drive follows half a step, range / 4095. A drive is without
+torque only outside of the mode. Torque is rounded to the nearest code here; the published encoders truncate.
+
+Drives truncate too (float_to_uint), so a code of an answer stands for the step above it, and is decoded as its middle:
+a joint at rest reads exactly zero, and the mean of many answers is right. The published decoders return the lower end.
+
+Sources: Core/Src/can.c of bgkatz/motorcontrol; damiao-motor 1.0.6; TMotorCANControl 1.2.6; see docs/how-to/mit.md.
+"""
+
+from math import nan
+from struct import Struct
+from typing import NamedTuple
+
+from drivers.can.frames import MalformedMessageError
+from drivers.mit.models import TORQUE_CODES, Model
+
+ANSWER_BYTES = 8
+_SPECIAL = b"\xff" * 7
+ENTER, LEAVE, SET_ZERO, CLEAR = (_SPECIAL + bytes([last]) for last in (0xFC, 0xFD, 0xFE, 0xFB))
+_PURE_TORQUE = bytes.fromhex("8000 8000 0000")  # codes of zero position and velocity; kp and kd exactly 0
+ZERO_CODE = (TORQUE_CODES + 1) // 2
+_ANSWER = Struct(">BHBBBBB")
+POSITION_CODES = 65535
+
+REGISTER_ID = 0x7FF
+READ, WRITE, STORE = 0x33, 0x55, 0xAA
+_REGISTER_FRAME = Struct("<HBB4s")
+
+DISABLED, ENABLED, LOST_COMMANDS = 0x0, 0x1, 0xD  # a Damiao's status
+FAULT_NAMES = {
+    1: "over-temperature",
+    2: "over-current",
+    3: "over-voltage",
+    4: "under-voltage",
+    5: "encoder fault",
+    6: "phase currents unbalanced",
+    0x8: "over-voltage",
+    0x9: "under-voltage",
+    0xA: "over-current",
+    0xB: "transistors too hot",
+    0xC: "rotor too hot",
+    LOST_COMMANDS: "watchdog expired",
+    0xE: "overload",
+}
+
+
+class Answer(NamedTuple):
+    """The answer to a command; `status` is a Damiao's, `fault` a CubeMars's."""
+
+    node_id: int
+    status: int
+    position_rad: float
+    velocity_rad_s: float
+    torque_nm: float
+    temperature_c: float  # of the drive
+    last: int  # Damiao: temperature of the rotor; CubeMars: the fault
+
+    @property
+    def fault(self) -> int:
+        return self.last
+
+
+def feedback_id(node_id: int, model: Model) -> int:
+    """Returns the id under which a drive answers: a CubeMars its own; a Damiao as the set-up page sets MST_ID."""
+    return node_id + 16 if model.has_registers else node_id
+
+
+def encode_torque(torque_nm: float, range_nm: float) -> bytes:
+    """Encodes torque alone, kp = kd = 0. What lies beyond the range gets its ends; NaN is no payload that may leave."""
+    if torque_nm != torque_nm:
+        return b""
+    torque_nm = -range_nm if torque_nm < -range_nm else range_nm if torque_nm > range_nm else torque_nm
+    code = round((torque_nm + range_nm) * (TORQUE_CODES / (2.0 * range_nm))) if torque_nm else ZERO_CODE
+    return _PURE_TORQUE + code.to_bytes(2, "big")
+
+
+def decode_torque(data: bytes, range_nm: float) -> float:
+    """Returns the torque of exactly one such command, zero for ZERO_CODE; NaN for any other payload."""
+    if len(data) != ANSWER_BYTES or data[:6] != _PURE_TORQUE or data[6] > 0xF:
+        return nan
+    code = data[6] << 8 | data[7]
+    return 0.0 if code == ZERO_CODE else _decode(code, range_nm, TORQUE_CODES)
+
+
+def _decode(code: float, limit: float, codes: int) -> float:
+    return code * (2.0 * limit) / codes - limit
+
+
+def _encode(value: float, limit: float, codes: int) -> int:
+    """Truncates, as a drive does, and ends at the range."""
+    return int((min(max(value, -limit), limit) + limit) * codes / (2.0 * limit))
+
+
+def decode_answer(data: bytes, model: Model) -> Answer:
+    """Raises MalformedMessageError for another length."""
+    if len(data) != ANSWER_BYTES:
+        raise MalformedMessageError(f"an answer of {len(data)} bytes")
+    head, position, velocity, middle, torque, temperature, last = _ANSWER.unpack(data)
+    return Answer(
+        head & 0xF,
+        head >> 4,
+        _decode(position + 0.5, model.position_rad, POSITION_CODES),
+        _decode((velocity << 4 | middle >> 4) + 0.5, model.velocity_rad_s, TORQUE_CODES),
+        _decode(((middle & 0xF) << 8 | torque) + 0.5, model.torque_nm, TORQUE_CODES),
+        float(temperature),
+        last,
+    )
+
+
+def encode_answer(answer: Answer, model: Model) -> bytes:
+    position = _encode(answer.position_rad, model.position_rad, POSITION_CODES)
+    velocity = _encode(answer.velocity_rad_s, model.velocity_rad_s, TORQUE_CODES)
+    torque = _encode(answer.torque_nm, model.torque_nm, TORQUE_CODES)
+    middle = (velocity & 0xF) << 4 | torque >> 8
+    head = answer.status << 4 | answer.node_id
+    temperature = round(min(max(answer.temperature_c, 0.0), 255.0))
+    return _ANSWER.pack(head, position, velocity >> 4, middle, torque & 0xFF, temperature, answer.last)
+
+
+def encode_read(node_id: int, register: int) -> bytes:
+    return encode_register(node_id, READ, register, bytes(4))
+
+
+def encode_register(node_id: int, kind: int, register: int, value: bytes) -> bytes:
+    return _REGISTER_FRAME.pack(node_id, kind, register, value)
+
+
+def decode_register(data: bytes) -> tuple[int, int, int, bytes]:
+    """Returns node, kind, register and value; raises MalformedMessageError for another length."""
+    if len(data) != ANSWER_BYTES:
+        raise MalformedMessageError(f"a register frame of {len(data)} bytes")
+    node_id, kind, register, value = _REGISTER_FRAME.unpack(data)
+    return node_id, kind, register, value
+
+
+def is_register_answer(data: bytes, node_id: int) -> bool:
+    """Returns whether an answer of a Damiao carries a register. So may that of one at its range's end."""
+    return len(data) == ANSWER_BYTES and data[0] == node_id and data[1] == 0 and data[2] in (READ, WRITE)
+
+
+def error_text(flags: int) -> str:
+    """Names a drive's fault; empty for none."""
+    return FAULT_NAMES.get(flags, f"fault {flags}") if flags else ""

@@ -1,0 +1,83 @@
+"""MIT mode as a drive type: its parameters, its axis, and how to read and forge its frames without commanding one."""
+
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+from control.rate import RATE_HZ
+from drivers.can.bus_load import FrameRate
+from drivers.can.frames import Frame
+from drivers.drive import DriveParameters, FrameContent, Outlet, Span, WatchdogEndpoints
+from drivers.mit import codec
+from drivers.mit.axis import MitAxis
+from drivers.mit.gate_tables import gate_table
+from drivers.mit.models import MODELS
+from drivers.mit.parameters import LARGEST_ID, MitParameters
+from drivers.transmit_gate import FrameKind, GateTable
+
+# All other signals of an answer arrive together or not at all: no code says that one is unknown.
+ROTOR_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(7, 8, bytes(1))}  # of a Damiao
+DRIVE_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(6, 7, bytes(1))}  # of a CubeMars
+SIGNALS = ("position", "current", "heartbeat", "error", "temperature")
+DAMIAO_OFFSET = 16  # of the id under which a Damiao answers
+OVERCURRENT = 0xA  # of a Damiao; its low bits are that of a CubeMars
+MODEL = MODELS["DM4310"]
+
+
+class Mit:
+    """Describes MIT mode, as DriveType requires."""
+
+    parameters = MitParameters
+    kind = FrameKind()
+    example_error = OVERCURRENT
+    command = FrameRate(codec.ANSWER_BYTES, RATE_HZ)
+    reports = (FrameRate(codec.ANSWER_BYTES, RATE_HZ),)
+
+    def gate_table(self, parameters: DriveParameters) -> GateTable:
+        return gate_table(cast(MitParameters, parameters))
+
+    def make_axis(
+        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
+    ) -> MitAxis:
+        return MitAxis(joint, cast(MitParameters, parameters), outlet)
+
+    def query(self, node_id: int) -> Frame:
+        return Frame(node_id, codec.LEAVE)
+
+    def announces(self, node_id: int) -> Frame:
+        answer = codec.Answer(node_id & LARGEST_ID, codec.DISABLED, 0.0, 0.0, 0.0, 0.0, 0)
+        return Frame((node_id & LARGEST_ID) + DAMIAO_OFFSET, codec.encode_answer(answer, MODEL))
+
+    def read_frame(self, frame: Frame) -> FrameContent | None:
+        """A CubeMars answers under its own id, with that id as the first byte, which no command of this program has."""
+        identifier, data = frame.arbitration_id, frame.data
+        if frame.is_fd or frame.is_error or frame.is_remote or frame.is_extended:
+            return None
+        if identifier == codec.REGISTER_ID and data:
+            return FrameContent(data[0] & LARGEST_ID)
+        node_id = identifier & LARGEST_ID
+        if identifier > DAMIAO_OFFSET + LARGEST_ID or not node_id:
+            return None
+        if identifier < DAMIAO_OFFSET and data[:1] != bytes([node_id]):
+            return FrameContent(node_id, is_command=True)
+        if identifier > DAMIAO_OFFSET and codec.is_register_answer(data, node_id):
+            return FrameContent(node_id)
+        of_damiao = identifier > DAMIAO_OFFSET
+        return FrameContent(node_id, signals=SIGNALS, spans=ROTOR_TEMPERATURE if of_damiao else DRIVE_TEMPERATURE)
+
+    def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
+        """Only a command should feed the watchdog."""
+        other = node_id % LARGEST_ID + 1
+        return {
+            "answers of another drive": self.announces(other),
+            "questions for another drive's registers": Frame(codec.REGISTER_ID, codec.encode_read(other, 9)),
+        }
+
+    def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
+        """Sets a Damiao's status, or the fault of a CubeMars."""
+        data, of_damiao = frame.data, frame.arbitration_id > LARGEST_ID
+        if len(data) != codec.ANSWER_BYTES:
+            return data
+        if of_damiao:
+            status = 0x8 | flags & 0x7 if flags else codec.DISABLED if idle else data[0] >> 4
+            return bytes([data[0] & 0xF | status << 4]) + data[1:]
+        return data[:-1] + bytes([flags & 0x7 if flags else data[-1]])

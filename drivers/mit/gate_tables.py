@@ -1,0 +1,33 @@
+"""Lists what may pass the transmit gate for one drive in MIT mode.
+
+Leaving the mode and, for a Damiao, clearing errors and reading the settings may always leave; entering only while the
+gate is open. No other gains than zero, no new zero position and no register may ever be written. No code is zero torque
+exactly, so while the gate is closed not even the nearest one leaves: leaving the mode takes its place.
+"""
+
+from drivers.mit import codec
+from drivers.mit.parameters import MitParameters
+from drivers.mit.settings import REGISTERS
+from drivers.transmit_gate import GateTable
+
+
+def gate_table(drive: MitParameters) -> GateTable:
+    ranges, node_id = drive.ranges, drive.node_id
+    always = {node_id: frozenset({codec.LEAVE})}
+    if ranges.has_registers:
+        always = {
+            node_id: frozenset({codec.LEAVE, codec.CLEAR}),
+            codec.REGISTER_ID: frozenset(codec.encode_read(node_id, register) for register in REGISTERS),
+        }
+    return GateTable(
+        node_id=node_id,
+        torque_id=node_id,
+        zero_torque=codec.encode_torque(0.0, ranges.torque_nm),
+        decode_torque=lambda data: codec.decode_torque(data, ranges.torque_nm),
+        always=always,
+        while_open={node_id: frozenset({codec.ENTER})},
+        checks={},
+        requests=frozenset(),
+        idle=codec.LEAVE,
+        torque_step_nm=ranges.torque_step_nm,
+    )

@@ -1,0 +1,54 @@
+"""The ranges of the motors that speak MIT mode: position, velocity and torque are codes within them, so both ends must
+use the same.
+
+CubeMars: the table MIT_Params of TMotorCANControl 1.2.6 (mit_can.py). Its authors have tried only the AK80-9, and
+other sources differ (the DFKI's driver has 22.5 or 25.64 rad/s for it, by its firmware). Damiao:
+the table of damiao-motor 1.0.6 (core/motor.py), the values of delivery of the registers 21 to 23.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+TORQUE_CODES = 4095  # steps of a 12-bit code
+
+
+class Model(NamedTuple):
+    """One motor's ranges, each from minus to plus."""
+
+    position_rad: float
+    velocity_rad_s: float
+    torque_nm: float
+    has_registers: bool = False  # Damiao: limits and time-out can be read, and every answer says whether it follows
+
+    @property
+    def torque_step_nm(self) -> float:
+        return 2.0 * self.torque_nm / TORQUE_CODES
+
+
+def _damiao(position_rad: float, velocity_rad_s: float, torque_nm: float) -> Model:
+    return Model(position_rad, velocity_rad_s, torque_nm, has_registers=True)
+
+
+MODELS: Mapping[str, Model] = {
+    "AK10-9": Model(12.5, 50.0, 65.0),
+    "AK60-6": Model(12.5, 50.0, 15.0),
+    "AK70-10": Model(12.5, 50.0, 25.0),
+    "AK80-6": Model(12.5, 76.0, 12.0),
+    "AK80-9": Model(12.5, 50.0, 18.0),
+    "AK80-64": Model(12.5, 8.0, 144.0),
+    "DM3507": _damiao(12.566, 50.0, 5.0),
+    "DM4310": _damiao(12.5, 30.0, 10.0),
+    "DM4310P": _damiao(12.5, 50.0, 10.0),
+    "DM4340": _damiao(12.5, 10.0, 28.0),
+    "DM4340P": _damiao(12.5, 10.0, 28.0),
+    "DM6006": _damiao(12.5, 45.0, 20.0),
+    "DM6248P": _damiao(12.566, 20.0, 120.0),
+    "DM8006": _damiao(12.5, 45.0, 40.0),
+    "DM8009": _damiao(12.5, 45.0, 54.0),
+    "DM10010": _damiao(12.5, 20.0, 200.0),
+    "DM10010L": _damiao(12.5, 25.0, 200.0),
+    "DMG6215": _damiao(12.5, 45.0, 10.0),
+    "DMH3510": _damiao(12.5, 280.0, 1.0),
+    "DMH6220": _damiao(12.5, 45.0, 10.0),
+    "DMJH11": _damiao(12.5, 10.0, 12.0),
+}

@@ -1,0 +1,44 @@
+"""The configuration of one drive in MIT mode."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, ClassVar
+
+from control.bounds import Bounds, Meaning
+from drivers.drive import DriveParameters
+from drivers.mit.models import MODELS, Model
+
+LARGEST_ID = 15  # an answer has four bits for it
+
+
+@dataclass(frozen=True)
+class MitParameters(DriveParameters):
+    node_id: Annotated[int, Bounds(1, LARGEST_ID), Meaning("on that bus", "id")] = 1
+    type: Annotated[str, Meaning("the protocol that the drive speaks")] = "mit"
+    model: Annotated[str, Meaning("of the motor, whose ranges the codes have, such as AK80-9 or DM4310")] = "DM4310"
+    torque_range_nm: Annotated[float, Bounds(0.0, 500.0), Meaning("register TMAX of a Damiao; 0: as delivered")] = 0.0
+    reported_constant_nm_a: Annotated[
+        float, Bounds(0.001, 10.0), Meaning("by which its answers state torque: current is that torque divided by it")
+    ] = 0.083
+
+    serial_digits: ClassVar[int] = 8
+
+    @cached_property
+    def ranges(self) -> Model:
+        """The ranges of the codes; raises KeyError for an unknown model, which the checks have refused."""
+        model = MODELS[self.model]
+        return model._replace(torque_nm=self.torque_range_nm) if self.torque_range_nm else model
+
+    def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
+        yield from super().torque_problems(torque_nm)
+        if self.model not in MODELS:
+            yield f"model = {self.model!r}", f"must be one of {', '.join(MODELS)}"
+            return
+        if self.torque_range_nm and not MODELS[self.model].has_registers:
+            yield f"torque_range_nm = {self.torque_range_nm:g}", f"must be 0: that of an {self.model} is fixed"
+        elif self.ranges.torque_nm < torque_nm:
+            key = "torque_range_nm" if self.torque_range_nm else "model"
+            value = f"{self.torque_range_nm:g}" if self.torque_range_nm else f"{self.model!r}"
+            reason = f"its codes end at {self.ranges.torque_nm:g} N·m, and limits.torque_nm = {torque_nm}"
+            yield f"{key} = {value}", reason

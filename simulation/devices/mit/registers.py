@@ -1,0 +1,55 @@
+"""The registers of a simulated Damiao that this program reads, and the frames that read and write them."""
+
+from drivers.can.frames import Frame
+from drivers.mit import codec
+from drivers.mit.models import Model
+from drivers.mit.settings import (
+    CONTROL_MODE,
+    FLOAT,
+    FLOATS,
+    MIT_MODE,
+    PMAX,
+    SERIAL,
+    SOFTWARE,
+    TIMEOUT,
+    TIMEOUT_UNIT_S,
+    TMAX,
+    VMAX,
+    WORD,
+)
+from simulation.devices.drive import SimulatedDriveParameters
+
+FIRMWARE = 5013
+
+
+def first_values(parameters: SimulatedDriveParameters, model: Model) -> dict[int, float]:
+    """Returns the registers after delivery, with the watchdog and the serial number that are asked for."""
+    return {
+        TIMEOUT: round(parameters.watchdog_s / TIMEOUT_UNIT_S),
+        CONTROL_MODE: MIT_MODE,
+        SOFTWARE: FIRMWARE,
+        SERIAL: int(parameters.serial_number or "0", 16),
+        PMAX: model.position_rad,
+        VMAX: model.velocity_rad_s,
+        TMAX: model.torque_nm,
+    }
+
+
+def encode_value(register: int, value: float) -> bytes:
+    return FLOAT.pack(value) if register in FLOATS else WORD.pack(int(value))
+
+
+def answer_register(values: dict[int, float], node_id: int, data: bytes) -> bytes:
+    """Executes one register frame; returns the answer, empty for another drive's and for unknown registers."""
+    addressed, kind, register, value = codec.decode_register(data)
+    if addressed != node_id or register not in values or kind not in (codec.READ, codec.WRITE):
+        return b""
+    if kind == codec.WRITE:
+        values[register] = (FLOAT if register in FLOATS else WORD).unpack(value)[0]
+    return codec.encode_register(node_id, kind, register, encode_value(register, values[register]))
+
+
+def write_frame(node_id: int, register: int, value: float) -> Frame:
+    return Frame(
+        codec.REGISTER_ID, codec.encode_register(node_id, codec.WRITE, register, encode_value(register, value))
+    )
