@@ -21,11 +21,12 @@ SPEED = "the rest then computes the same from nothing"
 SUBJECTS = (
     Subject(
         "drivers.transmit_gate",
-        ("drivers/test_transmit_gate.py", "drivers/moteus/test_gate_table.py"),
+        ("drivers/test_transmit_gate.py", "drivers/moteus/test_gate_table.py", "drivers/mit/test_gate_table.py"),
         EVERY_MUTANT,
     ),
     Subject("drivers.odrive.gate_tables", ("drivers/test_transmit_gate.py",), EVERY_MUTANT),
     Subject("drivers.moteus.gate_tables", ("drivers/moteus/test_gate_table.py",)),
+    Subject("drivers.mit.gate_tables", ("drivers/mit/test_gate_table.py",)),
     Subject(
         "drivers.can.reopening_port",
         ("drivers/can/test_reopening_port.py",),

@@ -7,13 +7,14 @@ from typing import Any
 import pytest
 
 from control.controller import WalkOrder
-from control.modes import Mode
+from control.faults import FaultKind
+from control.modes import Mode, Request
 from control.records import JOINTS
 from drivers.drive_types import DRIVE_TYPES
 from drivers.moteus import codec
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.drive_presets import with_drive_type
-from simulation.harness.lockstep import Lockstep
+from simulation.harness.lockstep import Lockstep, drives_of
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.folders import ROOT
@@ -62,6 +63,27 @@ def mud() -> Mapping[str, float]:
 @pytest.mark.parametrize("drives", ["moteus", "mit", "mixed"])
 def test_the_mud_is_the_same_whatever_the_drives(drives: str, mud: Mapping[str, float]) -> None:
     assert walked(drives) == pytest.approx(dict(mud), rel=0.02)
+
+
+def test_drives_whose_watchdog_cannot_be_read_are_armed_by_force_only() -> None:
+    cubemars = ROBOTS["mit"].replace('type = "mit"', 'type = "mit"\nmodel = "AK80-9"')
+    robot = Lockstep(parse_configuration(cubemars), Track([(3.0, MUDS["48.5"])]))
+    robot.run_for(1.0)
+    assert {fault.kind for fault in robot.loop.faults.blocking()} == {FaultKind.WATCHDOG_UNKNOWN}
+    assert "watchdog is unknown" in str(robot.loop.request(Request.ARM, robot.now_s))
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
+    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 3.0) and robot.loop.forced
+    robot.run_for(1.0)
+    assert robot.loop.mode is Mode.HOLD and robot.loop.drives.refused_commands == 0
+
+
+def test_a_drive_with_the_ranges_of_another_model_is_not_armed_by_force_either() -> None:
+    configuration = parse_configuration(ROBOTS["mit"])
+    robot = Lockstep(configuration, Track([(3.0, MUDS["48.5"])]), drives=drives_of(configuration, model="DM4340"))
+    robot.run_for(1.0)
+    refused = str(robot.loop.request(Request.ARM, robot.now_s, forced=True))
+    assert "do not fit" in refused
+    assert robot.loop.mode is Mode.IDLE
 
 
 def test_a_robot_may_have_two_protocols() -> None:

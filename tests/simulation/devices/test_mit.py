@@ -235,26 +235,23 @@ def test_a_setting_that_differs_is_named_with_what_was_found_and_what_to_do(
     robot = Robot()
     robot.devices[0].receive(write_frame(1, register, value), 10.0)
     robot.tick(count=3 * len(REGISTERS))
-    assert found in robot.drives.health.left.sweep.setting_problem
-    assert robot.drives.health.left.adduction.setting_problem == ""
+    assert found in robot.axis.health.setting_problem
+    assert robot.drives.axes[1].health.setting_problem == ""
 
 
 def test_the_range_of_torque_may_be_configured_and_is_then_compared() -> None:
     robot = Robot(torque_range_nm=4.0)
     robot.tick(count=3 * len(REGISTERS))
-    assert robot.drives.health.left.sweep.setting_problem == ""
+    assert robot.axis.health.setting_problem == ""
     other = Robot({"torque_range_nm": 0.0}, torque_range_nm=4.0)
     other.tick(count=3 * len(REGISTERS))
-    assert (
-        "TMAX (register 23) is 10 and that of torque_range_nm = 4 is 4"
-        in other.drives.health.left.sweep.setting_problem
-    )
+    assert "TMAX (register 23) is 10 and that of torque_range_nm = 4 is 4" in other.axis.health.setting_problem
 
 
 def test_the_watchdog_of_a_cubemars_stays_unknown() -> None:
     robot = Robot(model="AK80-9")
     robot.tick(count=300)
-    health = robot.drives.health.left.sweep
+    health = robot.axis.health
     assert isnan(health.watchdog_s) and "AK80-9 reports none" in health.watchdog_advice
     assert health.firmware_supported and robot.drives.unknown_frames == 0
 
@@ -277,7 +274,7 @@ def test_arming_enters_at_zero_torque_and_disarming_leaves(model: str) -> None:
     assert all(device.energised for device in robot.devices)
     assert abs(robot.devices[0].torque_nm(robot.now_s)) < MODELS[model].torque_step_nm
     robot.tick(idle=False, torque_nm=0.3, count=2)
-    state = robot.drives.read(robot.now_s).left.sweep
+    state = robot.drives.read(robot.now_s)[0]
     assert state.closed_loop and robot.drives.refused_commands == 0
     assert 0.083 * state.current_a == pytest.approx(0.3, abs=2.0 * MODELS[model].torque_step_nm)
     robot.drives.disarm(robot.now_s, at_once=True)
@@ -298,7 +295,7 @@ def test_a_drive_whose_watchdog_expired_is_not_commanded_back() -> None:
     robot.arm()
     robot.devices[0].trip(DriveError.WATCHDOG)
     robot.tick(idle=False, torque_nm=0.2, count=2)
-    health = robot.drives.health.left.sweep
+    health = robot.axis.health
     assert health.watchdog_expired and health.errors == "watchdog expired" and not robot.axis.closed_loop
     robot.tick(idle=False, count=2)
     robot.axis.clear_errors()
@@ -314,7 +311,7 @@ def test_a_restart_while_armed_ends_following(model: str) -> None:
     robot.arm()
     robot.devices[0].restart(robot.now_s)
     robot.tick(idle=False, count=round((BOOT_S + 0.1) / TICK_S))
-    assert robot.drives.health.left.sweep.restarts == 1
+    assert robot.axis.health.restarts == 1
     assert not robot.axis.closed_loop and not robot.devices[0].energised
 
 
@@ -325,8 +322,8 @@ def test_commands_of_another_program_are_counted(model: str, data: bytes, counte
     robot.tick(count=3)
     robot.far.send(Frame(1, data))
     robot.tick()
-    assert robot.drives.health.left.sweep.foreign_commands == counted
-    assert robot.drives.health.left.adduction.foreign_commands == 0
+    assert robot.axis.health.foreign_commands == counted
+    assert robot.drives.axes[1].health.foreign_commands == 0
 
 
 def test_a_register_that_another_program_writes_counts_for_its_drive() -> None:
