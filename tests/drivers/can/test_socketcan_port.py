@@ -240,6 +240,7 @@ def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(c
         assert len(wanted) == 2 * (reports + commands)
         nodes = [drive.node_id for drive in configuration.drive.values() if drive.bus == name]
         wanted |= {moteus.reply_id(node_id) for node_id in nodes}  # a drive of that type would answer so
+        wanted |= {node_id + 16 for node_id in nodes}  # and a Damiao
         assert {word for word in range(0x800) if passes(filters, word)} == wanted
         for identifier in wanted:
             assert not passes(filters, identifier | constants.CAN_RTR_FLAG)
