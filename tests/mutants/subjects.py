@@ -14,7 +14,6 @@ class Subject(NamedTuple):
 
 A_TEXT = "a text of the diagram"
 CONTINUOUS = "it has the same value there from both sides"
-NOT_FINITE = "a difference with NaN is NaN as much as a sum"
 MORE_OFTEN = "the same counters are only read more often"
 REPORTED = "the report tests the exact bound again"
 SPEED = "the rest then computes the same from nothing"
@@ -39,9 +38,6 @@ SUBJECTS = (
         "control.limits",
         ("control/test_limits.py",),
         equivalent={
-            "to Sub in `a + b + c + d`": NOT_FINITE,
-            "to Sub in `a + b + c`": NOT_FINITE,
-            "to Sub in `a + b`": NOT_FINITE,
             "True to False in `strict=True`": "four joints have four values by their type",
             "GtE to Gt in `velocity_rad_s >= limit_rad_s`": CONTINUOUS,
             "LtE to Lt in `velocity_rad_s <= (1.0 - VELOCITY_FADE) * limit_rad_s`": CONTINUOUS,
