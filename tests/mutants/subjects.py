@@ -38,7 +38,7 @@ SUBJECTS = (
         "control.limits",
         ("control/test_limits.py",),
         equivalent={
-            "True to False in `strict=True`": "four joints have four values by their type",
+            "True to False in `strict=True`": "each of them has one value for each joint",
             "GtE to Gt in `velocity_rad_s >= limit_rad_s`": CONTINUOUS,
             "LtE to Lt in `velocity_rad_s <= (1.0 - VELOCITY_FADE) * limit_rad_s`": CONTINUOUS,
         },
