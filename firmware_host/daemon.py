@@ -137,7 +137,9 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         stack.callback(drives.close)
         pose = open_pose(configuration.pose)
         stack.callback(pose.close)
-        recorder = open_recorder(configuration, rights)
+        recorder: Recording = open_recorder(configuration, rights)
+        if failures is not None:
+            recorder = FailingRecorder(recorder, failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         loop = _make_loop(configuration, drives, pose, recorder, failures)
         warnings = status.warnings
@@ -161,8 +163,9 @@ def _make_loop(
 ) -> Loop:
     if failures is None:
         return Loop(configuration, drives, pose, recorder)
-    pose, recorder = FailingPose(pose, failures), FailingRecorder(recorder, failures)
-    return Loop(configuration, drives, pose, recorder, wall_clock=FailingClock(time.time, failures))
+    return Loop(
+        configuration, drives, FailingPose(pose, failures), recorder, wall_clock=FailingClock(time.time, failures)
+    )
 
 
 def _print_warnings(program: str, warnings: Iterable[str]) -> None:

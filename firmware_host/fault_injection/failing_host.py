@@ -93,6 +93,7 @@ class FailingRecorder:
         self._recorder = recorder
         self._failures = failures
         self._refused = self._unreported = 0
+        self._loss_stamp_s = 0.0  # of the last refused row
         self._count()
 
     def _count(self) -> None:
@@ -105,9 +106,10 @@ class FailingRecorder:
         if failure and (failure.kind is not FailureKind.INTERMITTENT or self._failures.loses()):
             self._refused += 1
             self._unreported += 1
+            (self._loss_stamp_s,) = STAMP.unpack_from(payload)
             taken = False
         else:
-            self._report_loss(payload)
+            self._report_loss()
             taken = self._recorder.put(kind_index, payload)
         self._count()
         return taken
@@ -124,13 +126,13 @@ class FailingRecorder:
         problem = f"the log is failing on purpose: {failure.kind}"
         return report._replace(alive=self.writer_alive, dropped=self.dropped, problem=problem)
 
-    def _report_loss(self, payload: bytes) -> None:
-        """Report missing rows before the first row after them, with the stamp of that row."""
+    def _report_loss(self) -> None:
+        """Report missing rows before the first row after them, or at the end, as the recorder itself does."""
         if self._unreported:
-            (stamp_s,) = STAMP.unpack_from(payload)
             text = f"rows missing here: {self._unreported}, the log was failing on purpose"
             self._unreported = 0
-            self._recorder.put(EVENT_KIND, EVENT.encode(stamp_s, text))
+            self._recorder.put(EVENT_KIND, EVENT.encode(self._loss_stamp_s, text))
 
     def close(self, timeout_s: float) -> bool:
+        self._report_loss()
         return self._recorder.close(timeout_s)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tests.dst.scenario import Call, Failure, Harm, Scenario, Surroundings
+from tests.dst.scenario import Call, Failure, Harm, Scenario, Surroundings, Terminate
 
 
 class Regression(NamedTuple):
@@ -117,6 +117,16 @@ REGRESSIONS = (
             start="extraction",
             events=(Harm(at_s=0.217, name="slow current", joint="right_sweep", for_s=0.19),),
             for_s=0.457,
+        ),
+    ),
+    Regression(
+        "the loss of rows was not reported in a log that ended while it failed",
+        Scenario(
+            seed=6360,
+            surroundings=Surroundings(configuration=(("log.rest_hz", 0.0), ("log.rest_full_s", 0.3))),
+            start="idle",
+            events=(Failure(at_s=0.123, component="log", kind="off", for_s=0.072), Terminate(at_s=0.173)),
+            for_s=0.245,
         ),
     ),
 )

@@ -184,6 +184,7 @@ class Run:
                 self.outcome.covered[f"{type(event).__name__.lower()}"] += 1
 
     def check_log(self, folder: Path, lockstep: RecordedRobot) -> None:
+        lockstep.loop.recorder.close(0.0)
         with suppress(BrokenPromiseError):
             for text in log_problems(folder, lockstep):
                 self._break("WholeLog", text)

@@ -124,6 +124,15 @@ def test_a_failing_log_refuses_rows_and_then_logs_their_number(kind: str, alive:
     assert (recorder.dropped, recorder.writer_alive) == (5, True)
 
 
+def test_a_log_that_ends_while_it_fails_reports_its_last_loss() -> None:
+    kept, failures = KeepingRecorder(), Failures(())
+    recorder = FailingRecorder(kept, failures)
+    failures.begin("log", "off", 0.0, 9.0)
+    put_numbers(recorder, range(3))
+    assert recorder.close(2.5) and kept.closed_in_s == 2.5
+    assert kept.texts == ["rows missing here: 3, the log was failing on purpose"]
+
+
 def test_an_intermittent_log_loses_about_half_and_logs_each_gap() -> None:
     kept, failures = KeepingRecorder(), Failures(())
     recorder = FailingRecorder(kept, failures)
