@@ -13,16 +13,16 @@ old values.
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from math import cos, exp, isfinite, pi, radians
+from math import exp, isfinite, pi
 from random import Random
 
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
-from simulation.devices.cogging import cogging_torque_nm
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages
+from simulation.devices.motor import encoder_turns, joint_torque_nm
 from simulation.devices.odrive_forgeries import (
     ENABLE_WATCHDOG_ENDPOINT,
     WATCHDOG_TIMEOUT_ENDPOINT,
@@ -191,15 +191,11 @@ class SimulatedOdrive:
                 self.trip(DriveError.OVERSPEED)
         torque_nm = 0.0
         if self.axis_state is AxisState.CLOSED_LOOP and self._modes == TORQUE_MODES:
-            torque_nm = self._computed_nm(now_s) * (1.0 + parameters.torque_constant_error)
-            if parameters.commutation_error_deg:
-                torque_nm *= cos(radians(parameters.commutation_error_deg))
+            torque_nm = self._computed_nm(now_s)
         else:
             self._current_a = self._setpoint_a = 0.0
         self._stepped_s = now_s
-        if parameters.cogging_nm:
-            torque_nm += cogging_torque_nm(parameters, self._turns)
-        return parameters.sign * torque_nm
+        return joint_torque_nm(parameters, torque_nm, self._turns)
 
     def _computed_nm(self, now_s: float) -> float:
         """Returns the torque by the drive's own torque constant, after its clamps and the lag of the current."""
@@ -255,11 +251,7 @@ class SimulatedOdrive:
         parameters = self.parameters
         if parameters.encoder_frozen:
             return codec.GET_ENCODER_ESTIMATES.encode(self._reported_turns, 0.0)
-        error_rad = parameters.encoder_offset_rad
-        if parameters.encoder_noise_rad:
-            error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
-        turns = self._turns + parameters.sign * error_rad / TURN_RAD
-        self._reported_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        self._reported_turns = encoder_turns(parameters, self._turns, self._random)
         turns_s = self._turns_s
         if parameters.velocity_noise_rad_s:
             turns_s += self._random.gauss(0.0, parameters.velocity_noise_rad_s) / TURN_RAD

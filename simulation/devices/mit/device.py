@@ -11,7 +11,7 @@ imperfections as in simulation/devices/odrive.py.
 """
 
 from collections.abc import Iterable
-from math import cos, exp, isnan, nan, pi, radians
+from math import exp, isnan, nan, pi
 from random import Random
 
 from control.records import NEVER_S
@@ -20,12 +20,12 @@ from drivers.mit import codec
 from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS
 from drivers.mit.settings import PMAX, TIMEOUT, TIMEOUT_UNIT_S, TMAX, VMAX
-from simulation.devices.cogging import cogging_torque_nm
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.late_messages import LateMessages
+from simulation.devices.late_messages import LateAnswers
 from simulation.devices.mit.commands import AT_REST, decode_command
 from simulation.devices.mit.forgeries import forged_frame
 from simulation.devices.mit.registers import answer_register, first_values
+from simulation.devices.motor import encoder_turns, joint_torque_nm
 
 TURN_RAD = 2.0 * pi
 BOOT_S = 0.5  # silence of a drive that restarts
@@ -40,7 +40,7 @@ class SimulatedMit:
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self.parameters = parameters
         self._random = random
-        self._late = LateMessages(random)
+        self._answers = LateAnswers(random)
         model = MODELS[parameters.model or DEFAULT_MODEL]
         self._model = model._replace(torque_nm=parameters.torque_range_nm or model.torque_nm)
         self._feedback_id = codec.feedback_id(parameters.node_id, self._model)
@@ -55,9 +55,7 @@ class SimulatedMit:
         self._torque_nm = 0.0  # of the motor, by the drive's own torque constant
         self._rad = self._rad_s = self._reported_rad = 0.0
         self._boots_until_s = NEVER_S
-        self._late.reset()
-        self._answers: list[Frame] = []  # that have not arrived yet
-        self._repeated: bytes | None = None
+        self._answers.reset()
         self._forged_current_a = nan
 
     def restart(self, now_s: float) -> None:
@@ -77,11 +75,7 @@ class SimulatedMit:
             return []
         if not data:
             return []
-        answer = Frame(self._feedback_id, data, stamp_s=now_s)
-        if not self.parameters.message_delay_s:
-            return [answer]
-        self._answers.append(answer)
-        return []
+        return self._answers.give(Frame(self._feedback_id, data, stamp_s=now_s), self.parameters.message_delay_s)
 
     def _answer(self, frame: Frame, now_s: float) -> bytes:
         """Answers with the values of before, and executes the frame."""
@@ -92,7 +86,7 @@ class SimulatedMit:
             return answer_register(self.registers, parameters.node_id, frame.data)
         if frame.arbitration_id != parameters.node_id or len(frame.data) != codec.ANSWER_BYTES:
             return b""
-        answer = self._new_or_repeated(self._state())
+        answer = self._answers.new_or_repeated(self._state(), parameters.repeated_fraction)
         self._execute(frame.data, now_s)
         return answer
 
@@ -122,14 +116,8 @@ class SimulatedMit:
         return codec.encode_answer(answer, ranges)
 
     def _measured_rad(self) -> float:
-        parameters = self.parameters
-        if parameters.encoder_frozen:
-            return self._reported_rad
-        error_rad = parameters.encoder_offset_rad
-        if parameters.encoder_noise_rad:
-            error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
-        counts = (self._rad + parameters.sign * error_rad) / TURN_RAD * parameters.encoder_counts
-        self._reported_rad = round(counts) / parameters.encoder_counts * TURN_RAD
+        if not self.parameters.encoder_frozen:
+            self._reported_rad = encoder_turns(self.parameters, self._rad / TURN_RAD, self._random) * TURN_RAD
         return self._reported_rad
 
     def _measured_rad_s(self) -> float:
@@ -143,14 +131,6 @@ class SimulatedMit:
         if not isnan(forged_a):
             return forged_a * constant_nm_a
         return self._torque_nm + (constant_nm_a * self._random.gauss(0.0, noise_a) if noise_a else 0.0)
-
-    def _new_or_repeated(self, data: bytes) -> bytes:
-        fraction = self.parameters.repeated_fraction
-        if not fraction:
-            return data
-        if self._repeated is None or self._random.random() >= fraction:
-            self._repeated = data
-        return self._repeated
 
     @property
     def energised(self) -> bool:
@@ -181,21 +161,16 @@ class SimulatedMit:
 
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""
-        parameters = self.parameters
         expired = 0.0 < self.registers[TIMEOUT] * TIMEOUT_UNIT_S < now_s - self._fed_s
         if expired and self.energised and self._model.has_registers:
             self.trip(DriveError.WATCHDOG)
         torque_nm = 0.0
         if self.energised:
-            torque_nm = self._computed_nm(now_s, expired) * (1.0 + parameters.torque_constant_error)
-            if parameters.commutation_error_deg:
-                torque_nm *= cos(radians(parameters.commutation_error_deg))
+            torque_nm = self._computed_nm(now_s, expired)
         else:
             self._torque_nm = 0.0
         self._stepped_s = now_s
-        if parameters.cogging_nm:
-            torque_nm += cogging_torque_nm(parameters, self._rad / TURN_RAD)
-        return parameters.sign * torque_nm
+        return joint_torque_nm(self.parameters, torque_nm, self._rad / TURN_RAD)
 
     def _computed_nm(self, now_s: float, expired: bool) -> float:
         """Returns the torque by the drive's own torque constant, after its limits and the lag of the current."""
@@ -218,8 +193,4 @@ class SimulatedMit:
 
     def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
         """Returns the answers that have arrived by now, where they are late; it sends nothing by itself."""
-        longest_s = self.parameters.message_delay_s
-        if not longest_s:
-            return ()
-        answers, self._answers = self._answers, []
-        return self._late.update(answers, now_s, longest_s)
+        return self._answers.arrived(now_s, self.parameters.message_delay_s)

@@ -12,7 +12,7 @@ the drive and the joint lie the same imperfections as in simulation/devices/odri
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from math import cos, exp, isnan, nan, pi, radians
+from math import exp, isnan, nan, pi
 from random import Random
 
 from control.records import NEVER_S
@@ -21,12 +21,12 @@ from drivers.moteus import codec, registers
 from drivers.moteus.codec import Mode, Reply
 from drivers.moteus.registers import Register, Subframe
 from drivers.moteus.settings import MAX_CURRENT, REGISTER_MAP, TIMEOUT_MODE, WATCHDOG
-from simulation.devices.cogging import cogging_torque_nm
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.late_messages import LateMessages
+from simulation.devices.late_messages import LateAnswers
 from simulation.devices.moteus.console import MoteusConsole
 from simulation.devices.moteus.forgeries import answer_frame, command_frame, forged_frame
 from simulation.devices.moteus.torque import DEFAULTS, PURE_TORQUE, position_mode_nm, timeout_nm
+from simulation.devices.motor import encoder_turns, joint_torque_nm
 
 TURN_RAD = 2.0 * pi
 BOOT_S = 0.5  # silence of a drive that restarts
@@ -40,7 +40,7 @@ class SimulatedMoteus:
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self.parameters = parameters
         self._random = random
-        self._late = LateMessages(random)
+        self._answers = LateAnswers(random)
         self._ids = (codec.command_id(parameters.node_id), parameters.node_id)
         self.reset(0.0)
 
@@ -54,9 +54,7 @@ class SimulatedMoteus:
         self._current_a = self._setpoint_nm = 0.0  # the motor's current, and the torque that it follows
         self._turns = self._turns_s = self._reported_turns = self._held_turns = 0.0
         self._boots_until_s = NEVER_S
-        self._late.reset()
-        self._answers: list[Frame] = []  # that have not arrived yet
-        self._repeated: bytes | None = None
+        self._answers.reset()
         self._forged_current_a = nan
 
     def restart(self, now_s: float) -> None:
@@ -77,11 +75,7 @@ class SimulatedMoteus:
             data = self._usual_answer(frame.data, now_s) or self._any_answer(frame.data, now_s)
         if not data or not frame.arbitration_id & codec.REPLY_WANTED:
             return []
-        answer = answer_frame(self.parameters.node_id, data, now_s)
-        if not self.parameters.message_delay_s:
-            return [answer]
-        self._answers.append(answer)
-        return []
+        return self._answers.give(answer_frame(self.parameters.node_id, data, now_s), self.parameters.message_delay_s)
 
     def _any_answer(self, data: bytes, now_s: float) -> bytes:
         """Answers with the values of before, as a drive does, and executes the frame."""
@@ -111,7 +105,7 @@ class SimulatedMoteus:
         )
         if data != codec.QUERY_ALONE:
             self._follow(PURE_TORQUE | {Register.COMMAND_TORQUE: torque_nm}, now_s)
-        return self._new_or_repeated(answer)
+        return self._answers.new_or_repeated(answer, parameters.repeated_fraction)
 
     def _execute(self, subframes: Iterable[Subframe], now_s: float) -> None:
         """Writes the registers; the mode comes first, and all that a command does not write is at its default."""
@@ -179,14 +173,8 @@ class SimulatedMoteus:
         return float(word - (1 << 32) if word >> 31 else word)
 
     def _measured_turns(self) -> float:
-        parameters = self.parameters
-        if parameters.encoder_frozen:
-            return self._reported_turns
-        error_rad = parameters.encoder_offset_rad
-        if parameters.encoder_noise_rad:
-            error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
-        turns = self._turns + parameters.sign * error_rad / TURN_RAD
-        self._reported_turns = round(turns * parameters.encoder_counts) / parameters.encoder_counts
+        if not self.parameters.encoder_frozen:
+            self._reported_turns = encoder_turns(self.parameters, self._turns, self._random)
         return self._reported_turns
 
     def _measured_current_a(self) -> float:
@@ -195,12 +183,6 @@ class SimulatedMoteus:
             return forged_a
         noise_a = self.parameters.current_noise_a
         return self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
-
-    def _new_or_repeated(self, data: bytes) -> bytes:
-        fraction = self.parameters.repeated_fraction
-        if self._repeated is None or self._random.random() >= fraction:
-            self._repeated = data
-        return self._repeated if fraction else data
 
     @property
     def energised(self) -> bool:
@@ -235,20 +217,15 @@ class SimulatedMoteus:
 
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""
-        parameters = self.parameters
         if self.mode is Mode.POSITION and 0.0 < self._timeout_s() < now_s - self._fed_s:
             self.trip(DriveError.WATCHDOG)
         torque_nm = 0.0
         if self.mode in (Mode.POSITION, Mode.TIMEOUT):
-            torque_nm = self._computed_nm(now_s) * (1.0 + parameters.torque_constant_error)
-            if parameters.commutation_error_deg:
-                torque_nm *= cos(radians(parameters.commutation_error_deg))
+            torque_nm = self._computed_nm(now_s)
         else:
             self._current_a = self._setpoint_nm = 0.0
         self._stepped_s = now_s
-        if parameters.cogging_nm:
-            torque_nm += cogging_torque_nm(parameters, self._turns)
-        return parameters.sign * torque_nm
+        return joint_torque_nm(self.parameters, torque_nm, self._turns)
 
     def _timeout_s(self) -> float:
         """Returns the time-out of the last command; 0 for none."""
@@ -280,8 +257,4 @@ class SimulatedMoteus:
 
     def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
         """Returns the answers that have arrived by now, where they are late; it sends nothing by itself."""
-        longest_s = self.parameters.message_delay_s
-        if not longest_s:
-            return ()
-        answers, self._answers = self._answers, []
-        return self._late.update(answers, now_s, longest_s)
+        return self._answers.arrived(now_s, self.parameters.message_delay_s)
