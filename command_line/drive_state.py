@@ -12,7 +12,7 @@ def is_stale(drive: dict[str, Any]) -> bool:
 
 
 def torque_state(drive: dict[str, Any]) -> str:
-    """Return on, off, or unknown: a drive that is not heard may have torque, whatever it said last."""
+    """Return on, off, or unknown: a drive that is not heard may have torque even if it last reported none."""
     age_s = drive["heartbeat_age_s"]
     if age_s is None or age_s > HEARTBEAT_STALE_S:
         return "unknown"

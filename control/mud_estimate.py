@@ -24,7 +24,7 @@ class Coefficient(NamedTuple):
     depth_m: float  # below the mud's surface
     exponent: float  # k ∝ z^exponent near depth_m
     exponent_std_error: float
-    strides: int  # behind the estimate
+    strides: int  # that the estimate is made from
     at_least: bool = False  # the mud never yielded: a lower bound
 
     def at(self, depth_m: float) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """The interface of motor drives, independent of the protocol that they speak.
 
-A `DriveAxis` is one drive as one joint; drivers/drives.py commands all of them together, whatever they speak. A
+A `DriveAxis` is one drive as one joint; drivers/drives.py commands all of them together, in any mix of protocols. A
 `DriveHealth` contains what a drive reports about itself, as opposed to its joint. A `DriveType` describes one protocol:
 the parameters that the configuration states, the axis and the gate's table of one drive, and how to read its frames
 without commanding a drive, which the checks of the wiring and the fault injection need. drivers/drive_types.py lists

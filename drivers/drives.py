@@ -64,7 +64,7 @@ class Drives:
         self.malformed_frames = 0  # of these drives, with a payload that cannot be decoded
         self._armed_s = self._disarmed_s = NEVER_S
         self._lost_before = self._lost
-        self._idling_lost = False  # the bus refused a command to idle, whatever the drives report
+        self._idling_lost = False  # the bus refused a command to idle, even if the drives report idle
 
     def poll(self) -> None:
         """Asks the drives that report only when asked; the others are asked nothing. `send` asks them as well."""

@@ -37,7 +37,7 @@ def open_bus(name: str, bus: BusParameters) -> CanPort:
 
 
 def _error_number(problem: BaseException | None) -> int:
-    """Return the operating system's error number behind an exception of a CAN library, or 0."""
+    """Return the operating system's error number that caused an exception of a CAN library, or 0."""
     while problem is not None:
         number = problem.errno if isinstance(problem, OSError) else getattr(problem, "error_code", None)
         if number:

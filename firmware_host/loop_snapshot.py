@@ -44,7 +44,6 @@ class LoopSnapshot(NamedTuple):
     mode: Mode
     forced: bool  # armed by force against a present fault
     moving: bool  # joints are on their way to a pose that was requested
-    may_be_in_mud: bool  # the held pose interrupted a walk
     fault: Fault | None  # the worst present fault that is more than a warning
     faults: tuple[AgedFault, ...]
     blocking: tuple[Fault, ...]  # the faults that block arming, unless it is forced
@@ -82,7 +81,6 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
         mode=loop.mode,
         forced=loop.forced,
         moving=loop.controller.moving,
-        may_be_in_mud=loop.controller.cut_short,
         fault=loop.fault,
         faults=tuple(AgedFault(fault, faults.age_ticks(fault) * loop.period_s) for fault in faults.present),
         blocking=tuple(faults.blocking()),

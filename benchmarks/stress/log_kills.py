@@ -102,7 +102,7 @@ def _by_others(path: Path, log: Log) -> str:
         with path.open("rb") as file:
             reader = make_reader(file, decoder_factories=[DecoderFactory()])
             by_mcap_ros2 = sum(1 for _ in reader.iter_decoded_messages())
-    except Exception as problem:  # noqa: BLE001 - whatever they raise, they did not open it
+    except Exception as problem:  # noqa: BLE001 - any exception means that they did not open it
         return f"{path.name} is refused: {type(problem).__name__}: {problem}"
     return "" if rows == by_rosbags == by_mcap_ros2 else f"{path.name}: {rows}, {by_rosbags}, {by_mcap_ros2} rows"
 

@@ -1,4 +1,4 @@
-"""Choice of the insertion depth, once a stride, in swing (paper, section III-D), and the search behind it.
+"""Choice of the insertion depth, once a stride, in swing (paper, section III-D), and the search for it.
 
 Two conditions bound the depth z: the flippers must not slip, 2 f_x(z) > f_r + f_a, and the mud must release them,
 τ_e(z) < τ_m. Within these bounds the robot should be fast. So of all candidates that come out of the mud, the search

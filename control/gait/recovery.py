@@ -16,7 +16,7 @@ of the mud that sticks to the plate is shorter too.
 In simulated clay of up to 9 kPa, at commanded depths of 3 to 5 cm, every flipper came out within 12 s; the body moved
 8 to 11 cm forward meanwhile, and never more than 4 mm back. A steady pull freed no flipper from 6 kPa and 5 cm on;
 rocking at half the rate, or equally long in both directions, did not free 9 kPa, and with bodies of half or three times
-the mass some flippers stayed stuck from 7.5 kPa on. Real mud may differ: nobody has tried it there.
+the mass some flippers stayed stuck from 7.5 kPa on. Real mud may differ: it has not been tried there.
 
 The target of a rocked joint leads it at rest, so that a plate that comes free is braked. The target of the lift leads
 by no more, so that the flipper does not fly up. The swing begins where the recovery ends, and the gap between their

@@ -18,7 +18,7 @@ MOVED_S = 0.02  # drives repeat an old value now and then
 LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path
 RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
-UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, whatever the velocity is
+UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, at any reported velocity
 YIELDING_NM = 0.4  # change of the torque meanwhile: more than dry friction and shakes of the bench (±0.15 N·m)
 
 

@@ -8,7 +8,7 @@ simulates:
    is a link to it.
 
 Another user may have prepared a folder, a file or a link under a name that can be guessed. Therefore each level of the
-path must belong to this user or root, and nobody else may replace it; new levels are open to this user alone, and
+path must belong to this user or root, and no other user may replace it; new levels are open to this user alone, and
 files are written without following a link.
 """
 

@@ -1,8 +1,8 @@
 """One drive in MIT mode as one joint: the newest answer, what it says of the drive, and the frames that command it.
 
 The drive sends nothing but one answer to each command, made before it executes it, so the signals have the time of the
-command as their stamp and their torque is that of the command before. No code is zero torque, so a drive that is to be
-idle is asked by the command to leave the mode, in every tick: whatever was lost, the next tick repeats it.
+command as their stamp and their torque is that of the command before. No code is zero torque, so every
+tick commands a drive that is to be idle to leave the mode; a lost command is repeated by the next tick.
 
 A Damiao's answer says whether it follows torque. A CubeMars's does not: it counts as following from its first answer
 without a fault after the command to enter, until the command to leave or a restart. drivers/answer_counter.py finds

@@ -40,7 +40,7 @@ _FLOAT = Struct("<f")
 _TORQUE_HEAD = bytes.fromhex("01000a 02208000 0d22")  # position mode; position NaN, velocity 0; torque as float
 _TORQUE_TAIL = bytes.fromhex("02230000 012b00") + QUERY  # scales of kp, kd and the integrator's limit 0
 TORQUE_BYTES = len(_TORQUE_HEAD) + _FLOAT.size + len(_TORQUE_TAIL)
-# The headers of the reply's subframes stand between the values, and one NOP behind them.
+# The headers of the reply's subframes stand between the values, and one NOP after them.
 _REPLY = Struct("<2s b 2s 2f 2s f 2s b 2s 3b 2s h s")
 _REPLY_HEADS = tuple(bytes.fromhex(head) for head in ("2100", "2e01", "2d04", "210a", "230d", "253a", "50"))
 REPLY_BYTES, FIRST_REPLY_BYTE = _REPLY.size, 0x21

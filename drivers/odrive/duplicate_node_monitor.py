@@ -2,7 +2,7 @@
 
 Two drives that both send their heartbeats make them arrive twice as often as the period says. Frames that are read in
 one tick arrived since the tick before; the earlier of the two times makes the rate a lower bound, so neither a stall of
-this program nor a burst of frames can look like a second drive, whatever the frames' stamps are. The monitor tells two
+this program nor a burst of frames can look like a second drive, even if their stamps are wrong. The monitor tells two
 heartbeat streams of equal period from one within 16 heartbeats: 0.8 s at the usual 0.1 s after the second drive
 appears. The readings of two encoders, which arrive in turns, jump back and forth between two positions, as no joint
 does: this shows within 10 readings.

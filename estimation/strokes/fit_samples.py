@@ -2,7 +2,7 @@
 
 R² is 1 - Σ w r² / Σ w τ², as R and statsmodels compute it for a line through the origin, with the travel of each batch
 as its weight w. It is large as soon as there is a torque. R² about the mean has Σ w (τ - τ̄)² in the denominator: it is
-negative where a constant torque, whatever the depth, would explain the samples better than the law does. Outliers count
+negative where a torque that is constant over depth would explain the samples better than the law does. Outliers count
 in full in both, although they count less in the fit.
 """
 

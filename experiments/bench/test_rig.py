@@ -96,7 +96,7 @@ class TestRig:
         return Sample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
     def _torque_on(self) -> bool:
-        """Return whether a drive reported closed loop before this tick, whatever the mode of the loop."""
+        """Return whether a drive reported closed loop before this tick, in any mode of the loop."""
         return any(state.closed_loop for state in self.loop.states)
 
     def _update_lateness(self, tick: Tick, states: DriveStates) -> None:

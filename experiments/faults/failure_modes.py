@@ -170,7 +170,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("voltage_silent", failing("JOINT.voltage", "off"), 1.5),
     FailureMode("drive_error", overcurrent, phases=PHASES),
     FailureMode("drive_error", watchdog_ran_out, 0.5, MOVING, "by its watchdog", no_commands=True),
-    FailureMode("drive_error", forged(Forgery.EMERGENCY_STOP), 0.5, MOVING, "by a stranger's stop"),
+    FailureMode("drive_error", forged(Forgery.EMERGENCY_STOP), 0.5, MOVING, "by another program's stop"),
     FailureMode("drive_disarmed", left_closed_loop, phases=MOVING),
     FailureMode("drive_energised", other_master, 1.0, ("idle",)),
     FailureMode("drive_restarted", restart, 2.0),

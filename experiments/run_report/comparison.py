@@ -36,7 +36,7 @@ class Difference:
 
     @property
     def is_shown(self) -> bool | None:
-        """Whether the runs differ; None where nobody can know."""
+        """Whether the runs differ; None where the logs do not show it."""
         return None if self.std_error is None else abs(self.difference) > SHOWN * self.std_error
 
 

@@ -1,4 +1,4 @@
-"""R² and residuals of the fits behind the estimates, stride by stride and by mud."""
+"""R² and residuals of the fits that the estimates come from, stride by stride and by mud."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -27,7 +27,7 @@ class Speed:
     """None where there is no pose, and no error of a single stride."""
 
     distance_m: float | None
-    duration_s: float | None  # of the strides behind the speed
+    duration_s: float | None  # of the strides that the speed is measured over
     speed_m_s: float | None
     speed_std_error_m_s: float | None
 

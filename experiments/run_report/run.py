@@ -58,7 +58,7 @@ class ReportedStride:
         return max(float(row["depth_m"]) for row in self.rows.values())
 
     def samples(self, flipper: str, name: str) -> FitSamples | None:
-        """Return the samples behind an estimate; None for a bound, or where this version would estimate otherwise."""
+        """Return the samples of a fit; None for a bound, or where this version would estimate otherwise."""
         if flipper not in self.fits:
             return None
         samples: FitSamples | None = getattr(self.fits[flipper], name)()

@@ -38,7 +38,7 @@ from firmware_host.operator.counted_nouns import counted
 
 PATIENCE_S = 900.0  # longest time of a whole walk
 UNSEEN_S = 2.0  # longest time without a pose, before or during a walk: the end of the track is unknown then
-BACKWARDS_M = 0.2  # distance behind the start; no mud pushes the body back so far
+BACKWARDS_M = 0.2  # distance before the start; no mud pushes the body back so far
 POLL_S = 0.05  # interval at which the status is checked
 PAST_END = ""  # name of the mud past the end of the trackway
 UNSEEN = "the pose of the body is lost: check that the cameras see the robot's markers"

@@ -39,7 +39,7 @@ class DeletedLog(NamedTuple):
 
 
 def new_run_id(robot: str) -> str:
-    """Returns an id that sorts by time and is a valid file name whatever the robot's name is."""
+    """Returns an id that sorts by time and is a valid file name for any name of the robot."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
     return f"{stamp}-{re.sub(r'[^A-Za-z0-9_.]+', '_', robot)[:60]}"
 

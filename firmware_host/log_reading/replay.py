@@ -61,7 +61,7 @@ class Replay:
     segment: int = 0  # of the run with which the log begins
     begin_s: float = 0.0  # on the log's own clock, which is also that of the strides
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
-    fits: tuple[StrideFits, ...] = ()  # behind the estimates, one for each stride
+    fits: tuple[StrideFits, ...] = ()  # that the estimates come from, one for each stride
     chosen_depths_m: tuple[float, ...] = ()  # after each stride, by the robot itself; NaN where the log does not say
 
 

@@ -36,7 +36,7 @@ Method = Callable[[dict[str, Any], Caller], Any]
 
 
 def validated(name: str, method: Method) -> Method:
-    """Return the method behind the validation of its parameters, which raises RefusedError."""
+    """Wrap the method in the validation of its parameters, which raises RefusedError."""
     return lambda params, caller: method(METHODS[name].read(params), caller)
 
 

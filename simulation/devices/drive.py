@@ -42,7 +42,7 @@ class SimulatedDriveParameters:
     overspeed_fraction: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # of the velocity limit that trips; ODrive: 1.2
     temperature_c: Annotated[float, Bounds(-50.0, 200.0)] = 30.0
     bus_voltage_v: Annotated[float, Bounds(0.0, 100.0)] = 24.0
-    motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor's own clip, whatever limit the bus sets
+    motor_current_limit_a: Annotated[float, Bounds(0.0, inf)] = inf  # the motor clips at it, at any limit from the bus
     current_limit_a: Annotated[float, Bounds(0.1, 200.0)] = 12.0  # in the settings of a drive that has it there
     timeout_mode: Annotated[int, Bounds(0, 15)] = 12  # moteus: what it does once its watchdog has expired
     serial_number: str = ""

@@ -1,7 +1,7 @@
 """A pseudo-terminal that stands in for a serial adapter: a device writes to one end, any program opens the other.
 
 A link with a fixed name, as under /dev/serial/by-id, points to the program's end while the device is plugged in. What
-finds the program's buffer full is lost, as on a real line that nobody reads.
+finds the program's buffer full is lost, as on a real line without a reader.
 """
 
 import fcntl

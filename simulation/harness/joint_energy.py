@@ -1,4 +1,4 @@
-"""Measures the energy that the motors' torque puts into each joint, whatever the controller believes.
+"""Measures the energy that the motors' torque puts into each joint, independently of the controller's estimates.
 
 The work of a motor is the integral of its true torque over the true path of its joint. Its sum may fall, because a
 braking motor takes energy out, so the energy of a failure is the largest rise of that sum over any interval since the

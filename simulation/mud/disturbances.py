@@ -23,7 +23,7 @@ Measured in the authors' raw logs, where not stated otherwise:
 
 Infrequent messages disturb more than the estimator here, where the joints' loop is closed over the bus: with the
 default gains it rings from a period of 5 ms on and oscillates by itself from 7 ms on. LAB therefore leaves the period
-to the drives. A test that wants repeated samples in the estimator alone repeats them behind the loop.
+to the drives. A test that wants repeated samples in the estimator alone repeats them after the loop.
 
 A stroke is a stay in the mud that reached 5 mm. When the plate has left the mud, new amounts are drawn for the next
 stroke. The draws do not depend on which disturbances are on.
@@ -54,7 +54,7 @@ class Disturbances:
     surface_sd_m: Annotated[float, Bounds(0.0, 0.01)] = 0.0
     current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.0  # 0: the drive's own
     sample_period_s: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # of angle, and of current; 0: the drive's own
-    current_limit_a: Annotated[float, Bounds(0.0, 200.0)] = 0.0  # of the motor, whatever the bus allows; 0: none
+    current_limit_a: Annotated[float, Bounds(0.0, 200.0)] = 0.0  # of the motor itself; 0: none
     shaken_fraction: Annotated[float, Bounds(0.0, 1.0)] = 0.0  # of the clinging weight
     trial_surface_sd_m: Annotated[float, Bounds(0.0, 0.01)] = 0.0
     sweep_friction_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0

@@ -1,7 +1,7 @@
 """How a stage covers a distance: driven by a controller with ramps, or pushed by hand with uneven speed and rests.
 
 A hand pushes at one speed for a few millimetres and at another for the next ones, changes between them with the
-acceleration of an arm, and sometimes rests. Its speeds, distances and rests are assumptions: nobody has measured one.
+acceleration of an arm, and sometimes rests. Its speeds, distances and rests are assumptions; none was measured.
 """
 
 from bisect import bisect_right

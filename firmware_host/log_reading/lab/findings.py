@@ -10,7 +10,6 @@ class FindingKind(StrEnum):
     EMPTY_CELL = "empty cell"  # NaN
     ROW_DROPPED = "row dropped"
     MISSING_SETTING = "missing setting"
-    MISSING_COLUMN = "missing column"
     UNKNOWN_STATE = "unknown state"
     TIME = "time"
     STUCK_SIGNAL = "stuck signal"

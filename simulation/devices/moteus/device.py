@@ -211,7 +211,7 @@ class SimulatedMoteus:
         return answer_frame(self.parameters.node_id, registers.padded(b""))
 
     def forge_torque(self, torque_nm: float) -> Frame:
-        """Asks for nothing: the stranger's answers would not be this program's."""
+        """Asks for nothing: the answers would go to the other program, not to this one."""
         data = codec.encode_torque(self.parameters.sign * torque_nm).removesuffix(codec.QUERY)
         return command_frame(self.parameters.node_id, registers.padded(data))
 
