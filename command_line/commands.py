@@ -29,6 +29,7 @@ COMMANDS = {  # module of options/ -> command -> function, help
             "Undo the installation; configuration and logs stay.",
         ),
     },
+    "drives": {"drives": ("", "Find and set up motor drives, while the daemon does not run.")},
     "simulation": {
         "demo": ("demo.demo.demo", "Walk a simulated robot over three muds, in real time."),
         "simulate": ("simulate.simulate", "Simulate the robot on a bus until Ctrl-C."),

@@ -30,6 +30,7 @@ SCHEMAS = {  # what prints it -> version
     "error": 1,
     "failures": 1,
     "demo": 1,
+    "drives-find": 1,
     "replay": 1,
     "log-comparison": 1,
     "log-info": 2,

@@ -7,18 +7,24 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from control.limits import JointLimits
 from control.records import JOINTS
+from drivers.bench.drive_bench import DriveBench
 from drivers.can.bus_load import FrameRate
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.drive import FD, DriveParameters, DriveType, FrameContent, WatchdogEndpoints
 from drivers.drives import Drives
+from drivers.mit.bench import MitBench
 from drivers.mit.drive_type import Mit
+from drivers.moteus.bench import MoteusBench
 from drivers.moteus.drive_type import Moteus
+from drivers.odrive.bench import OdriveBench
 from drivers.odrive.drive_type import Odrive
 from drivers.transmit_gate import TransmitGate
 
 DEFAULT = "odrive"
 DRIVE_TYPES: Mapping[str, DriveType] = {"odrive": Odrive(), "moteus": Moteus(), "mit": Mit()}
+# In the order in which a bus is searched: the questions of the first disturb no other drive.
+DRIVE_BENCHES: Mapping[str, DriveBench] = {"odrive": OdriveBench(), "mit": MitBench(), "moteus": MoteusBench()}
 
 
 def type_of(parameters: DriveParameters) -> DriveType:

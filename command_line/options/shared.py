@@ -31,6 +31,13 @@ def default_socket() -> Path:
     return simulated if simulated.exists() else service
 
 
+def default_configuration() -> Path:
+    """Returns the daemon's configuration; where there is none, that of `mudskipper simulate`."""
+    configured, folder = Path(DEFAULT_CONFIG), find_run_folder()
+    simulated = folder / SIMULATED / configured.name if folder else configured
+    return simulated if simulated.exists() and not configured.exists() else configured
+
+
 def add_socket(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--socket",

@@ -1,0 +1,65 @@
+"""Opens the buses for the commands on drives, which never share them with the daemon."""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+from drivers.bench.bench_port import BenchPort
+from drivers.can.bus_lock import BusRole
+from firmware_host.buses import BusError, lock_buses, open_ports
+from firmware_host.configuration.configuration import BusParameters, Configuration
+from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.toml_records import ConfigurationError
+
+FD_RATE_KBIT_S = 5000
+STOP_DAEMON = "If that is the daemon: 'systemctl stop mudskipper', with the robot disarmed."
+
+
+class OpenedBus(NamedTuple):
+    """One bus, and what the bench needs to know about it."""
+
+    name: str
+    parameters: BusParameters
+    port: BenchPort
+
+    @property
+    def carries_fd(self) -> bool:
+        return self.parameters.data_bit_rate_kbit_s > 0
+
+
+def chosen_buses(options: argparse.Namespace) -> tuple[dict[str, BusParameters], Configuration | None]:
+    """Returns the buses that the options name, and the configuration, where it is used. Raises ConfigurationError."""
+    if options.interface or options.channel:
+        if not (options.interface and options.channel):
+            raise ConfigurationError(
+                ["--interface and --channel belong together: --interface socketcan --channel can0"]
+            )
+        rate_kbit_s = FD_RATE_KBIT_S if options.fd else 0
+        return {options.channel: BusParameters(options.interface, options.channel, {}, 1000, rate_kbit_s)}, None
+    configuration = load_configuration(options.config)
+    for name in options.bus or ():
+        if name not in configuration.bus:
+            raise ConfigurationError([f"--bus {name}: {options.config} has {', '.join(configuration.bus)}"])
+    return {
+        name: bus for name, bus in configuration.bus.items() if name in (options.bus or configuration.bus)
+    }, configuration
+
+
+@contextmanager
+def opened_buses(buses: dict[str, BusParameters]) -> Iterator[list[OpenedBus]]:
+    """Yields the buses; no other program of this computer can command their drives meanwhile. Raises BusError."""
+    try:
+        locks = lock_buses(buses, BusRole.COMMANDS)
+    except BusError as problem:
+        raise BusError(f"{problem}. {STOP_DAEMON}") from problem
+    with locks:
+        ports = open_ports(buses)
+        try:
+            yield [OpenedBus(name, buses[name], make_bench_port(ports[name])) for name in buses]
+        finally:
+            for port in ports.values():
+                port.close()
+
+
+make_bench_port = BenchPort  # a test replaces it by one with a simulated clock

@@ -1,0 +1,37 @@
+"""Options of the commands on motor drives, while the daemon does not run."""
+
+import argparse
+from pathlib import Path
+
+from command_line.options.shared import Commands, add, add_json, default_configuration
+from drivers.drive_types import DRIVE_BENCHES
+
+Parser = argparse.ArgumentParser
+
+
+def add_drives(drives: Parser) -> None:
+    actions = drives.add_subparsers(dest="action", required=True, metavar="action")
+    _add_find(actions)
+
+
+def _add_find(actions: Commands) -> None:
+    find = add(actions, "find", "drives.find.find", "List the drives that answer on the buses.")
+    _add_configuration(find)
+    add_json(find)
+    find.add_argument("--bus", action="append", metavar="NAME", help="configured bus, repeatable (default: all)")
+    find.add_argument("--interface", metavar="NAME", help="of python-can, such as socketcan, without a configuration")
+    find.add_argument("--channel", metavar="NAME", help="of that interface, such as can0")
+    find.add_argument("--fd", action="store_true", help="that interface carries CAN FD")
+    find.add_argument(
+        "--type", action="append", choices=tuple(DRIVE_BENCHES), help="ask drives of this type alone, repeatable"
+    )
+
+
+def _add_configuration(parser: Parser) -> None:
+    parser.add_argument(
+        "--config",
+        type=Path,
+        default=default_configuration(),
+        metavar="FILE",
+        help="of the robot (default: that of the daemon, or of the simulated robot)",
+    )

@@ -1,0 +1,85 @@
+"""Finds ODrives: by their heartbeats, and by remote frames that ask every id for its version and serial number.
+
+A remote frame carries no data, so no drive takes it for a command. Firmware 0.5 has no version message and ignores the
+request; it would take the request for a serial number for a new id, so only drives that reported firmware 0.6 get that
+one. Id 63 is that of a board without an id yet (firmware 0.6.9). Source: ODrive's CANSimple documentation, and
+examples/can_enumerate.py of odriverobotics/ODriveResources.
+"""
+
+from collections.abc import Iterable, Sequence
+
+from drivers.bench.bench_port import BenchPort
+from drivers.bench.drive_bench import FoundDrive
+from drivers.can.frames import Frame, MalformedMessageError
+from drivers.odrive import codec
+from drivers.odrive.codec import Message, arbitration_id
+from drivers.odrive.drive_settings import SUPPORTED
+
+NAME = "odrive"
+IDS = range(64)
+NO_ID = 63
+
+
+class OdriveBench:
+    """Implements DriveBench."""
+
+    is_fd = False
+    disturbs = ""
+
+    def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
+        return {
+            frame.arbitration_id >> 5
+            for frame in _of_odrives(frames)
+            if _is_message(frame, codec.HEARTBEAT) and len(frame.data) == 8
+        }
+
+    def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
+        answers = port.ask_all(_request(node_id, codec.GET_VERSION) for node_id in IDS)
+        versions = {each.arbitration_id >> 5: each.data for each in answers if _has_version(each)}
+        numbers = self._serial_numbers(port, [each for each in versions if _version(versions[each])[4:6] == SUPPORTED])
+        return [
+            _found(node_id, versions.get(node_id), number)
+            for node_id in sorted(versions.keys() | heard)
+            for number in sorted(numbers.get(node_id, {""}))
+        ]
+
+    def _serial_numbers(self, port: BenchPort, node_ids: Sequence[int]) -> dict[int, set[str]]:
+        numbers: dict[int, set[str]] = {}
+        for frame in port.ask_all(_request(node_id, codec.ADDRESS) for node_id in node_ids):
+            if _is_message(frame, codec.ADDRESS) and len(frame.data) in (7, 8):
+                numbers.setdefault(frame.arbitration_id >> 5, set()).add(codec.decode_serial_number(frame.data))
+        return numbers
+
+
+def _found(node_id: int, version: bytes | None, number: str) -> FoundDrive:
+    if version is None:
+        reason = "it sends a heartbeat and answers no request for its version: firmware 0.5 or older"
+        return FoundDrive(NAME, node_id, problem=reason)
+    fields = _version(version)
+    firmware, hardware = (".".join(map(str, fields[part])) for part in (slice(4, 7), slice(1, 4)))
+    problem = "" if fields[4:6] == SUPPORTED else f"firmware {firmware} is not supported: needs 0.6"
+    problem = "it has no id yet: set axis0.config.can.node_id" if node_id == NO_ID else problem
+    return FoundDrive(NAME, node_id, hardware, firmware, number, problem)
+
+
+def _request(node_id: int, message: Message) -> Frame:
+    return Frame(arbitration_id(node_id, message), is_remote=True)
+
+
+def _of_odrives(frames: Iterable[Frame]) -> Iterable[Frame]:
+    return (frame for frame in frames if not (frame.is_extended or frame.is_fd or frame.is_error or frame.is_remote))
+
+
+def _is_message(frame: Frame, message: Message) -> bool:
+    return any(_of_odrives([frame])) and frame.arbitration_id & codec.LAST_COMMAND == message.command
+
+
+def _has_version(frame: Frame) -> bool:
+    try:
+        return _is_message(frame, codec.GET_VERSION) and bool(_version(frame.data))
+    except MalformedMessageError:
+        return False
+
+
+def _version(data: bytes) -> tuple[int, ...]:
+    return codec.GET_VERSION.decode(data)

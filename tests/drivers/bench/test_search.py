@@ -1,0 +1,178 @@
+"""A search of a bus finds every drive, names ids that answer twice, and never sends a frame that commands torque."""
+
+from __future__ import annotations
+
+import pytest
+
+from control.limits import JointLimits
+from drivers.bench.search import expectation_problems, id_problems, search
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus
+from drivers.drive_types import DRIVE_BENCHES, DRIVE_TYPES
+from drivers.mit import codec as mit
+from drivers.odrive import codec as odrive
+from drivers.odrive.parameters import OdriveParameters
+from drivers.transmit_gate import TransmitGate
+from simulation.devices.drive import Forgery
+from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
+
+ANY_ID = {"odrive": 5, "moteus": 5, "mit": 5}
+
+
+def found(bus: SimulatedBus, fd: bool = True, chosen: tuple[str, ...] = ()) -> list[tuple[object, ...]]:
+    return [each[:5] for each in search(bus.bench_port(), DRIVE_BENCHES, fd, chosen).found]
+
+
+def test_odrives_are_found_with_firmware_and_serial_number() -> None:
+    bus = SimulatedBus(simulated("odrive", 0, "385f324d3037"), simulated("odrive", 62, "385f324d3038"))
+    assert found(bus) == [
+        ("odrive", 0, "0.0.0", "0.6.11", "385f324d3037"),
+        ("odrive", 62, "0.0.0", "0.6.11", "385f324d3038"),
+    ]
+
+
+def test_moteus_drives_are_found_at_both_ends_of_their_ids() -> None:
+    serials = ("0123456789abcdef01234567", "89abcdef0123456789abcdef")
+    bus = SimulatedBus(simulated("moteus", 1, serials[0]), simulated("moteus", 126, serials[1]))
+    assert found(bus) == [
+        ("moteus", 1, "model 0", "1.1.0", serials[0]),
+        ("moteus", 126, "model 0", "1.1.0", serials[1]),
+    ]
+
+
+def test_a_damiao_is_found_with_the_models_of_its_ranges_and_a_cubemars_without_registers() -> None:
+    bus = SimulatedBus(simulated("mit", 1, "0badcafe", model="DM8009"), simulated("mit", 15, model="AK80-9"))
+    assert found(bus) == [
+        ("mit", 1, "DM8009", "5013", "0badcafe"),
+        ("mit", 15, "a CubeMars, or firmware without registers", "", ""),
+    ]
+
+
+def test_ranges_of_no_model_are_a_problem() -> None:
+    bus = SimulatedBus(simulated("mit", 1, torque_range_nm=3.3))
+    (drive,) = search(bus.bench_port(), DRIVE_BENCHES, False).found
+    assert drive.hardware == "" and "TMAX" in drive.problem
+
+
+def test_firmware_0_5_is_found_by_its_heartbeat() -> None:
+    class Old:
+        """Sends heartbeats and answers nothing."""
+
+        energised = False
+        parameters = None
+
+        def receive(self, frame: Frame, now_s: float) -> list[Frame]:
+            return []
+
+        def torque_nm(self, now_s: float) -> float:
+            return 0.0
+
+        def cyclic_frames(self, now_s: float) -> list[Frame]:
+            return [Frame(odrive.arbitration_id(7, odrive.HEARTBEAT), odrive.HEARTBEAT.encode(0, 1, 0, 0))]
+
+    (drive,) = search(SimulatedBus(Old()).bench_port(), DRIVE_BENCHES, False).found  # type: ignore[arg-type]
+    assert (drive.type, drive.node_id, drive.firmware) == ("odrive", 7, "") and "0.5" in drive.problem
+
+
+@pytest.mark.parametrize(
+    ("name", "serials"),
+    [
+        ("odrive", ("385f324d3037", "385f324d3038")),
+        ("moteus", ("0123456789abcdef01234567", "89abcdef0123456789abcdef")),
+        ("mit", ("00000001", "00000002")),
+    ],
+)
+def test_two_drives_with_one_id_are_named_with_both_serial_numbers(name: str, serials: tuple[str, str]) -> None:
+    bus = SimulatedBus(*(simulated(name, 3, serial) for serial in serials))
+    result = search(bus.bench_port(), DRIVE_BENCHES, True)
+    (problem,) = id_problems(result.found)
+    assert f"id 3 answers 2 times ({name}" in problem and all(serial in problem for serial in serials)
+
+
+def test_two_drives_without_registers_and_with_one_id_are_named() -> None:
+    bus = SimulatedBus(simulated("mit", 3, model="AK80-9"), simulated("mit", 3, model="AK80-9"))
+    (problem,) = id_problems(search(bus.bench_port(), DRIVE_BENCHES, False).found)
+    assert "id 3 answers 2 times" in problem
+
+
+def test_an_id_that_answers_in_two_protocols_is_named() -> None:
+    bus = SimulatedBus(simulated("odrive", 3), simulated("mit", 3))
+    result = search(bus.bench_port(), DRIVE_BENCHES, False, ("odrive", "mit"))
+    (problem,) = id_problems(result.found)
+    assert "id 3 answers as mit and as odrive" in problem
+
+
+def test_a_joint_whose_drive_speaks_another_protocol_is_named() -> None:
+    result = search(SimulatedBus(simulated("moteus", 3)).bench_port(), DRIVE_BENCHES, True)
+    expected = {"left_sweep": OdriveParameters("can", 3), "left_adduction": OdriveParameters("can", 4)}
+    other, silent = expectation_problems(result.found, expected)
+    assert "left_sweep" in other and "type moteus answers" in other
+    assert "left_adduction" in silent and "nothing answers" in silent
+
+
+def test_another_serial_number_than_the_configured_one_is_named() -> None:
+    result = search(SimulatedBus(simulated("odrive", 3, "385f324d3037")).bench_port(), DRIVE_BENCHES, False)
+    (problem,) = expectation_problems(result.found, {"left_sweep": OdriveParameters("can", 3, serial_number="ab")})
+    assert "385f324d3037, not ab" in problem
+
+
+def test_where_an_odrive_answers_no_other_protocol_is_asked() -> None:
+    bus = SimulatedBus(simulated("odrive", 0))
+    result = search(bus.bench_port(), DRIVE_BENCHES, True)
+    assert set(result.not_asked) == {"mit", "moteus"}
+    assert {frame.is_remote for frame in bus.sent} == {True}
+
+
+def test_no_fd_frame_is_sent_on_a_bus_without_fd() -> None:
+    bus = SimulatedBus()
+    result = search(bus.bench_port(), DRIVE_BENCHES, False, ("moteus",))
+    assert result.not_asked == {"moteus": "the bus is configured without CAN FD"} and not bus.sent
+
+
+@pytest.mark.parametrize("name", DRIVE_BENCHES)
+def test_no_question_is_a_command_of_torque(name: str) -> None:
+    """The daemon's own gate, closed, lets every question of a search pass, and no drive follows torque after it."""
+    node_id = ANY_ID[name]
+    bus = SimulatedBus(simulated(name, node_id))
+    search(bus.bench_port(), DRIVE_BENCHES, True, (name,))
+    parameters = DRIVE_TYPES[name].parameters(bus="can", node_id=node_id, type=name, serial_number="1")
+    gate = TransmitGate(JointLimits())
+    outlet = gate.outlet(MockBus().open(), [DRIVE_TYPES[name].gate_table(parameters)])
+    content = [(frame, DRIVE_TYPES[name].read_frame(frame)) for frame in bus.sent]
+    own = [frame for frame, read in content if read and read.node_id == node_id]
+    for frame in own:
+        outlet.send(frame)
+    assert own and not gate.refused, gate.last_refusal
+    assert not bus.energised
+
+
+def test_a_damiao_as_delivered_is_found_by_its_answers_on_id_0() -> None:
+    drive = simulated("mit", 2)
+    drive._feedback_id = 0  # type: ignore[attr-defined]
+    (each,) = search(SimulatedBus(drive).bench_port(), DRIVE_BENCHES, False).found
+    assert each.node_id == 2 and "MST_ID" in each.problem
+
+
+def test_old_registers_of_a_moteus_are_a_problem() -> None:
+    class Old:
+        energised = False
+
+        def receive(self, frame: Frame, now_s: float) -> list[Frame]:
+            asked = frame.arbitration_id & 0xFF == 4
+            return [moteus.forge(Forgery.OLD_FIRMWARE)] if asked else []
+
+        def torque_nm(self, now_s: float) -> float:
+            return 0.0
+
+        def cyclic_frames(self, now_s: float) -> list[Frame]:
+            return []
+
+    moteus = simulated("moteus", 4)
+    (drive,) = search(SimulatedBus(Old()).bench_port(), DRIVE_BENCHES, True).found  # type: ignore[arg-type]
+    assert "register map 4" in drive.problem
+
+
+def test_the_questions_of_mit_mode_are_those_that_leave_it() -> None:
+    bus = SimulatedBus()
+    search(bus.bench_port(), DRIVE_BENCHES, False, ("mit",))
+    assert {frame.data for frame in bus.sent} == {mit.LEAVE}
