@@ -46,6 +46,11 @@ class DriveParameters:
 
     serial_digits: ClassVar[int] = 12  # hexadecimal ones, of a serial number of this type of drive
 
+    @property
+    def reports_settings(self) -> bool:
+        """Whether its protocol can read the drive's watchdog, version and serial number back."""
+        return True
+
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         """Yields reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
         if self.current_limit_a < torque_nm / self.torque_constant_nm_a:

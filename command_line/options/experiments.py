@@ -266,4 +266,4 @@ def _add_faults(names: Commands) -> None:
     option("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
     option("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
     option("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
-    option("--drive", default="odrive", metavar="TYPE", help="type of the robot's drives (default: odrive)")
+    option("--drive", default="odrive", metavar="TYPE", help="type of the robot's drives, such as mit:AK80-9")

@@ -30,11 +30,17 @@ class MitParameters(DriveParameters):
         model = MODELS[self.model]
         return model._replace(torque_nm=self.torque_range_nm) if self.torque_range_nm else model
 
+    @property
+    def reports_settings(self) -> bool:
+        return self.ranges.has_registers
+
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         yield from super().torque_problems(torque_nm)
         if self.model not in MODELS:
             yield f"model = {self.model!r}", f"must be one of {', '.join(MODELS)}"
             return
+        if self.serial_number and not self.reports_settings:
+            yield f"serial_number = {self.serial_number!r}", f"must be empty: that of an {self.model} cannot be read"
         if self.torque_range_nm and not MODELS[self.model].has_registers:
             yield f"torque_range_nm = {self.torque_range_nm:g}", f"must be 0: that of an {self.model} is fixed"
         elif self.ranges.torque_nm < torque_nm:

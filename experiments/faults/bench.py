@@ -86,6 +86,14 @@ class FaultBench(Lockstep):
             with redirect_stderr(StringIO()):
                 end_safely(self.loop, problem)
 
+    @property
+    def forced(self) -> bool:
+        """Return whether the robot is armed by force, because the watchdog of a drive cannot be read."""
+        return not all(drive.reports_settings for drive in self.loop.configuration.drive.values())
+
+    def arm(self, forced: bool = False) -> None:
+        super().arm(forced or self.forced)
+
     @contextmanager
     def every_step(self, act: Act) -> Iterator[None]:
         """Call `act` in every step within this context."""

@@ -17,9 +17,10 @@ from drivers.drive_types import DEFAULT
 from experiments.faults.bench import FaultBench
 from experiments.faults.energy_bounds import DELAY_TICKS, SLEWING_TICKS, WATCHDOG_TICKS
 from experiments.faults.evaluation import LONGEST_STOP_S, Cell, problems
-from experiments.faults.failure_modes import BY_NAME, REPORTED_S, FailureMode
+from experiments.faults.failure_modes import REPORTED_S, FailureMode
 from experiments.faults.motor_energy import MotorEnergy
 from experiments.faults.phases import bench_for, enter_phase
+from experiments.faults.protocol_differences import mode_of
 
 STRICTNESS = {  # arming has no torque yet
     Mode.BOOT: 4, Mode.IDLE: 4, Mode.FAULT: 4, Mode.DAMPING: 3, Mode.STOPPING: 2, Mode.HOLD: 1, Mode.ARMING: 1,
@@ -33,11 +34,11 @@ WALKED_ON_S = 0.3  # with a fault that does not stop the robot
 
 def run_cell(name: str, phase: str, seed: int, drive: str = DEFAULT) -> Cell:
     """Run one cell, which depends on nothing but its arguments; `drive` is the type of the robot's drives."""
-    mode, random = BY_NAME[name], Random(f"{name} {phase} {seed}")
+    mode, random = mode_of(name, drive), Random(f"{name} {phase} {seed}")
     joint = random.choice(mode.joints(phase))
     cell = Cell(mode.fault, name, phase, seed, joint, _reaction_text(mode), _bound_ticks(mode))
     try:
-        _inject_and_measure(mode, cell, random, mode.drive or drive)
+        _inject_and_measure(mode, cell, random, drive)
     except Exception as problem:  # noqa: BLE001 - an escaped exception is a result of the cell
         cell.exception = f"{type(problem).__name__}: {problem}"
         cell.why.append(f"an exception escaped: {cell.exception}")
@@ -56,13 +57,13 @@ def _inject_and_measure(mode: FailureMode, cell: Cell, random: Random, drive: st
 
 
 def _reaction_text(mode: FailureMode) -> str:
-    if mode.kind:
+    if mode.kind and not mode.waived:
         return mode.kind.reaction.name.lower()
     return "drives_idle" if mode.ends_loop else "none"
 
 
 def _bound_ticks(mode: FailureMode) -> int | None:
-    if mode.kind:
+    if mode.kind and not mode.waived:
         return mode.bound_ticks or mode.kind.bound_ticks
     if not mode.ends_loop:
         return None
@@ -151,10 +152,11 @@ class Measurement:
         if self._cell.reported_ticks is not None:
             return
         loop = self._bench.loop
-        if any(fault.kind is kind for fault in loop.faults.present):
+        if any(fault.name in self._failure_mode.names for fault in loop.faults.present):
             self._cell.reported_ticks = self._ticks
             refusing = self._cell.phase == "idle" and _blocks_arming(kind)
-            if refusing and loop.request(Request.ARM, self._bench.now_s) is None:
+            forced = self._bench.forced and kind.blocks is not Blocks.UNLESS_FORCED
+            if refusing and loop.request(Request.ARM, self._bench.now_s, forced=forced) is None:
                 self._cell.why.append("arming was not refused")
 
     # the robot

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 
 from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
 from control.faults import Blocks, FaultKind, Reaction
@@ -52,17 +53,18 @@ def problems(cell: Cell, mode: FailureMode) -> Iterator[str]:
         if cell.reported:
             yield f"without a failure it reported {', '.join(cell.reported)}"
         return
-    if not mode.demands_reaction:
+    if mode.waived or not mode.demands_reaction:
         return
     yield from _late(cell)
-    others = set(cell.reported) - {cell.fault, *cell.true_too, *CONSEQUENCES.get(cell.fault, ())}
+    expected = {*mode.names, *mode.also, *chain.from_iterable(CONSEQUENCES.get(name, ()) for name in mode.names)}
+    others = set(cell.reported) - expected.union(cell.true_too)
     if others:
         yield f"it also reported {', '.join(sorted(others))}"
     if mode.kind is None or mode.kind.reaction >= Reaction.SOFT_STOP:
         yield from _not_stopped(cell)
     elif mode.kind.reaction <= Reaction.WARN and cell.phase != "idle" and not _goes_on(cell, mode.kind):
         yield f"a warning ended in mode {cell.mode}"
-    if mode.kind and cell.fault not in cell.reported:
+    if mode.kind and not set(mode.names) & set(cell.reported):
         yield "the log has no event of the fault"
 
 

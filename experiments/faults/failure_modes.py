@@ -74,7 +74,10 @@ class FailureMode:
     demands_reaction: bool = True  # False: any reaction will do, as long as no motor puts in too much energy
     torque_nm: float = 0.0  # of another program's commands, above the torque limit
     loses_rows: bool = False  # of the log
-    drive: str = ""  # the only type of drives with which it can occur; empty: any
+    instead: tuple[str, ...] = ()  # faults that a protocol may report in its place
+    also: tuple[str, ...] = ()  # faults that may be reported as well, because with this protocol they are true too
+    waived: bool = False  # the protocol cannot show it, so any reaction will do, and none
+    why: str = ""  # of what differs with this protocol
 
     @property
     def name(self) -> str:
@@ -98,6 +101,11 @@ class FailureMode:
     @property
     def kind(self) -> FaultKind | None:
         return FAULT_KINDS.get(self.fault)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The faults as one of which it may be reported."""
+        return self.fault, *self.instead
 
 
 BUGGY_METHODS = {  # of the loop, by the part of the tick in which the method is called
@@ -177,7 +185,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode("drive_version", forged(Forgery.OLD_FIRMWARE), phases=("idle", "stance")),
     FailureMode("duplicate_node_id", duplicate(0.3), 1.6),
     FailureMode("wrong_drive", forged(Forgery.OTHER_DRIVE), phases=("idle",)),
-    FailureMode("drive_settings", forged(Forgery.OTHER_SETTING), 2.5, ("idle",), drive="moteus"),
+    FailureMode("drive_settings", forged(Forgery.OTHER_SETTING), 2.5, ("idle",)),
     FailureMode("foreign_commands", commanded_by_another(0.3, every=2, heard=True), 1.0),
     FailureMode(
         "setpoint_mismatch", commanded_by_another(1.0, every=10, heard=False), 1.0, MOVING, "every tenth command"
@@ -185,8 +193,8 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     FailureMode(
         "setpoint_mismatch", commanded_by_another(-0.4, every=2, heard=False), 1.0, MOVING, "every second command"
     ),
-    FailureMode("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",), drive="odrive"),
-    FailureMode("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance"), drive="odrive"),
+    FailureMode("watchdog_unknown", forged(Forgery.STARTING), phases=("idle",)),
+    FailureMode("watchdog_off", forged(Forgery.WATCHDOG_OFF), phases=("idle", "stance")),
     # buses
     FailureMode("bus_warning", failing("bus.BUS", "warning")),
     FailureMode("bus_passive", failing("bus.BUS", "passive")),

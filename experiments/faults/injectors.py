@@ -11,6 +11,8 @@ from math import copysign
 from typing import Any
 
 from control.modes import Mode
+from drivers.can.frames import Frame
+from drivers.drive_types import type_of
 from experiments.faults.bench import FaultBench
 from simulation.devices.drive import DriveError, Forgery
 from simulation.devices.foreign_master import ForeignMaster
@@ -57,6 +59,22 @@ def failing(component: str, kind: str) -> Injector:
         bench.failures.end(name)
 
     return inject
+
+
+@contextmanager
+def unheard(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Lose everything that the drive sends; commands reach it."""
+    own = bench.loop.configuration.drive[joint]
+    port = bench.loop.drives.ports[own.bus]
+    receive = port.receive
+
+    def is_lost(frame: Frame) -> bool:
+        content = type_of(own).read_frame(frame)
+        return content is not None and content.node_id == own.node_id and not content.is_command
+
+    vars(port)["receive"] = lambda: [frame for frame in receive() if not is_lost(frame)]
+    yield
+    del vars(port)["receive"]
 
 
 # in a drive

@@ -18,7 +18,7 @@ def lease_hung_up(bench: FaultBench, joint: str) -> None:
     """Close the connection of the lease holder; where torque is off, right after a request to arm."""
     bench.loop.lease.renew("operator", bench.now_s, 10.0)
     if bench.loop.mode is Mode.IDLE:
-        bench.loop.request(Request.ARM, bench.now_s)
+        bench.loop.request(Request.ARM, bench.now_s, forced=bench.forced)
     bench.loop.lease.hang_up("operator")
 
 

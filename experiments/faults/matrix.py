@@ -5,18 +5,20 @@ it. The seed draws the mud, the joint, and the tick within the phase. The fields
 summary in JSON.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
-from drivers.drive_types import DEFAULT, DRIVE_TYPES
+from drivers.drive_types import DEFAULT
 from experiments.faults.cell import run_cell
 from experiments.faults.evaluation import Cell
-from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES
+from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
 from experiments.faults.phases import PHASES
+from experiments.faults.protocol_differences import differences
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Show
+from simulation.harness.drive_presets import DRIVES
 
 FAULTS = tuple(dict.fromkeys(mode.fault for mode in FAILURE_MODES))
 
@@ -35,26 +37,37 @@ class Plan:
     faults: tuple[str, ...] = FAULTS
     phases: tuple[str, ...] = PHASES
     seeds: int = 1
-    drive: str = DEFAULT  # the type of the robot's drives
+    drive: str = DEFAULT  # of the robot, as in `with_drive_type`
 
     def __post_init__(self) -> None:
         """Raises ValueError for an unknown fault, phase or type of drive."""
-        given = (("fault", self.faults, FAULTS), ("phase", self.phases, PHASES), ("drive", (self.drive,), DRIVE_TYPES))
+        given = (("fault", self.faults, FAULTS), ("phase", self.phases, PHASES), ("drive", (self.drive,), DRIVES))
         for what, names, known in given:
             for name in names:
                 if name not in known:
                     raise ValueError(f"{what} {name!r}: must be one of {', '.join(known)}")
 
     @property
+    def modes(self) -> list[FailureMode]:
+        return [mode for mode in FAILURE_MODES if mode.fault in self.faults and set(mode.phases) & set(self.phases)]
+
+    @property
     def cells(self) -> list[CellKey]:
+        table = differences(self.drive)
         return [
             CellKey(mode.name, phase, seed, self.drive)
             for seed in range(1, self.seeds + 1)
-            for mode in FAILURE_MODES
-            if mode.fault in self.faults
+            for mode in self.modes
+            if mode.name not in table or table[mode.name].exists
             for phase in self.phases
             if phase in mode.phases
         ]
+
+    @property
+    def differences(self) -> dict[str, str]:
+        """What differs with this type of drive, by failure mode."""
+        table = differences(self.drive)
+        return {mode.name: table[mode.name].text for mode in self.modes if mode.name in table}
 
 
 @dataclass(frozen=True)
@@ -81,6 +94,7 @@ class ModeSummary:
 class Settings:
     seeds: int
     phases: Sequence[str]
+    drive: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +103,7 @@ class FaultsReport:
     cells: Sequence[Cell]
     faults: Sequence[ModeSummary]
     ok: int
+    differences: Mapping[str, str]  # of this type of drive from the table of failure modes, with the reasons
     settings: Settings
 
 
@@ -105,7 +120,8 @@ def report_of(plan: Plan, cells: Sequence[Cell]) -> FaultsReport:
         cells=cells,
         faults=[_summary(own) for own in by_mode.values() if own],
         ok=sum(cell.ok for cell in cells),
-        settings=Settings(plan.seeds, plan.phases),
+        differences=plan.differences,
+        settings=Settings(plan.seeds, plan.phases, plan.drive),
     )
 
 

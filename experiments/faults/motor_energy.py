@@ -48,7 +48,7 @@ class MotorEnergy:
         mode, bounds = self._failure_mode, self._bounds
         if mode.ends_loop:
             return bounds.stopping_j(WATCHDOG_TICKS, Reaction.DRIVES_IDLE)
-        if mode.kind and mode.kind.reaction in STOPPING:
+        if mode.kind and mode.kind.reaction in STOPPING and not mode.waived:
             ticks = WATCHDOG_TICKS if mode.no_commands else 0
             return bounds.stopping_j(max(detection_ticks(mode.kind), ticks), mode.kind.reaction)
         kinds = (FAULT_KINDS[name] for name in reported)

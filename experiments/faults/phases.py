@@ -50,6 +50,8 @@ def _configuration(hopeless: bool, drive_type: str) -> Configuration:
     usual = configuration_of(WALKING, drive_type)
     drives = {
         joint: replace(drive, serial_number=f"{drive.node_id:0{drive.serial_digits}x}")
+        if drive.reports_settings
+        else drive
         for joint, drive in usual.drive.items()
     }
     configuration = replace(usual, faults=FaultBounds(), drive=drives)
@@ -63,14 +65,14 @@ def enter_phase(bench: FaultBench, phase: str, random: Random) -> None:
 
 def _to_idle(bench: FaultBench, random: Random) -> None:
     loop = bench.loop
-    _reach(bench, "idle", lambda: loop.mode is Mode.IDLE and not loop.faults.blocking())
+    _reach(bench, "idle", lambda: loop.mode is Mode.IDLE and not loop.faults.blocking(bench.forced))
     _wait(bench, random, 100)
 
 
 def _to_arming(bench: FaultBench, random: Random) -> None:
     """Stop in a tick before closed loop is requested, or while drives enter it, which takes 1 to 38 ticks."""
     _to_idle(bench, random)
-    bench.loop.request(Request.ARM, bench.now_s)
+    bench.loop.request(Request.ARM, bench.now_s, forced=bench.forced)
     for _ in range(random.randint(0, 8)):
         if bench.loop.mode is not Mode.HOLD:
             bench.step()

@@ -38,4 +38,5 @@ def faults_text(report: FaultsReport) -> str:
         for cell in report.cells
         if not cell.ok
     ]
-    return "\n".join([table([HEAD, *rows]), "", *failed, f"{report.ok} of {len(report.cells)} cells ok"])
+    different = [f"{name} with {report.settings.drive}: {text}" for name, text in report.differences.items()]
+    return "\n".join([table([HEAD, *rows]), "", *different, *failed, f"{report.ok} of {len(report.cells)} cells ok"])

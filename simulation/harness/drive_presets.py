@@ -12,17 +12,23 @@ import tomlkit
 
 from control.bounds import Bounds
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
+from drivers.mit.models import MODELS
 
+DRIVES = (*DRIVE_TYPES, *(f"mit:{model}" for model in MODELS))  # types of drive, and models of motor
 DATA_BIT_RATE_KBIT_S = 5000
 # Answers to questions are a whole tick old. With the default damping (0.06 and 0.08) joints oscillate after a flipper
 # has broken free at full torque.
 DAMPING = {"sweep_damping_nm_s_rad": 0.075, "adduction_damping_nm_s_rad": 0.1}
 
 
-def with_drive_type(text: str, name: str) -> str:
-    """Returns the text of the configuration with this type for every joint. The default type returns it unchanged."""
-    if name == DEFAULT:
+def with_drive_type(text: str, drive: str) -> str:
+    """Returns the text of the configuration with this type for every joint: "mit", or with a model "mit:AK80-9".
+
+    The default type returns it unchanged.
+    """
+    if drive == DEFAULT:
         return text
+    name, _, model = drive.partition(":")
     document: dict[str, Any] = tomlkit.parse(text)
     parameters = DRIVE_TYPES[name].parameters
     known = {field.name for field in fields(parameters)} - {"torque_constant_nm_a"}
@@ -32,6 +38,8 @@ def with_drive_type(text: str, name: str) -> str:
         for key in [key for key in table if key not in known]:
             del document["drive"][joint][key]
         table["type"] = name
+        if model:
+            table["model"] = model
         table["node_id"] += round(bounds.minimum)
     if DRIVE_TYPES[name].kind.is_fd:
         for bus in document["bus"].values():

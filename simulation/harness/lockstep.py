@@ -143,10 +143,10 @@ class Lockstep:
             self.step()
         return done()
 
-    def arm(self) -> None:
+    def arm(self, forced: bool = False) -> None:
         """Goes from power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
-        self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(), 3.0)
-        refused = self.loop.request(Request.ARM, self.now_s)
+        self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(forced), 3.0)
+        refused = self.loop.request(Request.ARM, self.now_s, forced=forced)
         if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
             raise RuntimeError(refused or f"not armed: {self.loop.fault}")
 

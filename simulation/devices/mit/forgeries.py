@@ -7,10 +7,11 @@ from simulation.devices.drive import Forgery
 from simulation.devices.mit.registers import encode_value, write_frame
 
 FORGED_COMMANDS = {Forgery.EMERGENCY_STOP: codec.LEAVE, Forgery.CLOSE_LOOP: codec.ENTER}
-FORGED_WRITES = {Forgery.WATCHDOG_OFF: (TIMEOUT, 0.0), Forgery.OTHER_SETTING: (TMAX, 3.0)}
+FORGED_WRITES = {Forgery.OTHER_SETTING: (TMAX, 3.0)}
 FORGED_ANSWERS = {  # a drive that starts has no firmware version yet
     Forgery.OLD_FIRMWARE: (SOFTWARE, 0.0),
     Forgery.STARTING: (SOFTWARE, 0.0),
+    Forgery.WATCHDOG_OFF: (TIMEOUT, 0.0),
     Forgery.OTHER_DRIVE: (SERIAL, float(0xABCDEF)),
 }
 

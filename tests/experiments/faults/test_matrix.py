@@ -25,14 +25,17 @@ from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
 from experiments.faults.loop_injectors import bug_in, nothing
 from experiments.faults.matrix import FAULTS, CellKey, Plan, report_of
 from experiments.faults.phases import PHASES, bench_for
+from experiments.faults.protocol_differences import differences, mode_of
 from experiments.trials.parallel_trials import run_parallel
+from simulation.harness.drive_presets import DRIVES
 
 
 def one_cell_of_each_fault() -> list[CellKey]:
-    """Choose a phase for each fault, more often one that is reached soon."""
+    """Choose a phase for each fault, more often one that is reached soon, and a type of drive that can have it."""
     phases = cycle(("hold", "idle", "stance", "hold", "arming"))
     firsts = {mode.fault: mode for mode in reversed(FAILURE_MODES)}.values()
-    return [CellKey(mode.name, next((p for _ in PHASES if (p := next(phases)) in mode.phases), mode.phases[0]), 1)
+    return [CellKey(mode.name, next((p for _ in PHASES if (p := next(phases)) in mode.phases), mode.phases[0]), 1,
+                    "mit" if mode.name in differences("odrive") else "odrive")
             for mode in firsts]  # fmt: skip
 
 
@@ -96,6 +99,28 @@ def test_a_cell_follows_from_its_name_phase_and_seed() -> None:
 def test_an_unknown_fault_or_phase_is_refused(faults: tuple[str, ...], phases: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="must be one of"):
         Plan(faults, phases)
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_the_differences_of_a_type_of_drive_name_failure_modes_and_faults(drive: str) -> None:
+    table = differences(drive)
+    assert set(table) <= set(BY_NAME) and all(difference.why for difference in table.values())
+    for name in table:
+        mode = mode_of(name, drive)
+        assert {*mode.instead, *mode.also} <= set(FaultKind) and mode.why == table[name].why
+
+
+def test_a_failure_that_a_drive_cannot_have_is_reported_and_has_no_cell() -> None:
+    plan = Plan(drive="mit:AK80-9")
+    assert "watchdog_off" not in {key.mode_name for key in plan.cells}
+    assert plan.differences["watchdog_off"].startswith("does not exist: ")
+    assert "watchdog_off" in {key.mode_name for key in Plan(drive="mit").cells}
+
+
+def test_a_failure_that_a_drive_cannot_show_is_injected_and_its_energy_bounded() -> None:
+    cell = run_cell("voltage_under", "hold", 1, "mit")
+    assert (cell.ok, cell.reported, cell.bound_ticks) == (True, [], None) and cell.energy_j <= cell.energy_bound_j
+    assert Plan(drive="mit").differences["voltage_under"].startswith("any reaction, or none: ")
 
 
 def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:

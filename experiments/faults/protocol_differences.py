@@ -1,0 +1,128 @@
+"""Lists the failures that a protocol shows otherwise than an ODrive's, or not at all, each with the reason.
+
+A difference changes fields of the failure mode for one type of drive: the fault that may be reported in its place, what
+is true as well, how it is caused. Where the protocol cannot show a failure, it is waived: it is injected all the same,
+and the bounds on energy, torque and arming hold, but no fault is demanded. What does not exist is left out. The report
+names every difference.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from drivers.drive_types import DRIVE_TYPES
+from drivers.mit.models import MODELS
+from experiments.faults.failure_modes import ABSENT_DRIVE, BY_NAME, FailureMode
+from experiments.faults.injectors import failing, unheard
+
+
+class Difference(NamedTuple):
+    """`changes` are fields of the failure mode; None: it does not exist with this protocol."""
+
+    why: str
+    changes: Mapping[str, Any] | None = None
+
+    @property
+    def exists(self) -> bool:
+        return self.changes is not None
+
+    @property
+    def text(self) -> str:
+        if self.changes is None:
+            return f"does not exist: {self.why}"
+        if "waived" in self.changes:
+            return f"any reaction, or none: {self.why}"
+        named = [f"{word} {', '.join(self.changes[word])}" for word in ("instead", "also") if word in self.changes]
+        return f"{' and '.join(named) or 'otherwise caused'}: {self.why}"
+
+
+def _instead(why: str, *faults: str) -> Difference:
+    return Difference(why, {"instead": faults})
+
+
+def _also(why: str, *faults: str) -> Difference:
+    return Difference(why, {"also": faults})
+
+
+def _waived(why: str) -> Difference:
+    return Difference(why, {"waived": True})
+
+
+Table = Mapping[str, Difference]
+
+UNASKED = "a drive that is not asked does not answer, and its newest answer is as old as the loop's last question"
+ASKED: Table = {  # drives that answer only when asked
+    "drive_late": Difference(
+        "a command that is lost is a question that is lost, for a tick longer: only answers are lost",
+        {"inject": unheard, "no_commands": False},
+    ),
+    "bus_refuses": _also(UNASKED, *ABSENT_DRIVE, "drive_quiet"),
+    "loop_overrun": _also(UNASKED, "drive_late"),
+    "loop_lagging": _also(UNASKED, "drive_late", "drive_quiet"),
+    "loop_lagging, every tick too long": _also(UNASKED, "drive_late", "drive_quiet"),
+    "loop_stalled": _also(UNASKED, "drive_late", "drive_quiet", "drive_silent"),
+    "loop_crawling": _also(UNASKED, "drive_late", "drive_quiet", "drive_silent"),
+    "daemon_hung": _also(UNASKED, *ABSENT_DRIVE, "drive_quiet"),
+}
+
+ONE_ANSWER = "one answer has all signals, so none of them is missing alone"
+HELD_FAST = "a joint that is held fast reports the same codes in every answer, as an encoder does that has failed"
+NO_VOLTAGE = "no answer states the supply's voltage; below a limit of its own the drive reports an error"
+MIT: Table = {
+    "position_stale": _instead(ONE_ANSWER, "drive_quiet"),
+    "position_silent": _instead(ONE_ANSWER, "drive_silent"),
+    "current_stale": _instead(ONE_ANSWER, "drive_quiet"),
+    "current_silent": _instead(ONE_ANSWER, "drive_silent"),
+    "heartbeat_silent": _instead(ONE_ANSWER, "drive_silent"),
+    "encoder_stuck": _also(
+        "one answer has all signals: torque and status are frozen together with the angle",
+        *("drive_energised", "torque_missing", "damping_failed"),
+    ),
+    "voltage_silent": _waived(NO_VOLTAGE),
+    "voltage_low": _waived(NO_VOLTAGE),
+    "voltage_under": _waived(NO_VOLTAGE),
+    "drive_error, by its watchdog": Difference(
+        "a drive without commands sends no answer that could state the error",
+        {"instead": ("drive_silent",), "inject": failing("JOINT.command", "off")},
+    ),
+    "drive_error, by another program's stop": _instead(
+        "the command to leave the mode is no error: the drive is without torque", "drive_disarmed"
+    ),
+    "drive_energised": _instead(
+        "it is commanded to leave the mode in every tick, and the other program's command is seen", "foreign_commands"
+    ),
+    "drive_version": _also(
+        "a drive without a version is starting, so none of its registers is known", "watchdog_unknown", "wrong_drive"
+    ),
+    "arming_failed": _instead("an answer states that it was in the mode, and has left it", "drive_disarmed"),
+    "joint_not_following": _instead(HELD_FAST, "encoder_stuck"),
+    "following_error": _instead(HELD_FAST, "encoder_stuck"),
+}
+NO_REGISTERS = "MIT mode reads no register of this motor, so it is armed by force"
+NO_STATUS = "no answer states whether the drive is in the mode"
+WITHOUT_REGISTERS: Table = {  # CubeMars
+    "drive_version": Difference(NO_REGISTERS),
+    "wrong_drive": Difference(NO_REGISTERS),
+    "drive_settings": Difference(NO_REGISTERS),
+    "watchdog_unknown": Difference(NO_REGISTERS),
+    "watchdog_off": Difference(NO_REGISTERS),
+    "drive_disarmed": _waived(NO_STATUS),
+    "arming_failed": _waived(NO_STATUS),
+}
+ODRIVE: Table = {"drive_settings": Difference("no setting but the watchdog is read back")}
+BY_TYPE: Mapping[str, Table] = {"odrive": ODRIVE, "mit": MIT}
+
+
+def differences(drive: str) -> Table:
+    """Returns the differences of a type of drive by the name of the failure mode; `drive` as in `with_drive_type`."""
+    name, _, model = drive.partition(":")
+    asked = ASKED if DRIVE_TYPES[name].query(1) is not None else {}
+    of_model = WITHOUT_REGISTERS if model and not MODELS[model].has_registers else {}
+    return {**asked, **BY_TYPE.get(name, {}), **of_model}
+
+
+def mode_of(name: str, drive: str) -> FailureMode:
+    """Returns a failure mode as it is with this type of drive."""
+    difference = differences(drive).get(name)
+    mode = BY_NAME[name]
+    return replace(mode, why=difference.why, **(difference.changes or {})) if difference else mode
