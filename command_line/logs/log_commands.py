@@ -3,7 +3,7 @@
 import argparse
 import os
 from collections.abc import Sequence
-from math import nan
+from math import fsum, nan
 from pathlib import Path
 
 from command_line import exit_codes
@@ -143,7 +143,7 @@ def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[
         strides = [by_number[number] for number in options.stride]
     else:
         strides = walk.own_strides if moving else choose_strides(walk)
-    length_s = sum(duration_s(walk, stride) for stride in strides)
+    length_s = fsum(duration_s(walk, stride) for stride in strides)
     if moving and length_s > LONGEST_FILM_S:
         raise UsageError(f"{length_s:.0f} s of film are more than {LONGEST_FILM_S:.0f} s; choose with --stride")
     return strides

@@ -18,7 +18,7 @@ there, or the mud changes.
 """
 
 from collections.abc import Sequence
-from math import exp, inf, isfinite, log, radians
+from math import exp, fsum, inf, isfinite, log, radians
 
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
@@ -117,7 +117,7 @@ class DepthForecast:
         depth_m = self.reached_m(commanded_m)
         reported = [self._thrust_n(stride, depth_m) for stride in self._strides]
         known = [thrust_n for thrust_n in reported if thrust_n is not None]
-        return self._flippers * sum(known) / len(known) if known else None
+        return self._flippers * fsum(known) / len(known) if known else None
 
     def _thrust_n(self, stride: StrideEstimate, depth_m: float) -> float | None:
         surface_m = _known(stride.surface_m)
@@ -142,7 +142,7 @@ class DepthForecast:
     def shear_at(self, depth_m: float) -> float:
         """Return k_s at the depth of the body's pad, the mean of the flippers; 0 if unknown."""
         reported = [self._shear(stride.flipper, depth_m) or 0.0 for stride in self._strides]
-        return sum(reported) / len(reported) if reported and depth_m > 0.0 else 0.0
+        return fsum(reported) / len(reported) if reported and depth_m > 0.0 else 0.0
 
     def extraction_nm(self, commanded_m: float) -> float:
         """Return the extraction torque of the flipper that needs more."""

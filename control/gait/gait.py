@@ -8,7 +8,7 @@ insertion that ends early, which stops within a tick).
 """
 
 from dataclasses import dataclass
-from math import cos, pi, radians, sin
+from math import cos, fsum, pi, radians, sin
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
@@ -95,7 +95,7 @@ def full_step_m(gait: GaitParameters, geometry: FlipperGeometry) -> float:
 
 
 def stride_duration_s(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> float:
-    return sum(row.duration_s for row in stride_table(gait, geometry, depth_m))
+    return fsum(row.duration_s for row in stride_table(gait, geometry, depth_m))
 
 
 def smooth_progress(time_s: float, duration_s: float) -> tuple[float, float]:
@@ -213,8 +213,8 @@ class Gait:
         sweep_rad, sweep_rad_s = sweep_start + sweep_span * fraction, sweep_span * rate
         if self._turns:
             added = [turn.after(self._time_s, duration_s) for turn in self._turns]
-            sweep_rad += sum(angle_rad for angle_rad, _ in added)
-            sweep_rad_s += sum(velocity_rad_s for _, velocity_rad_s in added)
+            sweep_rad += fsum(angle_rad for angle_rad, _ in added)
+            sweep_rad_s += fsum(velocity_rad_s for _, velocity_rad_s in added)
         return GaitTarget(
             phase,
             self.stride,

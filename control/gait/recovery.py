@@ -25,7 +25,7 @@ targets fades out without a jump of position or velocity.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import copysign, cos, radians, sin
+from math import copysign, cos, fsum, radians, sin
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
@@ -163,7 +163,7 @@ class Recovery:
         angles_rad = states.map(lambda state: state.angle_rad)
         self._targets = still(angles_rad)
         sweeps_rad = [angles_rad[self.rig.joints_of(name)][0] for name in stuck]
-        self._direction = -1.0 if self.attempt == 1 else copysign(1.0, sum(sweeps_rad))
+        self._direction = -1.0 if self.attempt == 1 else copysign(1.0, fsum(sweeps_rad))
         self.events = f"{_are_stuck(stuck)}, attempt {self.attempt} of {self.parameters.attempts}"
 
     def _pull(self, dt_s: float, stuck: Sequence[str], states: DriveStates) -> JointTargets:

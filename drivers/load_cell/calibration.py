@@ -7,7 +7,7 @@ prints grams or newtons uses its own calibration, whose standard error is unknow
 """
 
 import json
-from math import hypot, isfinite, sqrt
+from math import fsum, hypot, isfinite, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -60,8 +60,8 @@ def weigh(force_n: float, readings: list[float]) -> Weighing:
 
 
 def _mean(values: list[float]) -> tuple[float, float]:
-    mean = sum(values) / len(values)
-    square = sum((value - mean) ** 2 for value in values) / max(len(values) - 1, 1)
+    mean = fsum(values) / len(values)
+    square = fsum((value - mean) ** 2 for value in values) / max(len(values) - 1, 1)
     return mean, sqrt(square / len(values))
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from math import sqrt
 from typing import NamedTuple
 
+from control.exact_sum import exact_sum
 from control.records import UNKNOWN
 
 
@@ -43,7 +44,7 @@ class FitSamples(NamedTuple):
         return 1.0 - self.rms_residual_nm**2 / variance if variance > 0.0 else UNKNOWN
 
     def _mean(self, values: Sequence[float]) -> float:
-        return sum(w * value for w, value in zip(self.weights_m, values, strict=True)) / sum(self.weights_m)
+        return exact_sum(w * value for w, value in zip(self.weights_m, values, strict=True)) / exact_sum(self.weights_m)
 
 
 def no_samples() -> FitSamples | None:

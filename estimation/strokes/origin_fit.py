@@ -20,6 +20,8 @@ from math import inf, isfinite, sqrt
 from operator import mul
 from typing import NamedTuple
 
+from control.exact_sum import exact_sum
+
 HUBER = 3.0  # with the usual 1.345 the ends of strokes in mud that deviates from the law would be outliers
 NORMAL_MAD = 1.4826
 LAGS = 4
@@ -40,8 +42,8 @@ class OriginFit(NamedTuple):
 
 def fit_through_origin(x: Sequence[float], y: Sequence[float]) -> OriginFit | None:
     """Fit the slope; None with too few batches, without a positive regressor, or with numbers too large to square."""
-    square = sum([u * u for u in x])
-    if len(x) < MIN_BATCHES or not (0.0 < square < inf and max(x) > 0.0 and isfinite(sum(y))):
+    square = exact_sum([u * u for u in x])
+    if len(x) < MIN_BATCHES or not (0.0 < square < inf and max(x) > 0.0 and isfinite(exact_sum(y))):
         return None
     slope, weights = _median_slope(x, y), [1.0] * len(x)
     clip = HUBER * NORMAL_MAD * median([abs(v - slope * u) for u, v in zip(x, y, strict=True)])
@@ -67,8 +69,8 @@ def _median_slope(x: Sequence[float], y: Sequence[float]) -> float:
 
 def _weighted_slope(x: Sequence[float], y: Sequence[float], weights: Sequence[float]) -> float:
     weighted: list[float] = list(map(mul, weights, x))
-    square: float = sum(map(mul, weighted, x))
-    slope: float = sum(map(mul, weighted, y)) / square if square > 0.0 else inf
+    square: float = exact_sum(map(mul, weighted, x))
+    slope: float = exact_sum(map(mul, weighted, y)) / square if square > 0.0 else inf
     return slope
 
 
@@ -81,10 +83,10 @@ def _evaluated(x: Sequence[float], y: Sequence[float], weights: Sequence[float],
     residuals = [v - offset - (slope + tilt) * u for u, v in zip(x, y, strict=True)]
     weighted: list[float] = list(map(mul, weights, x))
     scores: list[float] = list(map(mul, weighted, residuals))
-    square: float = sum(map(mul, weighted, x))
+    square: float = exact_sum(map(mul, weighted, x))
     sums = list(accumulate([0.0] * (LAGS + 1) + scores + [0.0] * LAGS))
-    together = sum([(b - a) * (b - a) for a, b in zip(sums, sums[LAGS + 1 :], strict=False)]) / (LAGS + 1)
-    apart = square * sum([w * r * r for w, r in zip(weights, residuals, strict=True)])
+    together = exact_sum([(b - a) * (b - a) for a, b in zip(sums, sums[LAGS + 1 :], strict=False)]) / (LAGS + 1)
+    apart = square * exact_sum([w * r * r for w, r in zip(weights, residuals, strict=True)])
     variance = max(n * together, apart) / (n - 2) / square
     return OriginFit(slope, student_factor(n - 2) * sqrt(variance / square), square, variance, n - 2)
 

@@ -18,6 +18,7 @@ from enum import Enum
 from math import cos, hypot, inf, isfinite, sin
 from typing import NamedTuple
 
+from control.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate import stance_moment_m4, submerged_plate
 from control.records import UNKNOWN
@@ -76,7 +77,7 @@ def _moment_m4(geometry: FlipperGeometry, batch: Batch, surface_m: float) -> flo
 
 def _value(case: str, steady: Sequence[int], batches: Sequence[Batch], moments: Sequence[float]) -> Shear:
     fit = fit_through_origin([moments[i] for i in steady], [batches[i].sweep_nm for i in steady])
-    moment_m4 = sum(moments[i] for i in steady) / len(steady)
+    moment_m4 = exact_sum(moments[i] for i in steady) / len(steady)
     return Shear(fit, False, case, sum(batches[i].samples for i in steady), moment_m4=moment_m4, steady=steady)
 
 
@@ -113,7 +114,7 @@ def _yielding(geometry: FlipperGeometry, batches: Sequence[Batch], slips: list[f
 
 def _case(geometry: FlipperGeometry, batches: Sequence[Batch], slips: Sequence[float]) -> str:
     travel_m = geometry.flipper_length_m * (sin(batches[0].sweep_rad) - sin(batches[-1].sweep_rad))
-    return "yield" if sum(slips) > 0.8 * travel_m else "mixed"
+    return "yield" if exact_sum(slips) > 0.8 * travel_m else "mixed"
 
 
 def _without_pose(

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from math import cos, hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
+from control.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
@@ -171,7 +172,7 @@ def travels_m(batches: Sequence[Batch], shallowest_m: float, deepest_m: float) -
 
 
 def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    return sum([a * b for a, b in zip(x, y, strict=True)]) / sum([a * a for a in x])
+    return exact_sum([a * b for a, b in zip(x, y, strict=True)]) / exact_sum([a * a for a in x])
 
 
 def _slope_per_surface(
@@ -182,10 +183,10 @@ def _slope_per_surface(
     dk/dδ = (2 k Σ Φ²/z - Σ τΦ/z) / ΣΦ², which is 3/2 k/z where τ = k Φ.
     """
     squares = [moment * moment for moment in moments]
-    weighted = sum([square / depth_m for square, depth_m in zip(squares, depths_m, strict=True)])
+    weighted = exact_sum([square / depth_m for square, depth_m in zip(squares, depths_m, strict=True)])
     products = [torque * moment for torque, moment in zip(torques, moments, strict=True)]
-    reported = sum([product / depth_m for product, depth_m in zip(products, depths_m, strict=True)])
-    return (2.0 * fit.slope * weighted - reported) / sum(squares)
+    reported = exact_sum([product / depth_m for product, depth_m in zip(products, depths_m, strict=True)])
+    return (2.0 * fit.slope * weighted - reported) / exact_sum(squares)
 
 
 def evaluated(fit: OriginFit, systematic: float, samples: int) -> Estimate:

@@ -17,6 +17,7 @@ from math import exp, hypot, inf, sqrt
 from operator import mul
 from typing import NamedTuple
 
+from control.exact_sum import exact_sum
 from control.records import UNKNOWN
 from estimation.strokes.origin_fit import NORMAL_MAD, median
 
@@ -50,10 +51,10 @@ def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Surfac
     n = len(depths_m)
     if n < MIN_ABOVE + MIN_BELOW or depths_m[0] >= depths_m[-1]:
         return NO_SURFACE
-    if not sum([force_n * force_n for force_n in forces_n]) < inf:
+    if not exact_sum([force_n * force_n for force_n in forces_n]) < inf:
         return NO_SURFACE
     clipped_n = hampel_filtered(forces_n)
-    mean_n = sum(clipped_n) / n
+    mean_n = exact_sum(clipped_n) / n
     surface = _mud_begins(depths_m, [force_n - mean_n for force_n in clipped_n])
     return surface._replace(level_n=surface.level_n + mean_n) if surface.found else surface
 
@@ -74,7 +75,7 @@ def hampel_filtered(forces_n: Sequence[float]) -> list[float]:
 
 def _mud_begins(x: Sequence[float], y: Sequence[float]) -> Surface:
     """Choose between no surface, jump and kink; the mean of `y` is zero."""
-    square = sum([force_n * force_n for force_n in y])
+    square = exact_sum([force_n * force_n for force_n in y])
     jumps, kinks, kinks_m = _explained(x, y)
     largest, best = max(jumps), max(kinks)
     variance = max((square - largest) / max(len(x) - 4, 1), LEAST_VARIANCE_N2)
@@ -123,7 +124,7 @@ def _jump(x: Sequence[float], y: Sequence[float], jumps: list[float], variance: 
     likely = [border for border, square in enumerate(jumps, MIN_ABOVE) if square >= largest - LIKELY * variance]
     border = MIN_ABOVE + jumps.index(largest)
     mean_x, mean_y, slope, _ = _line(x[border:], y[border:])
-    edge_m, level_n = (x[border - 1] + x[border]) / 2.0, sum(y[:border]) / border
+    edge_m, level_n = (x[border - 1] + x[border]) / 2.0, exact_sum(y[:border]) / border
     error_m = _border_error_m(x, likely[0], likely[-1])
     jump_n = mean_y + slope * (edge_m - mean_x) - level_n
     return Surface(edge_m, error_m, level_n, sqrt(variance / border), True), jump_n, slope
@@ -140,8 +141,9 @@ def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, re
     """Return the kink, with the standard error of the intersection of line and constant."""
     n, below = len(x), len(x) - border
     travels_m = [depth_m - kink_m for depth_m in x[border:]]
-    mean_m = sum(travels_m) / n
-    slope = sum(map(mul, travels_m, y[border:])) / (sum(map(mul, travels_m, travels_m)) - n * mean_m * mean_m)
+    mean_m = exact_sum(travels_m) / n
+    spread_m2 = exact_sum(map(mul, travels_m, travels_m)) - n * mean_m * mean_m
+    slope = exact_sum(map(mul, travels_m, y[border:])) / spread_m2
     mean_x, _, _, spread = _line(x[border:], y[border:])
     variance = max(residual / max(n - 3, 1), LEAST_VARIANCE_N2)
     error_n = sqrt(variance * (1.0 / border + 1.0 / below + (kink_m - mean_x) ** 2 / spread))
@@ -169,8 +171,8 @@ def _mean(jump: Surface, kink: Surface, fraction: float) -> Surface:
 def _line(x: Sequence[float], y: Sequence[float]) -> tuple[float, float, float, float]:
     """Return the mean of x and of y, the least-squares slope, and Σ(x - mean)²."""
     n = len(x)
-    mean_x, mean_y = sum(x) / n, sum(y) / n
-    spread = sum([(u - mean_x) * (u - mean_x) for u in x])
+    mean_x, mean_y = exact_sum(x) / n, exact_sum(y) / n
+    spread = exact_sum([(u - mean_x) * (u - mean_x) for u in x])
     if not spread > 0.0:
         return mean_x, mean_y, 0.0, inf
-    return mean_x, mean_y, sum([(u - mean_x) * v for u, v in zip(x, y, strict=True)]) / spread, spread
+    return mean_x, mean_y, exact_sum([(u - mean_x) * v for u, v in zip(x, y, strict=True)]) / spread, spread

@@ -28,6 +28,7 @@ from collections.abc import Sequence
 from math import hypot, sqrt
 from typing import NamedTuple
 
+from control.exact_sum import exact_sum
 from control.records import UNKNOWN
 from estimation.strokes.surface import NO_SURFACE, Surface
 
@@ -117,13 +118,13 @@ def other_surface_m(finds: Sequence[Find]) -> float:
 
 
 def mean_m(finds: Sequence[Find]) -> float:
-    return sum([find.weight * find.depth_m for find in finds]) / sum([find.weight for find in finds])
+    return exact_sum([find.weight * find.depth_m for find in finds]) / exact_sum([find.weight for find in finds])
 
 
 def chi_square(finds: Sequence[Find]) -> float:
     """Return the square of the scatter about the mean, in units of the claimed errors."""
     middle_m = mean_m(finds)
-    return sum([find.weight * (find.depth_m - middle_m) ** 2 for find in finds])
+    return exact_sum([find.weight * (find.depth_m - middle_m) ** 2 for find in finds])
 
 
 def largest_chi_square(freedom: int) -> float:

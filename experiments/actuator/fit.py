@@ -24,7 +24,7 @@ one weight, relative to its mean, averaged over the weights.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos, hypot, nan, sqrt
+from math import cos, fsum, hypot, nan, sqrt
 from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
@@ -62,8 +62,8 @@ class Line(NamedTuple):
 def fit_line(x: Sequence[float], y: Sequence[float]) -> Line:
     """Needs FEWEST points with at least two values of x."""
     count, x_mean = len(x), fmean(x)
-    spread = sum((each - x_mean) ** 2 for each in x)
-    slope = sum((a - x_mean) * b for a, b in zip(x, y, strict=True)) / spread
+    spread = fsum((each - x_mean) ** 2 for each in x)
+    slope = fsum((a - x_mean) * b for a, b in zip(x, y, strict=True)) / spread
     intercept = fmean(y) - slope * x_mean
     slope_square = intercept_square = 0.0
     for a, b in zip(x, y, strict=True):
@@ -193,14 +193,14 @@ def _tare_a(entries: Mapping[str, Entry], trial: int) -> float | None:
 
 def direction_of(loads: Sequence[Load]) -> int:
     """Return -1 where weights pull the joint to negative angles, so that the motor's current is positive."""
-    return -1 if sum(load.torque_nm * load.current_a for load in loads) >= 0.0 else 1
+    return -1 if fsum(load.torque_nm * load.current_a for load in loads) >= 0.0 else 1
 
 
 def current_per_nm(plan: Plan, entries: Mapping[str, Entry]) -> float | None:
     """Return the mean over the heavier weights so far, or nothing."""
     loads = [load for load in raw_loads(plan, entries) if load.torque_nm >= LIGHT_NM and not load.doubtful]
-    total_nm = sum(load.torque_nm for load in loads)
-    return abs(sum(load.current_a for load in loads)) / total_nm if loads else None
+    total_nm = fsum(load.torque_nm for load in loads)
+    return abs(fsum(load.current_a for load in loads)) / total_nm if loads else None
 
 
 def can_fit(loads: Sequence[Load]) -> bool:

@@ -13,7 +13,7 @@ between two short moves does no work meanwhile, so the stops do not count.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import degrees, hypot, nan, radians, sqrt
+from math import degrees, fsum, hypot, nan, radians, sqrt
 from statistics import fmean, variance
 from typing import NamedTuple
 
@@ -62,11 +62,11 @@ def loop_of(up: Sequence[Sample], down: Sequence[Sample], quick: bool) -> Loop:
     samples, stroke_rad = [*up, *down], _end_rad(up) - _end_rad(down)
     if stroke_rad < SWING_RAD:
         raise MovedError(f"the empty arm swings by {degrees(stroke_rad):.1f} degrees only: is it blocked?")
-    spent_rad_a = sum(
+    spent_rad_a = fsum(
         (a.current_a + b.current_a) / 2.0 * (b.angle_rad - a.angle_rad)
         for a, b in pairwise([*samples, samples[0]])  # closed by a line to its beginning
     )
-    brisk_rad2_s = sum(
+    brisk_rad2_s = fsum(
         (b.angle_rad - a.angle_rad) ** 2 / (b.now_s - a.now_s) for a, b in pairwise(samples) if b.now_s > a.now_s
     )
     return Loop(spent_rad_a / (2.0 * stroke_rad), brisk_rad2_s / (2.0 * stroke_rad), quick)

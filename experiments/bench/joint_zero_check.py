@@ -1,7 +1,7 @@
 """Checks encoder zeros and limits without torque: against the geometry, flippers held level by hand, and the stops."""
 
 from itertools import pairwise
-from math import degrees, inf
+from math import degrees, fsum, inf
 
 from control.controller import measured_angles
 from control.records import JointAngles, Joints
@@ -77,4 +77,4 @@ def _angles(sample: Sample) -> JointAngles:
 
 
 def _mean_angles(samples: list[Sample]) -> JointAngles:
-    return Joints(*(sum(angles) / len(samples) for angles in zip(*map(_angles, samples), strict=True)))
+    return Joints(*(fsum(angles) / len(samples) for angles in zip(*map(_angles, samples), strict=True)))

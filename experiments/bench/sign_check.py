@@ -6,7 +6,7 @@ angle, velocity and current have the sign of the torque. A drive agrees with its
 the joint is then moved further under control, and the operator observes which flipper moves, and how.
 """
 
-from math import nan, radians
+from math import fsum, nan, radians
 
 from control.controller import measured_angles
 from control.rate import PERIOD_S
@@ -83,7 +83,7 @@ def _agreement(rig: Rig, joint: str, begun: DriveStates, samples: list[Sample], 
     fastest_rad_s = max((sample.states[index].velocity_rad_s for sample in samples), key=abs)
     yield Reading(f"{joint}: velocity with it", fastest_rad_s, "rad/s", 0.0, 20.0, contrary)
     late = samples[-round(STEP_S / PERIOD_S) :]
-    mean_a = sum(sample.states[index].current_a for sample in late) / len(late)
+    mean_a = fsum(sample.states[index].current_a for sample in late) / len(late)
     yield Reading(f"{joint}: current with it", mean_a, "A", FEWEST_A, 20.0, f"{contrary}, or its current sensor is off")
     for other, other_rad in zip(rig.joints, moved_rad, strict=True):
         if other != joint:

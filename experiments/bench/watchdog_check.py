@@ -8,7 +8,7 @@ the torque of a dead controller for as long as anything on the bus asks for tele
 """
 
 from collections.abc import Sequence
-from math import nan
+from math import fsum, nan
 
 from control.rate import PERIOD_S
 from control.records import DriveStates, Joints, Torques
@@ -93,7 +93,7 @@ def _idle_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
 
 def _gone_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
     """Return the time until the current stays below half of its earlier value."""
-    flowed_a = sum(sample.states[index].current_a for sample in pressed[-40:]) / 40.0
+    flowed_a = fsum(sample.states[index].current_a for sample in pressed[-40:]) / 40.0
     low = [sample.states[index].current_a / flowed_a < GONE_FRACTION for sample in silence]
     first = first_lasting(low, GONE_TICKS)
     return nan if first is None else silence[first].tick.now_s - pressed[-1].tick.now_s

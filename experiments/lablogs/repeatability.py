@@ -11,7 +11,7 @@ they are half of the true ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from math import fsum, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ class Scatter(NamedTuple):
 
     @property
     def chi(self) -> float | None:
-        return sqrt(sum(deviation**2 for deviation in self.deviations) / self.dof) if self.dof > 0 else None
+        return sqrt(fsum(deviation**2 for deviation in self.deviations) / self.dof) if self.dof > 0 else None
 
     def joined(self, other: Scatter) -> Scatter:
         return Scatter(self.deviations + other.deviations, self.dof + other.dof)
@@ -97,7 +97,7 @@ def separation(one: Sequence[float], other: Sequence[float]) -> float | None:
     """Return the difference of two means in pooled standard deviations; None where a group has fewer than two."""
     if min(len(one), len(other)) < 2:
         return None
-    squares = sum(float(np.var(values, ddof=1)) * (len(values) - 1) for values in (one, other))
+    squares = fsum(float(np.var(values, ddof=1)) * (len(values) - 1) for values in (one, other))
     pooled = sqrt(squares / (len(one) + len(other) - 2))
     return float(np.mean(one) - np.mean(other)) / pooled if pooled > 0.0 else None
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import fsum
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -78,7 +79,7 @@ def list_remarks(trials: Sequence[AnalysedTrial], settings: StageSettings) -> li
         remarks.append(f"in {len(by_trial)} trials {next(iter(by_trial.values()))}")
     else:
         remarks += [f"{key}: {remark}" for key, remark in by_trial.items()]
-    turned = sum(trial.profile is not None and trial.profile.turned for trial in trials)
+    turned = fsum(trial.profile is not None and trial.profile.turned for trial in trials)
     if turned:
         remarks.append(f"in {turned} trials the cell measured with the opposite sign; their forces are turned")
     return remarks
@@ -92,8 +93,8 @@ def make_report(
         settings=to_json(plan.settings) | {"depth_error_m": plan.depth_error_m},
         cell=cell,
         stage={
-            "speed_m_s": sum(pace.speed_m_s for pace in paces) / len(paces) if paces else None,
-            "acceleration_m_s2": sum(pace.acceleration_m_s2 for pace in paces) / len(paces) if paces else None,
+            "speed_m_s": fsum(pace.speed_m_s for pace in paces) / len(paces) if paces else None,
+            "acceleration_m_s2": fsum(pace.acceleration_m_s2 for pace in paces) / len(paces) if paces else None,
         },
         muds=[
             {"mud": mud} | {name: each._asdict() | {"std_error": each.std_error} for name, each in coefficients.items()}

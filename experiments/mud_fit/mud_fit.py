@@ -21,6 +21,7 @@ report are the keys of the summary in JSON.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import fsum
 from statistics import fmean
 from typing import NamedTuple
 
@@ -148,7 +149,7 @@ def fixed_speed_cm_s(ground: Ground, depth_m: float, seed: int, strides: int) ->
 
 def chi2_of(speeds: Mapping[float, float], targets: Mapping[float, Speed]) -> float:
     """Return the chi² of one mud. `speeds` and `targets` are by depth in metres."""
-    return sum(((speeds[depth_m] - paper.mean) / paper.sd) ** 2 for depth_m, paper in targets.items())
+    return fsum(((speeds[depth_m] - paper.mean) / paper.sd) ** 2 for depth_m, paper in targets.items())
 
 
 def best_fit(speeds: Speeds, targets: Targets) -> Fit:
@@ -162,7 +163,7 @@ def best_fit(speeds: Speeds, targets: Targets) -> Fit:
 def fit_with_damping(damping_n_s_m: float, speeds: Speeds, targets: Targets) -> Fit:
     grounds = [ground for ground in speeds if ground.damping_n_s_m == damping_n_s_m]
     best = {mud: min(grounds, key=lambda ground: chi2_of(speeds[ground], own)) for mud, own in targets.items()}
-    chi2 = sum(chi2_of(speeds[ground], targets[mud]) for mud, ground in best.items())
+    chi2 = fsum(chi2_of(speeds[ground], targets[mud]) for mud, ground in best.items())
     return Fit(damping_n_s_m, {mud: ground.strength_pa for mud, ground in best.items()}, chi2)
 
 
@@ -194,7 +195,7 @@ def _evaluate(fit: Fit, speeds: Speeds) -> Fit:
     """Return the fit with its chi² and its cells."""
     of_mud = {mud: speeds[Ground(fit.rail_damping_n_s_m, strength)] for mud, strength in fit.strength_pa.items()}
     cells = {rule: {mud: round(of_mud[mud][depth_m], 3) for mud in TARGETS} for rule, depth_m in FIXED_DEPTHS_M.items()}
-    chi2 = round(sum(chi2_of(of_mud[mud], targets) for mud, targets in TARGETS.items()), 3)
+    chi2 = round(fsum(chi2_of(of_mud[mud], targets) for mud, targets in TARGETS.items()), 3)
     return replace(fit, chi2=chi2, cells=cells)
 
 

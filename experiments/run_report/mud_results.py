@@ -9,7 +9,7 @@ stand next to them.
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite, sqrt
+from math import fsum, isfinite, sqrt
 from typing import Any
 
 from control.records import UNKNOWN
@@ -72,14 +72,14 @@ def count_outcomes(strides: Sequence[ReportedStride]) -> dict[str, int]:
 def speed_of(strides: Sequence[ReportedStride]) -> Speed:
     steps_m = [stride.step_m for stride in strides if isfinite(stride.step_m)]
     known = [stride for stride in strides if isfinite(stride.step_m + stride.duration_s)]
-    distance_m = sum(steps_m) if steps_m else None
+    distance_m = fsum(steps_m) if steps_m else None
     if not known:
         return Speed(distance_m, None, None, None)
-    duration_s = sum(stride.duration_s for stride in known)
-    speed_m_s = sum(stride.step_m for stride in known) / duration_s
+    duration_s = fsum(stride.duration_s for stride in known)
+    speed_m_s = fsum(stride.step_m for stride in known) / duration_s
     error = None
     if len(known) > 1:
-        squares = sum((stride.step_m - speed_m_s * stride.duration_s) ** 2 for stride in known)
+        squares = fsum((stride.step_m - speed_m_s * stride.duration_s) ** 2 for stride in known)
         freedom = len(known) - 1
         error = student_factor(freedom) * sqrt(squares / freedom * len(known)) / duration_s
     return Speed(distance_m, duration_s, speed_m_s, error)

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from math import fsum
 
 from experiments.trackway.depth_rule import DepthRule, chosen_by, configuration_for, constant_depth, walk_by
 from experiments.trackway.one_mud import (
@@ -129,7 +130,7 @@ def is_past(length_m: float, last: WalkedStride) -> bool:
 
 def is_stuck(strides: Sequence[WalkedStride]) -> bool:
     mud = strides[-1].mud
-    return sum(stride.duration_s for stride in strides if stride.mud == mud) >= STUCK_S
+    return fsum(stride.duration_s for stride in strides if stride.mud == mud) >= STUCK_S
 
 
 def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None) -> SimulatedReport:
@@ -159,7 +160,7 @@ def report_of(
     return SimulatedReport(
         **vars(report),
         best_constant_depth=best,
-        best_constant_mean_over_muds=round(sum(each.mean for each in best.values()) / len(best), 3),
+        best_constant_mean_over_muds=round(fsum(each.mean for each in best.values()) / len(best), 3),
         over_best={
             rule: {mud: _ratio(cell.mean, best[mud].mean) for mud, cell in row.items()}
             for rule, row in report.table.items()

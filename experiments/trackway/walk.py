@@ -9,7 +9,7 @@ extraction, because the plates are still in the mud when they swing forward.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, sin
+from math import fsum, inf, isfinite, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,7 +70,7 @@ def walk_of(entry: Mapping[str, Any]) -> Walk:
 
 def speed_m_s(strides: Sequence[WalkedStride]) -> float:
     """Return the distance over the time of at least one stride."""
-    return sum(stride.step_m for stride in strides) / sum(stride.duration_s for stride in strides)
+    return fsum(stride.step_m for stride in strides) / fsum(stride.duration_s for stride in strides)
 
 
 class WalkTick(NamedTuple):

@@ -10,7 +10,7 @@ is 1 to 6 % more than the upright plate's at each of these depths.)
 """
 
 from collections.abc import Sequence
-from math import cos, isfinite, sin
+from math import cos, fsum, isfinite, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
@@ -104,5 +104,5 @@ def _arc_stiffness(curve: ArcCurve, sign: float, to_depth_m: float) -> float:
 
 
 def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    square = sum(a * a for a in x)
-    return sum(a * b for a, b in zip(x, y, strict=True)) / square if square > 0.0 else UNKNOWN
+    square = fsum(a * a for a in x)
+    return fsum(a * b for a, b in zip(x, y, strict=True)) / square if square > 0.0 else UNKNOWN

@@ -9,7 +9,7 @@ drag and not the mud's strength while the body moves. Every method of estimation
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, chain
-from math import ceil
+from math import ceil, fsum
 from typing import Any
 
 from experiments.pictures.mud_layout import layout_of_lengths
@@ -82,7 +82,7 @@ class Plan:
 
     @property
     def length_m(self) -> float:
-        return sum(mud.length_m for mud in self.muds)
+        return fsum(mud.length_m for mud in self.muds)
 
     @property
     def borders_m(self) -> list[float]:

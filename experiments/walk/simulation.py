@@ -1,5 +1,6 @@
 """The simulated bench of the walks: fresh copies of the trackway along one track, and then the soft muds."""
 
+from math import fsum
 from pathlib import Path
 
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -25,8 +26,8 @@ def walking_bench(folder: Path, plan: Plan, seed: int) -> tuple[LockstepRobot, C
 
     def position_m(trial: PlannedTrial, prepared: int) -> float:
         if trial.key.startswith("walk/"):
-            return prepared * sum(lengths_m)
+            return prepared * fsum(lengths_m)
         strip = next(i for i, mud in enumerate(plan.soft) if trial.key.startswith(f"soft {mud} "))
-        return copies * sum(lengths_m) + STRIP_M * strip + SOFT_WALK_M * (prepared + 1)
+        return copies * fsum(lengths_m) + STRIP_M * strip + SOFT_WALK_M * (prepared + 1)
 
     return simulated_bench(folder, simulated_configuration(SECTIONS), Track(trackway * copies + soft), seed, position_m)

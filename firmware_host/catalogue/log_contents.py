@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from itertools import pairwise
-from math import inf, isfinite
+from math import fsum, inf, isfinite
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -78,8 +78,8 @@ def _travel(walks: Sequence[Ticks]) -> tuple[float | None, float | None]:
     """Returns distance and mean speed of these walks; None without a pose. Between two walks the robot may be moved."""
     known = [walk[np.isfinite(walk["body_x_m"])] for walk in walks]
     spans = [walk[[0, -1]] for walk in known if len(walk)]
-    distance_m = sum(float(np.diff(span["body_x_m"])[0]) for span in spans)
-    duration_s = sum(float(np.diff(span["stamp_s"])[0]) for span in spans)
+    distance_m = fsum(float(np.diff(span["body_x_m"])[0]) for span in spans)
+    duration_s = fsum(float(np.diff(span["stamp_s"])[0]) for span in spans)
     return (distance_m, distance_m / duration_s) if duration_s > 0.0 else (None, None)
 
 

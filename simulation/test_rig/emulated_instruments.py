@@ -7,6 +7,7 @@ rounds to a step of its own, and stops at its range. The encoder's counter start
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import fsum
 from pathlib import Path
 from random import Random
 from typing import Annotated
@@ -52,7 +53,7 @@ class EmulatedAmplifier(SerialTalker):
         force_n = self.mean_force_n(at_s) + self._noise_of_cell.gauss(0.0, self.amplifier.noise_n)
         force_n += self.amplifier.drift_n_s * (at_s - self._started_s)
         self._converted_n.append(force_n)
-        return self._line(sum(self._converted_n) / len(self._converted_n), at_s)
+        return self._line(fsum(self._converted_n) / len(self._converted_n), at_s)
 
     def _line(self, force_n: float, at_s: float) -> bytes:
         amplifier = self.amplifier

@@ -11,7 +11,7 @@ and its height along
     n = (cos α, -sin α cos β, -sin α sin β)    r = (sin α, cos α cos β, cos α sin β)    s = (0, -sin β, cos β)
 """
 
-from math import ceil, cos, sin
+from math import ceil, cos, fsum, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
@@ -63,8 +63,8 @@ class LoadCell:
         twist = Twist(*(axis[0] * forward_m_s + axis[2] * upward_m_s for axis in self.axes))
         wrench = self.plate.step(dt_s, self.clay, self._upright._replace(depth_m=self.depth_m), twist)
         forces_n = wrench[:3]  # along the three axes
-        forward_n = sum(force_n * axis[0] for force_n, axis in zip(forces_n, self.axes, strict=True))
-        return forward_n, sum(force_n * axis[2] for force_n, axis in zip(forces_n, self.axes, strict=True))
+        forward_n = fsum(force_n * axis[0] for force_n, axis in zip(forces_n, self.axes, strict=True))
+        return forward_n, fsum(force_n * axis[2] for force_n, axis in zip(forces_n, self.axes, strict=True))
 
     def lower(self, to_depth_m: float, speed_m_s: float) -> LoadCurve:
         """Moves straight down or up to a depth, in whole steps."""
@@ -121,4 +121,4 @@ def measure_shear(
     steps = ceil(distance_m / (speed_m_s * STEP_S))
     forces_n = [cell.step(STEP_S, -speed_m_s, 0.0)[0] for _ in range(steps)]
     steady_n = forces_n[steps // 2 :]
-    return sum(steady_n) / len(steady_n)
+    return fsum(steady_n) / len(steady_n)

@@ -6,7 +6,7 @@ move. The plate is any object that returns the force on it after a step of motio
 """
 
 from collections.abc import Sequence
-from math import inf
+from math import fsum, inf
 from random import Random
 from typing import NamedTuple, Protocol
 
@@ -111,12 +111,12 @@ class PlateStage:
             start_s += motion.duration_s + hold_s
 
     def _clear_moves(self) -> None:
-        self._travelled_m += sum(move.path_m for move in self._moves)
+        self._travelled_m += fsum(move.path_m for move in self._moves)
         self._moves = []
 
     def travelled_m(self, at_s: float) -> float:
         """Returns the stage's travel, forward and upward, that an encoder on it counts. `at_s` may lie in the past."""
-        return self._travelled_m + sum(move.position_m(at_s) for move in self._moves)
+        return self._travelled_m + fsum(move.position_m(at_s) for move in self._moves)
 
     def mean_force_n(self, until_s: float) -> float:
         """Returns the mean force since the last call, as an integrating converter measures it."""

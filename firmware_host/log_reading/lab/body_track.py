@@ -6,6 +6,7 @@ the direction in which the stances moved the body. The direction of the largest 
 authors' walks the body sinks further than it advances.
 """
 
+from math import fsum
 from typing import NamedTuple
 
 import numpy as np
@@ -119,7 +120,7 @@ def _report_lost(rows: LogRows, column: str, lost: Truths) -> list[Finding]:
     periods = runs(lost)
     if not periods or np.all(lost):
         return []
-    lost_s = sum(float(rows.time_s[each.stop - 1] - rows.time_s[each.start]) for each in periods)
+    lost_s = fsum(float(rows.time_s[each.stop - 1] - rows.time_s[each.start]) for each in periods)
     text = f"motion capture lost the body for {lost_s:.2f} s, in {len(periods)} period{'s' * (len(periods) > 1)}"
     return [rows.finding(FindingKind.POSE, column, periods[0].start, text)]
 
