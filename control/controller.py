@@ -119,6 +119,7 @@ class Controller:
         self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
         self.joint_targets: JointTargets | None = None  # of the last step with stiffness
+        self._follows = True  # the torques of the last step, those targets: a hold law did not replace them
 
     @property
     def walk_finished(self) -> bool:
@@ -144,8 +145,7 @@ class Controller:
     @property
     def followed_targets(self) -> JointTargets | None:
         """The joint targets of the last step, where the torques follow them."""
-        replaced = self.hold_law is not None and self._mode is Mode.HOLD
-        return self.joint_targets if self._mode in HELD and not replaced else None
+        return self.joint_targets if self._mode in HELD and self._follows else None
 
     @property
     def moving(self) -> bool:
@@ -208,7 +208,9 @@ class Controller:
             self._waited_s += elapsed_s
         self.joint_targets = self._targets(dt_s, mode, states)
         torques_nm = joint_torques_nm(self.joint_targets, states, self.gains, self.mass, self._fade)
-        return self.hold_law(torques_nm, states) if self.hold_law and mode is Mode.HOLD else torques_nm
+        law = self.hold_law if mode is Mode.HOLD else None
+        self._follows = law is None
+        return law(torques_nm, states) if law else torques_nm
 
     def _damp(self, elapsed_s: float, states: DriveStates, trusted: Joints[bool]) -> Torques:
         still = [each.update(state.angle_rad, elapsed_s) for each, state in zip(self._stillness, states, strict=True)]

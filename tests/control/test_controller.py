@@ -387,3 +387,17 @@ def test_flippers_that_the_mud_keeps_are_waited_for_but_not_long(low_rad: float)
 def test_a_stop_never_takes_longer_than_a_soft_stop_may() -> None:
     """Also on a path that is too long for it: of an arm that was turned far up by hand."""
     assert stopping_ticks(Joints(0.0, 3.0, 0.0, 3.0)) * PERIOD_S == pytest.approx(SOFT_STOP_S, abs=0.01)
+
+
+def test_targets_count_as_followed_only_where_the_last_torques_followed_them() -> None:
+    """A monitor that compares them with the joints would report a path that a hold law replaced."""
+    controller = weightless()
+    wanted_pose(controller, Mode.HOLD)
+    assert controller.followed_targets == controller.joint_targets is not None
+    controller.hold_law = lambda held, states: NO_TORQUE
+    wanted_pose(controller, Mode.HOLD)
+    assert controller.followed_targets is None
+    controller.hold_law = None
+    assert controller.followed_targets is None  # until the next step
+    wanted_pose(controller, Mode.HOLD)
+    assert controller.followed_targets == controller.joint_targets is not None
