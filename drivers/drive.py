@@ -45,6 +45,7 @@ class DriveParameters:
     ] = ""
 
     serial_digits: ClassVar[int] = 12  # hexadecimal ones, of a serial number of this type of drive
+    answers_only: ClassVar[bool] = False  # it sends nothing unless it is asked, which each tick does once
 
     @property
     def reports_settings(self) -> bool:

@@ -88,6 +88,7 @@ class FaultMonitor:
                 configuration.drive[joint].torque_constant_nm_a,
                 configuration.drive[joint].heartbeat_period_s,
                 dynamics,
+                configuration.drive[joint].answers_only,
             )
             for joint, joint_range, dynamics in zip(
                 joints, configuration.joint_ranges, _joint_dynamics(configuration), strict=True

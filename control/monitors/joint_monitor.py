@@ -15,7 +15,8 @@ from control.monitors.encoder_monitor import EncoderMonitor
 from control.monitors.motion_monitor import JointDynamics, MotionMonitor
 from control.monitors.stillness import Stillness
 from control.monitors.winding import Winding, WindingParameters
-from control.records import UNKNOWN, DriveState, JointTarget
+from control.rate import PERIOD_S
+from control.records import NEVER_S, UNKNOWN, DriveState, JointTarget
 
 MOST_SEEN_S = 0.03  # largest time that one tick adds to a duration: the joint was not observed during a longer gap
 MISSING_HEARTBEATS = 5  # in a row
@@ -87,8 +88,11 @@ class JointMonitor:
         torque_constant_nm_a: float,
         heartbeat_period_s: float = 0.1,
         dynamics: JointDynamics = JointDynamics(),  # noqa: B008 - immutable
+        answers_only: bool = False,
     ) -> None:
+        """`answers_only`: the drive sends nothing unless it is asked, so it is not silent while no tick asks."""
         self.joint = joint
+        self._answers_only = answers_only
         self.winding = Winding(winding)
         self._limits = limits
         self._bounds = bounds
@@ -111,6 +115,7 @@ class JointMonitor:
         self._current_ticks = 0
         self._fast_s = self._stalled_s = self._energised_s = self._missing_s = 0.0
         self._low_s = self._under_s = self._hot_s = 0.0
+        self._unasked_s, self._answer_stamp_s = 0.0, NEVER_S
         self._encoder.reset()
         self._motion.reset()
         self._stillness.reset()
@@ -133,6 +138,8 @@ class JointMonitor:
 
     def _watch_signals(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
         bounds, now_s = self._bounds, facts.now_s
+        if self._answers_only:
+            now_s -= self._unasked(facts.dt_s, state.heartbeat_stamp_s)
         position_s, current_s = now_s - state.angle_stamp_s, now_s - state.current_stamp_s
         if position_s > bounds.late_s or current_s > bounds.late_s:
             found.append(self._late(position_s, current_s))
@@ -144,6 +151,16 @@ class JointMonitor:
             found.append(self._fault(FaultKind.TEMPERATURE_SILENT, age_s=now_s - state.temperature_stamp_s))
         if isfinite(state.bus_voltage_stamp_s) and now_s - state.bus_voltage_stamp_s > SLOW_SILENCE_S:
             found.append(self._fault(FaultKind.VOLTAGE_SILENT, age_s=now_s - state.bus_voltage_stamp_s))
+
+    def _unasked(self, dt_s: float, answer_stamp_s: float) -> float:
+        """Return for how long of the time since the drive's newest answer the loop has missed its ticks.
+
+        The answer to the last question before a gap is read after it, as old as the gap.
+        """
+        missed_s = dt_s - PERIOD_S if dt_s > PERIOD_S else 0.0
+        self._unasked_s = missed_s + (self._unasked_s if answer_stamp_s == self._answer_stamp_s else 0.0)
+        self._answer_stamp_s = answer_stamp_s
+        return self._unasked_s
 
     def _late(self, position_s: float, current_s: float) -> Fault:
         """Return the most severe fault of two ages: both signals silent, one of them, or a late frame."""

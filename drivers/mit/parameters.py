@@ -23,6 +23,7 @@ class MitParameters(DriveParameters):
     ] = 0.083
 
     serial_digits: ClassVar[int] = 8
+    answers_only: ClassVar[bool] = True
 
     @cached_property
     def ranges(self) -> Model:

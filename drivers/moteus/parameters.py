@@ -15,3 +15,4 @@ class MoteusParameters(DriveParameters):
     type: Annotated[str, Meaning("the protocol that the drive speaks")] = "moteus"
     torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0), Meaning("torque per current")] = 0.0719  # 8.27 / 115
     serial_digits: ClassVar[int] = 24
+    answers_only: ClassVar[bool] = True

@@ -30,8 +30,11 @@ HEALTHY = DriveState(
 )
 
 
-def make_monitor(bounds: FaultBounds = BOUNDS, limits: JointLimits = LIMITS) -> JointMonitor:
-    return JointMonitor(JOINT, limits, SPAN, bounds, WINDING, CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A)
+def make_monitor(
+    bounds: FaultBounds = BOUNDS, limits: JointLimits = LIMITS, answers_only: bool = False
+) -> JointMonitor:
+    drive = (WINDING, CURRENT_LIMIT_A, TORQUE_CONSTANT_NM_A)
+    return JointMonitor(JOINT, limits, SPAN, bounds, *drive, answers_only=answers_only)
 
 
 def facts(now_s: float = NOW_S, **changes: Any) -> JointFacts:

@@ -202,6 +202,38 @@ def test_one_message_that_is_lost_is_at_most_late() -> None:
         assert found <= {"drive_late"}
 
 
+def silences(answers_only: bool, missed: int, lost_after: int) -> list[set[str]]:
+    """Faults of each tick around a gap of the loop; every tick asks, and its answer has the time of the question.
+
+    The answer to the last question before the gap is read after it; later ones are lost from `lost_after` on.
+    """
+    watch, asked_s, now_s = make_monitor(answers_only=answers_only), NOW_S, NOW_S
+    found = []
+    for tick in range(12):
+        dt_s = PERIOD_S * (1 + (missed if tick == 3 else 0))
+        now_s += dt_s
+        state = HEALTHY._replace(
+            angle_stamp_s=asked_s, current_stamp_s=asked_s, heartbeat_stamp_s=asked_s, temperature_stamp_s=asked_s
+        )
+        found.append(set(seen(watch, state, now_s, dt_s=dt_s)) & set(SEVERITY))
+        if tick < lost_after:
+            asked_s = now_s
+    return found
+
+
+@pytest.mark.parametrize("missed", [1, 2, 7, 20, 760])
+def test_a_drive_that_was_not_asked_is_not_silent(missed: int) -> None:
+    assert not any(silences(True, missed, lost_after=99))
+    assert any(silences(False, missed, lost_after=99)) is (missed > 1)
+
+
+@pytest.mark.parametrize("missed", [0, 7, 20])
+def test_a_drive_that_does_not_answer_after_a_gap_is_silent_as_soon_as_without_it(missed: int) -> None:
+    names_of = silences(True, missed, lost_after=3)
+    assert names_of == silences(True, 0, lost_after=3)
+    assert names_of[3:7] == [set(), set(), {"drive_late"}, {"drive_quiet"}]
+
+
 def test_a_drive_that_never_reported_its_temperature_has_no_temperature_fault() -> None:
     assert names(HEALTHY._replace(temperature_c=nan, temperature_stamp_s=NEVER_S)) == set()
 
