@@ -27,6 +27,7 @@ from drivers.setpoint_monitor import SetpointMonitor
 
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
+STOPPING_S = 0.1  # for which a drive that another program commanded is stopped in every tick
 QUIET_MODES = (Mode.STOPPED, Mode.FAULT, Mode.POSITION, Mode.TIMEOUT)  # in which nothing runs by itself
 
 
@@ -55,6 +56,8 @@ class MoteusAxis:
         self.closed_loop = False  # by the drive's newest reply
         self._following = False  # commanded by this program
         self._foreign_commands = self._restarts = 0
+        self._followed_s = UNKNOWN  # the last read with an answer that said so
+        self._disturbed_s = NEVER_S  # the last read of such an answer, or of a foreign command
         self._answers.reset()
         self.settings.reset()
         self.setpoints.reset()
@@ -84,11 +87,10 @@ class MoteusAxis:
         if turns - turns == 0.0 == turns_s - turns_s:  # finite
             self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
             self._velocity_rad_s = turns_s * self._rad_per_turn
-            self._angle_stamp_s = now_s
+            self._angle_stamp_s = self._measured_s(now_s)
         if current_a - current_a == 0.0:
             self._current_a = self.parameters.sign * current_a
-            asked_s = self._read_before_s  # every tick asks after it has read
-            self._current_stamp_s = asked_s if NEVER_S < asked_s < now_s else now_s
+            self._current_stamp_s = min(now_s, self._asked_s)
         if temperature_c != 0.0 and temperature_c == temperature_c:  # zero where no thermistor is configured
             self._temperature_c, self._temperature_stamp_s = temperature_c, now_s
         if voltage_v == voltage_v:
@@ -98,15 +100,29 @@ class MoteusAxis:
         if self.closed_loop and control_nm == control_nm:
             self.setpoints.on_report(control_nm, self.parameters.sign * self._velocity_rad_s)
 
+    @property
+    def _asked_s(self) -> float:
+        """When the newest answer was asked for: every tick asks after it has read."""
+        return self._read_before_s if self._read_before_s > NEVER_S else self._read_s
+
+    def _measured_s(self, stamp_s: float) -> float:
+        """Returns when the drive measured: just before its answer, or where that has no stamp, when it was asked."""
+        return stamp_s if stamp_s != self._read_s else min(stamp_s, self._asked_s)
+
     def _receive_mode(self, mode: int, fault: int, now_s: float) -> None:
-        """Handles mode and fault. A drive that left position mode by itself is not commanded back into it."""
+        """Handles mode and fault. A drive that left position mode by itself is not commanded back into it.
+
+        It counts as in closed loop if any answer of a read says so: other commands and stops may alternate.
+        """
         flags = codec.error_flags(mode, fault)
         if mode != self._mode or flags != self._error_flags:
             self._mode, self._error_flags, self._health = mode, flags, None
             self._reason = flags or self._reason
         if self.closed_loop and mode != Mode.POSITION:
             self._following = False
-        self.closed_loop = mode == Mode.POSITION
+        if mode == Mode.POSITION:
+            self._followed_s = self._disturbed_s = self._read_s
+        self.closed_loop = self._followed_s == self._read_s
         self._mode_stamp_s = now_s
         self.setpoints.on_heartbeat(self.closed_loop)
 
@@ -129,6 +145,7 @@ class MoteusAxis:
         commands = [each for each in subframes if each.kind in (registers.WRITE, registers.CONSOLE_INPUT)]
         if len(commands) > len(stops):
             self._foreign_commands += 1
+            self._disturbed_s = self._read_s
             self._health = None
 
     def _count_answer(self) -> None:
@@ -209,7 +226,15 @@ class MoteusAxis:
         if self._following or motor_nm != 0.0:
             self._transmit(codec.encode_torque(motor_nm))
         else:
-            self._transmit(codec.STOP_AND_QUERY if self.closed_loop else codec.QUERY_ALONE)
+            self._transmit(codec.STOP_AND_QUERY if self._is_disturbed else codec.QUERY_ALONE)
+
+    @property
+    def _is_disturbed(self) -> bool:
+        """Returns whether a drive that is to be idle follows torque, or soon may: another program commands it.
+
+        Its next command starts the drive again between two ticks. In the other modes a drive obeys none until a stop.
+        """
+        return self.closed_loop or self._mode == Mode.STOPPED and self._read_s - self._disturbed_s < STOPPING_S
 
     def forget_commands(self) -> None:
         self.setpoints.forget_commands()

@@ -117,6 +117,58 @@ def test_a_drive_that_another_program_energises_is_stopped_at_once() -> None:
     assert bench.devices[0].mode is Mode.STOPPED and bench.health.foreign_commands == 1
 
 
+@pytest.mark.parametrize("every", [1, 2, 3])
+def test_an_idle_drive_that_another_program_starts_again_and_again_is_stopped_in_every_tick(every: int) -> None:
+    """Its torque lasts one tick: this program's stop leaves before the drive's answer to the next question."""
+    bench = Bench()
+    bench.run(0.05, NO_TORQUE)
+    energised = []
+    for tick in range(60):
+        bench.tick(NO_TORQUE)
+        energised.append(bench.devices[0].energised)
+        if tick % every == 0:
+            bench.stranger.send(command_frame(1, codec.encode_torque(0.3)))
+    assert sum(energised[5:]) <= len(energised[5:]) / every + 1
+    assert bench.health.foreign_commands >= 59 // every
+    bench.run(0.11, NO_TORQUE)
+    ear = [frame.data for frame in bench.far.receive() if frame.arbitration_id == codec.command_id(1)]
+    assert ear == [codec.QUERY_ALONE] and not bench.devices[0].energised
+
+
+def test_a_drive_that_alternates_between_stops_and_torque_counts_as_in_closed_loop() -> None:
+    bench = Bench()
+    bench.run(0.05, NO_TORQUE)
+    states = []
+    for _ in range(30):
+        bench.stranger.send(command_frame(1, codec.encode_torque(0.0)))
+        states.append(bench.tick(NO_TORQUE)[0])
+    assert all(state.closed_loop for state in states[3:])
+
+
+def test_a_latched_watchdog_is_not_cleared_by_the_stops_of_a_disturbed_drive() -> None:
+    """A drive in this mode ignores the torque of others until a stop."""
+    bench = Bench()
+    bench.run(0.05, NO_TORQUE)
+    bench.devices[0].trip(DriveError.WATCHDOG)
+    bench.run(0.01, NO_TORQUE)
+    bench.stranger.send(command_frame(1, codec.encode_torque(0.3)))
+    bench.run(0.05, NO_TORQUE)
+    assert bench.devices[0].mode is Mode.TIMEOUT
+
+
+def test_an_answer_without_a_stamp_is_as_old_as_its_question() -> None:
+    bench = Bench()
+    bench.run(0.05, NO_TORQUE)
+    asked_s = bench.now_s
+    bench.now_s += 3.0  # of a loop that hung: the stamp of the answer is too old for this clock
+    for frame in bench.far.receive():
+        for device in bench.devices:
+            for answer in device.receive(frame, asked_s):
+                bench.far.send(answer)
+    state = bench.drives.read(bench.now_s)[0]
+    assert state.angle_stamp_s == state.current_stamp_s == pytest.approx(asked_s)
+
+
 @pytest.mark.parametrize("data", [codec.QUERY_ALONE, codec.STOP_AND_QUERY, codec.STOP])
 def test_questions_and_stops_of_others_are_no_foreign_commands(data: bytes) -> None:
     bench = Bench()
