@@ -88,6 +88,7 @@ class Measurement:
         self._disarmed_steps = 0
         self._missing_rows = bench.loop_ticks - bench.rows.ticks
         self._travel_rad = 0.0
+        self._restarted = mode.restarted
         self._energy = MotorEnergy(bench, mode)
 
     def run(self, duration_s: float, until_reported: bool = False) -> None:
@@ -99,6 +100,7 @@ class Measurement:
 
     def run_on(self) -> None:
         """Measure until the robot is at rest, and for a while longer."""
+        self._restarted = False
         kind, loop = self._failure_mode.kind, self._bench.loop
         longest = round((LONGEST_STOP_S + 1.0) / PERIOD_S) if kind and kind.reaction >= Reaction.SOFT_STOP else 0
         for _ in range(longest):
@@ -176,6 +178,8 @@ class Measurement:
 
     def _check_torque_off(self, torque_nm: float) -> None:
         """Check that mode and drives stay off once torque is off. A request to arm takes effect a tick later."""
+        if self._restarted:
+            return
         off = self._ticks > 0 and self._bench.loop.mode not in ENERGISED or self._bench.dead
         came_back = self._disarmed_steps > 0 and not off
         self._disarmed_steps = self._disarmed_steps + 1 if off else 0

@@ -75,6 +75,7 @@ class FailureMode:
     torque_nm: float = 0.0  # of another program's commands, above the torque limit
     loses_rows: bool = False  # of the log
     instead: tuple[str, ...] = ()  # faults that a protocol may report in its place
+    restarted: bool = False  # another program starts the drive again and again while it lasts
     also: tuple[str, ...] = ()  # faults that may be reported as well, because with this protocol they are true too
     waived: bool = False  # the protocol cannot show it, so any reaction will do, and none
     why: str = ""  # of what differs with this protocol

@@ -93,6 +93,11 @@ def drive_with(**changes: Any) -> Injector:
 
 
 @once
+def watchdog_tripped(bench: FaultBench, joint: str) -> None:
+    bench.drive(joint).trip(DriveError.WATCHDOG)
+
+
+@once
 def overcurrent(bench: FaultBench, joint: str) -> None:
     bench.drive(joint).trip(DriveError.OVERCURRENT)
 

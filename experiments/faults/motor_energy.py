@@ -46,6 +46,8 @@ class MotorEnergy:
 
     def _bound_j(self, reported: Iterable[str]) -> float:
         mode, bounds = self._failure_mode, self._bounds
+        if mode.restarted:
+            return bounds.stopping_j(round(mode.lasts_s / PERIOD_S), Reaction.DRIVES_IDLE)
         if mode.ends_loop:
             return bounds.stopping_j(WATCHDOG_TICKS, Reaction.DRIVES_IDLE)
         if mode.kind and mode.kind.reaction in STOPPING and not mode.waived:
@@ -59,6 +61,8 @@ class MotorEnergy:
     def _pushing_ticks(self) -> int:
         """Return the ticks for which a motor may push against an end stop: until the reaction takes effect."""
         mode = self._failure_mode
+        if mode.restarted:
+            return round(mode.lasts_s / PERIOD_S) + REACTING_TICKS
         if mode.ends_loop or mode.no_commands:
             return WATCHDOG_TICKS
         return REACTING_TICKS + (detection_ticks(mode.kind) if mode.kind and mode.kind.reaction in STOPPING else 0)

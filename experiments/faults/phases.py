@@ -12,6 +12,7 @@ from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import FaultBounds
 from control.records import Phase
+from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT
 from experiments.faults.bench import FaultBench
 from experiments.trials.trial import WALKING, configuration_of
@@ -48,14 +49,14 @@ def bench_for(phase: str, random: Random, hopeless: bool = False, drive: str = D
 def _configuration(hopeless: bool, drive_type: str) -> Configuration:
     """Use the bounds of a real robot; simulations in real time have wider ones, for the pauses of a busy computer."""
     usual = configuration_of(WALKING, drive_type)
-    drives = {
-        joint: replace(drive, serial_number=f"{drive.node_id:0{drive.serial_digits}x}")
-        if drive.reports_settings
-        else drive
-        for joint, drive in usual.drive.items()
-    }
+    drives = {joint: _as_real(drive) for joint, drive in usual.drive.items()}
     configuration = replace(usual, faults=FaultBounds(), drive=drives)
     return replace(configuration, recovery=SHORT_RECOVERY) if hopeless else configuration
+
+
+def _as_real(drive: DriveParameters) -> DriveParameters:
+    serial_number = f"{drive.node_id:0{drive.serial_digits}x}" if drive.reports_settings else ""
+    return replace(drive, serial_number=serial_number, command_delay_s=DriveParameters.command_delay_s)
 
 
 def enter_phase(bench: FaultBench, phase: str, random: Random) -> None:

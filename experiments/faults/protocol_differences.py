@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from drivers.drive_types import DRIVE_TYPES
 from drivers.mit.models import MODELS
 from experiments.faults.failure_modes import ABSENT_DRIVE, BY_NAME, FailureMode
-from experiments.faults.injectors import failing, unheard
+from experiments.faults.injectors import failing, unheard, watchdog_tripped
 
 
 class Difference(NamedTuple):
@@ -50,19 +50,13 @@ def _waived(why: str) -> Difference:
 
 Table = Mapping[str, Difference]
 
-UNASKED = "a drive that is not asked does not answer, and its newest answer is as old as the loop's last question"
+UNASKED = "a drive that is not asked does not answer"
 ASKED: Table = {  # drives that answer only when asked
     "drive_late": Difference(
         "a command that is lost is a question that is lost, for a tick longer: only answers are lost",
         {"inject": unheard, "no_commands": False},
     ),
     "bus_refuses": _also(UNASKED, *ABSENT_DRIVE, "drive_quiet"),
-    "loop_overrun": _also(UNASKED, "drive_late"),
-    "loop_lagging": _also(UNASKED, "drive_late", "drive_quiet"),
-    "loop_lagging, every tick too long": _also(UNASKED, "drive_late", "drive_quiet"),
-    "loop_stalled": _also(UNASKED, "drive_late", "drive_quiet", "drive_silent"),
-    "loop_crawling": _also(UNASKED, "drive_late", "drive_quiet", "drive_silent"),
-    "daemon_hung": _also(UNASKED, *ABSENT_DRIVE, "drive_quiet"),
 }
 
 ONE_ANSWER = "one answer has all signals, so none of them is missing alone"
@@ -109,8 +103,23 @@ WITHOUT_REGISTERS: Table = {  # CubeMars
     "drive_disarmed": _waived(NO_STATUS),
     "arming_failed": _waived(NO_STATUS),
 }
+FOREIGN_TORQUES = ("foreign_commands", "setpoint_mismatch", "foreign_torque")
+RESTARTED = Difference(
+    "each command of another program starts the drive again: it is stopped in every tick until that program ends",
+    {"restarted": True},
+)
+MOTEUS: Table = {
+    "drive_error, by its watchdog": Difference(
+        "a drive without commands is not asked either, so its watchdog trips while it is", {"inject": watchdog_tripped}
+    ),
+    "drive_error, by another program's stop": _instead("a stop is no error", "drive_disarmed"),
+    **dict.fromkeys(
+        (mode.name for mode in BY_NAME.values() if mode.fault in FOREIGN_TORQUES),
+        RESTARTED,
+    ),
+}
 ODRIVE: Table = {"drive_settings": Difference("no setting but the watchdog is read back")}
-BY_TYPE: Mapping[str, Table] = {"odrive": ODRIVE, "mit": MIT}
+BY_TYPE: dict[str, Table] = {"odrive": ODRIVE, "moteus": MOTEUS, "mit": MIT}
 
 
 def differences(drive: str) -> Table:

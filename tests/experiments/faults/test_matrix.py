@@ -25,7 +25,7 @@ from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
 from experiments.faults.loop_injectors import bug_in, nothing
 from experiments.faults.matrix import FAULTS, CellKey, Plan, report_of
 from experiments.faults.phases import PHASES, bench_for
-from experiments.faults.protocol_differences import differences, mode_of
+from experiments.faults.protocol_differences import BY_TYPE, differences, mode_of
 from experiments.trials.parallel_trials import run_parallel
 from simulation.harness.drive_presets import DRIVES
 
@@ -128,6 +128,36 @@ def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(mon
     assert run_cell(name, "stance", 1).ok
     monkeypatch.setattr(stamp_clock, "STEP_S", 10.0)
     assert not run_cell(name, "stance", 1).ok
+
+
+@pytest.mark.parametrize(
+    ("name", "phase"),
+    [
+        ("none", "stance"),
+        ("drive_late", "hold"),
+        ("drive_energised", "idle"),
+        ("drive_error, by its watchdog", "hold"),
+        ("drive_error, by another program's stop", "hold"),
+        ("foreign_commands", "idle"),
+        ("setpoint_mismatch, every second command", "hold"),
+        ("bus_refuses", "hold"),
+        ("loop_overrun", "hold"),
+        ("loop_lagging", "hold"),
+        ("loop_stalled", "idle"),
+        ("daemon_hung", "hold"),
+    ],
+)
+def test_moteus_react_to_what_differs_from_drives_that_report_by_themselves(name: str, phase: str) -> None:
+    cell = run_cell(name, phase, 1, "moteus")
+    assert cell.why == []
+
+
+def test_torque_of_another_program_must_end_with_that_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where each of its commands starts the drive again; elsewhere it must end once the drives are idle."""
+    name = "foreign_commands"
+    assert run_cell(name, "hold", 1, "moteus").ok
+    monkeypatch.setitem(BY_TYPE, "moteus", {})
+    assert "torque or closed loop came back by itself" in run_cell(name, "hold", 1, "moteus").why
 
 
 # the evaluation
