@@ -72,15 +72,13 @@ def node_id(text: str) -> tuple[str, int]:
 
 
 def geometry_value(text: str) -> tuple[str, float]:
-    """Parses a key of [geometry] with its value in m; the reader checks its bounds."""
+    """Parses a key of [geometry] with its value in m or degrees; the reader checks its bounds."""
     key, _, value = text.partition("=")
-    names = [field.name for field in fields(FlipperGeometry)]
+    names = [field.name for field in fields(FlipperGeometry) if field.name != "plate_corners_m"]
     with suppress(ValueError):
         if key in names and isfinite(float(value)):
             return key, float(value)
-    raise argparse.ArgumentTypeError(
-        f"{text}: must be one of {', '.join(names)} with its value in m, as in drop_m=0.05"
-    )
+    raise argparse.ArgumentTypeError(f"{text}: must be one of {', '.join(names)} with its value, as in drop_m=0.05")
 
 
 def mud_length(text: str) -> tuple[str, float]:

@@ -7,16 +7,20 @@ the lower edge's middle lies at
     p = R_x(β) · [l sin α, l cos α, -h]
       = (l sin α, l cos α cos β + h sin β, l cos α sin β - h cos β)        x forward, y outward, z up
 
-from the intersection of the axes, at the height H above the mud. The paper describes this robot without its drop
-(figure 2); with h = 0 its force matrix is rows x and z of J / l². Drop and height are from the authors' controller.
-The published lengths disagree (0.115 m in the paper, 0.120 m in the controller): measure your robot.
+from the intersection of the axes, at the height H above the mud. A plate of another shape (plate/outline.py) has its
+lowest corner at that drop, and "the lower edge's middle" is the point at l along the arm and h below it. The paper
+describes this robot without its drop (figure 2); with h = 0 its force matrix is rows x and z of J / l². Drop and height
+are from the authors' controller. The published lengths disagree (0.115 m in the paper, 0.120 m in the controller):
+measure your robot.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import asin, atan2, cos, hypot, radians, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
+from control.plate.outline import Corner, PlateOutline, mounted_outline, rectangle
 
 MIN_LEVER_M = 0.01  # below it the adduction joint moves the plate sideways, not down: refuse to command it
 
@@ -46,6 +50,24 @@ class FlipperGeometry:
     plate_height_m: Annotated[float, Bounds(0.002, 0.5), Meaning("plate's extent from its lower to its upper edge")] = (
         0.070
     )
+    plate_corners_m: Annotated[
+        tuple[Corner, ...],
+        Meaning("[outward, upward] in m of each corner of a plate that is no rectangle, instead of width and height"),
+    ] = ()
+    plate_angle_deg: Annotated[
+        float, Bounds(-45.0, 45.0), Meaning("by which the mounted plate is turned in its plane, lower end outward")
+    ] = 0.0
+
+    @cached_property
+    def plate(self) -> PlateOutline:
+        """The outline of the plate as mounted."""
+        corners = self.plate_corners_m or rectangle(self.plate_width_m, self.plate_height_m)
+        return mounted_outline(corners, self.plate_angle_deg)
+
+    @property
+    def has_level_rectangle(self) -> bool:
+        """Whether the plate is the paper's: a rectangle with a level lower edge."""
+        return not (self.plate_corners_m or self.plate_angle_deg)
 
     @property
     def clearance_m(self) -> float:

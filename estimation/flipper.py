@@ -12,6 +12,7 @@ from functools import partial
 from math import cos, hypot, isfinite, sin
 
 from control.geometry import FlipperGeometry
+from control.plate.integrals import growth_exponent
 from control.records import UNKNOWN, Estimate, FlipperLoad, Phase
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_between
@@ -199,11 +200,12 @@ class FlipperEstimator(StrideEstimator):
         return bound_extraction(self.geometry, stroke.batches, self._surface)
 
     def _shear_estimate(self, shear: Shear) -> Estimate:
-        """Add the errors of the surface, dk = 2 k dδ / z since the pressure grows with depth, and of the friction."""
+        """Add the errors of friction and of the surface, dk = (n + 1) k dδ / z as pressure and area grow with depth."""
         if shear.fit is None:
             return NOT_THERE._replace(samples=shear.samples, reason=shear.reason or NOT_THERE.reason)
         depth_m = self._deepest_m - self.surface_m
-        surface = 2.0 * shear.fit.slope * self._surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
+        power = 1.0 + growth_exponent(self.geometry, depth_m)
+        surface = power * shear.fit.slope * self._surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
         friction = self._air.std_error_nm / shear.moment_m4
         estimate = evaluated(shear.fit, hypot(surface, friction), shear.samples)
         return estimate._replace(at_least=shear.at_least, reason=estimate.reason or shear.reason)

@@ -7,6 +7,7 @@ The published force map turns joint torques into forces. The surface is the dept
     steady stance f_x =  k_s · b z²/2     b: the plate's width
     extraction   -f_z =  k_e · A z
 
+(for a plate that is no rectangle the mean widths with which A z and b z²/2 are its submerged volume and its moment)
 are fitted by least squares with a few running sums each, and closed when swing begins. If the body advances on solid
 mud the paper adds the body's drag to f_x; with `compensation`, half of it is added to each flipper's force.
 """
@@ -14,6 +15,7 @@ mud the paper adds the body's drag to f_x; with `compensation`, half of it is ad
 from math import isfinite
 
 from control.geometry import FlipperGeometry
+from control.plate.integrals import mean_width_m, moment_width_m
 from control.records import UNKNOWN, FlipperLoad, Phase
 from estimation.force_map import paper_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_at
@@ -32,7 +34,6 @@ class PaperEstimator(StrideEstimator):
     def __init__(self, flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, drag_n: float = 0.0) -> None:
         """`drag_n`, the body's drag on each flipper, is added to the thrust while the body advances; 0: as measured."""
         self.drag_n = drag_n
-        self.edge_m2 = geometry.plate_width_m * geometry.plate_thickness_m
         self._penetration, self._shear, self._extraction = LineFit(), LineFit(), LineFit()
         super().__init__(flipper, geometry, drive, motion_at)
 
@@ -64,7 +65,7 @@ class PaperEstimator(StrideEstimator):
             self._surface_m = load.depth_m
         self._deepest_m = larger(load.depth_m, self._deepest_m)
         if load.depth_m >= self._surface_m:
-            self._penetration.update(self.edge_m2 * (load.depth_m - self._surface_m), load.force_z_n)
+            self._penetration.update(self._volume_m3(load.depth_m - self._surface_m), load.force_z_n)
 
     def _learn_stance(self, sweep_rad: float, load: FlipperLoad, body_x_m: float) -> None:
         self._deepest_m = larger(load.depth_m, self._deepest_m)
@@ -75,7 +76,8 @@ class PaperEstimator(StrideEstimator):
         if submerged_m > 0.0 and abs(sweep_rad) <= self._steady_rad:
             advanced = body_x_m - self._body_at_stance_m > ADVANCED_M
             force_x_n = load.force_x_n + (self.drag_n if advanced else 0.0)
-            self._shear.update(self.geometry.plate_width_m * submerged_m * submerged_m / 2.0, force_x_n)
+            width_m = moment_width_m(self.geometry, submerged_m)
+            self._shear.update(width_m * submerged_m * submerged_m / 2.0, force_x_n)
 
     def _learn_extraction(self, load: FlipperLoad) -> None:
         self._extraction_nm = larger(-load.adduction_torque_nm, self._extraction_nm)
@@ -83,7 +85,10 @@ class PaperEstimator(StrideEstimator):
             self._extraction_start_m = load.depth_m
         submerged_m = load.depth_m - self.surface_m
         if submerged_m > 0.0 and load.depth_m < self._extraction_start_m - MOBILISED_M:
-            self._extraction.update(self.edge_m2 * submerged_m, -load.force_z_n)
+            self._extraction.update(self._volume_m3(submerged_m), -load.force_z_n)
+
+    def _volume_m3(self, submerged_m: float) -> float:
+        return mean_width_m(self.geometry, submerged_m) * self.geometry.plate_thickness_m * submerged_m
 
     @property
     def surface_m(self) -> float:

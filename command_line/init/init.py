@@ -2,13 +2,15 @@
 
 import argparse
 import sys
-from dataclasses import fields
+from collections.abc import Mapping
 from pathlib import Path
 
 from command_line import exit_codes
+from command_line.init.plate_file import RECTANGLE, plate_answer, read_corners
 from command_line.init.questions import Ask, ask, number, one_of, whole_number
 from command_line.screen import complain
 from control.geometry import FlipperGeometry
+from control.plate.outline import Corner
 from control.records import FLIPPERS, Rig
 from drivers.drive_types import DRIVE_TYPES
 from firmware_host.configuration.key_reference import Key, configuration_keys
@@ -17,6 +19,7 @@ from firmware_host.configuration.new_file import NewRobot, drive_keys, new_file
 from firmware_host.configuration.toml_records import ConfigurationError
 
 PRINTED = Path("-")
+SIDES = ("plate_width_m", "plate_height_m")
 
 
 def init(options: argparse.Namespace) -> int:
@@ -81,13 +84,26 @@ def _node_ids(options: argparse.Namespace, robot: NewRobot, read: Ask | None) ->
 
 
 def _geometry(options: argparse.Namespace, read: Ask | None) -> FlipperGeometry:
+    """Raises ConfigurationError."""
     given = dict(options.set or ())
-    keys = {key.name: key for key in configuration_keys(FlipperGeometry, "geometry")}
-    values = {
-        field.name: given[field.name] if field.name in given else _ask_value(keys[field.name], read)
-        for field in fields(FlipperGeometry)
-    }
-    return FlipperGeometry(**values)
+    corners = _corners(options, given, read)
+    left_out = {"plate_corners_m", *(SIDES if corners else ())}
+    keys = {key.name: key for key in configuration_keys(FlipperGeometry, "geometry") if key.name not in left_out}
+    values = {name: given[name] if name in given else _ask_value(key, read) for name, key in keys.items()}
+    return FlipperGeometry(plate_corners_m=corners, **values)
+
+
+def _corners(options: argparse.Namespace, given: Mapping[str, float], read: Ask | None) -> tuple[Corner, ...]:
+    """Returns the plate's corners; none for a rectangle. Raises ConfigurationError."""
+    sides = [name for name in SIDES if name in given]
+    if options.plate and sides:
+        raise ConfigurationError([f"--set {sides[0]}: must be left out where --plate gives the plate's corners"])
+    prompt = f"plate: {RECTANGLE}, or a file of its corners"
+    plate = options.plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, plate_answer, read))
+    try:
+        return () if plate == RECTANGLE else read_corners(Path(plate))
+    except ValueError as problem:
+        raise ConfigurationError([str(problem)]) from problem
 
 
 def _ask_value(key: Key, read: Ask | None) -> float:

@@ -47,6 +47,7 @@ def add_init(init: Parser) -> None:
         "--channel", action="append", metavar="NAME", help="such as can0; twice: the left and the right flipper's own"
     )
     option("--node", type=node_id, action="append", metavar="JOINT=ID", help="right_sweep=3, repeatable")
+    option("--plate", metavar="FILE", help="corners of a plate that is no rectangle: lines of outward, upward in m")
     option("--set", type=geometry_value, action="append", metavar="KEY=M", help="geometry: drop_m=0.05, repeatable")
 
 

@@ -1,6 +1,6 @@
 """Forecast of a stride at another depth, on the safe side: the flippers' thrust, and the torque of their extraction.
 
-The thrust of one flipper at the middle of the sweep is f_x = k_s(z) ∫ζ dA (control/plate.py), limited by its motor. Mud
+The thrust of one flipper at the middle of the sweep is f_x = k_s(z) ∫ζ dA (control/plate), limited by its motor. Mud
 that yielded gives a value of k_s; mud that did not gives only a lower bound, but the insertion gives k_p, and both
 depend on the one strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log with a readable insertion (their 12.5N
 mud, 1.8 cm), and 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to 3 cm. So the
@@ -23,7 +23,7 @@ from math import exp, fsum, inf, isfinite, log, radians
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
-from control.plate import stroke_moment_m4, submerged_plate
+from control.plate.integrals import stroke_moment_m4, submerged_plate
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 SHEAR_RATIO = 0.55  # k_s over k_p before any mud gave both

@@ -20,6 +20,7 @@ from control.depth.forecast import GRID_M
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.plate.integrals import mean_width_m, moment_width_m
 from control.records import TWO_FLIPPERS, Estimate, Rig, StrideEstimate
 
 NOT_REPORTED = Estimate(0.0, 0.0, 0, False)
@@ -75,14 +76,14 @@ class PaperAdaptation:
         self._late_m = inf if all(stride.released for stride in strides) else walked_m
 
     def _comes_out(self, depth_m: float) -> bool:
-        edge_m2 = self.geometry.plate_width_m * self.geometry.plate_thickness_m
+        edge_m2 = mean_width_m(self.geometry, depth_m) * self.geometry.plate_thickness_m
         extraction_n = self._k_e.value * edge_m2 * depth_m
         return depth_m < self._stuck_m - GRID_M / 2.0 and extraction_n < self.parameters.motor_force_n
 
     def _slips(self, depth_m: float) -> bool:
         if not self._k_s.valid:
             return False
-        thrust_n = self._k_s.value * self.geometry.plate_width_m * depth_m * depth_m / 2.0
+        thrust_n = self._k_s.value * moment_width_m(self.geometry, depth_m) * depth_m * depth_m / 2.0
         return self._flippers * thrust_n <= self._resistance_n()
 
     def _resistance_n(self) -> float:

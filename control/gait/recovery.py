@@ -70,8 +70,8 @@ class RecoveryParameters:
 
 def lowest_point_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
     """Return the depth of the plate's lower corner below the nominal surface."""
-    slope = cos(sweep_rad) * sin(adduction_rad)
-    return geometry.depth_m(sweep_rad, adduction_rad) + abs(slope) * geometry.plate_width_m / 2.0
+    per_outward, per_upward = -cos(sweep_rad) * sin(adduction_rad), cos(adduction_rad)
+    return geometry.depth_m(sweep_rad, adduction_rad) + geometry.plate.below_origin_m(per_outward, per_upward)
 
 
 def is_in_mud(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> bool:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from control.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
-from control.plate import stance_moment_m4, submerged_plate
+from control.plate.integrals import moment_width_m, stance_moment_m4, submerged_plate
 from control.records import UNKNOWN
 from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
@@ -133,7 +133,7 @@ def _bound(
     geometry: FlipperGeometry, case: str, reason: str, batches: Sequence[Batch], moments: Sequence[float]
 ) -> Shear:
     """Return the largest k_s that HELD batches in a row withstood; mud withstands a first quick push better."""
-    least_m4 = geometry.flipper_length_m * geometry.plate_width_m * SHALLOWEST_M**2 / 2.0
+    least_m4 = geometry.flipper_length_m * moment_width_m(geometry, SHALLOWEST_M) * SHALLOWEST_M**2 / 2.0
     withstood = [
         b.sweep_nm / moment if moment > least_m4 else UNKNOWN for b, moment in zip(batches, moments, strict=True)
     ]

@@ -4,7 +4,7 @@
     extraction    τ₂ - cross-coupling = -k_e Φ        over the last three quarters of the rise
 
 Φ is the moment of the submerged volume in each pose, and the cross-coupling is the adduction torque of the load across
-the plate's face, which the sweep joint measures (both in control/plate.py). Each piece of the travel counts by its
+the plate's face, which the sweep joint measures (both in control/plate). Each piece of the travel counts by its
 length within these limits, unless the adduction joint has no vertical lever there. Over the first quarter of the rise
 the mud's force on the plate reverses from supporting it to holding it down.
 """
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from control.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
-from control.plate import cross_coupling, stroke_moment_m4, submerged_plate
+from control.plate.integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin
@@ -131,11 +131,13 @@ def _fit(
     if fit is None:
         hidden = pieces.lever_m < MIN_VERTICAL_LEVER_M
         return NOT_THERE._replace(samples=pieces.samples, reason=UNOBSERVABLE if hidden else TOO_SHORT)
-    edge_m2 = geometry.plate_width_m * geometry.plate_thickness_m
+    deepest_m = max(pieces.depths_m)
+    edge_m2 = mean_width_m(geometry, deepest_m) * geometry.plate_thickness_m
+    scales_m = [depth_m / growth_exponent(geometry, depth_m) for depth_m in pieces.depths_m]
     systematic = hypot(
         CROSS_COUPLING_UNCERTAINTY * _slope(pieces.moments, pieces.crossed_nm),
-        _slope_per_surface(fit, pieces.moments, pieces.torques, pieces.depths_m) * surface.std_error_m,
-        1.5 * zero_error_n / (edge_m2 * max(pieces.depths_m)),
+        _slope_per_surface(fit, pieces.moments, pieces.torques, scales_m) * surface.std_error_m,
+        1.5 * zero_error_n / (edge_m2 * deepest_m),
     )
     return evaluated(scatter.pooled(fit) if scatter else fit, systematic, pieces.samples)
 
@@ -176,16 +178,16 @@ def _slope(x: Sequence[float], y: Sequence[float]) -> float:
 
 
 def _slope_per_surface(
-    fit: OriginFit, moments: Sequence[float], torques: Sequence[float], depths_m: Sequence[float]
+    fit: OriginFit, moments: Sequence[float], torques: Sequence[float], scales_m: Sequence[float]
 ) -> float:
-    """Return dk/dδ for a surface deeper by dδ: Φ falls by about Φ dδ / z, so with k = Σ τΦ / ΣΦ²
+    """Return dk/dδ for a surface deeper by dδ: Φ falls by about Φ dδ / s with s = z/n, so with k = Σ τΦ / ΣΦ²
 
-    dk/dδ = (2 k Σ Φ²/z - Σ τΦ/z) / ΣΦ², which is 3/2 k/z where τ = k Φ.
+    dk/dδ = (2 k Σ Φ²/s - Σ τΦ/s) / ΣΦ², which is 3/2 k/z where τ = k Φ and Φ grows in proportion to depth, n = 1.
     """
     squares = [moment * moment for moment in moments]
-    weighted = exact_sum([square / depth_m for square, depth_m in zip(squares, depths_m, strict=True)])
+    weighted = exact_sum([square / scale_m for square, scale_m in zip(squares, scales_m, strict=True)])
     products = [torque * moment for torque, moment in zip(torques, moments, strict=True)]
-    reported = exact_sum([product / depth_m for product, depth_m in zip(products, depths_m, strict=True)])
+    reported = exact_sum([product / scale_m for product, scale_m in zip(products, scales_m, strict=True)])
     return (2.0 * fit.slope * weighted - reported) / exact_sum(squares)
 
 

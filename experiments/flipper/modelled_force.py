@@ -1,6 +1,6 @@
 """The forces that the fitted coefficients predict, for comparison with the measured forces.
 
-The default method's laws (control/plate.py) are about the torques of the joints: τ₂ = k_p Φ in insertion, τ₁ = k_s Ψ in
+The default method's laws (control/plate) are about the torques of the joints: τ₂ = k_p Φ in insertion, τ₁ = k_s Ψ in
 stance, τ₂ = -k_e Φ in extraction, with the cross-coupled load on the plate's face added to τ₂. The law's torque
 replaces the measured one, the other joint's stays as measured, and both go through the same map from torques to forces
 as the measurement. The paper's laws are about the forces themselves: f_z = k_p A z, f_x = k_s b z²/2, f_z = -k_e A z.
@@ -15,7 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from control.geometry import FlipperGeometry
-from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate.integrals import (
+    cross_coupling,
+    mean_width_m,
+    moment_width_m,
+    stance_moment_m4,
+    stroke_moment_m4,
+    submerged_plate,
+)
 from control.records import Phase
 from estimation.force_map import smallest_force_n
 from estimation.strokes.shear import MOBILISED_M
@@ -99,8 +106,8 @@ def _default_force(row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m
 
 def _paper_force(row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m3: float) -> float:
     if row.phase is Phase.STANCE:
-        return k_n_m3 * geometry.plate_width_m * row.submerged_m**2 / 2.0
-    edge_m2 = geometry.plate_width_m * geometry.plate_thickness_m
+        return k_n_m3 * moment_width_m(geometry, row.submerged_m) * row.submerged_m**2 / 2.0
+    edge_m2 = mean_width_m(geometry, row.submerged_m) * geometry.plate_thickness_m
     return (1.0 if row.phase is Phase.INSERTION else -1.0) * k_n_m3 * edge_m2 * row.submerged_m
 
 

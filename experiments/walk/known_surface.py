@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from control.plate.integrals import moment_width_m
 from control.records import Phase
 from estimation.paper import ADVANCED_M, STEADY_FRACTION
 from estimation.strokes.line_fit import LineFit
@@ -47,7 +48,8 @@ def k_s_of(
     steady = stance & (submerged_m > 0.0) & np.isfinite(profile.sweep_nm)
     if stance.any():
         steady &= np.abs(profile.sweep_rad) <= STEADY_FRACTION * abs(profile.sweep_rad[stance][0])
-    moments_m3 = geometry.plate_width_m * submerged_m**2 / 2.0
+    widths_m = np.array([moment_width_m(geometry, depth_m) for depth_m in submerged_m.tolist()])
+    moments_m3 = widths_m * submerged_m**2 / 2.0
     forces_n = np.cos(profile.sweep_rad) * profile.sweep_nm / geometry.flipper_length_m
     if drag_n and stance.any():
         advanced = profile.body_m - profile.body_m[stance][0] > ADVANCED_M

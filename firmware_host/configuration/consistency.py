@@ -11,6 +11,7 @@ from math import ceil, degrees, floor, radians
 from operator import attrgetter
 
 from control.depth.gait_choice import gait_candidates
+from control.geometry import FlipperGeometry
 from control.joint_pd import (
     LEAST_MARGIN_RAD,
     LOOP_DELAY_S,
@@ -18,6 +19,7 @@ from control.joint_pd import (
     largest_stiffness_nm_rad,
     phase_margin_rad,
 )
+from control.plate.outline import outline_problems
 from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from firmware_host.configuration.drive_consistency import bus_problems, drive_problems, rig_problems
@@ -43,6 +45,7 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _pose_problems(configuration.pose)
     yield from drive_problems(configuration)
     yield from bus_problems(configuration)
+    yield from _plate_problems(configuration.geometry)
     yield from _motor_force_problems(configuration)
     yield from _depth_problems(configuration)
     yield from _range_problems(configuration)
@@ -122,6 +125,20 @@ def _winding_problems(configuration: Configuration) -> Iterator[str]:
         yield (
             f"winding.room_c = {room_c}: must be less than {nearly_hot_c:g}, the middle of limits.temperature_warm_c"
             " and temperature_hot_c, or a resting motor counts as too hot"
+        )
+
+
+def _plate_problems(geometry: FlipperGeometry) -> Iterator[str]:
+    """Checks that the plate is a polygon, and that it lies beyond the sweep axis."""
+    problems = list(outline_problems(geometry.plate_corners_m)) if geometry.plate_corners_m else []
+    yield from (f"geometry.plate_corners_m: {problem}" for problem in problems)
+    if problems:
+        return
+    inward_m = -min(outward_m for outward_m, _ in geometry.plate.corners)
+    if inward_m >= geometry.flipper_length_m:
+        yield (
+            f"geometry.flipper_length_m = {geometry.flipper_length_m}: must be more than {inward_m:.4g}, the plate's"
+            " extent inward from there, or the plate reaches the sweep axis"
         )
 
 

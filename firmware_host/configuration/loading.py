@@ -52,6 +52,7 @@ def parse_configuration(text: str, file: Path | None = None) -> Configuration:
     warnings = rename_former_keys(document, FORMER_KEYS)
     _apply_protocol(document)
     _require_known_types(document)
+    _require_one_shape(document)
     fields = _READER.read(document)
     configuration = Configuration(**fields, text=text, warnings=tuple(warnings))
     problems = list(contradictions(configuration))
@@ -73,6 +74,17 @@ def _require_known_types(document: dict[str, Any]) -> None:
     ]
     if problems:
         raise ConfigurationError(problems)
+
+
+def _require_one_shape(document: dict[str, Any]) -> None:
+    """Raises ConfigurationError where a plate has both corners and the sides of a rectangle."""
+    geometry = document.get("geometry")
+    if not isinstance(geometry, dict) or not geometry.get("plate_corners_m"):
+        return
+    sides = [name for name in ("plate_width_m", "plate_height_m") if name in geometry]
+    if sides:
+        must_be = "must be left out where geometry.plate_corners_m gives the plate"
+        raise ConfigurationError([f"geometry.{name} = {shown(geometry[name])}: {must_be}" for name in sides])
 
 
 def _apply_protocol(document: dict[str, Any]) -> None:

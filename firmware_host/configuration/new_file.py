@@ -5,6 +5,7 @@ the motor's force follow from the geometry: the defaults of another robot could 
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from math import floor
 from typing import Any, NamedTuple
 
@@ -73,11 +74,17 @@ def _common(robot: NewRobot) -> dict[str, dict[str, Any]]:
     return {
         "robot": {"name": robot.name},
         "rig": {"flippers": robot.rig.flippers},
-        "geometry": dict(vars(robot.geometry)),
+        "geometry": _geometry(robot.geometry),
         "gait": {"protocol": "single_flipper" if alone else "walking"},
         "estimation": {"fixed_base": robot.fixed_base},
         "adaptation": _adaptation(robot.geometry),
     }
+
+
+def _geometry(geometry: FlipperGeometry) -> dict[str, Any]:
+    """Returns the keys of a rectangle, or of a plate with corners."""
+    left_out = ("plate_width_m", "plate_height_m") if geometry.plate_corners_m else ("plate_corners_m",)
+    return {name: value for name, value in asdict(geometry).items() if name not in left_out}
 
 
 def _adaptation(geometry: FlipperGeometry) -> dict[str, Any]:
@@ -106,7 +113,7 @@ def _buses(robot: NewRobot) -> dict[str, dict[str, Any]]:
 
 def _section(name: str, values: Mapping[str, Any], keys: list[Key]) -> str:
     described = {key.name: key for key in keys}
-    lines = (f"{f'{key} = {toml_value(value)}':<36}{_comment(described.get(key))}" for key, value in values.items())
+    lines = (f"{f'{key} = {toml_value(value)}':<35} {_comment(described.get(key))}" for key, value in values.items())
     return f"[{name}]\n" + "".join(f"{line.rstrip()}\n" for line in lines)
 
 

@@ -11,7 +11,18 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    create_model,
+)
+from pydantic_core import PydanticCustomError
 
 from control.bounds import Bounds
 from firmware_host.configuration.file_problems import ConfigurationError as ConfigurationError  # for its users here
@@ -143,7 +154,14 @@ def _checked_hint(hint: Any) -> Any:
 def _checked_tuple(items: tuple[Any, ...]) -> Any:
     """Returns the type of an array in the file that becomes a tuple of any length, or of as many items as named."""
     inner, length = _checked_hint(items[0]), None if items[-1] is ... else len(items)
-    return Annotated[list[inner], Field(min_length=length or 0, max_length=length), AfterValidator(tuple)]  # type: ignore[valid-type]
+    checked = Annotated[list[inner], Field(min_length=length or 0, max_length=length), AfterValidator(tuple)]  # type: ignore[valid-type]
+    return checked if is_dataclass(items[0]) else Annotated[checked, BeforeValidator(_require_array)]
+
+
+def _require_array(value: object) -> object:
+    if not isinstance(value, list):
+        raise PydanticCustomError("array", "must be an array, in [brackets]")
+    return value
 
 
 @dataclass(frozen=True)

@@ -151,14 +151,14 @@ class Arm:
         """Finds the clay under the flipper, its remaining firmness after earlier strokes, and its height."""
         self.relief_m = self.track.surface_m(edge_m)
         if self._disturbed:
-            deepest_m = lowest_point_m(attitude, self.parameters.geometry.plate_width_m)
+            deepest_m = lowest_point_m(attitude, self.contact.plate.size)
             self.history.step(deepest_m - self.relief_m, edge_m)
         clay, firmness = self.track.clay_at(edge_m), self.history.firmness
         self.clay = clay if firmness == 1.0 else clay.scaled(firmness)
 
     def _meet_stones(self, stones: StoneContact, dt_s: float, edge_m: float, attitude: Attitude) -> None:
         geometry, sweep_rad, adduction_rad = self.parameters.geometry, self.sweep_rad, self.adduction_rad
-        push = stones.step(dt_s, edge_m, lowest_point_m(attitude, geometry.plate_width_m))
+        push = stones.step(dt_s, edge_m, lowest_point_m(attitude, self.contact.plate.size))
         if push is not NO_PUSH:
             pushed = contact_force(geometry, sweep_rad, push_wrench(geometry, sweep_rad, adduction_rad, push))
             self.force = ContactForce(*map(add, self.force, pushed))

@@ -44,7 +44,10 @@ NO_CONTACT = ContactForce(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def plate_size(geometry: FlipperGeometry) -> PlateSize:
-    return PlateSize(geometry.plate_width_m, geometry.plate_height_m, geometry.plate_thickness_m)
+    if geometry.has_level_rectangle:
+        return PlateSize(geometry.plate_width_m, geometry.plate_height_m, geometry.plate_thickness_m)
+    plate = geometry.plate
+    return PlateSize(plate.width_m, plate.height_m, geometry.plate_thickness_m, plate.corners)
 
 
 def attitude_of(

@@ -47,8 +47,10 @@ Strip = tuple[float, float, float, float]
 Fraction = TypeVar("Fraction", float, complex)
 
 
-def submerged_strips(submerged_m: float, strip_m: float, per_upward: float, clay: Clay) -> list[Strip]:
-    """Returns the strips of a column that is in the mud up to `submerged_m` above the lower edge."""
+def submerged_strips(
+    submerged_m: float, strip_m: float, per_upward: float, clay: Clay, foot_m: float = 0.0
+) -> list[Strip]:
+    """Returns the strips of a column in the mud up to `submerged_m` above its foot, which is at the height `foot_m`."""
     strips, strength_pa, layers = [], clay.strength_pa, clay.layers
     for strip in range(STRIPS):
         low_m = strip * strip_m
@@ -62,7 +64,7 @@ def submerged_strips(submerged_m: float, strip_m: float, per_upward: float, clay
         if layers:
             half_m = covered_m * per_upward / 2.0
             strength_pa = clay.mean_strength_pa(depth_m - half_m, depth_m + half_m)
-        strips.append((middle_m, depth_m, covered_m, strength_pa))
+        strips.append((foot_m + middle_m, depth_m, covered_m, strength_pa))
     return strips
 
 
@@ -164,13 +166,14 @@ class LowerEdge(Springs[float]):
         super().__init__([0.0, 0.0])
         self.thickness_m = thickness_m
 
-    def step(self, step: PlateStep, positions_m: tuple[float, float], wet_m: float) -> tuple[float, float]:
+    def step(
+        self, step: PlateStep, positions_m: tuple[float, float], depths_m: tuple[float, float], wet_m: float
+    ) -> tuple[float, float]:
         """Returns the force upward, and its moment outward."""
-        dt_s, clay, rate, attitude, twist = step
+        dt_s, clay, rate, _, twist = step
         fractions, limits_n = self._fractions, self._limits_n
         force_n = moment_nm = 0.0
-        for half, outward_m in enumerate(positions_m):
-            depth_m = attitude.depth_m + attitude.per_outward * outward_m
+        for half, (outward_m, depth_m) in enumerate(zip(positions_m, depths_m, strict=True)):
             suction = DEEP_FACTOR / BEARING_FACTOR * min(depth_m / SUCTION_FADE_M, 1.0)
             moved_m = dt_s * (twist.upward_m_s + twist.upward_per_outward_s * outward_m)
             limit_n = BEARING_FACTOR * clay.strength_at_pa(depth_m) * self.thickness_m * wet_m / 2.0

@@ -1,21 +1,24 @@
-"""A rigid rectangular plate in clay, integrated over its surface in three dimensions.
+"""A rigid plate in clay, integrated over its surface in three dimensions.
 
-The plate is cut into strips along its height and two columns across the wet part of its lower edge, at its Gauss
-points. A spring that slides at its yield force holds every piece below the mud's surface (mud_springs.py):
+The plate is cut into panels across its width (plate_panels.py; the paper's rectangle is one), each panel into two
+columns at the Gauss points of the wet part of its lower edge, and each column into strips along its height. A spring
+that slides at its yield force holds every piece below the mud's surface (mud_springs.py):
 
     faces         across: N_p(ζ) s_u, both faces together      along: a s_u on each face and narrow side, as a vector
     narrow sides  N_p(ζ) s_u for a body as wide as the plate is thick, half of it on each
     lower edge    down N_c s_u, up 9 s_u with suction fading near the surface
 
 with the strength s_u at the depth of the piece (for a strip, the mean over its height), times the rate factor of the
-plate's speed. The laws and their constants are those of the clay. Adhesion does not depend on pressure (undrained), so
-across and along are independent. Lean, cross-coupling and lateral pull follow from the sum.
+plate's speed. The laws and their constants are those of the clay. A slanted edge that looks down bears on its extent
+across, one that looks up (as the top) does not. The narrow sides press at the middle of each one's range outward, and
+stick with the columns, in proportion to the panels' areas. Adhesion does not depend on pressure (undrained), so across
+and along are independent. Lean, cross-coupling and lateral pull follow from the sum.
 
 At rest loads relax: they fade by up to `relaxation` within half a second, and motion loads the springs again.
 """
 
 from math import exp, sqrt
-from typing import NamedTuple
+from typing import Any
 
 from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.mud_springs import (
@@ -26,22 +29,57 @@ from simulation.mud.mud_springs import (
     PlateStep,
     PressedColumn,
     RubbedColumn,
+    Springs,
     Strip,
     submerged_strips,
 )
-from simulation.mud.rigid_plate import NO_WRENCH, Attitude, PlateSize, Twist, Wrench, lowest_point_m, wet_edge_m
+from simulation.mud.plate_panels import GAUSS, Panel, panels_of, sides_m
+from simulation.mud.rigid_plate import NO_WRENCH, Attitude, PlateSize, Twist, Wrench, lowest_point_m
 
-GAUSS = 0.5 / sqrt(3.0)  # of a width, each side of its middle
 RELAXATION_S = 0.2
 RESTING_M_S = 0.002
 WAKING_M = 0.001
 
 
-class Column(NamedTuple):
-    """Half of the plate: both faces, and a narrow side."""
+class PanelContact:
+    """Owns the mud on one panel: two columns of both faces with a part of the narrow sides, and the lower edge."""
 
-    pressed: PressedColumn
-    rubbed: RubbedColumn
+    def __init__(self, size: PlateSize, panel: Panel, side_m: float) -> None:
+        """`side_m`: of the thickness of each narrow side, the part that a column of this panel counts."""
+        self.panel = panel
+        self._side_m = side_m
+        self._pressed = [PressedColumn(size.width_m, SIDEWAYS_YIELD_M) for _ in range(2)]
+        self._rubbed = [RubbedColumn() for _ in range(2)]
+        self._edge = LowerEdge(size.thickness_m)
+        self.parts: tuple[Springs[Any], ...] = (*self._pressed, *self._rubbed, self._edge)
+
+    def step(self, step: PlateStep) -> tuple[float, ...]:
+        """Returns the panel's part of the wrench."""
+        attitude, panel = step.attitude, self.panel
+        wet_m, middle_m = panel.wet_part_m(attitude)
+        positions_m = (middle_m - GAUSS * wet_m, middle_m + GAUSS * wet_m)
+        inner, outer = (self._step_column(step, half, positions_m[half], wet_m / 2.0) for half in (0, 1))
+        depths_m = (panel.foot_depth_m(attitude, positions_m[0]), panel.foot_depth_m(attitude, positions_m[1]))
+        edge_n, edge_nm = self._edge.step(step, positions_m, depths_m, wet_m)
+        n, r, s, n_u, n_s, r_s, s_u = [a + b for a, b in zip(inner, outer, strict=True)]
+        return n, r, s + edge_n, n_u, n_s, r_s, s_u + edge_nm
+
+    def _step_column(self, step: PlateStep, half: int, outward_m: float, breadth_m: float) -> tuple[float, ...]:
+        v_n, v_r, v_s, n_u, n_s, r_s, s_u = step.twist
+        foot_m, strip_m = self.panel.foot_at_m(outward_m), self.panel.length_at_m(outward_m) / STRIPS
+        strips = strips_at(step, outward_m, foot_m, strip_m)
+        normal_n, normal_nm = self._pressed[half].step(step, strips, breadth_m, v_n + n_u * outward_m, n_s)
+        sticky_m = 2.0 * breadth_m + self._side_m
+        velocity_m_s = complex(v_r, v_s + s_u * outward_m)
+        along_n, outward_nm = self._rubbed[half].step(step, strips, sticky_m, velocity_m_s, r_s)
+        up_n = along_n.imag
+        return normal_n, along_n.real, up_n, normal_n * outward_m, normal_nm, outward_nm, up_n * outward_m
+
+
+def strips_at(step: PlateStep, outward_m: float, foot_m: float, strip_m: float) -> list[Strip]:
+    depth_m, per_outward, per_upward = step.attitude
+    submerged_m = (depth_m + per_outward * outward_m) / per_upward - foot_m
+    return submerged_strips(submerged_m, strip_m, per_upward, step.clay, foot_m)
 
 
 class PlateContact:
@@ -51,12 +89,19 @@ class PlateContact:
         self.size = size
         self.relaxation = relaxation
         self._strip_m = size.height_m / STRIPS
-        self._inner, self._outer = (
-            Column(PressedColumn(size.width_m, SIDEWAYS_YIELD_M), RubbedColumn()) for _ in range(2)
-        )
+        panels = panels_of(size)
+        area_m2 = sum(panel.area_m2 for panel in panels)
+        self._panels = [
+            PanelContact(size, panel, size.thickness_m * ((panel.outer_m - panel.inner_m) * size.height_m / area_m2))
+            for panel in panels
+        ]
+        self._sides_m = sides_m(size, STRIPS)
         self._inner_side, self._outer_side = (PressedColumn(size.thickness_m, LENGTHWAYS_YIELD_M) for _ in range(2))
-        self._edge = LowerEdge(size.thickness_m)
-        self._parts = (*self._inner, *self._outer, self._inner_side, self._outer_side, self._edge)
+        self._parts: tuple[Springs[Any], ...] = (
+            *(part for panel in self._panels for part in panel.parts),
+            self._inner_side,
+            self._outer_side,
+        )
         self.reset()
 
     def reset(self) -> None:
@@ -67,7 +112,7 @@ class PlateContact:
 
     def leaves(self, attitude: Attitude) -> bool:
         """Returns whether the plate is clear of the mud; the mud then forgets it."""
-        if lowest_point_m(attitude, self.size.width_m) > 0.0:
+        if lowest_point_m(attitude, self.size) > 0.0:
             return False
         if self._touched:
             self.reset()
@@ -86,16 +131,13 @@ class PlateContact:
 
     def _wrench(self, step: PlateStep) -> Wrench:
         """Returns the sum over all pieces."""
-        half_m = self.size.width_m / 2.0
-        wet_m, middle_m = wet_edge_m(step.attitude, self.size.width_m)
-        positions_m = (middle_m - GAUSS * wet_m, middle_m + GAUSS * wet_m)
-        inner = self._step_column(step, self._inner, positions_m[0], wet_m / 2.0)
-        outer = self._step_column(step, self._outer, positions_m[1], wet_m / 2.0)
-        inner_n, inner_nm = self._step_side(step, self._inner_side, -half_m)
-        outer_n, outer_nm = self._step_side(step, self._outer_side, half_m)
-        edge_n, edge_nm = self._edge.step(step, positions_m, wet_m)
-        n, r, s, n_u, n_s, r_s, s_u = [a + b for a, b in zip(inner, outer, strict=True)]
-        return Wrench(n, r + inner_n + outer_n, s + edge_n, n_u, n_s, r_s + inner_nm + outer_nm, s_u + edge_nm)
+        total = self._panels[0].step(step)
+        for panel in self._panels[1:]:
+            total = tuple([a + b for a, b in zip(total, panel.step(step), strict=True)])
+        inner_n, inner_nm = self._step_side(step, self._inner_side, self._sides_m[0])
+        outer_n, outer_nm = self._step_side(step, self._outer_side, self._sides_m[1])
+        n, r, s, n_u, n_s, r_s, s_u = total
+        return Wrench(n, r + inner_n + outer_n, s, n_u, n_s, r_s + inner_nm + outer_nm, s_u)
 
     def _relax(self, dt_s: float, speed_m_s: float) -> None:
         """Fades the load at rest. Motion forgets the rest, and the distance it covers loads the springs again."""
@@ -108,23 +150,8 @@ class PlateContact:
         for part in self._parts:
             part.fade(remaining)
 
-    def _strips(self, step: PlateStep, outward_m: float) -> list[Strip]:
-        depth_m, per_outward, per_upward = step.attitude
-        submerged_m = (depth_m + per_outward * outward_m) / per_upward
-        return submerged_strips(submerged_m, self._strip_m, per_upward, step.clay)
-
-    def _step_column(self, step: PlateStep, column: Column, outward_m: float, breadth_m: float) -> tuple[float, ...]:
-        """Returns the column's part of the wrench."""
-        v_n, v_r, v_s, n_u, n_s, r_s, s_u = step.twist
-        strips = self._strips(step, outward_m)
-        normal_n, normal_nm = column.pressed.step(step, strips, breadth_m, v_n + n_u * outward_m, n_s)
-        sticky_m = 2.0 * breadth_m + self.size.thickness_m
-        along_n, outward_nm = column.rubbed.step(step, strips, sticky_m, complex(v_r, v_s + s_u * outward_m), r_s)
-        up_n = along_n.imag
-        return normal_n, along_n.real, up_n, normal_n * outward_m, normal_nm, outward_nm, up_n * outward_m
-
     def _step_side(self, step: PlateStep, side: PressedColumn, outward_m: float) -> tuple[float, float]:
         """Returns the force outward, and its moment upward."""
-        strips, twist = self._strips(step, outward_m), step.twist
+        strips, twist = strips_at(step, outward_m, 0.0, self._strip_m), step.twist
         breadth_m = self.size.thickness_m / 2.0
         return side.step(step, strips, breadth_m, twist.outward_m_s, twist.outward_per_upward_s)

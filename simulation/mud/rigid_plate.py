@@ -1,4 +1,4 @@
-"""A rigid rectangular plate in its own directions: its attitude in the mud, its motion, and the mud's force on it.
+"""A rigid plate in its own directions: its attitude in the mud, its motion, and the mud's force on it.
 
 The directions are the normal n, outward r along the lower edge and upward s along the plate's height; the middle of the
 lower edge is the point that everything is counted from.
@@ -10,9 +10,12 @@ from typing import NamedTuple
 
 
 class PlateSize(NamedTuple):
+    """The plate's extents; `corners_m` are the outline of one that is no rectangle, (outward, upward) around it."""
+
     width_m: float
     height_m: float
     thickness_m: float
+    corners_m: tuple[tuple[float, float], ...] = ()
 
 
 class Attitude(NamedTuple):
@@ -27,20 +30,11 @@ class Attitude(NamedTuple):
         return Attitude(self.depth_m - surface_m, self.per_outward, self.per_upward)
 
 
-def lowest_point_m(attitude: Attitude, width_m: float) -> float:
-    """Returns the depth of the lower edge's lower corner."""
-    return attitude.depth_m + abs(attitude.per_outward) * width_m / 2.0
-
-
-def wet_edge_m(attitude: Attitude, width_m: float) -> tuple[float, float]:
-    """Returns the width of the submerged part of the lower edge, and how far outward its middle is."""
-    half_m = width_m / 2.0
-    if attitude.depth_m >= abs(attitude.per_outward) * half_m:
-        return width_m, 0.0
-    waterline_m = -attitude.depth_m / attitude.per_outward
-    if attitude.per_outward > 0.0:
-        return half_m - waterline_m, (half_m + waterline_m) / 2.0
-    return half_m + waterline_m, (waterline_m - half_m) / 2.0
+def lowest_point_m(attitude: Attitude, size: PlateSize) -> float:
+    """Returns the depth of the deepest corner."""
+    if not size.corners_m:
+        return attitude.depth_m + abs(attitude.per_outward) * size.width_m / 2.0
+    return attitude.depth_m + max(attitude.per_outward * u - attitude.per_upward * s for u, s in size.corners_m)
 
 
 class Twist(NamedTuple):

@@ -17,7 +17,7 @@ press the edge 0.7 mm into it. With C an arm in air rebounds from the top at six
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from math import copysign, cos, inf, sin
+from math import cos, inf, sin
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
@@ -69,13 +69,15 @@ def push_wrench(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: floa
     F_n = F_x cos α - F_z sin α sin β    F_r = F_x sin α + F_z cos α sin β    F_s = F_z cos β
     """
     sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
-    corner_m = copysign(geometry.plate_width_m / 2.0, -ca * sb)
-    upright_n, upward_n = -push.upward_n * sa * sb, push.upward_n * cb
+    corner_m, height_m = max(geometry.plate.corners, key=lambda corner: -ca * sb * corner[0] - cb * corner[1])
+    upright_n, upward_n, across_n = -push.upward_n * sa * sb, push.upward_n * cb, push.upward_n * ca * sb
     return Wrench(
         push.forward_n * ca + upright_n,
-        push.forward_n * sa + push.upward_n * ca * sb,
+        push.forward_n * sa + across_n,
         upward_n,
         normal_outward_nm=upright_n * corner_m,
+        normal_upward_nm=upright_n * height_m,
+        outward_upward_nm=across_n * height_m,
         upward_outward_nm=upward_n * corner_m,
     )
 

@@ -2,7 +2,7 @@
 
 A stage that pushes a leaning plate straight down presses its face through the mud, and part of that load points up:
 nothing in 2 cm of clay, a seventh of the whole at 5 cm. A flipper's plate moves down along an arc on which it leans
-more and more, and the load on its face is no part of k_p and k_e (control/plate.py). So here the joint turns the plate
+more and more, and the load on its face is no part of k_p and k_e (control/plate). So here the joint turns the plate
 at one sweep angle, with one speed of its lower edge and in equal steps of depth, and the cell reads the moment of all
 forces within the plate's plane. The contact model is the same as under the robot.
 """
@@ -11,7 +11,7 @@ from math import degrees, hypot
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from control.plate import stroke_moment_m4, submerged_plate
+from control.plate.integrals import stroke_moment_m4, submerged_plate
 from simulation.mud.clay import Clay
 from simulation.mud.flipper_contact import ArmMotion, attitude_of, contact_force, plate_size, twist_of
 from simulation.mud.plate_contact import PlateContact
@@ -24,7 +24,7 @@ class ArcCurve(NamedTuple):
     """One pose after the other, in the order of time."""
 
     depths_m: list[float]  # of the lower edge's middle below the surface
-    moments_m4: list[float]  # Φ of control/plate.py
+    moments_m4: list[float]  # Φ of control/plate
     moments_nm: list[float]  # that lift the plate
 
 
@@ -44,7 +44,7 @@ class JointCell:
         self._sweep_rad = sweep_rad
         self._surface_m = surface_m
         self._plate = PlateContact(plate_size(geometry), relaxation)
-        self.clear_m = -geometry.plate_width_m / 2.0  # both ends of the edge are out, however it leans
+        self.clear_m = -max(abs(outward_m) for outward_m, _ in geometry.plate.corners)  # all corners out, at any lean
         self._adduction_rad = self._angle_at_rad(self.clear_m)
         self._depth_m = self.clear_m
 

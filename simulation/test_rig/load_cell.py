@@ -50,7 +50,7 @@ class LoadCell:
         self.clay = clay
         self.plate = PlateContact(plate_size(geometry), relaxation)
         self._upright = Attitude(0.0, -ca * sb, cb)
-        self.clear_m = -lowest_point_m(self._upright, geometry.plate_width_m)  # depth at which the plate is just out
+        self.clear_m = -lowest_point_m(self._upright, self.plate.size)  # depth at which the plate is just out
         self.reset()
 
     def reset(self) -> None:

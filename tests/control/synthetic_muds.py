@@ -1,6 +1,6 @@
 """Muds, strides and beliefs that are made up for the tests of the choice of depth, and the plate in numpy.
 
-What the plate meets is summed over small pieces of it here, not by the formulas of control/plate.py.
+What the plate meets is summed over small pieces of it here, not by the formulas of control/plate.
 """
 
 from math import nan

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.rate import PERIOD_S
 from control.records import DriveState, Phase
 from estimation.joint_load import FlipperDrive

@@ -1,6 +1,6 @@
 """Strokes through made-up mud that keeps the estimator's own laws, so that the truth is known to the last digit.
 
-The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ of control/plate.py on the true surface,
+The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ of control/plate on the true surface,
 what the plate's face bears, gravity, inertia, friction and mud that clings. Without noise only two things are left in
 between: strokes are averaged over pieces of the way, and the surface has to be found first. The law bends a line of
 force against depth by 3 % at 2 cm, 8 % at 3 cm and 20 % at 4 cm (the plate leans more, the deeper it is), which reads
@@ -21,7 +21,7 @@ from control.gait.recovery import OUT_M, is_in_mud, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.joint_pd import ArmMass
-from control.plate import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import NO_LOAD, DriveState, Estimate, GaitTarget, Phase, StrideEstimate
 from estimation.flipper import CLINGING_M, FlipperEstimator
 from estimation.force_map import smallest_force_n

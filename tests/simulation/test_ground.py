@@ -13,7 +13,7 @@ from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay, Layer
 from simulation.mud.disturbances import Disturbances
-from simulation.mud.flipper_contact import ContactForce, attitude_of
+from simulation.mud.flipper_contact import ContactForce, attitude_of, plate_size
 from simulation.mud.rigid_plate import lowest_point_m
 from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, RandomStrength, Ridges, Track
@@ -37,7 +37,7 @@ def depth_m(arm: Arm) -> float:
 
 
 def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:
-    return lowest_point_m(attitude_of(geometry, sweep_rad, adduction_rad), geometry.plate_width_m)
+    return lowest_point_m(attitude_of(geometry, sweep_rad, adduction_rad), plate_size(geometry))
 
 
 @pytest.mark.parametrize("lift_nm", [-0.2, -0.75, -1.66])

@@ -4,7 +4,7 @@
     k_e    the same for the last three quarters of the way up, with the force downward
     k_s    F = k ∫ζ dA at the set depth, with F the mean over the second half of the travel
 
-V is the submerged volume of the upright plate and ∫ζ dA the first moment of its face (control/plate.py). Forces are
+V is the submerged volume of the upright plate and ∫ζ dA the first moment of its face (control/plate). Forces are
 corrected to the set speed of the stage, to which a coefficient belongs.
 
 The standard error of one trial contains those of speed, surface and samples. The misfit of the law is not part of it,
@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from control.plate import submerged_part
+from control.plate.integrals import submerged_part
 from estimation.strokes.origin_fit import MIN_BATCHES, student_factor
 from experiments.loadcell.analysis.contact import Profile, StrokeError
 from experiments.loadcell.analysis.curve_fit import Array

@@ -10,6 +10,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.init.init import answers
+from command_line.init.plate_file import read_corners
 from command_line.main import main
 from command_line.parser import build_parser
 from control.geometry import FlipperGeometry
@@ -17,6 +18,8 @@ from control.records import JOINTS
 from drivers.drive_types import DRIVE_TYPES
 from firmware_host.configuration.loading import load_configuration, parse_configuration
 from firmware_host.configuration.new_file import NewRobot, new_file
+
+PLATES = Path(__file__).resolve().parents[3] / "examples" / "plates"
 
 
 def options_of(*arguments: str) -> argparse.Namespace:
@@ -63,7 +66,7 @@ def test_without_a_terminal_nothing_is_asked(capsys: pytest.CaptureFixture[str])
 def test_empty_answers_are_the_defaults() -> None:
     robot, asked = answered([])
     assert parse_configuration(new_file(robot)).geometry == FlipperGeometry()
-    assert len(asked) == 6 + len(JOINTS) + 6
+    assert len(asked) == 6 + len(JOINTS) + 8
     assert robot == NewRobot(node_ids={joint: number for number, joint in enumerate(JOINTS)})
 
 
@@ -79,6 +82,8 @@ def test_a_wrong_answer_is_asked_again(capsys: pytest.CaptureFixture[str]) -> No
         "63",
         "5",
         "6",
+        "square",
+        "rectangle",
         "long",
         "0.001",
         "0.115",
@@ -91,6 +96,7 @@ def test_a_wrong_answer_is_asked_again(capsys: pytest.CaptureFixture[str]) -> No
     assert printed.splitlines() == [
         "  middle: must be one of left, right, both",
         "  63: must be a whole number from 0 to 62",
+        "  square: No such file or directory",
         "  long: must be a number",
         "  0.001: must be from 0.02 to 1",
     ]
@@ -99,6 +105,37 @@ def test_a_wrong_answer_is_asked_again(capsys: pytest.CaptureFixture[str]) -> No
 def test_an_option_answers_its_question() -> None:
     _, asked = answered([], "--flippers", "left", "--set", "drop_m=0.04", "--node", "left_sweep=7", "--channel", "can3")
     assert not [prompt for prompt in asked if prompt.startswith(("flippers", "drop_m", "node id of left_sweep", "its"))]
+
+
+@pytest.mark.parametrize("name", ["trapezoid", "paddle"])
+def test_a_plate_comes_from_a_file_of_its_corners(name: str) -> None:
+    file = PLATES / f"{name}.csv"
+    robot, asked = answered([], "--plate", str(file))
+    written = parse_configuration(new_file(robot)).geometry
+    assert written.plate_corners_m == robot.geometry.plate_corners_m == read_corners(file)
+    assert not [prompt for prompt in asked if prompt.startswith(("plate:", "plate_width_m", "plate_height_m"))]
+    shown = [line for line in new_file(robot).splitlines() if line.startswith("plate_")]
+    assert [line.split(" = ")[0] for line in shown] == ["plate_thickness_m", "plate_corners_m", "plate_angle_deg"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("0 0\n0.02 0.06\n", "has 2 corners"),
+        ("0 0\n0.02; 0.06\n-0.02 0.06", "line 2: 0.02; 0.06: must be two numbers in m"),
+        ("-0.02, 0\n0.02, 0.06\n0.02, 0\n-0.02, 0.06\n", "corner 1 to 2 crosses"),
+        ("0 0\n20 60\n-20 60", "in m"),
+        ("0 0\nnan 0.06\n-0.02 0.06", "nan m outward"),
+        ("", "has 0 corners"),
+    ],
+)
+def test_a_file_without_a_plate_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, words: str
+) -> None:
+    plate = tmp_path / "plate.csv"
+    plate.write_text(text)
+    assert main(["init", "-", "--plate", str(plate)]) == exit_codes.CONFIGURATION
+    assert words in capsys.readouterr().err
 
 
 def test_each_flipper_may_have_its_own_bus() -> None:
@@ -120,6 +157,12 @@ def test_depths_and_force_follow_the_geometry(length_m: float) -> None:
     [
         (("--set", "drop_m=0.07"), exit_codes.CONFIGURATION, "geometry.axis_height_m"),
         (("--set", "drop_m=0.6"), exit_codes.CONFIGURATION, "geometry.drop_m = 0.6: must be at most 0.5"),
+        (("--plate", "none.csv"), exit_codes.CONFIGURATION, "none.csv: No such file or directory"),
+        (
+            ("--plate", "x", "--set", "plate_width_m=0.02"),
+            exit_codes.CONFIGURATION,
+            "--set plate_width_m: must be",
+        ),
         (("--channel", "a", "--channel", "b", "--channel", "c"), exit_codes.CONFIGURATION, "must be 1 or 2"),
         (("--flippers", "right", "--node", "left_sweep=1"), exit_codes.CONFIGURATION, "right_sweep, right_adduction"),
         (("--node", "left_sweep=1", "--node", "right_sweep=1"), exit_codes.CONFIGURATION, "has the same on bus"),

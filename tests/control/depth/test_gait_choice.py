@@ -15,7 +15,7 @@ from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.limits import JointLimits
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
-from control.plate import stroke_moment_m4, submerged_plate
+from control.plate.integrals import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from tests.control.synthetic_muds import both
 

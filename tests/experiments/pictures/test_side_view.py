@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from control.plate import submerged_plate
+from control.plate.integrals import submerged_plate
 from experiments.pictures.side_view import Point, view_from_side
-from simulation.mud.flipper_contact import attitude_of
+from simulation.mud.flipper_contact import attitude_of, plate_size
 from simulation.mud.rigid_plate import lowest_point_m
 
 GEOMETRY = FlipperGeometry()
@@ -79,7 +79,7 @@ def test_every_point_of_the_plate_is_seen_within_its_outline(sweep_rad: float, a
 @given(SWEEPS, ADDUCTIONS)
 def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, adduction_rad: float) -> None:
     """Its normal (cos α, -sin α cos β, -sin α sin β): what is seen along y is the face times sin α cos β, of the part
-    in the mud too, whose area control/plate.py integrates.
+    in the mud too, whose area control/plate integrates.
     """
     outline, fraction = view_from_side(SHEET, sweep_rad, adduction_rad).plate, abs(sin(sweep_rad)) * cos(adduction_rad)
     face_m2 = SHEET.plate_width_m * SHEET.plate_height_m
@@ -92,7 +92,7 @@ def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, 
 def test_the_lowest_corner_is_as_deep_as_the_simulator_has_it(sweep_rad: float, adduction_rad: float) -> None:
     outline = view_from_side(SHEET, sweep_rad, adduction_rad).plate
     assert -min(z_m for _, z_m in outline) == pytest.approx(
-        lowest_point_m(attitude_of(SHEET, sweep_rad, adduction_rad), SHEET.plate_width_m), abs=1e-12
+        lowest_point_m(attitude_of(SHEET, sweep_rad, adduction_rad), plate_size(SHEET)), abs=1e-12
     )
 
 

@@ -208,6 +208,45 @@ def test_a_motor_force_beyond_the_torque_limit_is_refused(example_text: str) -> 
     ]
 
 
+TRIANGLE = "[[0.0, 0.0], [0.02, 0.06], [-0.02, 0.06]]"
+
+
+def test_a_plate_is_a_rectangle_or_the_corners_of_the_file() -> None:
+    assert parse_configuration(minimal_text()).geometry.plate_corners_m == ()
+    text = f"{minimal_text()}\n[geometry]\nplate_angle_deg = 10\nplate_corners_m = {TRIANGLE}"
+    geometry = parse_configuration(text).geometry
+    assert geometry.plate_corners_m == ((0.0, 0.0), (0.02, 0.06), (-0.02, 0.06))
+    assert (len(geometry.plate.corners), geometry.plate_angle_deg) == (3, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("keys", "messages"),
+    [
+        (
+            f"plate_corners_m = {TRIANGLE}\nplate_height_m = 0.06",
+            ["geometry.plate_height_m = 0.06: must be left out where geometry.plate_corners_m gives the plate"],
+        ),
+        ("plate_corners_m = [[0.0, 0.0], [0.02, 0.06]]", ["geometry.plate_corners_m: has 2 corners"]),
+        (
+            "plate_corners_m = [[-0.02, 0.0], [0.02, 0.06], [0.02, 0.0], [-0.02, 0.06]]",
+            ["geometry.plate_corners_m: the edge from corner 1 to 2 crosses"],
+        ),
+        ("plate_corners_m = [[0, 0], [0, 0.06], [0, 0.03]]", ["geometry.plate_corners_m: the plate is 0 m wide"]),
+        ("plate_corners_m = [[0, 0], [20, 60], [-20, 60]]", ["geometry.plate_corners_m: corner 2: 20 m outward"] ),
+        ("plate_corners_m = 5", ["geometry.plate_corners_m = 5: must be an array, in [brackets]"]),
+        ("plate_corners_m = [[0, 0], [0.02], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 = [0.02]: "]),
+        ("plate_corners_m = [[0, 0], [0.02, 'x'], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 2 = 'x': "]),
+        ("plate_corners_m = [[0, 0], [0.02, nan], [-0.02, 0.06]]", ["geometry.plate_corners_m 2 2 = nan: "]),
+        ("plate_angle_deg = 50.0", ["geometry.plate_angle_deg = 50.0: must be at most 45.0"]),
+        ("plate_width_m = 0.25", ["geometry.flipper_length_m = 0.12: must be more than 0.125"]),
+    ],
+)  # fmt: skip
+def test_a_plate_that_is_no_plate_is_refused(keys: str, messages: list[str]) -> None:
+    problems = problems_of(f"{minimal_text()}\n[geometry]\n{keys}")
+    assert all(problem.startswith(message) for problem, message in zip(problems, messages, strict=False)), problems
+    assert problems
+
+
 def test_a_room_in_which_every_motor_counts_as_hot_is_refused() -> None:
     text = f"{minimal_text()}\n[limits]\ntemperature_warm_c = 40.0\ntemperature_hot_c = 60.0\n"
     (problem,) = problems_of(f"{text}\n[winding]\nroom_c = 50.0\n")
@@ -234,7 +273,8 @@ TOML_VALUES = st.one_of(
     st.sampled_from(['""', '"x"', "[]", "{}", "[1, 2]", "{ a = 1 }"]),
 )
 KEYS = st.sampled_from(
-    ["geometry.drop_m", "gait.pause_s", "gait.protocol", "limits.torque_nm", "drive.left_sweep.bus", "bus.a.options",
+    ["geometry.drop_m", "geometry.plate_corners_m", "gait.pause_s", "gait.protocol", "limits.torque_nm",
+     "drive.left_sweep.bus", "bus.a.options",
      "adaptation.max_depth_m", "robot.name", "loop", "drive", "bus", "geometry", "gait", "nonsense.key", "text"]
 )  # fmt: skip
 

@@ -19,7 +19,7 @@ from simulation.mud.flipper_contact import (
     plate_size,
     twist_of,
 )
-from simulation.mud.rigid_plate import Wrench, lowest_point_m
+from simulation.mud.rigid_plate import PlateSize, Wrench, lowest_point_m
 
 GEOMETRY = FlipperGeometry()
 CLAY = MUDS["48.5"]
@@ -71,7 +71,7 @@ def test_the_attitude_gives_the_depth_of_every_point_of_the_plate(sweep_rad: flo
 @given(SWEEPS, ADDUCTIONS)
 def test_the_lowest_point_is_the_lower_one_of_the_two_lower_corners(sweep_rad: float, adduction_rad: float) -> None:
     corners_m = [position_m(sweep_rad, adduction_rad, u, 0.0)[2] for u in (-0.0125, 0.0125)]
-    lowest = lowest_point_m(attitude_of(GEOMETRY, sweep_rad, adduction_rad), GEOMETRY.plate_width_m)
+    lowest = lowest_point_m(attitude_of(GEOMETRY, sweep_rad, adduction_rad), plate_size(GEOMETRY))
     assert lowest == pytest.approx(-GEOMETRY.axis_height_m - min(corners_m))
 
 
@@ -207,4 +207,4 @@ def test_a_reset_contact_is_a_new_one() -> None:
 
 def test_the_plate_is_the_one_of_the_geometry() -> None:
     size = plate_size(FlipperGeometry(plate_width_m=0.03, plate_height_m=0.06, plate_thickness_m=0.005))
-    assert size == (0.03, 0.06, 0.005)
+    assert size == PlateSize(0.03, 0.06, 0.005)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from simulation.mud.clay import MUDS, Clay, Layer, rate_factor
 from simulation.mud.mud_springs import LENGTHWAYS_YIELD_M, SIDEWAYS_YIELD_M
 from simulation.mud.plate_contact import PlateContact
-from simulation.mud.rigid_plate import NO_WRENCH, Attitude, PlateSize, Twist, Wrench, lowest_point_m, wet_edge_m
+from simulation.mud.plate_panels import panels_of
+from simulation.mud.rigid_plate import NO_WRENCH, Attitude, PlateSize, Twist, Wrench, lowest_point_m
 
 SIZE = PlateSize(0.025, 0.07, 0.004)
 CLAY = MUDS["48.5"]
@@ -435,11 +436,11 @@ def test_the_wet_part_of_the_edge_is_the_part_below_the_surface(attitude: Attitu
     positions_m = SIZE.width_m * ((np.arange(2000) + 0.5) / 2000 - 0.5)
     wet_m = positions_m[attitude.depth_m + attitude.per_outward * positions_m > 0.0]
     if not len(wet_m):
-        assert lowest_point_m(attitude, SIZE.width_m) <= 0.5 * SIZE.width_m / 2000
+        assert lowest_point_m(attitude, SIZE) <= 0.5 * SIZE.width_m / 2000
         return
-    width_m, middle_m = wet_edge_m(attitude, SIZE.width_m)
+    width_m, middle_m = panels_of(SIZE)[0].wet_part_m(attitude)
     assert width_m == pytest.approx(len(wet_m) * SIZE.width_m / 2000, abs=SIZE.width_m / 2000)
     assert middle_m == pytest.approx(wet_m.mean(), abs=SIZE.width_m / 2000)
-    assert lowest_point_m(attitude, SIZE.width_m) == pytest.approx(
+    assert lowest_point_m(attitude, SIZE) == pytest.approx(
         max(attitude.depth_m + attitude.per_outward * wet_m, default=-inf), abs=SIZE.width_m / 2000
     )

@@ -1,20 +1,21 @@
 """The submerged part of a flipper's plate and its moments about the joints: the geometry of the coefficients.
 
-The plate of width b hangs under the arm. The point u outward and s up from the middle of its lower edge lies at the
-depth
+The plate hangs under the arm. The point u outward and s up from the middle of its lower edge lies at the depth
 
     ζ(u, s) = z - u cos α sin β - s cos β         z: depth of the edge's middle
 
-so the mud's surface cuts the plate along a straight line, and the submerged part is a polygon: over the submerged
-length of the edge, from s = 0 up to s = D(u) / cos β with D(u) = ζ(u, 0), or up to the plate's top if that is submerged
-too. D is linear in u, so the integrals of 1, u, s, ζ, ζu and ζs over the polygon are polynomials in the depths D₁,
-D₂ of the edge's two ends (zero for an end above the mud) and the width w' between them. With q = cos β, ū the middle:
+so the mud's surface cuts the plate along a straight line, and the submerged part is a polygon. It is the sum, with
+their signs, of the submerged regions above the outline's edges (outline.py). Above an edge s₀(u) that region reaches up
+to s₀(u) + D(u) / cos β with D(u) = ζ(u, s₀(u)). D is linear in u, so the integrals of 1, u, s, ζ, ζu and ζs over the
+region are polynomials in the depths D₁, D₂ of the edge's two ends (zero for an end above the mud) and the width w'
+between them. With q = cos β, (ū, s̄₀) the middle of the edge's submerged part and m = ds₀/du its slope:
 
     ∫dA   = w' (D₁ + D₂) / 2q                 ∫ζ dA  = w' (D₁² + D₁D₂ + D₂²) / 6q
     ∫u dA = ū ∫dA + w'² (D₂ - D₁) / 12q       ∫ζu dA = ū ∫ζ dA + w'² (D₂² - D₁²) / 24q
-    ∫s dA = w' (D₁² + D₁D₂ + D₂²) / 6q²       ∫ζs dA = w' (D₁ + D₂)(D₁² + D₂²) / 24q²
+    ∫s dA  = w' (D₁² + D₁D₂ + D₂²) / 6q²      + s̄₀ ∫dA   + m w'² (D₂ - D₁) / 12q
+    ∫ζs dA = w' (D₁ + D₂)(D₁² + D₂²) / 24q²   + s̄₀ ∫ζ dA + m w'² (D₂² - D₁²) / 24q
 
-The part above a submerged top is the same polygon at depths reduced by the plate's height, and is subtracted.
+A rectangle is the region above its lower edge, less the one above its upper edge once that is submerged.
 
 The coefficients are stiffnesses per volume, N/m³, in the paper's sense (section III-B):
 
@@ -58,46 +59,62 @@ def submerged_plate(
 
 def submerged_part(geometry: FlipperGeometry, depth_m: float, per_outward: float, per_upward: float) -> SubmergedPlate:
     """Return the integrals from the depth of the edge's middle, its gain outward and its loss upward."""
-    below = _below(depth_m, per_outward, per_upward, geometry.plate_width_m)
-    top_m = geometry.plate_height_m
-    if depth_m + abs(per_outward) * geometry.plate_width_m / 2.0 <= top_m * per_upward:
-        return below
-    a, au, as_, z, zu, zs = _below(depth_m - top_m * per_upward, per_outward, per_upward, geometry.plate_width_m)
-    return SubmergedPlate(
-        below.area_m2 - a,
-        below.area_outward_m3 - au,
-        below.area_upward_m3 - as_ - top_m * a,
-        below.depth_moment_m3 - z,
-        below.depth_moment_outward_m4 - zu,
-        below.depth_moment_upward_m4 - zs - top_m * z,
-    )
+    q = per_upward
+    area_m2 = outward_m3 = upward_m3 = depth_m3 = depth_outward_m4 = depth_upward_m4 = 0.0
+    for inner_m, outer_m, height_m, outer_height_m, slope, sign in geometry.plate.edges:
+        low_m = depth_m - height_m * q + per_outward * inner_m
+        high_m = depth_m - outer_height_m * q + per_outward * outer_m
+        from_m = inner_m
+        if low_m < 0.0 or high_m < 0.0:
+            if low_m <= 0.0 and high_m <= 0.0:
+                continue
+            if slope:
+                waterline_m = inner_m + (outer_m - inner_m) * low_m / (low_m - high_m)
+            else:
+                waterline_m = -(depth_m - height_m * q) / per_outward
+            if low_m < 0.0:
+                low_m, inner_m = 0.0, waterline_m
+            else:
+                high_m, outer_m = 0.0, waterline_m
+        wet_m, middle_m, sum_m = outer_m - inner_m, (inner_m + outer_m) / 2.0, low_m + high_m
+        signed_m = sign * wet_m
+        uneven_m2 = signed_m * wet_m * (high_m - low_m)
+        part_m2 = signed_m * sum_m / (2.0 * q)
+        part_m3 = signed_m * (low_m * low_m + low_m * high_m + high_m * high_m) / (6.0 * q)
+        uneven_m3, uneven_m4 = uneven_m2 / (12.0 * q), uneven_m2 * sum_m / (24.0 * q)
+        area_m2 += part_m2
+        outward_m3 += middle_m * part_m2 + uneven_m3
+        upward_m3 += part_m3 / q
+        depth_m3 += part_m3
+        depth_outward_m4 += middle_m * part_m3 + uneven_m4
+        depth_upward_m4 += signed_m * sum_m * (low_m * low_m + high_m * high_m) / (24.0 * q * q)
+        if height_m or slope:
+            height_m += slope * (middle_m - from_m)
+            upward_m3 += height_m * part_m2 + slope * uneven_m3
+            depth_upward_m4 += height_m * part_m3 + slope * uneven_m4
+    return SubmergedPlate(area_m2, outward_m3, upward_m3, depth_m3, depth_outward_m4, depth_upward_m4)
 
 
-def _below(depth_m: float, per_outward: float, q: float, width_m: float) -> SubmergedPlate:
-    """Return the integrals of a plate that extends upward without end."""
-    half_m = width_m / 2.0
-    low_m, high_m = depth_m - per_outward * half_m, depth_m + per_outward * half_m
-    inner_m, outer_m = -half_m, half_m
-    if low_m < 0.0 or high_m < 0.0:
-        if low_m <= 0.0 and high_m <= 0.0:
-            return DRY
-        waterline_m = -depth_m / per_outward
-        if low_m < 0.0:
-            low_m, inner_m = 0.0, waterline_m
-        else:
-            high_m, outer_m = 0.0, waterline_m
-    wet_m, middle_m = outer_m - inner_m, (inner_m + outer_m) / 2.0
-    rise_m = high_m - low_m
-    area_m2 = wet_m * (low_m + high_m) / (2.0 * q)
-    moment_m3 = wet_m * (low_m * low_m + low_m * high_m + high_m * high_m) / (6.0 * q)
-    return SubmergedPlate(
-        area_m2,
-        middle_m * area_m2 + wet_m * wet_m * rise_m / (12.0 * q),
-        moment_m3 / q,
-        moment_m3,
-        middle_m * moment_m3 + wet_m * wet_m * rise_m * (low_m + high_m) / (24.0 * q),
-        wet_m * (low_m + high_m) * (low_m * low_m + high_m * high_m) / (24.0 * q * q),
-    )
+def mean_width_m(geometry: FlipperGeometry, depth_m: float) -> float:
+    """Return the width of a rectangle with as much area down to this depth, of a plate on a level arm."""
+    if geometry.has_level_rectangle or depth_m <= 0.0:
+        return geometry.plate_width_m
+    return submerged_part(geometry, depth_m, 0.0, 1.0).area_m2 / depth_m
+
+
+def moment_width_m(geometry: FlipperGeometry, depth_m: float) -> float:
+    """Return the width of a rectangle with the same ∫ζ dA = w z²/2, of a plate on a level arm."""
+    if geometry.has_level_rectangle or depth_m <= 0.0:
+        return geometry.plate_width_m
+    return 2.0 * submerged_part(geometry, depth_m, 0.0, 1.0).depth_moment_m3 / (depth_m * depth_m)
+
+
+def growth_exponent(geometry: FlipperGeometry, depth_m: float) -> float:
+    """Return n of a volume that grows as z^n: 1 for a rectangle, 2 for a triangle on its tip.
+
+    d/dz ∫ζ dA = A, so z A / ∫ζ dA = n + 1.
+    """
+    return 2.0 * mean_width_m(geometry, depth_m) / moment_width_m(geometry, depth_m) - 1.0
 
 
 def stance_moment_m4(geometry: FlipperGeometry, plate: SubmergedPlate) -> float:

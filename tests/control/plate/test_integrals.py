@@ -1,7 +1,7 @@
 """The plate's closed forms against a dense grid, exact polygon clipping, and a derivation in sympy."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple
+from dataclasses import asdict
 from fractions import Fraction
 from math import cos, hypot, pi, radians, sin, sqrt
 from typing import NamedTuple
@@ -14,10 +14,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
-from control.plate import (
+from control.plate.integrals import (
     DRY,
     SubmergedPlate,
     cross_coupling,
+    growth_exponent,
+    mean_width_m,
+    moment_width_m,
     stance_moment_m4,
     stroke_moment_m4,
     submerged_part,
@@ -35,6 +38,25 @@ geometries = st.builds(
     plate_width_m=st.floats(0.005, 0.2),
     plate_thickness_m=st.floats(0.001, 0.02),
     plate_height_m=st.floats(0.005, 0.2),
+)
+TRAPEZOID = ((-0.0075, 0.0), (0.0075, 0.0), (0.0175, 0.07), (-0.0175, 0.07))
+ARROW = ((-0.02, 0.0), (0.0, 0.03), (0.02, 0.0), (0.0, 0.07))  # its lower edge has a notch
+
+
+@st.composite
+def polygons(draw: st.DrawFn) -> tuple[tuple[float, float], ...]:
+    """Corners around a middle at any radius, so that plates have notches, in either order."""
+    corners = draw(st.integers(3, 9))
+    turns = sorted(draw(st.lists(st.integers(0, 71), min_size=corners, max_size=corners, unique=True)))
+    radii_m = draw(st.lists(st.floats(0.005, 0.05), min_size=corners, max_size=corners))
+    points = [(r * cos(pi * turn / 36.0), r * sin(pi * turn / 36.0)) for turn, r in zip(turns, radii_m, strict=True)]
+    lowest_m = min(s for _, s in points)
+    lifted = tuple((u, s - lowest_m) for u, s in points)
+    return lifted if draw(st.booleans()) else lifted[::-1]
+
+
+shapes = st.builds(
+    FlipperGeometry, plate_corners_m=st.one_of(st.just(()), polygons()), plate_angle_deg=st.floats(-45.0, 45.0)
 )
 sweeps = st.floats(-pi / 3, pi / 3)
 adductions = st.floats(-1.2, 1.2)  # the plate stands up: cos β > 0
@@ -158,15 +180,15 @@ def clipped(corners: Sequence[Point], height: Callable[[Point], Fraction]) -> li
 def exact_integrals(
     geometry: FlipperGeometry, depth_m: float, per_outward: float, per_upward: float
 ) -> tuple[Fraction, ...]:
-    """Of 1, u, s, ζ, ζu, ζs, without rounding: a fan of triangles, on each the rule of its edges' middles, which is
-    exact for quadratics.
+    """Of 1, u, s, ζ, ζu, ζs, without rounding: a fan of signed triangles, on each the rule of its edges' middles, which
+    is exact for quadratics.
     """
-    half, top = Fraction(geometry.plate_width_m) / 2, Fraction(geometry.plate_height_m)
+    corners = [(Fraction(u), Fraction(s)) for u, s in geometry.plate.corners]
 
     def zeta(point: Point) -> Fraction:
         return Fraction(depth_m) + Fraction(per_outward) * point[0] - Fraction(per_upward) * point[1]
 
-    polygon = clipped([(-half, Fraction(0)), (half, Fraction(0)), (half, top), (-half, top)], zeta)
+    polygon = clipped(corners, zeta)
     sums = [Fraction(0)] * 6
     for b, c in zip(polygon[1:], polygon[2:], strict=False):
         a = polygon[0]
@@ -184,13 +206,17 @@ def rounding_scale(geometry: FlipperGeometry, depth_m: float, per_outward: float
 
     They reckon with the plate reaching up to the waterline, and take off what lies above its top.
     """
-    half = geometry.plate_width_m / 2.0
-    deep = abs(depth_m) + abs(per_outward) * half + geometry.plate_height_m * q
-    up, wide = deep / q, geometry.plate_width_m
+    half = max(abs(u) for u, _ in geometry.plate.corners)
+    deep = abs(depth_m) + abs(per_outward) * half + geometry.plate.height_m * q
+    up, wide = deep / q, 2.0 * half
     return wide * up * np.array([1.0, wide, up, deep, deep * wide, deep * up])
 
 
-@given(geometries, st.floats(-0.3, 0.3), st.floats(-0.9, 0.9), st.floats(0.3, 1.0))
+@given(st.one_of(geometries, shapes), st.floats(-0.3, 0.3), st.floats(-0.9, 0.9), st.floats(0.3, 1.0))
+@example(FlipperGeometry(plate_corners_m=TRAPEZOID), 0.03, 0.0, 1.0)
+@example(FlipperGeometry(plate_corners_m=TRAPEZOID), 0.03, 1.0 / 7.0, 1.0)  # the surface along an edge
+@example(FlipperGeometry(plate_corners_m=ARROW), 0.02, 0.2, 0.9)  # cut into two parts
+@example(FlipperGeometry(plate_corners_m=ARROW, plate_angle_deg=20.0), 0.05, -0.2, 0.9)
 @example(AUTHORS, 0.0, 0.5, 0.8)  # one corner under
 @example(AUTHORS, 0.0, -0.5, 0.8)
 @example(AUTHORS, 0.2, 0.5, 0.8)  # all under
@@ -368,10 +394,80 @@ def vanishes(value: float) -> bool:
 @given(poses, st.sampled_from([0.25, 2.0, 16.0]))
 def test_moments_scale_with_the_fourth_power_of_length(pose: Pose, times: float) -> None:
     """By powers of two, which do not round."""
-    assume(not any(vanishes(value) for value in (*pose[1:], *astuple(pose.geometry))))
-    larger = FlipperGeometry(*(times * length_m for length_m in astuple(pose.geometry)))
+    lengths_m = {name: value for name, value in asdict(pose.geometry).items() if isinstance(value, float)}
+    assume(not any(vanishes(value) for value in (*pose[1:], *lengths_m.values())))
+    larger = FlipperGeometry(plate_corners_m=(), **{name: times * length_m for name, length_m in lengths_m.items()})
     small, large = pose.plate(), pose._replace(geometry=larger).plate()
     assert stance_moment_m4(larger, large) == times**4 * stance_moment_m4(pose.geometry, small)
     stroke_m4 = stroke_moment_m4(pose.geometry, small, pose.sweep_rad)
     assert stroke_moment_m4(larger, large, pose.sweep_rad) == times**4 * stroke_m4
     assert cross_coupling(larger, large, pose.sweep_rad) == cross_coupling(pose.geometry, small, pose.sweep_rad)
+
+
+GOLDEN = {  # sweep, adduction, surface: the integrals and the joints' moments, from before plates had other shapes
+    (0.0, -0.41903952430809965, 0.0): (
+        (0.0008210358914259373, 5.799752855866767e-07, 1.3611165291637947e-05)
+        + (1.243352949040879e-05, 1.7399258567600304e-08, 1.38694984745305e-07),
+        (1.509422797416655e-06, 4.1133240858223993e-07, -0.0),
+    ),
+    (-0.5, -0.9384752447687668, 0.0): (
+        (0.001749942070584595, 7.181121205595786e-10, 6.124595213426096e-05)
+        + (5.13001108731797e-05, 6.452289276210746e-08, 1.373171939551732e-06),
+        (6.2205361975436705e-06, 7.428849539509415e-07, 0.09185630457408762),
+    ),
+    (0.5, -0.1533572654973197, 0.0): (
+        (2.7020059975460703e-05, 1.5798153989542406e-07, 2.438546844615212e-08)
+        + (2.409927578608387e-08, 1.8098840804507695e-10, 1.6312106536506102e-11),
+        (3.072901502375141e-09, 1.2812733117940217e-08, -0.18545012678838574),
+    ),
+    (0.3, -0.4, -0.04): (
+        (0.0017374861395913546, 1.2358814228663515e-07, 6.0387292194893406e-05)
+        + (5.944043250142077e-05, 3.3779924376656716e-08, 1.4226581351233621e-06),
+        (7.166631824547149e-06, 8.036161486330695e-07, -0.06388889926988872),
+    ),
+}
+
+
+@pytest.mark.parametrize("pose", GOLDEN)
+def test_the_papers_rectangle_keeps_its_moments_to_the_last_digit(pose: tuple[float, float, float]) -> None:
+    integrals, moments = GOLDEN[pose]
+    plate, sweep_rad = submerged_plate(AUTHORS, *pose), pose[0]
+    assert plate == integrals
+    assert moments == (
+        stance_moment_m4(AUTHORS, plate),
+        stroke_moment_m4(AUTHORS, plate, sweep_rad),
+        cross_coupling(AUTHORS, plate, sweep_rad),
+    )
+
+
+# other shapes
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 17.0, -45.0])
+@given(depth_m=st.floats(-0.05, 0.15), per_outward=st.floats(-0.9, 0.9), per_upward=st.floats(0.3, 1.0))
+def test_a_rectangle_given_by_its_corners_has_the_integrals_of_one_given_by_its_sides(
+    angle_deg: float, depth_m: float, per_outward: float, per_upward: float
+) -> None:
+    corners = ((0.0125, 0.0), (0.0125, 0.07), (-0.0125, 0.07), (-0.0125, 0.0))
+    by_corners = FlipperGeometry(plate_corners_m=corners, plate_angle_deg=angle_deg)
+    by_sides = FlipperGeometry(plate_angle_deg=angle_deg)
+    one, other = (submerged_part(each, depth_m, per_outward, per_upward) for each in (by_corners, by_sides))
+    lost = 50.0 * np.finfo(float).eps * rounding_scale(by_sides, depth_m, per_outward, per_upward)
+    assert np.all(np.abs(np.array(one) - np.array(other)) <= lost)
+
+
+@pytest.mark.parametrize("geometry", [AUTHORS, FlipperGeometry(plate_width_m=0.04, plate_height_m=0.03)])
+@given(depth_m=st.floats(0.001, 0.1))
+def test_a_level_rectangle_has_its_own_width_at_every_depth(geometry: FlipperGeometry, depth_m: float) -> None:
+    assert mean_width_m(geometry, depth_m) == moment_width_m(geometry, depth_m) == geometry.plate_width_m
+    assert growth_exponent(geometry, depth_m) == 1.0
+
+
+def test_the_widths_of_a_triangle_and_of_a_trapezoid_are_those_of_their_areas() -> None:
+    triangle = FlipperGeometry(plate_corners_m=((0.0, 0.0), (0.02, 0.06), (-0.02, 0.06)))
+    assert mean_width_m(triangle, 0.03) == pytest.approx(0.01)  # half of 2 cm
+    assert moment_width_m(triangle, 0.03) == pytest.approx(0.02 / 3.0)  # z³/6 · 2/3 in place of w z²/2
+    assert growth_exponent(triangle, 0.03) == pytest.approx(2.0)
+    trapezoid = FlipperGeometry(plate_corners_m=TRAPEZOID)
+    assert mean_width_m(trapezoid, 0.035) == pytest.approx((0.015 + 0.025) / 2.0)
+    assert 1.0 < growth_exponent(trapezoid, 0.035) < 2.0
