@@ -12,6 +12,7 @@ Parser = argparse.ArgumentParser
 def add_drives(drives: Parser) -> None:
     actions = drives.add_subparsers(dest="action", required=True, metavar="action")
     _add_find(actions)
+    _add_setup(actions)
 
 
 def _add_find(actions: Commands) -> None:
@@ -24,6 +25,26 @@ def _add_find(actions: Commands) -> None:
     find.add_argument("--fd", action="store_true", help="that interface carries CAN FD")
     find.add_argument(
         "--type", action="append", choices=tuple(DRIVE_BENCHES), help="ask drives of this type alone, repeatable"
+    )
+
+
+def _add_setup(actions: Commands) -> None:
+    text = "Compare the drives' settings with the configuration, and write those that differ."
+    setup = add(actions, "setup", "drives.setup.setup", text)
+    _add_configuration(setup)
+    setup.add_argument("joint", nargs="*", metavar="JOINT", help="such as left_sweep (default: all)")
+    what = setup.add_mutually_exclusive_group()
+    what.add_argument("--write", action="store_true", help="write and store what differs, one drive at a time")
+    what.add_argument("--restore", type=Path, metavar="FILE", help="write the old settings of this file again")
+    setup.add_argument(
+        "--backup", type=Path, metavar="FILE", help="with --write: new file for the old settings; else: compare with it"
+    )
+    setup.add_argument(
+        "--endpoints",
+        type=Path,
+        action="append",
+        metavar="FILE",
+        help="flat_endpoints.json of an ODrive's build, repeatable (default: those next to the configuration)",
     )
 
 

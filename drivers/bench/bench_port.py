@@ -30,6 +30,10 @@ class BenchPort:
         self._sleep = sleep
 
     @property
+    def now_s(self) -> float:
+        return self._now()
+
+    @property
     def error_frames(self) -> int:
         return self._port.error_frames
 

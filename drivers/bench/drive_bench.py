@@ -1,28 +1,29 @@
-"""The interface of one protocol to the bench: how its drives are found. drivers/drive_types.py lists the protocols.
+"""The interface of one protocol to the bench: how its drives are found, and how one is set up.
 
-A type of drive without an entry there cannot be searched for.
+drivers/drive_types.py lists the protocols. A type of drive without an entry there can be neither found nor set up.
 """
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from drivers.bench.bench_port import BenchPort
+from drivers.bench.drive_setup import DriveSetup
+from drivers.bench.found_drive import FoundDrive
 from drivers.can.frames import Frame
+from drivers.drive import DriveParameters, WatchdogEndpoints
 
 
-class FoundDrive(NamedTuple):
-    """One drive that answers on a bus. Empty texts are not known."""
+class SetupFacts(NamedTuple):
+    """What is known of one drive before it is asked."""
 
-    type: str
-    node_id: int
-    hardware: str = ""  # or the motor's model
-    firmware: str = ""
-    serial_number: str = ""
-    problem: str = ""  # why this program cannot use it as it is
+    parameters: DriveParameters
+    longest_watchdog_s: float
+    endpoints: Sequence[WatchdogEndpoints] = ()
+    documents: Sequence[Any] = ()  # files of the makers, read as JSON, with the numbers of parameters
 
 
 class DriveBench(Protocol):
-    """How the drives of one protocol are found."""
+    """How the drives of one protocol are found and set up."""
 
     @property
     def is_fd(self) -> bool:
@@ -40,3 +41,6 @@ class DriveBench(Protocol):
 
         Two drives that answer under one id are two entries.
         """
+
+    def open_setup(self, port: BenchPort, facts: SetupFacts) -> DriveSetup:
+        """Raises ValueError for a document that is none of the makers'."""

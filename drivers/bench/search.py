@@ -10,7 +10,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_bench import DriveBench, FoundDrive
+from drivers.bench.drive_bench import DriveBench
+from drivers.bench.found_drive import FoundDrive
 from drivers.drive import DriveParameters
 
 LISTENING_S = 1.1  # heartbeats may be a second apart

@@ -6,16 +6,19 @@ the registers, 0x7FF, is that by which all ODrives enter their boot loader: they
 Sources: see codec.py; ODrive's CANSimple documentation.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from struct import Struct
+from collections.abc import Iterable, Iterator, Sequence
+from typing import cast
 
 from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_bench import FoundDrive
+from drivers.bench.drive_bench import SetupFacts
+from drivers.bench.drive_setup import DriveSetup, NoSetup
+from drivers.bench.found_drive import FoundDrive
 from drivers.can.frames import Frame
 from drivers.mit import codec
-from drivers.mit.models import MODELS
-from drivers.mit.parameters import LARGEST_ID
-from drivers.mit.settings import FLOAT, FLOATS, PMAX, SAME_FRACTION, SERIAL, SOFTWARE, TMAX, VMAX, WORD
+from drivers.mit.identity import is_answer, is_register, models_of, node_of, number_of
+from drivers.mit.parameters import LARGEST_ID, MitParameters
+from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, TMAX, VMAX
+from drivers.mit.setup import NOTHING, DamiaoSetup
 
 NAME = "mit"
 IDS = range(1, LARGEST_ID + 1)
@@ -42,38 +45,33 @@ class MitBench:
             for each in _found(node_id, ids, registers.get(node_id, {}))
         ]
 
+    def open_setup(self, port: BenchPort, facts: SetupFacts) -> DriveSetup:
+        parameters = cast(MitParameters, facts.parameters)
+        if parameters.ranges.has_registers:
+            return DamiaoSetup(port, parameters, facts.longest_watchdog_s)
+        return NoSetup(FoundDrive(NAME, parameters.node_id, parameters.model), NOTHING)
+
     def _read_registers(self, port: BenchPort, node_ids: Iterable[int]) -> dict[int, Values]:
         questions = (
             Frame(codec.REGISTER_ID, codec.encode_read(node_id, register)) for node_id in node_ids for register in ASKED
         )
         found: dict[int, Values] = {}
         for frame in port.ask_all(questions):
-            node_id = frame.data[0] & LARGEST_ID if frame.data else 0
-            if _may_answer(frame, node_id) and codec.is_register_answer(frame.data, node_id):
+            node_id = node_of(frame)
+            if is_answer(frame, node_id) and is_register(frame, node_id):
                 _, _, register, value = codec.decode_register(frame.data)
                 found.setdefault(node_id, {}).setdefault(register, set()).add(number_of(register, value))
         return found
-
-
-def number_of(register: int, value: bytes) -> float:
-    layout: Struct = FLOAT if register in FLOATS else WORD
-    return float(layout.unpack(value)[0])
 
 
 def _answers(frames: Iterable[Frame]) -> dict[int, list[int]]:
     """Returns the ids of the answers by the id of the drive that gave them."""
     found: dict[int, list[int]] = {}
     for frame in frames:
-        node_id = frame.data[0] & LARGEST_ID if frame.data else 0
-        if _may_answer(frame, node_id) and not codec.is_register_answer(frame.data, node_id):
+        node_id = node_of(frame)
+        if is_answer(frame, node_id) and not is_register(frame, node_id):
             found.setdefault(node_id, []).append(frame.arbitration_id)
     return found
-
-
-def _may_answer(frame: Frame, node_id: int) -> bool:
-    """Drives answer under their own id, under that plus 16 as the set-up page says, or under 0 as delivered."""
-    usual = not (frame.is_fd or frame.is_extended or frame.is_remote or frame.is_error)
-    return usual and len(frame.data) == codec.ANSWER_BYTES and frame.arbitration_id in (0, node_id, node_id + 16)
 
 
 def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDrive]:
@@ -82,7 +80,7 @@ def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDr
         for _ in ids:
             yield FoundDrive(NAME, node_id, "a CubeMars, or firmware without registers")
         return
-    models = _models({register: min(found) for register, found in values.items()})
+    models = models_of({register: min(found) for register, found in values.items()})
     firmware = ", ".join(f"{each:.0f}" for each in sorted(values.get(SOFTWARE, ())))
     problem = "" if models else "its ranges PMAX, VMAX and TMAX are those of no model in docs/how-to/mit.md"
     if any(each != node_id + 16 for each in ids):
@@ -90,16 +88,3 @@ def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDr
     numbers = [f"{int(each):08x}" for each in sorted(values.get(SERIAL, ()))] or [""]
     for number in numbers if len(numbers) > 1 else numbers * len(ids):
         yield FoundDrive(NAME, node_id, " or ".join(models), firmware, number, problem)
-
-
-def _models(values: Mapping[int, float]) -> list[str]:
-    """Returns the models with registers that are delivered with these ranges."""
-    found = [values.get(register, 0.0) for register in (PMAX, VMAX, TMAX)]
-    return [
-        name
-        for name, model in MODELS.items()
-        if model.has_registers
-        and all(
-            abs(each - expected) <= SAME_FRACTION * expected for each, expected in zip(found, model[:3], strict=True)
-        )
-    ]

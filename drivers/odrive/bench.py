@@ -7,13 +7,17 @@ examples/can_enumerate.py of odriverobotics/ODriveResources.
 """
 
 from collections.abc import Iterable, Sequence
+from typing import cast
 
 from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_bench import FoundDrive
+from drivers.bench.drive_bench import SetupFacts
+from drivers.bench.found_drive import FoundDrive
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.odrive import codec
 from drivers.odrive.codec import Message, arbitration_id
 from drivers.odrive.drive_settings import SUPPORTED
+from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.setup import OdriveSetup, build_of_file, build_of_watchdog
 
 NAME = "odrive"
 IDS = range(64)
@@ -42,6 +46,10 @@ class OdriveBench:
             for node_id in sorted(versions.keys() | heard)
             for number in sorted(numbers.get(node_id, {""}))
         ]
+
+    def open_setup(self, port: BenchPort, facts: SetupFacts) -> OdriveSetup:
+        builds = [*map(build_of_watchdog, facts.endpoints), *map(build_of_file, facts.documents)]
+        return OdriveSetup(port, cast(OdriveParameters, facts.parameters), facts.longest_watchdog_s, builds)
 
     def _serial_numbers(self, port: BenchPort, node_ids: Sequence[int]) -> dict[int, set[str]]:
         numbers: dict[int, set[str]] = {}

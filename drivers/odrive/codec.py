@@ -46,6 +46,7 @@ SET_INPUT_TORQUE = Message(0x0E, "<f")  # N·m
 SET_LIMITS = Message(0x0F, "<ff")  # turns/s, A
 GET_IQ = Message(0x14, "<ff")  # set-point A, measured A
 GET_TEMPERATURE = Message(0x15, "<ff")  # FET °C, motor °C
+REBOOT = Message(0x16, "<B")  # action: 0 restart, 1 store the settings and restart
 GET_BUS_VOLTAGE_CURRENT = Message(0x17, "<ff")  # V, A
 SET_VEL_GAINS = Message(0x1B, "<ff")  # N·m per turn/s, and its integrator's
 CLEAR_ERRORS = Message(0x18, "<B")  # identify flag

@@ -20,16 +20,12 @@ from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
+from drivers.odrive.setup import SAVE
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages
 from simulation.devices.motor import encoder_turns, joint_torque_nm
-from simulation.devices.odrive_forgeries import (
-    ENABLE_WATCHDOG_ENDPOINT,
-    WATCHDOG_TIMEOUT_ENDPOINT,
-    forged_current,
-    forged_frame,
-    forged_torque,
-)
+from simulation.devices.odrive_forgeries import forged_current, forged_frame, forged_torque
+from simulation.devices.odrive_settings import OdriveSettings
 
 TURN_RAD = 2.0 * pi
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
@@ -53,6 +49,7 @@ class SimulatedOdrive:
         self.parameters = parameters
         self._random = random
         self._late = LateMessages(random)
+        self._settings = OdriveSettings()
         self._ids = {message: arbitration_id(parameters.node_id, message) for message in self._PAYLOADS}
         self.reset(0.0)
 
@@ -85,6 +82,7 @@ class SimulatedOdrive:
     def restart(self, now_s: float) -> None:
         """Restarts as after a supply dip: ignores and sends nothing for BOOT_S, then reports its initialisation."""
         turns, turns_s = self._turns, self._turns_s
+        self.parameters = self._settings.restart(self.parameters)
         self.reset(now_s + BOOT_S)
         self._turns, self._turns_s = turns, turns_s
         self._stepped_s = now_s
@@ -122,21 +120,15 @@ class SimulatedOdrive:
             self.errors = 0
         elif command == codec.ESTOP.command:
             self._disarm(codec.ERROR_ESTOP)
+        elif command == codec.REBOOT.command:
+            if codec.REBOOT.decode(data)[0] == SAVE:
+                self._settings.save()
+            self.restart(now_s)
 
     def _read_parameter(self, data: bytes) -> list[Frame]:
-        """Answers reads of the watchdog's settings, the only parameters of this drive; none can be written."""
-        try:
-            opcode, endpoint, _ = codec.RX_SDO.decode(data)
-        except MalformedMessageError:
-            return []
-        values = {
-            ENABLE_WATCHDOG_ENDPOINT: bytes([self.parameters.watchdog_s > 0.0]),
-            WATCHDOG_TIMEOUT_ENDPOINT: codec.SDO_FLOAT.pack(self.parameters.watchdog_s),
-        }
-        if opcode != codec.SDO_READ or endpoint not in values:
-            return []
-        answer = codec.TX_SDO.encode(0, endpoint, 0) + values[endpoint]
-        return [Frame(arbitration_id(self.parameters.node_id, codec.TX_SDO), answer)]
+        """Executes a message that reads or writes a setting."""
+        answer, self.parameters = self._settings.execute(data, self.parameters)
+        return [Frame(arbitration_id(self.parameters.node_id, codec.TX_SDO), answer)] if answer else []
 
     def _set_limits(self, velocity_turn_s: float, current_a: float) -> None:
         self._velocity_limit_turn_s = velocity_turn_s

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from control.records import TWO_FLIPPERS, Rig
 from drivers.can.run_folder import make_own_folder, run_folder, write_private_file
+from simulation.devices.odrive_settings import BUILD
 
 HEAD = """\
 # A robot whose drives are simulated on local buses.
@@ -113,6 +114,7 @@ def write_local_setup(folder: Path, logs: Path) -> Path:
     make_buses(folder)
     path = folder / "mudskipper.toml"
     write_private_file(path, configuration_text(folder, logs.absolute()))
+    write_private_file(folder / "flat_endpoints.json", json.dumps(BUILD, indent=1))  # as the drives' maker does
     return path
 
 

@@ -44,11 +44,12 @@ class SimulatedMit:
         model = MODELS[parameters.model or DEFAULT_MODEL]
         self._model = model._replace(torque_nm=parameters.torque_range_nm or model.torque_nm)
         self._feedback_id = codec.feedback_id(parameters.node_id, self._model)
+        self.stored: dict[int, float] = {}  # registers that outlast a restart
         self.reset(0.0)
 
     def reset(self, now_s: float) -> None:
         """Restores the state after power-on."""
-        self.registers = first_values(self.parameters, self._model)
+        self.registers = first_values(self.parameters, self._model) | self.stored
         self.status = codec.DISABLED
         self._command = AT_REST
         self._fed_s = self._stepped_s = now_s
@@ -83,7 +84,7 @@ class SimulatedMit:
         if parameters.any_frame_feeds:
             self._fed_s = now_s
         if frame.arbitration_id == codec.REGISTER_ID and self._model.has_registers:
-            return answer_register(self.registers, parameters.node_id, frame.data)
+            return answer_register(self.registers, self.stored, parameters.node_id, frame.data)
         if frame.arbitration_id != parameters.node_id or len(frame.data) != codec.ANSWER_BYTES:
             return b""
         answer = self._answers.new_or_repeated(self._state(), parameters.repeated_fraction)

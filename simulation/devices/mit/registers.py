@@ -17,6 +17,7 @@ from drivers.mit.settings import (
     VMAX,
     WORD,
 )
+from drivers.mit.setup import ESC_ID, MST_ID
 from simulation.devices.drive import SimulatedDriveParameters
 
 FIRMWARE = 5013
@@ -25,6 +26,8 @@ FIRMWARE = 5013
 def first_values(parameters: SimulatedDriveParameters, model: Model) -> dict[int, float]:
     """Returns the registers after delivery, with the watchdog and the serial number that are asked for."""
     return {
+        MST_ID: parameters.node_id + 16,
+        ESC_ID: parameters.node_id,
         TIMEOUT: round(parameters.watchdog_s / TIMEOUT_UNIT_S),
         CONTROL_MODE: MIT_MODE,
         SOFTWARE: FIRMWARE,
@@ -39,9 +42,12 @@ def encode_value(register: int, value: float) -> bytes:
     return FLOAT.pack(value) if register in FLOATS else WORD.pack(int(value))
 
 
-def answer_register(values: dict[int, float], node_id: int, data: bytes) -> bytes:
+def answer_register(values: dict[int, float], stored: dict[int, float], node_id: int, data: bytes) -> bytes:
     """Executes one register frame; returns the answer, empty for another drive's and for unknown registers."""
     addressed, kind, register, value = codec.decode_register(data)
+    if addressed == node_id and kind == codec.STORE:
+        stored.update(values)
+        return codec.encode_register(node_id, kind, register, bytes(4))
     if addressed != node_id or register not in values or kind not in (codec.READ, codec.WRITE):
         return b""
     if kind == codec.WRITE:

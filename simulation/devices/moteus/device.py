@@ -59,8 +59,10 @@ class SimulatedMoteus:
 
     def restart(self, now_s: float) -> None:
         """Restarts as after a supply dip: ignores and answers nothing for BOOT_S."""
-        turns, turns_s = self._turns, self._turns_s
+        turns, turns_s, console = self._turns, self._turns_s, self.console
         self.reset(now_s + BOOT_S)
+        self.console = console
+        console.load()
         self._turns, self._turns_s, self._stepped_s = turns, turns_s, now_s
         self._boots_until_s = now_s + BOOT_S
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 
@@ -20,13 +21,13 @@ from tests.drivers.bench.simulated_bus import SimulatedBus
 class Bench:
     """Owns the configuration file and the simulated buses of a robot with one type of drive."""
 
-    def __init__(self, folder: Path, drive_type: str, patch: pytest.MonkeyPatch) -> None:
+    def __init__(self, folder: Path, drive_type: str, patch: pytest.MonkeyPatch, **changes: Any) -> None:
         self.config = write_local_setup(folder, folder)
         self.config.write_text(with_drive_type(self.config.read_text(encoding="utf-8"), drive_type), encoding="utf-8")
         configuration = load_configuration(self.config)
         self.drives = {
             joint: make_simulated_drive(each, Random(1))
-            for joint, each in drives_of(configuration, serial_number="0badcafe").items()
+            for joint, each in drives_of(configuration, serial_number="0badcafe", **changes).items()
         }
         self.buses = {
             name: SimulatedBus(*(self.drives[joint] for joint, each in configuration.drive.items() if each.bus == name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from random import Random
 from typing import Any
 
@@ -31,6 +32,9 @@ class SimulatedBus:
         self.sent: list[Frame] = []
         self.energised = False  # a drive was, at any time
         self.unplugged_after = 10**9  # frames of the bench, from which on nothing passes the cable
+        self.restart_after = 10**9  # frames of the bench, after which the drives lose their supply for a moment
+
+        self.at_frame: tuple[int, Callable[[], None]] = (10**9, lambda: None)  # of the bench, and what happens then
 
     def bench_port(self, _: object = None) -> BenchPort:
         return BenchPort(self.port, lambda: self.now_s, self.sleep)
@@ -46,6 +50,11 @@ class SimulatedBus:
             if len(self.sent) <= self.unplugged_after:
                 for drive in self.drives:
                     self._answer(drive.receive(frame, self.now_s))
+            if len(self.sent) == self.at_frame[0]:
+                self.at_frame[1]()
+            if len(self.sent) == self.restart_after:
+                for drive in self.drives:
+                    drive.restart(self.now_s)
         for drive in self.drives:
             drive.torque_nm(self.now_s)
             self.energised = self.energised or drive.energised

@@ -30,6 +30,7 @@ GOLDEN: list[tuple[str, tuple[float, ...], int, str]] = [  # of node 3
     ("SET_LIMITS", (10.0, 12.0), 0x06F, "00 00 20 41 00 00 40 41"),
     ("GET_IQ", (-0.5, 0.75), 0x074, "00 00 00 bf 00 00 40 3f"),
     ("GET_TEMPERATURE", (30.0, 45.5), 0x075, "00 00 f0 41 00 00 36 42"),
+    ("REBOOT", (1,), 0x076, "01"),
     ("GET_BUS_VOLTAGE_CURRENT", (24.0, 1.25), 0x077, "00 00 c0 41 00 00 a0 3f"),
     ("SET_VEL_GAINS", (0.5, -2.0), 0x07B, "00 00 00 3f 00 00 00 c0"),
     ("CLEAR_ERRORS", (1,), 0x078, "01"),

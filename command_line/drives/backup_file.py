@@ -1,0 +1,75 @@
+"""The file with the settings of drives before and after they are written, from which they can be restored."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import tomlkit
+
+from command_line.drives.joint_setup import JointSetup
+from drivers.bench.drive_setup import same
+from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.log.whole_files import whole_file
+
+HEAD = "Settings of the drives, written by 'mudskipper drives setup' at {}. Restore the old ones with --restore."
+
+
+class Backup(NamedTuple):
+    """The settings of one joint's drive."""
+
+    type: str
+    node_id: int
+    serial_number: str
+    old: dict[str, float]
+    new: dict[str, float]
+
+    def state(self, values: Mapping[str, float]) -> str:
+        """Says which of both settings these are."""
+        for name, expected in (("new", self.new), ("old", self.old)):
+            if all(key in values and same(values[key], value) for key, value in expected.items()):
+                return f"has the {name} settings"
+        return "has neither the old nor the new settings"
+
+
+def default_path() -> Path:
+    return Path(f"drives-{datetime.now(UTC):%Y%m%d-%H%M%S}.toml")
+
+
+def write_backup(path: Path, setups: list[JointSetup], changes: Mapping[str, Mapping[str, float]]) -> None:
+    """Writes the file whole, and waits until the disk has it. Raises OSError."""
+    document = tomlkit.document()
+    document.add(tomlkit.comment(HEAD.format(f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC")))
+    for setup in setups:
+        old = {key: setup.values[key] for key in changes[setup.joint]}
+        found = setup.found
+        document[setup.joint] = {
+            "type": found.type,
+            "node_id": found.node_id,
+            "serial_number": found.serial_number,
+            "firmware": found.firmware,
+            "old": old,
+            "new": dict(changes[setup.joint]),
+        }
+    with whole_file(path) as hidden, hidden.open("w", encoding="utf-8") as file:
+        file.write(tomlkit.dumps(document))
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def read_backup(path: Path) -> dict[str, Backup]:
+    """Returns the settings by joint. Raises ConfigurationError."""
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        return {joint: _backup(each) for joint, each in document.items()}
+    except OSError as problem:
+        raise ConfigurationError([f"{path}: {problem.strerror}"]) from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise ConfigurationError([f"{path}: is no file of 'mudskipper drives setup --write'"]) from None
+
+
+def _backup(table: Mapping[str, Any]) -> Backup:
+    old, new = ({str(key): float(value) for key, value in table[name].items()} for name in ("old", "new"))
+    return Backup(str(table["type"]), int(table["node_id"]), str(table["serial_number"]), old, new)

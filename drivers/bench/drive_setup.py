@@ -1,0 +1,101 @@
+"""The interface of one drive to the bench while its settings are compared, written and stored.
+
+A setting is a number under the drive's own name, in the drive's own unit. Writing changes the drive's memory alone;
+storing makes it last. A type of drive that can do neither says so in `cannot`.
+"""
+
+from collections.abc import Sequence
+from math import nan
+from typing import NamedTuple, Protocol
+
+from drivers.bench.found_drive import FoundDrive
+
+SAME_FRACTION = 1e-4  # of a number that a drive keeps as binary32, or prints with six digits
+
+
+class CannotReadError(Exception):
+    """This setting cannot be read over CAN as things are; the message says why, and what helps."""
+
+
+class Setting(NamedTuple):
+    """One setting, what the configuration wants it to be, and within which bounds it is accepted."""
+
+    key: str
+    wanted: float
+    least: float
+    most: float
+    source: str  # of the wanted value: a key of the configuration, or a guide
+    read_only: str = ""  # why it is never written; empty where it is
+
+    def accepts(self, value: float) -> bool:
+        return self.least <= value <= self.most
+
+
+def exactly(key: str, wanted: float, source: str, read_only: str = "", fraction: float = SAME_FRACTION) -> Setting:
+    """Returns a setting that must be equal to `wanted`, up to a fraction of it."""
+    margin = fraction * abs(wanted)
+    return Setting(key, wanted, wanted - margin, wanted + margin, source, read_only)
+
+
+def same(value: float, expected: float) -> bool:
+    """Returns whether a drive has taken a value; NaN is a value, of a watchdog that is off."""
+    if expected != expected:
+        return value != value
+    return abs(value - expected) <= SAME_FRACTION * abs(expected)
+
+
+class DriveSetup(Protocol):
+    """One drive, under the id of the configuration. Everything raises NoAnswerError where it does not answer."""
+
+    @property
+    def cannot(self) -> str:
+        """Why its settings can be neither read nor written over CAN; empty where they can."""
+
+    @property
+    def stored(self) -> str:
+        """What proves that settings last, once `save` has returned; for people."""
+
+    def identify(self) -> FoundDrive:
+        """Asks for what is known of this drive; it comes before everything else."""
+
+    def activity(self) -> str:
+        """Returns what the drive does, where it is not idle; empty for an idle one."""
+
+    def settings(self) -> Sequence[Setting]: ...
+
+    def read(self, key: str) -> float:
+        """Raises CannotReadError."""
+
+    def write(self, key: str, value: float) -> None:
+        """Writes to the drive's memory. Raises CannotReadError."""
+
+    def save(self) -> None:
+        """Stores all settings, and returns once the drive answers again."""
+
+
+class NoSetup:
+    """Implements DriveSetup for drives whose settings cannot be read over CAN."""
+
+    stored = ""
+
+    def __init__(self, found: FoundDrive, reason: str) -> None:
+        self._found = found
+        self.cannot = reason
+
+    def identify(self) -> FoundDrive:
+        return self._found
+
+    def activity(self) -> str:
+        return ""
+
+    def settings(self) -> Sequence[Setting]:
+        return ()
+
+    def read(self, key: str) -> float:
+        return nan
+
+    def write(self, key: str, value: float) -> None:
+        raise CannotReadError(self.cannot)
+
+    def save(self) -> None:
+        raise CannotReadError(self.cannot)

@@ -1,0 +1,200 @@
+"""Wherever the writing of settings is interrupted, the drive ends with all the old or all the new ones, as reported."""
+
+from __future__ import annotations
+
+from math import inf, isnan
+from typing import Any
+
+import pytest
+
+from drivers.bench.bench_port import NoAnswerError
+from drivers.bench.drive_bench import SetupFacts
+from drivers.bench.drive_setup import DriveSetup, same
+from drivers.bench.settings_change import Change, Names, Outcome, change_settings
+from drivers.drive_types import DRIVE_BENCHES, DRIVE_TYPES
+from simulation.devices.drive import SimulatedDrive
+from simulation.devices.odrive_settings import BUILD
+from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
+
+ID, LONGEST_S = 3, 0.3
+NAMES = ("odrive", "moteus", "mit")
+FIRST: dict[str, Any] = {
+    "watchdog_s": 0.0,
+    "torque_constant_nm_a": 0.07,
+    "current_limit_a": 6.0,
+    "heartbeat_period_s": 0.5,
+}
+
+
+class Bench:
+    """One drive of a type with other settings than the configuration wants."""
+
+    def __init__(self, name: str, **changes: Any) -> None:
+        self.device: SimulatedDrive = simulated(name, ID, "0badcafe", **(FIRST | changes))
+        self.bus = SimulatedBus(self.device)
+        parameters = DRIVE_TYPES[name].parameters(bus="can", node_id=ID, type=name)
+        facts = SetupFacts(parameters, LONGEST_S, (), [BUILD])
+        self.drive: DriveSetup = DRIVE_BENCHES[name].open_setup(self.bus.bench_port(), facts)
+        self.drive.identify()
+        self.first = self.read()
+        differing = [each for each in self.drive.settings() if not each.accepts(self.first[each.key])]
+        self.new = {each.key: each.wanted for each in differing if not each.read_only}
+        self.old = {key: self.first[key] for key in self.new}
+        self.begin = len(self.bus.sent)
+
+    def read(self) -> dict[str, float]:
+        return {each.key: self.drive.read(each.key) for each in self.drive.settings()}
+
+    def change(self, interrupt_after: float = inf) -> Change:
+        calls = iter(range(10**6))
+        return change_settings(self.drive, self.old, self.new, lambda: next(calls) >= interrupt_after, Names())
+
+    @property
+    def frames(self) -> int:
+        return len(self.bus.sent) - self.begin
+
+    def state(self) -> str:
+        """Which settings the drive has now."""
+        found = self.read()
+        fitting = [
+            name
+            for name, wanted in (("old", self.old), ("new", self.new))
+            if all(same(found[key], value) for key, value in wanted.items())
+        ]
+        others = all(same(found[key], value) for key, value in self.first.items() if key not in self.new)
+        return fitting[0] if fitting and others else f"mixed: {found}"
+
+    def switch_off_and_on(self) -> None:
+        self.bus.unplugged_after = 10**9
+        self.device.restart(self.bus.now_s)
+        self.bus.sleep(3.0)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_settings_that_differ_are_written_and_outlast_a_restart(name: str) -> None:
+    bench = Bench(name)
+    assert len(bench.new) >= 1
+    assert bench.change().outcome is Outcome.NEW
+    assert bench.state() == "new"
+    bench.switch_off_and_on()
+    assert bench.state() == "new"
+    assert all(each.accepts(bench.read()[each.key]) for each in bench.drive.settings() if not each.read_only)
+    assert not bench.bus.energised
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_written_settings_that_were_not_stored_are_lost_in_a_restart(name: str) -> None:
+    bench = Bench(name)
+    for key, value in bench.new.items():
+        bench.drive.write(key, value)
+    assert bench.state() == "new"
+    bench.switch_off_and_on()
+    assert bench.state() == "old"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_interrupted_change_leaves_the_old_settings(name: str) -> None:
+    """Ctrl-C before any setting, or before the storing."""
+    for calls in range(len(Bench(name).new) + 1):
+        bench = Bench(name)
+        assert bench.change(interrupt_after=calls).outcome is Outcome.OLD
+        assert bench.state() == "old"
+        bench.switch_off_and_on()
+        assert bench.state() == "old"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_cable_that_comes_out_leaves_the_old_or_the_new_settings(name: str) -> None:
+    whole = Bench(name)
+    whole.change()
+    outcomes = set()
+    for frames in range(whole.frames):
+        bench = Bench(name)
+        bench.bus.unplugged_after = bench.begin + frames
+        outcome = bench.change().outcome
+        outcomes.add(outcome)
+        bench.switch_off_and_on()
+        allowed = {
+            Outcome.NEW: ("new",),
+            Outcome.OLD: ("old",),
+            Outcome.OLD_AFTER_RESTART: ("old",),
+            Outcome.UNKNOWN: ("old", "new"),
+        }
+        assert bench.state() in allowed[outcome], (frames, outcome)
+    assert {Outcome.OLD_AFTER_RESTART, Outcome.UNKNOWN} <= outcomes
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_supply_that_fails_leaves_the_old_or_the_new_settings(name: str) -> None:
+    """The drive restarts after any frame, and answers again a moment later."""
+    whole = Bench(name)
+    whole.change()
+    for frames in range(whole.frames):
+        bench = Bench(name)
+        bench.bus.restart_after = bench.begin + frames
+        outcome = bench.change().outcome
+        bench.switch_off_and_on()
+        expected = {Outcome.NEW: ("new",), Outcome.UNKNOWN: ("old", "new")}.get(outcome, ("old",))
+        assert bench.state() in expected, (frames, outcome)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_written_while_torque_is_on(name: str) -> None:
+    bench = Bench(name)
+    bench.device.energised = True
+    change = bench.change()
+    assert "not idle" in change.text and change.outcome is Outcome.OLD
+    assert bench.frames == 1 and bench.state() == "old"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_frame_of_a_setup_is_a_command_of_torque(name: str) -> None:
+    bench = Bench(name)
+    bench.change()
+    parameters = DRIVE_TYPES[name].parameters(bus="can", node_id=ID, type=name)
+    table = DRIVE_TYPES[name].gate_table(parameters)
+    closing = {payload for payloads in table.while_open.values() for payload in payloads}
+    for frame in bench.bus.sent:
+        assert isnan(table.decode_torque(frame.data)) or frame.arbitration_id != table.torque_id
+        assert frame.data not in closing
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_silent_drive_is_named_by_what_it_was_asked(name: str) -> None:
+    bench = Bench(name)
+    bench.bus.unplugged_after = 0
+    with pytest.raises(NoAnswerError, match="no answer to"):
+        bench.drive.identify()
+
+
+def test_an_odrive_without_the_numbers_of_its_build_says_which_file_is_missing() -> None:
+    bus = SimulatedBus(simulated("odrive", ID))
+    parameters = DRIVE_TYPES["odrive"].parameters(bus="can", node_id=ID)
+    other = BUILD | {"hw_version": "4.4.58"}
+    drive = DRIVE_BENCHES["odrive"].open_setup(bus.bench_port(), SetupFacts(parameters, LONGEST_S, (), [other]))
+    drive.identify()
+    with pytest.raises(Exception, match="firmware 0.6.11, hardware 0.0.0"):
+        drive.read("axis0.config.watchdog_timeout")
+
+
+def test_a_cubemars_says_that_it_cannot() -> None:
+    parameters = DRIVE_TYPES["mit"].parameters(bus="can", node_id=ID, type="mit", model="AK80-9")  # type: ignore[call-arg]
+    drive = DRIVE_BENCHES["mit"].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
+    assert "neither read nor written" in drive.cannot and not drive.settings()
+
+
+@pytest.mark.parametrize(
+    ("name", "identifier", "data"),
+    [
+        ("odrive", 0x64, "01 01 00 00 cd cc cc 3d"),  # writes 0.1 to parameter 1
+        ("odrive", 0x76, "01"),  # stores and restarts
+        ("moteus", 0x8003, "40 01 0b 63 6f 6e 66 20 77 72 69 74 65 0a 42 01 30 50 50 50"),  # conf write, and a poll
+        ("mit", 0x7FF, "03 00 55 09 d0 07 00 00"),  # 2000 times 50 µs
+        ("mit", 0x7FF, "03 00 aa 01 00 00 00 00"),  # stores
+    ],
+)
+def test_the_frames_that_write_and_store(name: str, identifier: int, data: str) -> None:
+    """Bytes of examples/can_param_access.py of ODrive, docs/protocol of moteus, and damiao-motor 1.0.6."""
+    bench = Bench(name)
+    bench.change()
+    assert (identifier, bytes.fromhex(data)) in {(frame.arbitration_id, frame.data) for frame in bench.bus.sent}
