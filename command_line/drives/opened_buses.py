@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from drivers.bench.bench_port import BenchPort
 from drivers.can.bus_lock import BusRole
+from drivers.can.can_port import CanPort
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.configuration.loading import load_configuration
@@ -22,6 +23,7 @@ class OpenedBus(NamedTuple):
     name: str
     parameters: BusParameters
     port: BenchPort
+    can_port: CanPort  # the same bus, for a driver
 
     @property
     def carries_fd(self) -> bool:
@@ -56,7 +58,7 @@ def opened_buses(buses: dict[str, BusParameters]) -> Iterator[list[OpenedBus]]:
     with locks:
         ports = open_ports(buses)
         try:
-            yield [OpenedBus(name, buses[name], make_bench_port(ports[name])) for name in buses]
+            yield [OpenedBus(name, buses[name], make_bench_port(ports[name]), ports[name]) for name in buses]
         finally:
             for port in ports.values():
                 port.close()

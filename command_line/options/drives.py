@@ -13,6 +13,7 @@ def add_drives(drives: Parser) -> None:
     actions = drives.add_subparsers(dest="action", required=True, metavar="action")
     _add_find(actions)
     _add_setup(actions)
+    _add_zero(actions)
 
 
 def _add_find(actions: Commands) -> None:
@@ -46,6 +47,14 @@ def _add_setup(actions: Commands) -> None:
         metavar="FILE",
         help="flat_endpoints.json of an ODrive's build, repeatable (default: those next to the configuration)",
     )
+
+
+def _add_zero(actions: Commands) -> None:
+    text = "Make a joint's present position its angle zero, in the configuration file."
+    zero = add(actions, "zero", "drives.zero.zero", text)
+    _add_configuration(zero)
+    zero.add_argument("joint", nargs="+", metavar="JOINT", help="such as left_sweep")
+    zero.add_argument("--yes", action="store_true", help="write it without asking")
 
 
 def _add_configuration(parser: Parser) -> None:

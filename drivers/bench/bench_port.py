@@ -42,6 +42,9 @@ class BenchPort:
         """Why frames did not leave; empty while all did."""
         return self._port.last_send_error if self._port.failed_sends else ""
 
+    def sleep(self, duration_s: float) -> None:
+        self._sleep(duration_s)
+
     def listen(self, duration_s: float) -> list[Frame]:
         """Returns all frames of that time."""
         return self._receive(lambda frames: False, duration_s)

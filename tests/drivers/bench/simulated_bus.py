@@ -36,6 +36,8 @@ class SimulatedBus:
 
         self.at_frame: tuple[int, Callable[[], None]] = (10**9, lambda: None)  # of the bench, and what happens then
 
+        self.each_step: Callable[[], None] = lambda: None
+
     def bench_port(self, _: object = None) -> BenchPort:
         return BenchPort(self.port, lambda: self.now_s, self.sleep)
 
@@ -45,6 +47,7 @@ class SimulatedBus:
             self._step()
 
     def _step(self) -> None:
+        self.each_step()
         for frame in self._far.receive():
             self.sent.append(frame)
             if len(self.sent) <= self.unplugged_after:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.actuator.configuration_change import changed_text, replace_file
-from experiments.robot.bench_robot import BenchError
+from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.local_setup import CONFIGURATION
 
@@ -61,14 +60,14 @@ def test_tables_may_be_written_in_any_way() -> None:
 
 
 def test_a_change_that_would_be_wrong_is_refused_with_key_value_and_bound(example_text: str) -> None:
-    with pytest.raises(BenchError, match=r"stays as it is.*drive.right_sweep.torque_constant_nm_a = 99.0: must be"):
+    with pytest.raises(FileChangeError, match=r"stays as it is.*right_sweep.torque_constant_nm_a = 99.0: must be"):
         changed_text(example_text, {CONSTANT: 99.0})
-    with pytest.raises(BenchError, match=r"drive.right_sweep.current_limit_a = 12.0: must be at least 18.75"):
+    with pytest.raises(FileChangeError, match=r"drive.right_sweep.current_limit_a = 12.0: must be at least 18.75"):
         changed_text(example_text, {CONSTANT: 0.04})
 
 
 def test_what_is_no_toml_is_refused() -> None:
-    with pytest.raises(BenchError, match="cannot be changed"):
+    with pytest.raises(FileChangeError, match="cannot be changed"):
         changed_text("[drive", {CONSTANT: 0.07})
 
 
@@ -93,7 +92,7 @@ def test_a_file_is_replaced_with_its_permissions_and_the_old_one_remains(tmp_pat
 def test_a_file_that_changed_meanwhile_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "mudskipper.toml"
     path.write_text("theirs = 1\n", encoding="utf-8")
-    with pytest.raises(BenchError, match="changed during this experiment"):
+    with pytest.raises(FileChangeError, match="changed during this command"):
         replace_file(path, "mine = 1\n", "mine = 2\n")
     assert path.read_text(encoding="utf-8") == "theirs = 1\n"
 
@@ -106,7 +105,7 @@ def test_a_file_that_cannot_be_written_stays_as_it_is(tmp_path: Path, monkeypatc
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr(os, "replace", refuse)
-    with pytest.raises(BenchError, match=r"mudskipper.toml: Permission denied; nothing was changed. Run the same"):
+    with pytest.raises(FileChangeError, match=r"mudskipper.toml: Permission denied; nothing was changed. Run the same"):
         replace_file(path, "a = 1\n", "a = 2\n")
     assert path.read_text(encoding="utf-8") == "a = 1\n"
     assert [each.name for each in tmp_path.iterdir()] == ["mudskipper.toml"]

@@ -1,0 +1,143 @@
+"""`mudskipper drives zero`: makes a joint's present position its angle zero, in the configuration file.
+
+The drive keeps its own zero; `zero_turn` is the encoder's reading where the joint's angle is zero. The position is read
+by the daemon's own driver with a closed transmit gate, so sign and protocol are those of the walk.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from difflib import unified_diff
+from math import degrees, isfinite, pi
+from typing import NamedTuple
+
+from command_line import exit_codes
+from command_line.drives.opened_buses import opened_buses
+from command_line.screen import complain, watched
+from drivers.bench.bench_port import BenchPort
+from drivers.drive_types import make_drives
+from drivers.drives import Drives
+from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
+from firmware_host.buses import BusError
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.toml_records import ConfigurationError, read_text
+
+HEARING_S, READING_S = 1.0, 1.0
+POLL_S = 0.005
+FEWEST_READINGS = 20
+LARGEST_MOTION_DEG = 0.3  # several steps of the coarsest encoder code (MIT mode: 0.02°), with its noise
+DIGITS = 5  # of a turn: 0.004°
+
+
+class UnusableReadingError(Exception):
+    """The position cannot be used; the message says why."""
+
+
+class Reading(NamedTuple):
+    joint: str
+    old_turn: float
+    new_turn: float
+    angle_deg: float  # of the joint, by the old zero
+    motion_deg: float  # between the extremes
+
+
+def zero(options: argparse.Namespace) -> int:
+    try:
+        text = read_text(options.config)
+        configuration = parse_configuration(text, options.config)
+        for joint in options.joint:
+            if joint not in configuration.rig.joints:
+                raise ConfigurationError([f"{joint}: this robot has {', '.join(configuration.rig.joints)}"])
+        readings = _read(configuration, list(dict.fromkeys(options.joint)))
+        after = changed_text(text, {("drive", each.joint, "zero_turn"): each.new_turn for each in readings})
+        for each in readings:
+            print(
+                f"{each.joint}: zero_turn {each.old_turn:g} -> {each.new_turn:g}; the joint stood at"
+                f" {each.angle_deg:.2f}°, and moved by {each.motion_deg:.3f}°"
+            )
+        return _replace(options, text, after)
+    except ConfigurationError as problem:
+        complain(*problem.problems)
+        return exit_codes.CONFIGURATION
+    except (BusError, UnusableReadingError, FileChangeError) as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
+
+
+def _replace(options: argparse.Namespace, before: str, after: str) -> int:
+    path = options.config
+    if after == before:
+        print(f"{path} needs no change")
+        return exit_codes.OK
+    print(
+        "\n".join(unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", "", "", 0, ""))
+    )
+    if not options.yes and not _agreed(f"Write this to {path}? [y/N] "):
+        print(f"{path} was left as it is")
+        return exit_codes.REFUSED if sys.stdin.isatty() else exit_codes.USAGE
+    backup = replace_file(path, before, after)
+    print(f"{path} is changed; the old file is {backup.name}. The daemon reads it when it starts")
+    return exit_codes.OK
+
+
+def _agreed(question: str) -> bool:
+    if not sys.stdin.isatty():
+        complain("there is no terminal on which to ask: add --yes to write it")
+        return False
+    with suppress(EOFError):
+        return input(question).strip().lower() in ("y", "yes")
+    return False
+
+
+def _read(configuration: Configuration, joints: Sequence[str]) -> list[Reading]:
+    """Reads all joints at once. Raises BusError and UnusableReadingError."""
+    names = {configuration.drive[joint].bus for joint in joints}
+    chosen = {joint: configuration.drive[joint] for joint in configuration.rig.joints if joint in joints}
+    with opened_buses({name: configuration.bus[name] for name in configuration.bus if name in names}) as opened:
+        ports = {bus.name: bus.can_port for bus in opened}
+        drives = make_drives(chosen, ports, configuration.limits, configuration.watchdog_endpoints)
+        with watched() as show:
+            angles_rad = read_angles(drives, opened[0].port, show)
+    return [_reading(joint, chosen[joint].zero_turn, chosen[joint].sign, angles_rad[joint]) for joint in chosen]
+
+
+def read_angles(
+    drives: Drives, clock: BenchPort, show: Callable[[str, int, int], None]
+) -> Mapping[str, Sequence[float]]:
+    """Returns the new readings of every joint's angle for READING_S. Raises UnusableReadingError."""
+    begun_s = clock.now_s
+    states = drives.read(begun_s)
+    while not drives.heard and clock.now_s - begun_s < HEARING_S:
+        drives.poll()
+        clock.sleep(POLL_S)
+        states = drives.read(clock.now_s)
+    found: dict[str, list[float]] = {axis.joint: [] for axis in drives.axes}
+    stamps_s = dict.fromkeys(found, 0.0)
+    begun_s = clock.now_s
+    while (elapsed_s := clock.now_s - begun_s) < READING_S:
+        show("ms read", round(1e3 * elapsed_s), round(1e3 * READING_S))
+        drives.poll()
+        clock.sleep(POLL_S)
+        states = drives.read(clock.now_s)
+        for axis, state in zip(drives.axes, states, strict=True):
+            if state.closed_loop:
+                raise UnusableReadingError(f"{axis.joint}: its drive follows torque; nothing was written")
+            if state.angle_stamp_s != stamps_s[axis.joint] and isfinite(state.angle_rad):
+                stamps_s[axis.joint] = state.angle_stamp_s
+                found[axis.joint].append(state.angle_rad)
+    return found
+
+
+def _reading(joint: str, zero_turn: float, sign: int, angles_rad: Sequence[float]) -> Reading:
+    if len(angles_rad) < FEWEST_READINGS:
+        text = f"{joint}: {len(angles_rad)} readings of its position in {READING_S:g} s, {FEWEST_READINGS} are needed"
+        raise UnusableReadingError(f"{text}; check its power, wiring and id with 'mudskipper drives find'")
+    motion_deg = degrees(max(angles_rad) - min(angles_rad))
+    if motion_deg > LARGEST_MOTION_DEG:
+        text = f"{joint} moved by {motion_deg:.2f}° within {READING_S:g} s, more than {LARGEST_MOTION_DEG:g}°"
+        raise UnusableReadingError(f"{text}: hold it still, and run the command again")
+    mean_rad = sum(angles_rad) / len(angles_rad)
+    new_turn = round(zero_turn + sign * mean_rad / (2.0 * pi), DIGITS)
+    return Reading(joint, zero_turn, new_turn, degrees(mean_rad), motion_deg)

@@ -1,0 +1,103 @@
+"""Changes values of the configuration file, and leaves its comments, order and everything else unchanged.
+
+The new text must be a configuration that the daemon accepts. The file is replaced atomically, so a power cut leaves the
+old or the new one, and the old one stays next to it as `.before`.
+"""
+
+import os
+import tomllib
+from collections.abc import Mapping, MutableMapping
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import Table
+
+from firmware_host.configuration.file_problems import why_not
+from firmware_host.configuration.loading import parse_configuration
+from firmware_host.configuration.toml_records import ConfigurationError, read_text
+from firmware_host.log.whole_files import whole_file
+
+BACKUP = ".before"
+Changes = Mapping[tuple[str, ...], float]  # the key's path, and its new value
+
+
+class FileChangeError(Exception):
+    """The file stays as it is; the text says why, and what to do."""
+
+
+def changed_text(text: str, changes: Changes) -> str:
+    """Raises FileChangeError where the result is no configuration, or differs in anything but the changes."""
+    try:
+        document = tomlkit.parse(text)
+        for path, value in changes.items():
+            _set(document, path, value)
+        changed = tomlkit.dumps(document)
+        parse_configuration(changed)
+    except TOMLKitError as problem:
+        raise FileChangeError(f"the configuration cannot be changed: {problem}") from problem
+    except ConfigurationError as problem:
+        raise FileChangeError(
+            f"the configuration stays as it is, since changed it would be invalid: {problem}. Fix that, and run the"
+            " same command again"
+        ) from problem
+    if tomllib.loads(changed) != _expected(text, changes):
+        raise FileChangeError(
+            "the configuration stays as it is: its tables are written in a way that cannot be changed here"
+        )
+    return changed
+
+
+def _expected(text: str, changes: Changes) -> dict[str, Any]:
+    document = tomllib.loads(text)
+    for path, value in changes.items():
+        table = document
+        for name in path[:-1]:
+            table = table.setdefault(name, {})
+        table[path[-1]] = value
+    return document
+
+
+def _set(document: MutableMapping[str, Any], path: tuple[str, ...], value: float) -> None:
+    """Put a new key below the last one of its table, above comments on the next table."""
+    table = document
+    for depth, name in enumerate(path[:-1]):
+        if name not in table:
+            table[name] = tomlkit.table(is_super_table=depth < len(path) - 2)
+        table = table[name]
+    body = table.value.body if isinstance(table, Table) and path[-1] not in table else []
+    trailing = list(reversed([*takewhile(lambda item: item[0] is None, reversed(body))]))
+    del body[len(body) - len(trailing) :]
+    table[path[-1]] = value
+    body.extend(trailing)
+
+
+def replace_file(path: Path, before: str, after: str) -> Path:
+    """Return the path of the backup. Raises FileChangeError where the file changed meanwhile, or may not be written."""
+    try:
+        path = path.resolve(strict=True)  # a link stays one
+        if read_text(path) != before:
+            raise FileChangeError(f"{path} was changed during this command: run it again")
+        backup = path.with_name(path.name + BACKUP)
+        _write(backup, before, path)
+        _write(path, after, path)
+    except OSError as problem:
+        raise FileChangeError(
+            f"{why_not(problem, path)}; nothing was changed. Run the same command as a user who may write it, such as"
+            " root"
+        ) from problem
+    return backup
+
+
+def _write(path: Path, text: str, like: Path) -> None:
+    """Write atomically, with the owner and the permissions of another file."""
+    status = like.stat()
+    with whole_file(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
+        os.fchmod(file.fileno(), status.st_mode & 0o777)
+        if (os.geteuid(), os.getegid()) != (status.st_uid, status.st_gid):
+            os.fchown(file.fileno(), status.st_uid, status.st_gid)
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
