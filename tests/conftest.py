@@ -16,7 +16,7 @@ from tests.folders import ROOT
 from tests.recorded_walks import record_walks
 from tests.running_bench import Bench, SharedBench, running_bench
 
-# A busy machine is not wrong, and a commit gets the same verdict every time; `--hypothesis-profile search` looks on.
+# No deadline, as the machine may be busy; the same examples for each commit; `--hypothesis-profile search` tries more.
 settings.register_profile("search", deadline=None)
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
@@ -25,7 +25,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job sta
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Of the bench (tests/bench), here because pytest asks for options before it looks there."""
+    """Add the options of the bench (tests/bench) here, because pytest reads options before it loads that folder."""
     bench = parser.getgroup("bench", "the robot's bench: tests/bench")
     bench.addoption("--simulated", action="store_true", help="on a simulated robot, as fast as it computes")
     bench.addoption(
@@ -43,7 +43,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session")
 def example_text() -> str:
-    """Returns the configuration from which the owner of a robot starts."""
+    """Returns the text of the example configuration."""
     return (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
 
 
@@ -54,14 +54,14 @@ def configuration() -> Configuration:
 
 @pytest.fixture
 def short_folder() -> Iterator[Path]:
-    """A folder whose path leaves room for the name of a Unix socket."""
+    """Yield a folder with a path short enough for a Unix socket."""
     with tempfile.TemporaryDirectory(prefix="mud-") as folder:
         yield Path(folder)
 
 
 @pytest.fixture(scope="session")
 def two_walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
-    """A log in which the robot walked two strides, held, and walked one more."""
+    """Record a log in which the robot walks two strides, holds, and walks one more."""
     path = tmp_path_factory.mktemp("logs") / "two.mcap"
     record_walks(path, configuration, 2, 1)
     return path
@@ -76,7 +76,7 @@ def shared_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SharedBen
 
 @pytest.fixture
 def bench(shared_bench: SharedBench) -> Bench:
-    """A robot at rest that many tests share: they leave both processes running."""
+    """Return a robot at rest that many tests share; a test must leave both processes running."""
     made = shared_bench.start()
     made.reset()
     return made
@@ -84,7 +84,7 @@ def bench(shared_bench: SharedBench) -> Bench:
 
 @pytest.fixture
 def own_bench(shared_bench: SharedBench, tmp_path: Path) -> Iterator[Bench]:
-    """A robot whose processes the test may end."""
+    """Yield a robot whose processes the test may end."""
     shared_bench.end()
     with running_bench(tmp_path / "logs") as made:
         yield made

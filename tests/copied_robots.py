@@ -1,4 +1,4 @@
-"""Copies of a robot in lockstep, so that many tests start from the moment to which one walk has brought it."""
+"""Copies of a robot in lockstep, so that many tests can start from the same moment of one walk."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ Robot = TypeVar("Robot", bound=Lockstep)
 
 
 def copy_of(robot: Robot) -> Robot:
-    """Returns a robot that goes on exactly as this one would; what happens to one does not change the other."""
+    """Returns an independent robot in exactly the same state."""
     shared = [robot.loop.configuration, *MESSAGES]
     return deepcopy(robot, {id(each): each for each in shared})

@@ -1,4 +1,4 @@
-"""Folders that tests read: the repository, and measurements that no one here made, where they are at hand."""
+"""Folders that tests read: the repository, and the authors' measurements if they are available."""
 
 import os
 from pathlib import Path

@@ -28,7 +28,10 @@ CYCLE = (  # state, duration in s, sweep and adduction in rad at its end, torque
 
 
 def lab_columns(strides: int = 3, mud: bool = True) -> Columns:
-    """Both flippers, angles falling in insertion and stance, the motors working on the mud or on friction alone."""
+    """Return a walk of both flippers in mud, or in air, where the motors only overcome friction and the arm's weight.
+
+    The angles fall in insertion and stance.
+    """
     rest = (0, 1.0, 0.0, 0.0, (0.0, 0.06), (0.0, 0.06))
     parts = [rest, CYCLE[3], *CYCLE * strides]
     noise = np.random.default_rng(7)
@@ -49,7 +52,7 @@ def lab_columns(strides: int = 3, mud: bool = True) -> Columns:
 
 
 def write_lab_log(path: Path, columns: Columns, settings: dict[str, str] = SETTINGS) -> Path:
-    """Write the columns as the authors publish them."""
+    """Write the columns in the form that the authors publish."""
     head = [",".join(settings), ",".join(settings.values()), ",".join(columns)]
     rows = [",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values(), strict=True)]
     path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")

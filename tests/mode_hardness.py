@@ -1,4 +1,4 @@
-"""How hard each mode stops the robot, and the mildest mode that each reaction permits, as the documentation says it."""
+"""The documented order of modes by how hard they stop the robot, and the mildest mode that each reaction permits."""
 
 from __future__ import annotations
 

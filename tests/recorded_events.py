@@ -1,4 +1,4 @@
-"""A recorder that keeps the event texts of a log, for tests that look at what was reported."""
+"""A recorder that stores the event texts of a log, for tests of reported events."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from firmware_host.log.rows import EVENT, EVENT_KIND
 
 
 class EventRecorder(NullRecorder):
-    """Passes every row on to `log` too, if there is one."""
+    """Records event texts and passes every row on to `log`, if there is one."""
 
     def __init__(self, log: Recording | None = None) -> None:
         self.kinds: list[int] = []  # of all rows

@@ -13,7 +13,7 @@ from simulation.mud.track import paper_track
 
 
 def record_walks(path: Path, configuration: Configuration, *strides: int) -> Lockstep:
-    """One walk after another of so many strides, with a hold between them. The robot as it is afterwards."""
+    """Record walks of these numbers of strides, with a hold between them; return the robot after the last walk."""
     recorder = Recorder(path, configuration.text, {"robot": "test"})
     robot = Lockstep(configuration, paper_track(), recorder=recorder)
     walk_and_hold(robot, *strides)
@@ -23,7 +23,7 @@ def record_walks(path: Path, configuration: Configuration, *strides: int) -> Loc
 
 
 def walk_and_hold(robot: Lockstep, *strides: int, rest_s: float = 0.0) -> list[tuple[float, float]]:
-    """Armed, and before each walk at rest for a while. When each began and was over, by the robot's clock."""
+    """Arm the robot and walk, with a rest before each walk; return begin and end of each walk by the robot's clock."""
     robot.arm()
     spans_s = []
     for count in strides:

@@ -21,7 +21,7 @@ from tests.waiting import LONGEST_S
 
 
 class Bench:
-    """Owns the processes of one robot. `run` is what an operator types."""
+    """Owns the processes of one robot. `run` executes a command that an operator would type."""
 
     def __init__(self, folder: Path, logs: Path) -> None:
         self.folder, self.logs = folder, logs
@@ -57,13 +57,13 @@ class Bench:
         self.wait_for(lambda report: bool(report["mode"] == "idle" and report["fault"] is None))
 
     def reset(self) -> None:
-        """Ends what the test before left: failures, torque, joints beyond their limits, faults."""
+        """Clears the failures, torque, joint positions beyond limits and faults that the previous test left."""
         client = StatusClient(self.socket)
         client.call("fail", component="all", kind="ok")
         client.call("disarm")
         self.wait_for(lambda report: report["mode"] in ("idle", "fault"))
         self.robot.send_signal(signal.SIGUSR1)  # moves the joints back
-        with suppress(CallRefusedError):  # as long as they are beyond their limits
+        with suppress(CallRefusedError):  # refused while joints are beyond their limits
             client.call("clear")
         self.wait_for(lambda report: report["mode"] in ("idle", "fault") and not report["failing"])
         while client.call("status")["fault"]:
@@ -74,7 +74,7 @@ class Bench:
         self.wait_until_ready()
 
     def stop_daemon(self) -> Path:
-        """Ends it in order; returns its only log."""
+        """Shuts the daemon down cleanly; returns its only log."""
         self.daemon.send_signal(signal.SIGTERM)
         assert self.daemon.wait(LONGEST_S) == 0
         (path,) = (self.logs / "done").glob("*.mcap")
@@ -106,7 +106,7 @@ def running_bench(logs: Path) -> Iterator[Bench]:
 
 
 class SharedBench:
-    """Owns at most one running robot: each takes a part of a processor."""
+    """Owns at most one running robot, because each one loads a processor."""
 
     def __init__(self, folders: pytest.TempPathFactory) -> None:
         self._folders = folders

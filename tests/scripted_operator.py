@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 
 class ScriptedOperator:
-    """An Operator with a list of `answers`, and after them the first answer of each question."""
+    """An Operator that gives the listed `answers` and then the first possible answer of each question."""
 
     def __init__(self, *answers: str) -> None:
         self.answers = list(answers)

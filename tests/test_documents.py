@@ -1,4 +1,4 @@
-"""The documents at the top of the project stay short, and their links lead somewhere."""
+"""The documents at the top of the project stay short, and the targets of their links exist."""
 
 from __future__ import annotations
 

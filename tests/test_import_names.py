@@ -1,4 +1,4 @@
-"""The top-level names `control`, `drivers` and the like are ours alone, although python-control has one of them too."""
+"""Top-level names such as `control` and `drivers` belong to this project, although python-control uses one too."""
 
 from importlib.metadata import packages_distributions
 from importlib.util import find_spec

@@ -30,7 +30,7 @@ MOST_MODULES = 14  # in one folder
 
 
 def imports(source: str, package: str) -> set[str]:
-    """Every module that a source names in an import, wherever in the file the import stands."""
+    """Return every module that a source imports, at module level or inside a function."""
     found = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
@@ -45,16 +45,16 @@ def allowed(package: str, imported: str) -> bool:
     top = imported.split(".")[0]
     if top == package or top in sys.stdlib_module_names:
         return True
-    if top not in HEIGHT:  # a library
+    if top not in HEIGHT:  # an external library
         return package != "control"
-    if (package, top) == ("simulation", "estimation"):  # the simulated mud must not know the fits that are tried on it
+    if (package, top) == ("simulation", "estimation"):  # the simulated mud must not know the fits that are tested on it
         return False
     return HEIGHT[top] < HEIGHT[package]
 
 
 @cache
 def sources() -> dict[str, str]:
-    """The source of every module of the product, by its dotted name."""
+    """Return the source of every module of the product by its dotted name."""
     return {
         ".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8")
         for package in HEIGHT
@@ -63,12 +63,12 @@ def sources() -> dict[str, str]:
 
 
 def imported_modules(module: str) -> set[str]:
-    """The product's own modules that a module imports."""
+    """Return the product's own modules that a module imports."""
     return imports(sources()[module], module.split(".")[0]) & sources().keys() - {module}
 
 
 def circle(edges: dict[str, set[str]]) -> list[str]:
-    """One circle of a graph, or nothing."""
+    """Return one cycle of a graph, or an empty list."""
     try:
         TopologicalSorter(edges).prepare()
     except CycleError as error:
@@ -81,7 +81,7 @@ def room(module: str) -> str:
 
 
 def sibling_rooms() -> dict[str, set[str]]:
-    """For each folder within a package, the folders next to it that it imports from."""
+    """Return, for each folder within a package, the sibling folders that it imports from."""
     edges: dict[str, set[str]] = {}
     for module in sources():
         for imported in imported_modules(module):
@@ -158,7 +158,7 @@ def test_a_circle_is_noticed() -> None:
 
 @pytest.mark.parametrize("protocol", DRIVE_TYPES)
 def test_only_its_own_folder_and_the_tables_know_a_protocol(protocol: str) -> None:
-    """A further drive protocol touches drivers/PROTOCOL, drivers/drive_types.py and simulation/devices alone."""
+    """A new drive protocol changes only drivers/PROTOCOL, drivers/drive_types.py and simulation/devices."""
     driver, device = f"drivers.{protocol}", f"simulation.devices.{protocol}"
     assert any(room(module) == driver for module in sources())
     assert any(module == device or room(module) == device for module in sources())

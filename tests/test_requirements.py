@@ -76,7 +76,7 @@ def test_every_pin_has_hashes(file: str) -> None:
 
 @pytest.mark.parametrize("file", EXTRAS)
 def test_what_the_pinned_packages_need_is_pinned_too(file: str) -> None:
-    """As far as they are installed here: their metadata says what they need."""
+    """The metadata of the installed packages lists what they need."""
     pinned = pins(file)
     for name in pinned:
         try:

@@ -1,11 +1,11 @@
-"""Waiting for what another process, or the kernel, does in its own time."""
+"""Waiting for asynchronous actions of another process or of the kernel."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
-LONGEST_S = 120.0  # on a computer that others keep busy: only a failing test waits for so long
+LONGEST_S = 120.0  # generous for a busy computer; only a failing test waits this long
 
 
 def wait_until(done: Callable[[], bool]) -> None:

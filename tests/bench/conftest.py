@@ -1,4 +1,4 @@
-"""The bench's stages on one rig: opened once, each stage only after the one before it, idle whatever happens.
+"""The stages of the bench share one rig, opened once; each stage needs the one before it; the drives always end idle.
 
 pytest tests/bench --can can0             a robot, asked before it moves
 pytest tests/bench --config FILE          the same on the interfaces of the configuration
@@ -79,7 +79,7 @@ def configuration_path(simulated: bool) -> Path:
 
 
 def open_rig(config: pytest.Config, configuration: Configuration) -> tuple[Rig, BenchOperator]:
-    """Raises BenchError."""
+    """Open the rig and its operator. Raises BenchError."""
     if config.option.simulated:
         simulated = SimulatedRig(configuration)
         return simulated, SimulatedBenchOperator(simulated)
@@ -128,7 +128,7 @@ def bench(request: pytest.FixtureRequest, opened: TestRig | str) -> Iterator[Sta
 
 
 def ask_before_moving(what: str, test_rig: TestRig, report: BenchReport, stage: int) -> None:
-    """Ask once for each stage that moves something, whatever the answer is."""
+    """Ask only once for each stage that moves something, also if the operator refuses."""
     if stage not in report.consents:
         report.consents[stage] = False  # in case no answer comes
         report.consents[stage] = lets_move(what, test_rig, stage)

@@ -1,4 +1,4 @@
-"""Shared by the stages of the bench: the test rig, the measured values, and the report of all stages."""
+"""The parts that the stages of the bench share: the test rig, the measured values, and the report of all stages."""
 
 from __future__ import annotations
 

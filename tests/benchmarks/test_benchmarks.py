@@ -37,7 +37,10 @@ SUMMARY = {"median", "p99", "max"}
 
 
 def report_of(name: str, *arguments: str) -> dict[str, Any]:
-    """In a process of its own, since a benchmark switches garbage collection off. Those of stress judge their bar."""
+    """Run a benchmark and return its report; a stress test ends with status 1 if it misses its bar.
+
+    It gets a process of its own because a benchmark switches garbage collection off.
+    """
     command = [sys.executable, "-m", BENCHMARKS[name], "--json", *arguments]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=TIMEOUT_S)
     assert done.stderr == ""
@@ -74,7 +77,7 @@ def test_loop_jitter() -> None:
 
 
 def test_viewers_cost(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """The screen, `live` and its clients run until the turn ends."""
+    """`all_run` shows that the screen, `live` and its clients ran until the measurement ended."""
     assert run_benchmark(viewers_cost.measure, ["--seconds", "0.5", "--pairs", "1"]) == 0
     report = json.loads(capsys.readouterr().out)
     figures = {f"{name}_{part}" for name in ("tick_us", "wake_late_us") for part in ("p50", "p99")}
@@ -84,7 +87,7 @@ def test_viewers_cost(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
 
 
 def test_lockstep_speed(capsys: pytest.CaptureFixture[str]) -> None:
-    """Slow or not, a benchmark of speed ends with status 0, and prints the same object on one line or on many."""
+    """A benchmark of speed ends with status 0 even if it is slow, and prints its JSON on one line or on many."""
     assert run_benchmark(lockstep_speed.measure, ["--rounds", "1", "--longest", "0.5"]) == 0
     report = json.loads(capsys.readouterr().out)
     (walk,) = report["rounds"]
@@ -94,7 +97,7 @@ def test_lockstep_speed(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_can_fuzz() -> None:
-    """What it finds is asserted: it depends on no clock. Memory is not, in so few frames."""
+    """Its findings depend on no clock, so they are asserted; with so few frames its memory figure is not."""
     parts = report_of("can_fuzz", "--frames", "8000")["parts"]
     assert {name: part["frames"] for name, part in parts.items()} == {"boot": 4000, "idle": 4000}
     for part in parts.values():
@@ -122,7 +125,7 @@ def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send(frame: Frame, forbid
 
 
 def test_soak() -> None:
-    """Released resources and complete rows are asserted, memory is not in so short a time."""
+    """Released resources and complete rows are asserted; memory is not, because the run is too short."""
     report = report_of("soak", "--hours", "0.002")
     assert max(report["left"].values()) <= 0
     assert (report["bugs"], report["dropped"], report["ticks_missing"], report["files_not_whole"]) == ([], 0, 0, 0)
@@ -133,7 +136,7 @@ def test_soak() -> None:
 
 
 def test_daemon_kills() -> None:
-    """Killed once, stopped once; a busy machine lengthens no time that is asserted, only the wait for it."""
+    """The daemon is killed once and stopped once. A busy machine only lengthens waits, and no time is asserted."""
     report = report_of("daemon_kills", "--kills", "2")
     assert [made["signal"] for made in report["rounds"]] == ["SIGKILL", "SIGSTOP"]
     for made in report["rounds"]:
@@ -166,7 +169,7 @@ def test_corrupted_logs() -> None:
 
 
 def test_log_kills() -> None:
-    """Each victim once; with this seed the first kill waits for a second segment, and the others do not."""
+    """Each victim is killed once; with this seed only the first kill waits for a second segment."""
     report = report_of("log_kills", "--kills", "4", "--seed", "2542")
     assert [kill["victim"] for kill in report["rounds"]] == ["daemon", "writer", "both", "all"]
     sums = report["sums"]

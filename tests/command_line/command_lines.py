@@ -1,4 +1,4 @@
-"""Runs command lines: in this process, or in one of their own."""
+"""Runs command lines in this process or in a separate one."""
 
 from __future__ import annotations
 

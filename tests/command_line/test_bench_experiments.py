@@ -1,4 +1,4 @@
-"""`mudskipper experiment flipper` and `walk`: one command, no questions, a folder with everything."""
+"""`mudskipper experiment flipper` and `walk` ask no questions and leave a folder with all results."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_one_command_leaves_page_pictures_numbers_notebook_and_log(first: int, f
     assert first == exit_codes.OK
     wanted = {"report.html", "summary.json", "figure4_49.5.png", "figure5.png", "notebook.jsonl", "simulated-001.mcap"}
     assert wanted <= names(folder)
-    summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)  # NaN is no JSON
+    summary = json.loads((folder / "summary.json").read_text(), parse_constant=pytest.fail)  # NaN is not valid JSON
     assert summary["muds"][0]["mud"] == "49.5"
 
 

@@ -1,4 +1,4 @@
-"""A drive that fell silent may have torque, whatever it said last."""
+"""A drive that fell silent may have torque, even if it last reported that it was idle."""
 
 from __future__ import annotations
 

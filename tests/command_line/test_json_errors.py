@@ -1,4 +1,4 @@
-"""With --json, a command that fails prints its reason as JSON, in one shape; --json is spelled alike everywhere."""
+"""With --json, every command that fails prints its reason as a JSON object with the same keys."""
 
 from __future__ import annotations
 

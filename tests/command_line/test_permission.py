@@ -1,4 +1,4 @@
-"""A user who may only stop the robot can do that and no more."""
+"""A user who is only permitted to stop the robot can do nothing else."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_anything_else_is_not_permitted(
 
 
 def permitted(path: Path, method: str, groups: Sequence[int] = ()) -> bool:
-    """Whether a process of another user, in these groups alone, may call `method`."""
+    """Return whether a process of another user with only these groups may call `method`."""
     child = os.fork()
     if child == 0:
         status = 2
@@ -91,7 +91,7 @@ def permitted(path: Path, method: str, groups: Sequence[int] = ()) -> bool:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 def test_only_members_of_the_named_group_may_connect_where_others_may_not_stop(short_folder: Path) -> None:
-    """Neither user nor group owns the file of the socket."""
+    """The callers match neither the user nor the group that owns the file of the socket."""
     short_folder.chmod(0o755)
     viewers = grp.getgrall()[-1]
     rights = load_rights(StatusParameters(read_group=viewers.gr_name, anyone_may_stop=False))

@@ -1,4 +1,4 @@
-"""`mudskipper plot` and `mudskipper film`: what is drawn, what is written, what is refused."""
+"""`mudskipper plot` and `mudskipper film`: the files, the drawn values and the refused options."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from tests.waiting import LONGEST_S
 
 
 def png_size(path: Path) -> tuple[int, int]:
-    """Of a picture that can be decoded to its end."""
+    """Decode the whole picture and return its size."""
     with Image.open(path) as picture:
         assert picture.format == "PNG"
         picture.load()
@@ -44,11 +44,11 @@ def png_size(path: Path) -> tuple[int, int]:
 
 @pytest.fixture
 def log(two_walks: Path, tmp_path: Path) -> Path:
-    """In a folder of its own."""
+    """Copy the log into a folder of its own."""
     return Path(shutil.copy(two_walks, tmp_path / "two.mcap"))
 
 
-# what is written
+# files
 
 
 @pytest.mark.parametrize(("command", "name", "width"), [("plot", "two.png", 1200), ("film", "two-strides.png", 1800)])
@@ -74,7 +74,7 @@ def test_a_strip_has_a_row_for_each_stride_asked_for(log: Path, tmp_path: Path) 
         assert main(["film", str(log), "--walk", "1", *options, "--out", str(tmp_path / "strip.png")]) == exit_codes.OK
         heights.append(png_size(tmp_path / "strip.png")[1])
     rows = np.diff(heights)
-    assert rows[0] > 100 and abs(rows[1] - rows[0]) < 0.1 * rows[0]  # rounding, and each row as wide as the widest
+    assert rows[0] > 100 and abs(rows[1] - rows[0]) < 0.1 * rows[0]  # rounding; each row is as wide as the widest
 
 
 def test_a_film_runs_in_real_time_for_ever(log: Path, tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_film_runs_in_real_time_for_ever(log: Path, tmp_path: Path) -> None:
             film.load()
             shown_ms += film.info["duration"]
     frames = len(film_frames(walk, [walk.own_strides[1]]))
-    assert shown_ms == 1000 * frames // FRAMES_PER_S  # frames that look alike are joined, their times added
+    assert shown_ms == 1000 * frames // FRAMES_PER_S  # equal frames are merged and their times added
     assert abs(shown_ms / 1000.0 - duration_s(walk, walk.own_strides[1])) <= 1.0 / FRAMES_PER_S
 
 
@@ -111,11 +111,11 @@ def test_a_cut_log_is_drawn_as_far_as_it_goes(log: Path, capsys: pytest.CaptureF
     png_size(log.with_name("two.png"))
 
 
-# what is drawn
+# drawn values
 
 
 def drawn(walk: RecordedWalk, path: Path) -> Figure:
-    """Return the figure that a plot is saved from."""
+    """Return the figure that `plot_walk` saves."""
     figures: list[Figure] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", lambda figure, *arguments, **options: figures.append(figure))
@@ -125,7 +125,7 @@ def drawn(walk: RecordedWalk, path: Path) -> Figure:
 
 @pytest.fixture(scope="module")
 def figure(two_walks: Path, tmp_path_factory: pytest.TempPathFactory) -> Figure:
-    """The first walk."""
+    """Draw the first walk."""
     return drawn(read_walk(two_walks, 1), tmp_path_factory.mktemp("figure") / "walk.png")
 
 
@@ -135,7 +135,7 @@ def panel(figure: Figure, label: str) -> Axes:
 
 
 def row_of(figure: Figure, label: str) -> list[Axes]:
-    """The panels of the left and the right flipper."""
+    """Return the panels of the left and the right flipper."""
     row = panel(figure, label).get_gridspec(), panel(figure, label).get_subplotspec()
     assert row[1] is not None
     return [axes for axes in figure.axes if (spec := axes.get_subplotspec()) and spec.rowspan == row[1].rowspan]
@@ -172,7 +172,7 @@ def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: 
 
 
 def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
-    """Stuck where the flipper hung in the mud as the stride closed; slipping and stuck in the colour of their bars."""
+    """A mark shows where a flipper was stuck when its stride closed; slipping and stuck strides have coloured bars."""
     walk = read_walk(two_walks, 1)
     slipping, stuck = walk.own_strides[0] | {"step_m": 0.01}, walk.own_strides[1] | {"released": False}
     slipping["released"] = True
@@ -205,7 +205,7 @@ def test_without_a_pose_there_are_no_panels_of_place(two_walks: Path, tmp_path: 
 
 @pytest.mark.filterwarnings("error")
 def test_strides_that_say_nothing_are_no_trouble(two_walks: Path, tmp_path: Path) -> None:
-    """Not a number, infinite, negative, and none at all in a walk of one tick."""
+    """Estimates may be NaN, infinite, negative, or missing in a walk without duration."""
     walk = read_walk(two_walks, 1)
     values = ((np.nan, np.nan), (np.inf, 1.0), (1e6, np.inf), (-1e6, 1.0))
     wild = [
@@ -265,7 +265,7 @@ def test_frames_are_a_twentieth_of_a_second_apart(two_walks: Path) -> None:
         np.testing.assert_allclose(np.diff(walk.time_s[rows]), 1.0 / FRAMES_PER_S, atol=0.003)  # one tick
 
 
-# what is refused
+# refused options
 
 
 @pytest.mark.parametrize("command", ["plot", "film"])

@@ -1,4 +1,4 @@
-"""`mudskipper simulate`: which ground it is given, and what is refused before anything starts."""
+"""`mudskipper simulate` gets the requested ground, and refuses wrong options before anything starts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WORLD = "[[segment]]\nstart_m = 0\nend_m = 1\nstrength_pa = 2000\n"
 
 
 class StillPeer(peer.Peer):
-    """Ends as soon as it has begun."""
+    """A simulated robot that ends as soon as it has begun."""
 
     made: list[StillPeer] = []
 
@@ -95,7 +95,7 @@ def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers
 
 def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class HandedPeer(peer.Peer):
-        """With its joints at their stops, for one step."""
+        """A simulated robot with its joints at their stops; it runs for one step."""
 
         def run(self) -> None:
             for arm in self.robot.plant.arms:
@@ -196,7 +196,7 @@ def test_a_second_terminal_finds_the_simulated_robot_where_no_service_runs(
     monkeypatch.setattr(shared, "DEFAULT_SOCKET", str(short_folder / "mudskipper.sock"))
     simulated.touch()
     assert shared.default_socket() == simulated
-    (short_folder / "mudskipper.sock").touch()  # the service's
+    (short_folder / "mudskipper.sock").touch()  # the socket of the service
     assert shared.default_socket() == short_folder / "mudskipper.sock"
     monkeypatch.setenv("MUDSKIPPER_SOCKET", "/given")
     assert shared.default_socket() == Path("/given")

@@ -1,4 +1,4 @@
-"""A program of one's own operates the simulated robot, in real time."""
+"""A user's own program operates the simulated robot in real time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The public package and the examples do what their texts say."""
+"""The public package and the examples do what their documentation says."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_log_without_strides_has_their_fields(tmp_path: Path) -> None:
 
 
 def test_a_replay_is_that_of_the_command() -> None:
-    expected = repr(replay_files([LOG]).strides)  # in which NaN equals NaN
+    expected = repr(replay_files([LOG]).strides)  # as text, because NaN is not equal to NaN
     assert repr(mudskipper.replay(LOG).strides) == expected
     assert repr(mudskipper.replay(str(LOG), method="paper").strides) != expected
 

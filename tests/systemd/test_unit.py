@@ -22,13 +22,13 @@ from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
 SYSTEMD = ROOT / "systemd"
-LINUX_QUEUE_LENGTH = 10  # of a CAN interface that nobody configured
+LINUX_QUEUE_LENGTH = 10  # of a CAN interface without configuration
 
 Settings = dict[str, list[str]]
 
 
 def read_settings(name: str) -> Settings:
-    """Every `Key=value` of a unit: the words of all its lines."""
+    """Return, for each key of a unit, the words of all its lines `Key=value`."""
     settings: Settings = {}
     for line in (SYSTEMD / name).read_text(encoding="utf-8").splitlines():
         key, separator, value = line.partition("=")
@@ -89,7 +89,7 @@ def test_the_socket_is_in_the_unit_s_runtime_directory_which_everybody_may_enter
     assert configuration.status.socket == StatusParameters().socket
     assert configuration.status.anyone_may_stop
     assert only(unit, "RuntimeDirectoryMode") == "0755"
-    assert "PrivateUsers" not in unit  # it would make everybody "nobody" to the daemon
+    assert "PrivateUsers" not in unit  # the daemon would see every caller as the user "nobody"
 
 
 def test_logs_go_into_the_unit_s_state_directory(unit: Settings, configuration: Configuration) -> None:
@@ -108,7 +108,7 @@ def test_the_unit_s_user_and_group_are_the_ones_that_sysusers_makes(unit: Settin
 def test_a_wrong_configuration_is_not_tried_again(unit: Settings) -> None:
     assert only(unit, "RestartPreventExitStatus") == str(EXIT_CONFIGURATION)
     assert only(unit, "Restart") == "on-failure"
-    assert "ExecStartPre" not in unit  # whose status RestartPreventExitStatus does not look at
+    assert "ExecStartPre" not in unit  # RestartPreventExitStatus ignores its status
 
 
 def test_systemd_waits_longer_than_the_daemon_ever_takes_to_end(unit: Settings) -> None:
@@ -134,7 +134,7 @@ def test_the_loop_may_have_its_priority_but_not_that_of_the_interrupts(
 
 def test_the_log_s_writer_may_finish_before_it_is_killed(unit: Settings) -> None:
     assert only(unit, "KillMode") == "control-group"
-    assert only(unit, "KillSignal") == "SIGTERM"  # which the writer does not take
+    assert only(unit, "KillSignal") == "SIGTERM"  # the log's writer ignores it
 
 
 def test_the_unit_lives_and_dies_with_the_buses_of_the_example_configuration(
@@ -169,14 +169,14 @@ def test_the_transmit_queue_holds_the_tick_that_arms_where_linux_s_own_would_not
 def test_the_filter_lets_through_what_the_loop_and_the_writer_call(unit: Settings) -> None:
     allowed = expand(unit["SystemCallFilter"][0]) - expand(unit["SystemCallFilter"][1].removeprefix("~"))
     needed = {"sched_setscheduler", "sched_setaffinity", "setpriority", "mlockall", "vfork", "execve", "chmod"}
-    needed |= {"umask", "getsockopt"}  # the socket file's permissions, and who connects
+    needed |= {"umask", "getsockopt"}  # for the permissions of the socket's file and the identity of callers
     assert len(unit["SystemCallFilter"]) == 2
     assert needed <= allowed
     assert not {"setuid", "chown", "reboot", "ptrace"} & allowed
 
 
 def expand(name: str) -> set[str]:
-    """The system calls of one of systemd's sets."""
+    """Return the system calls of one of systemd's sets."""
     listing = systemd_analyze("syscall-filter", name).stdout
     words = {line.strip() for line in listing.splitlines()[1:] if line.startswith("    ")}
     calls = {word for word in words if word[0] not in "@#"}
@@ -185,9 +185,9 @@ def expand(name: str) -> set[str]:
 
 @pytest.mark.parametrize("name", ["mudskipper.service", "mudskipper-live.service"])
 def test_systemd_finds_nothing_wrong_with_a_unit(name: str, tmp_path: Path) -> None:
-    """`verify` wants the program to be there, so the copy that it reads starts this Python instead."""
+    """`verify` requires that the program exists, so the copied unit starts this Python instead."""
     copy, unit = tmp_path / name, read_settings(name)
-    program = Path(tempfile.mkdtemp(prefix="mud-")) / "python"  # a path without spaces, wherever this lies
+    program = Path(tempfile.mkdtemp(prefix="mud-")) / "python"  # the repository's path may contain spaces
     program.symlink_to(sys.executable)
     text = (SYSTEMD / name).read_text(encoding="utf-8")
     copy.write_text(text.replace(unit["ExecStart"][0], str(program)), encoding="utf-8")
@@ -196,7 +196,7 @@ def test_systemd_finds_nothing_wrong_with_a_unit(name: str, tmp_path: Path) -> N
 
 
 def test_the_service_is_exposed_no_more_than_a_well_hardened_one() -> None:
-    """1.3 of 10 on systemd's scale; most of what is left is the robot's need of CAN and of real time."""
+    """It is 1.3 of 10 on systemd's scale; most of the rest comes from the robot's need of CAN and of real time."""
     done = systemd_analyze("security", "--offline=true", "--threshold=13", str(SYSTEMD / "mudskipper.service"))
     assert done.returncode == 0, done.stdout
 

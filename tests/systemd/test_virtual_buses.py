@@ -1,4 +1,4 @@
-"""The same installation on buses inside the kernel: the guide's changes for them fit together."""
+"""The guide's changes for an installation on virtual CAN buses agree with each other."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOCK_FILE = "requirements/robot.txt"
 
 @pytest.fixture
 def edited(tmp_path: Path) -> Path:
-    """Copies of configuration and unit after the guide's own `sed`."""
+    """Return copies of configuration and unit after the `sed` commands of the guide."""
     guide = (ROOT / GUIDE).read_text(encoding="utf-8")
     (line,) = [line for line in guide.splitlines() if line.startswith("sed -i ")]
     program, in_place, expression, *paths = shlex.split(line)
@@ -68,7 +68,7 @@ def test_the_virtual_machine_is_installed_by_the_guide_s_commands() -> None:
     left_out = [command for command in commands if f"\n{{ {command}" not in script]
     assert [" ".join(command.split()[:2]) for command in left_out] == [
         *("apt install", "git clone"),  # the base system has the packages, and the working tree is copied instead
-        *("mudskipper doctor", "systemctl status", "mudskipper simulate"),  # need a system that runs
+        *("mudskipper doctor", "systemctl status", "mudskipper simulate"),  # need a running system
     ]
     places = [script.index(f"\n{{ {command}") for command in commands if command not in left_out]
     assert places == sorted(places)

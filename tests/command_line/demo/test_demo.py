@@ -1,4 +1,4 @@
-"""The demo runs to its end over a short world, and every signal ends it in order."""
+"""The demo walks over a short world to its end, and every signal shuts it down cleanly."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def start_demo(out: Path, *arguments: str) -> subprocess.Popen[str]:
 
 
 def interrupt(demo: subprocess.Popen[str], number: signal.Signals, line: str) -> tuple[str, str]:
-    """Sends the signal after a line that begins with `line`; returns output and complaints."""
+    """Sends the signal after a line that begins with `line`; returns standard output and standard error."""
     assert demo.stdout is not None
     shown = ""
     for text in demo.stdout:
@@ -51,7 +51,7 @@ def children_of(out: Path) -> list[str]:
 
 
 def test_the_demo_walks_a_described_ground_and_summarises_it(tmp_path: Path) -> None:
-    """The first mud appears twice and is told apart by its position."""
+    """The first mud appears twice; the summary distinguishes the two segments by position."""
     world = tmp_path / "world.toml"
     borders_m, muds = (0.0, 0.1, 0.2, 0.3), ("water_percent = 48.5", "strength_pa = 1500", "water_percent = 48.5")
     world.write_text(

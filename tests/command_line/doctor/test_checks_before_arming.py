@@ -1,4 +1,4 @@
-"""What `mudskipper check` says of the pose's source where no daemon runs."""
+"""`mudskipper check` examines the source of the pose when no daemon runs."""
 
 from __future__ import annotations
 

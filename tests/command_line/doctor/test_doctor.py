@@ -1,4 +1,4 @@
-"""`mudskipper doctor` as a person runs it: without a daemon, with one, and with a configuration that is wrong."""
+"""`mudskipper doctor` runs without a daemon, with one, and with a wrong configuration."""
 
 from __future__ import annotations
 

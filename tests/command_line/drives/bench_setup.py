@@ -1,4 +1,4 @@
-"""A configured robot on simulated buses, on which the commands of the bench run in simulated time."""
+"""A configured robot on simulated buses; the commands of the bench run on it in simulated time."""
 
 from __future__ import annotations
 

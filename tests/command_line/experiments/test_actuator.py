@@ -64,7 +64,7 @@ def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
     assert abs(joint["friction_nm"] - COULOMB_NM) < 3.0 * joint["friction_error_nm"]
 
     coarse = [*SHORT, "--out", str(tmp_path), "--lever-tolerance", "10"]
-    assert main(coarse) == exit_codes.OK  # goes on behind what was read: nothing is left, and the doubt is another
+    assert main(coarse) == exit_codes.OK  # all readings exist, so only the fit runs again
     assert "right_sweep" in capsys.readouterr().out
     (doubtful,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["joints"]
     assert doubtful["torque_constant_tolerance_nm_a"] == pytest.approx(0.048 * TRUE_CONSTANT_NM_A, rel=0.02)
@@ -100,7 +100,7 @@ def test_a_missing_daemon_is_reported_with_how_to_start_it(tmp_path: Path, capsy
 def test_an_operator_at_a_terminal_is_asked_and_may_skip_weights(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The robot is simulated in step with its loop, and nobody hangs weights on it: only the empty arm is read."""
+    """The robot is simulated in lockstep and no weight is ever hung on it, so only the empty arm is read."""
     configuration = simulated_configuration()
     recorder = FileRecorder(tmp_path / "robot.mcap", configuration)
     robot = LockstepRobot(Lockstep(configuration, paper_track(), 1, recorder), recorder)

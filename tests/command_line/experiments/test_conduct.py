@@ -26,7 +26,7 @@ ANSWERS = {"": "it hangs", "s": "skip it", "r": "the last one again"}
 
 @contextmanager
 def typed(monkeypatch: pytest.MonkeyPatch, text: str) -> Iterator[None]:
-    """A terminal at which this is typed, and then nothing more."""
+    """Provides a standard input that contains the text and then ends."""
     source, sink = os.pipe()
     os.write(sink, text.encode())
     os.close(sink)
@@ -72,7 +72,7 @@ def test_the_robot_is_attended_during_a_prompt(monkeypatch: pytest.MonkeyPatch) 
 
 def test_an_enter_that_was_pressed_before_a_question_does_not_answer_it(monkeypatch: pytest.MonkeyPatch) -> None:
     keyboard, terminal = os.openpty()
-    os.write(keyboard, b"\n\n")  # in haste, while the robot still walked
+    os.write(keyboard, b"\n\n")  # typed before the question, while the robot still walked
     looks: list[int] = []
 
     def look() -> None:
@@ -121,7 +121,7 @@ def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.Captu
         "value": 1.0,
         "simulated": True,
     }
-    assert said.err.splitlines()[0] == "half of it"  # no bar of progress either, where nobody watches
+    assert said.err.splitlines()[0] == "half of it"  # standard error is no terminal, so no progress bar either
     assert not {"\033", "\r"} & set(said.err)
 
 

@@ -39,7 +39,7 @@ def evaluated(plan: Plan) -> Outcome:
 
 @pytest.fixture(autouse=True)
 def one_stride(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each trial, instead of two and eight; the trials of a plan are run once."""
+    """Each trial has one stride instead of two (single flipper) or eight (walk); each plan is simulated only once."""
     monkeypatch.setattr(command_line.experiments.estimation, "evaluate", lambda plan, show: evaluated(plan))
     monkeypatch.setattr(command_line.experiments.estimation, "Plan", partial(Plan, single_strides=1, walking_strides=1))
 
@@ -52,7 +52,7 @@ def no_trials(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command_line.experiments.estimation, "evaluate", evaluate)
 
 
-# what is refused
+# refused options
 
 
 REFUSED = {
@@ -85,11 +85,11 @@ def test_an_impossible_output_folder_is_refused_before_the_work(
     assert "must be a folder" in refusal(capsys, *SHORT, "--out", str(tmp_path / "file"))
 
 
-# what is planned
+# the plan
 
 
 def planned(monkeypatch: pytest.MonkeyPatch, *options: str) -> Plan:
-    """The plan that the command would have run."""
+    """Return the plan that the command would have run; Ctrl-C ends it before the first trial."""
     plans = list[Plan]()
 
     def evaluate(plan: Plan, *arguments: Any) -> None:
@@ -119,7 +119,7 @@ def test_without_layers_nothing_is_disturbed(layers: str, monkeypatch: pytest.Mo
     assert (plan.disturbances.clinging_n, plan.repeats, plan.torque) == (0.0, False, False)
 
 
-# what is printed and written
+# output
 
 
 def test_json_is_one_object_with_the_documented_keys_and_is_written_too(
@@ -128,10 +128,10 @@ def test_json_is_one_object_with_the_documented_keys_and_is_written_too(
     out = tmp_path / "made" / "here"
     assert main([*SHORT, "--json", "--out", str(out)]) == exit_codes.OK
     printed = capsys.readouterr()
-    report = json.loads(printed.out, parse_constant=pytest.fail)  # no NaN: that is no JSON
+    report = json.loads(printed.out, parse_constant=pytest.fail)  # NaN is not valid JSON
     assert printed.out.count("\n") == 1
     assert set(report) >= {"errors", "plates", "boundaries", "settings"}
-    assert len(report["errors"]) == 3 * 2  # coefficients and methods
+    assert len(report["errors"]) == 3 * 2  # 3 coefficients, 2 methods
     for row in report["errors"]:
         assert set(row) >= DOCUMENTED
         assert (row["setup"], row["mud"], row["strides"]) == ("single flipper", "49.5", 2)
@@ -172,9 +172,7 @@ def test_unknown_values_are_printed_as_dashes() -> None:
 
 @pytest.mark.parametrize("seeds", ["1", "100"])
 def test_ctrl_c_ends_it_at_once_and_in_silence(seeds: str) -> None:
-    """In a terminal all processes get the signal: of one trial, while another worker waits, and of a hundred, which
-    take minutes.
-    """
+    """All processes of a terminal get the signal, in one trial (another worker waits) and in a hundred (minutes)."""
     command = [sys.executable, "-m", "command_line.main", *COMMAND, "--setup", "walking", "--mud", "49.5"]
     command += ["--seeds", seeds, "--layers", "none"]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)

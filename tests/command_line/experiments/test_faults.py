@@ -22,7 +22,7 @@ CONTROL = replace(CELL, fault="none", mode_name="none", bound_ticks=None, reacti
 
 @pytest.fixture
 def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
-    """Record the plans in place of a run, which reports the three cells above."""
+    """Return the list of plans that the command would run; each run reports the three cells above at once."""
     seen: list[Plan] = []
 
     def run(plan: Plan, show: object) -> FaultsReport:

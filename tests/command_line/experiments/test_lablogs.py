@@ -43,7 +43,7 @@ def test_a_folder_without_a_readable_log_names_each_reason(capsys: pytest.Captur
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two trials of one mud, a walk, and a file that is no log."""
+    """Return a folder with two trials of one mud, a walk, and a file that is no log."""
     folder = tmp_path_factory.mktemp("logs")
     for name in NAMES:
         shutil.copy(LOGS / f"{name}.csv.gz", folder)

@@ -41,7 +41,7 @@ def no_walks(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "run", run)
 
 
-# what is refused
+# refused options
 
 
 def test_a_real_trackway_needs_a_daemon(capsys: pytest.CaptureFixture[str], tmp_path: Path, no_walks: None) -> None:
@@ -84,11 +84,11 @@ def test_an_impossible_output_folder_is_refused_before_the_work(
     assert "file/below: Not a directory" in failure(capsys, "experiment", name, "--simulated", "--out", below)
 
 
-# what is planned
+# the plan
 
 
 def planned(monkeypatch: pytest.MonkeyPatch, name: str, *options: str) -> Any:
-    """The plan that the command would have run; Ctrl-C comes instead."""
+    """Return the plan that the command would have run; Ctrl-C ends it before the first walk."""
     plans = list[Any]()
 
     def run(plan: Any, *arguments: Any) -> None:
@@ -119,7 +119,7 @@ def test_strengths_of_a_sweep_can_be_chosen_and_come_in_their_order(monkeypatch:
     assert planned(monkeypatch, "mud-fit", "--seeds", "1").seeds == 1
 
 
-# what is printed and written
+# output
 
 
 def stride(mud: str, step_m: float = 0.12) -> WalkedStride:
@@ -127,7 +127,7 @@ def stride(mud: str, step_m: float = 0.12) -> WalkedStride:
 
 
 def run_trackway(plan: simulation.Plan, notebook: Notebook, show: Show) -> simulation.SimulatedReport:
-    """6 cm/s everywhere; one trial slips in the second stride of the second mud, and never sees the third."""
+    """Report 6 cm/s everywhere; one trial slips in the second stride of the second mud and ends before the third."""
     whole = Walk([stride(mud) for mud in MUDS for _ in range(4)], "")
     short = Walk([stride("48.5")] * 4 + [stride("53.1"), stride("53.1", 0.02)], "")
     walks = {rule.name: [whole] * (plan.seeds - 1) + [short] for rule in plan.rules}
@@ -160,7 +160,7 @@ def test_json_is_one_object_and_is_written_too(
     out = tmp_path / "made" / "here"
     assert main(["experiment", name, "--simulated", "--json", "--out", str(out)]) == exit_codes.OK
     printed = capsys.readouterr()
-    report = json.loads(printed.out, parse_constant=pytest.fail)  # no NaN: that is no JSON
+    report = json.loads(printed.out, parse_constant=pytest.fail)  # NaN is not valid JSON
     assert printed.out.count("\n") == 1
     assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == report
     assert "summary.json" in printed.err
@@ -209,7 +209,7 @@ def test_the_screen_shows_table_one_next_to_the_papers(capsys: pytest.CaptureFix
     main(["experiment", "trackway", "--simulated", "--seeds", "3"])
     speeds, failed, best, short = capsys.readouterr().out.split("\n\n")
     lines = [" ".join(line.split()) for line in speeds.splitlines()]
-    assert lines[2] == "3 cm 6.00 ± 0.00 5.17 ± 1.44 6.00 ± 0.00 5.72"  # 6, 6, and 3.5 of two strides
+    assert lines[2] == "3 cm 6.00 ± 0.00 5.17 ± 1.44 6.00 ± 0.00 5.72"  # 53.1: 6, 6 and 3.5 (mean of two strides)
     assert lines[4] == "paper 7.6 ± 0.5, ours outside 2.1 ± 0.8, ours outside 7.2 ± 0.5, ours outside 5.63"
     assert "none of 12" in failed and "1 (0) slippage of 10" in failed
     assert "2 past the end, 1 stuck in 53.1" in failed

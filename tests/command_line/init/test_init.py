@@ -27,7 +27,7 @@ def options_of(*arguments: str) -> argparse.Namespace:
 
 
 def answered(lines: Sequence[str], *arguments: str) -> tuple[NewRobot, list[str]]:
-    """The robot that these lines describe, and what was asked."""
+    """Return the robot that these answers describe, and the questions that were asked."""
     asked: list[str] = []
     replies: Iterator[str] = iter(lines)
 

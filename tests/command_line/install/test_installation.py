@@ -1,4 +1,4 @@
-"""`install` and `uninstall` on a made-up system, whose commands are only noted down."""
+"""`install` and `uninstall` act on a synthetic system that only records its commands."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PREFIX = Path("/opt/robot/venv")
 
 
 class Machine:
-    """A root folder, and systemctl as far as it matters here."""
+    """Owns a root folder and emulates the calls of systemctl that an installation needs."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -72,7 +72,7 @@ class Machine:
         return build_parser().parse_args([command, "--root", str(self.root), *options])
 
     def system(self) -> System:
-        """As if it were the one that runs."""
+        """Return this folder as a system that is running."""
         return System(self.root, PREFIX, self.run, live=True)
 
     def text(self, place: str) -> str:
@@ -97,7 +97,7 @@ def machine(tmp_path: Path) -> Machine:
 
 
 def release(monkeypatch: pytest.MonkeyPatch, place: str) -> None:
-    """A new version of one file of ours."""
+    """Simulate a new version of the project in which one file has changed."""
     texts = load_sources(PREFIX)
     changed = texts | {place: texts[place] + "# new\n"}
     monkeypatch.setattr(service_plan, "load_sources", lambda prefix: changed)

@@ -1,4 +1,4 @@
-"""The live page: rows reach every browser, a hanging one loses its own, and only this page may stop the robot."""
+"""The live page: rows reach every browser, a hanging browser loses only its own, and no other page stops the robot."""
 
 import json
 from collections.abc import Iterator
@@ -89,7 +89,7 @@ def test_a_viewer_that_hangs_loses_its_own_messages_and_learns_how_many() -> Non
     for _ in range(100):
         viewers.publish(MESSAGE)
         assert reading.get(0.0) is not None
-    assert (reading.lost, hanging.lost) == (0, 81)  # it holds 20 messages, one of them the first
+    assert (reading.lost, hanging.lost) == (0, 81)  # its queue holds 20 messages, one of them the initial one
 
     def newest(viewer: Viewer) -> dict[str, Any]:
         found = [message for message in iter(lambda: viewer.get(0.0), None)]

@@ -51,7 +51,7 @@ def subscribe(socket: ClientConnection, channel_id: int) -> None:
 
 
 def decoded(channel: dict[str, Any], payload: bytes) -> Any:
-    """Decodes a message by the definition that was advertised."""
+    """Decodes a message with the advertised definition."""
     types = get_typestore(Stores.EMPTY)
     types.register(get_types_from_msg(channel["schema"], channel["schemaName"]))
     return types.deserialize_cdr(payload, channel["schemaName"])

@@ -1,4 +1,4 @@
-"""The catalogue of many logs, as a person types it."""
+"""The commands of the log catalogue: `log index`, `log list` and `log query`."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_listing_opens_no_log_that_the_catalogue_knows(folder: Path, monkeypat
         opened.extend([Path(path)] if str(path).endswith(".mcap") else [])
         return plain(path, *arguments, **named)
 
-    monkeypatch.setattr(io, "open", noted)  # which Path.open and Path.read_bytes call
+    monkeypatch.setattr(io, "open", noted)  # Path.open and Path.read_bytes call it
     assert main(["log", "list", str(folder)]) == exit_codes.OK
     assert opened == []
 
@@ -79,7 +79,7 @@ def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: py
 
 
 def test_a_listing_of_known_logs_loads_no_library_that_reads_logs(folder: Path) -> None:
-    """They take longer to load than a thousand entries to list."""
+    """Loading these libraries takes longer than listing a thousand entries."""
     assert main(["log", "index", str(folder)]) == exit_codes.OK
     program = (
         f"import sys; from command_line.main import main; main(['log', 'list', {str(folder)!r}]);"

@@ -1,4 +1,4 @@
-"""Every command that reads a log of the paper's authors says what is wrong with it, where, and in the same words."""
+"""Every command that reads a log of the paper's authors reports its problems and their position in the same words."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ each_command = pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMAND
 
 @pytest.fixture
 def hung(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A log with a current that hangs for half a second, and without a setting."""
+    """Write a log in which one current is frozen for half a second and one setting is missing."""
     monkeypatch.chdir(tmp_path)
     columns = lab_columns()
     columns["rightsweeping_curr"][560:660] = columns["rightsweeping_curr"][560]
@@ -77,7 +77,7 @@ def test_log_info_says_what_a_csv_is(hung: Path) -> None:
 
 @pytest.fixture
 def z_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A walk in a capture whose z is up: the body sinks by 61 mm and advances by 33 mm along x."""
+    """Write a walk in a capture with z up: the body sinks by 61 mm and advances by 33 mm along x."""
     monkeypatch.chdir(tmp_path)
     columns = lab_columns()
     stance = columns["turtle_state"] == 3
@@ -114,7 +114,7 @@ def test_log_info_prints_how_far_the_body_sinks(z_up: Path, hung: Path) -> None:
 
 
 def test_a_replay_takes_the_vertical_axis_of_its_configuration(z_up: Path, example_text: str) -> None:
-    """An argument replaces it."""
+    """The argument `vertical` overrides the configuration."""
     configuration = parse_configuration(example_text + '\n[pose]\nvertical = "z"\n')
     by_z, by_y = mudskipper.replay(z_up, vertical="z"), mudskipper.replay(z_up)
     assert _steps_m(by_z) != _steps_m(by_y)

@@ -1,4 +1,4 @@
-"""Commands that read logs print what a person and what a machine wants."""
+"""Commands that read logs print text for an operator and JSON for a program."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tests.waiting import LONGEST_S
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> Path:
-    """A recorded walk of two strides."""
+    """Record a walk of two strides."""
     path = tmp_path_factory.mktemp("logs") / "walk.mcap"
     record_walks(path, configuration, 2)
     return path
@@ -70,7 +70,7 @@ def test_replay_shows_the_depth_that_the_robot_chose(walk: Path) -> None:
 
 
 def test_an_exported_log_replays_like_the_log(walk: Path, tmp_path: Path) -> None:
-    """Up to what the authors' columns do not hold: velocity, and the arm's weight."""
+    """Small differences remain because the authors' columns have neither velocities nor the arm's weight."""
     path = tmp_path / "walk.csv"
     assert run("log", "export", str(walk), "--csv", "--out", str(path)).returncode == exit_codes.OK
     assert path.read_text(encoding="utf-8").splitlines()[2].startswith("time,turtle_state,leftadduction_pos")
@@ -94,7 +94,7 @@ def test_a_broken_log_is_a_sentence(tmp_path: Path, contents: bytes) -> None:
 
 
 def make_segments(walk: Path, folder: Path) -> list[Path]:
-    """The same walk, cut into files of two seconds."""
+    """Write the same walk as files of two seconds."""
     rows = rows_of(walk)
     parameters = replace(ONE_FILE, segment_s=2.0)
     opening = {"configuration_text": read_log(walk).configuration_text, "metadata": {"robot": "test", "run_id": "run"}}
@@ -141,7 +141,7 @@ def test_a_picture_of_a_log_that_is_being_written_does_not_stay_beside_it(
     path.write_bytes(walk.read_bytes()[:-1000])
     assert main(["plot", str(path)]) == exit_codes.OK
     assert (tmp_path / "here" / "walk.png").exists()
-    assert "was cut off" in capsys.readouterr().err  # nobody holds its lock
+    assert "was cut off" in capsys.readouterr().err  # no writer holds its lock
     with path.open("rb") as writer:
         flock(writer.fileno(), LOCK_EX)
         assert main(["replay", str(path)]) == exit_codes.OK
@@ -166,7 +166,7 @@ def test_a_command_that_takes_its_time_says_how_far_it_is(
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setattr(screen, "REFRESH_S", 0.0)
     assert main([*command, str(walk)]) == exit_codes.OK
-    assert word not in capsys.readouterr().err  # it took no time
+    assert word not in capsys.readouterr().err  # a quick command shows no progress
     monkeypatch.setattr(screen, "QUIET_S", 1e-9)
     assert main([*command, str(walk)]) == exit_codes.OK
     assert word in capsys.readouterr().err

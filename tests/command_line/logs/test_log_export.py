@@ -1,4 +1,4 @@
-"""Exports of a log, as a person types them."""
+"""`mudskipper log export` to CSV, Parquet and ROS, from the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Listing, recovering and preserving logs, as a person types it."""
+"""The commands that list, recover and preserve the logs of a folder."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def make_log(folder: Path, name: str) -> LogFile:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A finished log, and one whose writer was killed."""
+    """Return a folder with a finished log and one whose writer was killed."""
     make_log(tmp_path, "1.mcap").finish()
     make_log(tmp_path, "2.mcap")._file.close()
     return tmp_path
@@ -56,7 +56,7 @@ def test_a_log_that_is_being_written_is_not_taken_for_one_that_was_cut_off(
     assert main.main(["log", "list", str(tmp_path)]) == exit_codes.OK
     printed = capsys.readouterr().out
     assert "being written" in printed and "recover" not in printed
-    log.finish()  # the list has not taken its lock away
+    log.finish()  # the listing left its lock in place
     assert main.main(["log", "list", str(tmp_path), "--json"]) == exit_codes.OK
     assert [entry["state"] for entry in json.loads(capsys.readouterr().out)["logs"]] == ["whole"]
 
@@ -138,7 +138,7 @@ def test_what_cannot_be_recovered_is_said(folder: Path, capsys: pytest.CaptureFi
 def test_who_may_not_read_or_move_a_log_is_told_what_to_do(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As the kernel refuses it to whoever is not root, as whom tests may run."""
+    """The refusal of the kernel is simulated because the tests may run as root."""
 
     def refuse(path: Path, *_: object) -> Path:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))

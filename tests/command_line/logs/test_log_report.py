@@ -1,4 +1,4 @@
-"""`mudskipper log report`: one page of any log, whatever it holds, and one page that compares several runs."""
+"""`mudskipper log report` makes one page of any log, and one page that compares several runs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_the_page_shows_every_walk_stride_and_event(
     assert len(report["strides"]) == len(report["fits"]) == len(log.strides) > 0
     assert report["summary"]["ticks"] == len(log.ticks) and report["log"] == [two_walks.name]
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png") == 5  # two of each walk, and the fits
+    assert page.count("data:image/png") == 5  # two of each of the two walks, and the fits
     for name in ("walk-1", "walk-2", "strides-1", "strides-2", "fits"):
         starts = {ending: (folder / f"{name}{ending}").read_bytes()[:5] for ending in (".png", ".svg", ".pdf")}
         assert starts == {".png": b"\x89PNG\r", ".svg": b"<?xml", ".pdf": b"%PDF-"}
@@ -53,7 +53,7 @@ def test_the_page_shows_every_walk_stride_and_event(
 
 
 def pages_of(monkeypatch: pytest.MonkeyPatch, *words: str) -> Page:
-    """What a page would show, without its pictures."""
+    """Return the sections and tables of the page, without its pictures."""
     sections: list[Section] = []
 
     def take(folder: Path, report: Any, title: str, shown: list[Section], logs: list[Path], *_: object) -> list[Path]:
@@ -83,7 +83,7 @@ def test_times_count_from_the_log_s_begin_however_long_the_computer_is_up(
 
 
 def after(log: Log, uptime_s: float) -> Log:
-    """The same, of a computer that has been up for longer."""
+    """Return the same log as if the computer had been up for longer by `uptime_s`."""
     ticks = log.ticks.copy()
     ticks["stamp_s"] += uptime_s
     strides = [row | {name: row[name] + uptime_s for name in ("stamp_s", "t_start_s")} for row in log.strides]
@@ -116,7 +116,7 @@ def test_every_line_on_the_terminal_fits_80_columns(
 
 
 def test_muds_have_the_names_they_are_given(two_walks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By name and length, or by the world; else their k_p describes them."""
+    """The operator names a mud by name and length or by a world file; a mud without a name is described by its k_p."""
     out = ("--out", str(tmp_path))
     text, (_, unnamed) = section(pages_of(monkeypatch, str(two_walks), *out), "Result")
     assert re.fullmatch(r"k_p 1\.\d N/cm³", unnamed[0]) and "names no muds" in text
@@ -171,7 +171,7 @@ def another_walk(tmp_path_factory: pytest.TempPathFactory, configuration: Config
 def test_runs_are_compared_on_one_page_with_one_table_and_one_figure(
     two_walks: Path, another_walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The same simulated mud in both: no coefficient differs."""
+    """Both runs are in the same simulated mud, so no coefficient differs."""
     out = tmp_path / "out"
     words = ["log", "report", str(two_walks), str(another_walk), "--mud", "48.5=60", "--out", str(out), "--json"]
     assert main(words) == exit_codes.OK
@@ -201,7 +201,7 @@ def test_a_run_without_strides_is_a_row_of_the_comparison(
     assert "No complete stride in rest." in text
 
 
-# bad input: one sentence each
+# bad input gives one sentence each
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""`stop` and `disarm` succeed only where every drive has confirmed; otherwise the operator has to cut the power."""
+"""`stop` and `disarm` succeed only if every drive has confirmed; otherwise the operator has to cut the power."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Report = dict[str, Any]
 
 
 def report(mode: str, closed_loop: bool, age_s: float | None = 0.0, changed: Report | None = None) -> Report:
-    """A status in which the left adduction drive may differ."""
+    """Return a status with equal drives; `changed` alters the left adduction drive."""
     drives = [{"joint": joint, "closed_loop": closed_loop, "heartbeat_age_s": age_s} for joint in JOINTS]
     drives[1] |= changed or {}
     return {"mode": mode, "notice": "", "drives": drives}
@@ -36,7 +36,7 @@ def report(mode: str, closed_loop: bool, age_s: float | None = 0.0, changed: Rep
         (report("hold", closed_loop=True), 0),
         (report("fault", closed_loop=False), 0),
         (report("fault", closed_loop=True), 4),
-        (report("idle", closed_loop=False, age_s=0.4), 4),  # from before the request
+        (report("idle", closed_loop=False, age_s=0.4), 4),  # the heartbeats are older than the request
         (report("hold", closed_loop=True, changed={"heartbeat_age_s": 0.4}), 1),
         (report("boot", closed_loop=False, age_s=None), 4),
         (report("idle", closed_loop=False, changed={"heartbeat_age_s": None}), 1),
@@ -47,7 +47,7 @@ def test_a_drive_confirms_by_a_heartbeat_after_the_request(found: Report, unconf
 
 
 class Robot:
-    """A client that answers with these reports; the last one stays."""
+    """A client that answers with these reports in order and repeats the last one."""
 
     reports: list[Report] = []
 

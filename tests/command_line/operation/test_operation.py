@@ -69,7 +69,7 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log_until_an_operator
     bench.wait_for(lambda report: report["mode"] == "walking")
     bench.daemon.kill()
     bench.daemon.wait(LONGEST_S)
-    time.sleep(2.0 * WATCHDOG_S)  # only the drives can have acted
+    time.sleep(2.0 * WATCHDOG_S)  # only the drives' own watchdogs can have acted
     bench.restart_daemon()
     report = bench.wait_for(lambda report: report["mode"] == "idle")
     assert not any(drive["closed_loop"] for drive in report["drives"])
@@ -85,7 +85,7 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log_until_an_operator
 def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_bench: Bench) -> None:
     own_bench.run("arm")
     own_bench.robot.kill()
-    silent = {"left_sweep", "right_adduction"}  # one drive's silence is noticed first
+    silent = {"left_sweep", "right_adduction"}  # their silence may be detected in different ticks
     own_bench.wait_for(lambda report: silent <= {fault["subject"] for fault in report["faults"]})
     assert own_bench.wait_for(lambda report: report["mode"] == "fault")["fault"]
     assert own_bench.run("status").returncode == exit_codes.UNHEALTHY
@@ -136,7 +136,7 @@ def test_check_without_a_daemon_checks_what_it_can(
 
 
 def test_status_loads_no_large_library() -> None:
-    """Half a second of imports would make a rescue feel like a hang."""
+    """Half a second of imports would look like a hang in an emergency."""
     program = (
         "import sys; from command_line.main import main; main(['status', '--socket', '/none']);"
         "large = ('numpy', 'can', 'pydantic', 'matplotlib', 'mcap', 'shtab', 'inspect', 'shutil', 'json', 'tempfile');"
@@ -174,6 +174,6 @@ def test_the_version_and_a_completion_script_are_printed() -> None:
 
 
 def test_the_command_line_and_the_daemon_agree() -> None:
-    """The command line does not import these from the daemon, because `status` has to start fast."""
+    """The command line keeps copies of the daemon's constants because `status` has to start fast."""
     assert exit_codes.CONFIGURATION == EXIT_CONFIGURATION
     assert StatusParameters().socket == shared.DEFAULT_SOCKET

@@ -1,4 +1,4 @@
-"""Every path in a layout is a field of our logs, or of an export's standard messages, that a viewer can show."""
+"""Every path in a layout names a field of this project's logs, or of an export's messages, that a viewer can show."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def paths_of_plotjuggler() -> list[str]:
 
 
 def problem_of(path: str, grammar: re.Pattern[str], numeric: bool) -> str:
-    """Says what is wrong with a path; empty for one that shows a value."""
+    """Returns why a path shows no value; empty if it shows one."""
     found = grammar.fullmatch(path)
     if not found or found["topic"] not in FIELDS:
         return f"{path}: no topic of ours"
@@ -112,7 +112,7 @@ def test_rerun_shows_what_an_export_contains() -> None:
 
 
 def test_plotjuggler_and_foxglove_can_decode_our_definitions() -> None:
-    """The grammar of ROS 2 has no field that this project invented."""
+    """The definitions use only the field types of ROS 2."""
     for kind in ROW_KINDS:
         store = get_typestore(Stores.EMPTY)
         store.register(get_types_from_msg(kind.definition, kind.schema_name))

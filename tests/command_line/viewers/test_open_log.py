@@ -1,4 +1,4 @@
-"""`log open` starts an installed viewer with the layout, and says otherwise what is missing."""
+"""`log open` starts an installed viewer with the layout, or names what is missing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
 
 @pytest.fixture
 def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """The commands of viewers that were started; none of them runs."""
+    """Return the list of commands that would start viewers; none of them runs."""
     commands: list[list[str]] = []
     monkeypatch.setattr(subprocess, "Popen", lambda command, **_: commands.append(command))
     return commands

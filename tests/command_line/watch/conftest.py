@@ -17,7 +17,7 @@ def walking(configuration: Configuration) -> Lockstep:
 
 @pytest.fixture
 def walked(walking: Lockstep) -> ServedRobot:
-    """A robot in the middle of its walk."""
+    """Return a robot in the middle of its walk."""
     return ServedRobot(copy_of(walking))
 
 

@@ -1,4 +1,4 @@
-"""A simulated robot behind a status socket, both in this process: it answers as the daemon does, in its own time."""
+"""A simulated robot with a status socket, both in this process: it answers like the daemon, in simulated time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plain lines come at their period, and as fast as they can where a line takes longer than that."""
+"""Plain lines are printed at their period, or without a pause if a line takes longer than the period."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of the log's writer keep the screen up to date between two statuses."""
+"""Rows from the log's writer keep the screen up to date between two status requests."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_with_rows_the_daemon_is_asked_less_often_and_the_screen_stays_current(
     with robot.served(short_folder / "s"):
         stream = RowStream(stream_path(short_folder / "s"), rights, {})
         feed = Feed(short_folder / "s", 0.1)
-        assert feed.poll(0.0)  # connects to both
+        assert feed.poll(0.0)  # connects to the status socket and the row stream
         while not feed.rows.live:
             stream.publish([])
             feed.rows.newest(0.0)

@@ -66,7 +66,7 @@ def test_it_shows_a_robot_that_walks(walked: ServedRobot, short_folder: Path) ->
 def test_stop_and_disarm_act_at_once(
     walked: ServedRobot, short_folder: Path, key: str, modes: set[Mode], before: tuple[str, ...]
 ) -> None:
-    """Also while a question waits or the help is shown."""
+    """They act also while a question is open or the help is shown."""
 
     async def script(app: WatchApp, pilot: Pilot[int]) -> None:
         await pilot.press(*before, key)
@@ -96,7 +96,7 @@ def test_arming_walking_and_clearing_ask_first(resting: ServedRobot, short_folde
     async def script(app: WatchApp, pilot: Pilot[int]) -> None:
         await pilot.press("a")
         await until(app, pilot, lambda: "Arm the robot?" in shown(app))
-        await pilot.press("n", "y")  # the second key answers nothing
+        await pilot.press("n", "y")  # no question is open at the second key
         await pilot.pause(4 * PERIOD_S)
         assert resting.mode is Mode.IDLE and "Arm the robot?" not in shown(app)
         await pilot.press("a", "y")
@@ -139,7 +139,7 @@ def test_it_survives_a_restart_of_the_daemon(walked: ServedRobot, resting: Serve
         await until(app, pilot, lambda: "cut motor power" in shown(app))
         with resting.served(path):
             await until(app, pilot, lambda: "NO ANSWER" not in shown(app))
-            assert not app.feed.history.strides  # those of the daemon before
+            assert not app.feed.history.strides  # the strides of the previous daemon are gone
 
     drive(path, script)
 

@@ -1,4 +1,4 @@
-"""What the screen shows, line by line: it fits every terminal, and what matters comes first."""
+"""The lines of the screen fit every terminal, and the most important ones come first."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def lines_of(
 
 
 def changed(history: History, **values: Any) -> History:
-    """The same history with other values in its status."""
+    """Return the same history with other values in its status."""
     other = copy.deepcopy(history)
     other.status.update(values)
     return other
@@ -80,7 +80,7 @@ def test_a_larger_terminal_shows_more_strides(history: History) -> None:
 
 
 def dead_buses(walked: ServedRobot) -> list[dict[str, Any]]:
-    """The causes that the daemon reports when both buses went off a while ago."""
+    """Return the causes that the daemon reports some time after both buses went off."""
     loop = walked.robot.loop
     faults = [
         kind.fault(joint, age_s=1.6)

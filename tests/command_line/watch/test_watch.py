@@ -1,4 +1,4 @@
-"""`mudskipper watch` as a process: plain lines in a pipe, a screen on a terminal that is left as it was."""
+"""`mudskipper watch` as a process prints plain lines into a pipe, or a screen on a terminal, which it restores."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.command_line.watch.served_robot import ServedRobot
 from tests.waiting import LONGEST_S
 
 WATCH = [sys.executable, "-m", "command_line.main", "watch"]
-SCREEN, CURSOR = (b"\x1b[?1049h", b"\x1b[?1049l"), (b"\x1b[?25l", b"\x1b[?25h")  # xterm: taken, given back
+SCREEN, CURSOR = (b"\x1b[?1049h", b"\x1b[?1049l"), (b"\x1b[?25l", b"\x1b[?25h")  # xterm: switched on, restored
 
 
 def test_a_pipe_gets_plain_lines_also_over_a_restart(
@@ -50,7 +50,7 @@ def test_a_pipe_gets_plain_lines_also_over_a_restart(
 
 
 class Terminal:
-    """A pseudo-terminal with the program in it."""
+    """A pseudo-terminal in which the program runs."""
 
     def __init__(self, path: Path, terminal_type: str) -> None:
         self.pid, self._descriptor = pty.fork()

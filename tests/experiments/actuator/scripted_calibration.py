@@ -26,7 +26,7 @@ TRUE_NM_A = 0.0719
 
 
 class ScriptedRobot(StillRobot):
-    """A BenchRobot whose winding warms by what hangs, and which lets go when it is told to."""
+    """A BenchRobot with a scripted mode, winding temperature and hanging weight; its winding cools while it waits."""
 
     configuration: Configuration = bench_configuration()
 
@@ -51,7 +51,7 @@ class ScriptedRobot(StillRobot):
 
 
 class ScriptedWeights:
-    """A WeightHandler that hangs what it is asked for, unless the script of a step says something else."""
+    """A WeightHandler that hangs the requested weight, unless the script of the step says otherwise."""
 
     handling_s = 2.0
 
@@ -78,7 +78,7 @@ class ScriptedWeights:
 
 
 class ScriptedJoint:
-    """A HeldJoint that reads what hangs, to the last digit; a negative weight never comes to rest."""
+    """A HeldJoint that reads the hanging weight without an error; with a negative weight it never comes to rest."""
 
     def __init__(self, robot: Any, joint: str) -> None:
         self.robot: ScriptedRobot = robot
@@ -97,7 +97,7 @@ LOOP = Loop(0.18, 0.2, quick=False)
 
 
 class Case:
-    """One calibration; `run` again goes on with it."""
+    """Owns the parts of one calibration; a second `run` continues it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -116,7 +116,7 @@ class Case:
         self.hand.script[step.key] = list(answers)
 
     def hanging(self, grams: float) -> Callable[[], str]:
-        """Something else hangs than what was asked for."""
+        """Return an answer of the script that hangs this weight instead of the requested one."""
 
         def hang() -> str:
             self.robot.hanging_g = grams

@@ -20,7 +20,7 @@ PLAN = Plan(("right_adduction",), weights_g=(50.0,), trials=1)
 
 
 class HoldingRobot(StillRobot):
-    """A BenchRobot that holds a joint, until it is told to let go."""
+    """A BenchRobot that holds a joint until it is disarmed; with `trouble` every call fails."""
 
     def __init__(self, trouble: BenchError | None = None) -> None:
         super().__init__("hold")
@@ -40,7 +40,7 @@ class HoldingRobot(StillRobot):
 
 
 class Impatient(ScriptedOperator):
-    """Presses Ctrl-C where a question stands."""
+    """An operator who presses Ctrl-C at each question."""
 
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
         self.asked.append(question)
@@ -48,7 +48,7 @@ class Impatient(ScriptedOperator):
 
 
 class Holding(ScriptedOperator):
-    """Sees that the motor holds until they do."""
+    """An operator who checks at each question that the motor still holds."""
 
     def __init__(self, robot: HoldingRobot) -> None:
         super().__init__()

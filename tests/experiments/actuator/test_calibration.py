@@ -1,4 +1,4 @@
-"""The course of a calibration: the operator's answers, failures, and continuation."""
+"""The sequence of a calibration: the operator's answers, failures, and continuation."""
 
 from __future__ import annotations
 

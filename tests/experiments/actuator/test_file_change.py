@@ -1,4 +1,4 @@
-"""A configuration file is changed in place: only what was asked for, at once, never to something wrong."""
+"""A configuration file is changed in place: atomically, only in the requested keys, and never to an invalid file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FRICTION = ("friction", "right_sweep", "coulomb_nm")
 
 
 def table_text(text: str, name: str) -> str:
-    """Returns the header and the keys of a table that ends with an empty line, whatever its keys are."""
+    """Returns the header and all keys of a table that ends with an empty line."""
     header = f"[{name}]\n"
     _, found, below = text.partition(header)
     assert found

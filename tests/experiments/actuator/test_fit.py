@@ -1,4 +1,4 @@
-"""What readings say of a motor, against numpy's line through the same points, and how often its errors hold true."""
+"""The fit of a motor agrees with numpy's line through the same points, and its errors cover the truth often enough."""
 
 from __future__ import annotations
 
@@ -24,8 +24,11 @@ Entries = dict[str, dict[str, Any]]
 def make_entries(
     plan: Plan = PLAN, sign: float = 1.0, noise_a: float = 0.02, seed: int = 1, truth: float = 1.0, hidden: float = 0.0
 ) -> Entries:
-    """`truth`: of the weights' torques, as a share of what they are thought to be. `hidden`: by friction at rest, as a
-    share of what it bears less with a weight than without."""
+    """Return synthetic readings with a known line and friction.
+
+    `truth` is the ratio of true to assumed torque of the weights. `hidden` is the part of LESS_A, the friction at rest
+    that is missing under a weight, by which each weight's current is off.
+    """
     random, entries = Random(seed), Entries()
     for step in steps_of(plan):
         angle_rad = random.gauss(0.0, 0.003)
@@ -59,13 +62,15 @@ def test_the_line_is_that_of_an_independent_fit(sign: float) -> None:
 
 
 def within_two(reported: list[tuple[float, float]]) -> float:
-    """The share of errors that are at most two of those that are told."""
+    """Return the fraction of errors that are within two reported standard errors."""
     return sum(abs(wrong) <= 2.0 * error for wrong, error in reported) / len(reported)
 
 
 def test_the_errors_contain_scatter_lever_weights_and_friction_at_rest() -> None:
-    """Each of 400 benches has a lever and weights that are anywhere within their tolerances, and a friction at rest
-    that hides anything of what it bears less with a weight."""
+    """Each of 400 benches has a lever and weights drawn uniformly within their tolerances.
+
+    An unknown part of the friction that is missing under a weight shifts each bench's currents, in either direction.
+    """
     random, plan = Random(4), replace(PLAN, lever_tolerance_m=0.002, weight_tolerance=0.005)
     constants, offsets, dry, viscous = (list[tuple[float, float]]() for _ in range(4))
     for seed in range(400):
@@ -169,7 +174,7 @@ SLOPE, INTERCEPT = 13.9, 0.02
 
 
 def make_currents(x: list[float], random: Random) -> list[float]:
-    """A hook off its mark errs in proportion to the weight, a reading does not."""
+    """Return currents with a hook error in proportion to the weight and a constant reading error."""
     return [SLOPE * nm * (1.0 + random.gauss(0.0, 0.003)) + INTERCEPT + random.gauss(0.0, 0.02) for nm in x]
 
 

@@ -1,4 +1,4 @@
-"""Friction out of loops: against motions whose friction is chosen, and on a simulated joint."""
+"""Friction from loops is recovered from synthetic motions with known friction, and from a simulated joint."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HALF_RAD, DRY_A, VISCOUS_A_S = 0.09, 0.18, 0.03
 
 
 def made_stroke(direction: float, duration_s: float, taken_a: Callable[[float, float], float]) -> list[Sample]:
-    """From rest to rest, half a cosine; `taken_a` is what angle and acceleration take besides friction."""
+    """Return half a cosine from rest to rest; `taken_a` is the current besides friction, by angle and acceleration."""
     samples, rate = [], pi / duration_s
     for number in range(501):
         now_s = duration_s * number / 500
@@ -41,7 +41,7 @@ def weight_magnets_and_inertia(angle_rad: float, acceleration_rad_s2: float) -> 
 def test_a_loop_shows_friction_and_no_reversible_work(duration_s: float) -> None:
     up, down = (made_stroke(direction, duration_s, weight_magnets_and_inertia) for direction in (1.0, -1.0))
     loop = loop_of(up, down, quick=False)
-    speed_rad_s = pi / 4.0 * HALF_RAD * pi / duration_s  # mean over the way, of half a cosine
+    speed_rad_s = pi / 4.0 * HALF_RAD * pi / duration_s  # mean over the path of half a cosine
     assert loop.speed_rad_s == pytest.approx(speed_rad_s, rel=1e-3)
     assert loop.spent_a == pytest.approx(DRY_A + VISCOUS_A_S * speed_rad_s, rel=1e-3)
 

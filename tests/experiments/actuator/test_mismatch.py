@@ -1,4 +1,4 @@
-"""A reading of another weight than the one that was asked for is detected."""
+"""A reading of a weight other than the requested one is detected."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_the_weight_that_was_asked_for_matches(weight_g: float, trial: int, sign
 @pytest.mark.parametrize("weight_g", PAPER_WEIGHTS_G)
 def test_another_weight_of_the_list_is_named(weight_g: float, other_g: float, trial: int) -> None:
     if weight_g == other_g or {weight_g, other_g} == {10.0, 20.0}:
-        return  # friction may be as large
+        return  # friction may be as large as the difference
     step = Step(trial, weight_g)
     mismatch = find_mismatch(PLAN, before(step), step, current_a(other_g), CONFIGURED_NM_A)
     assert mismatch is not None

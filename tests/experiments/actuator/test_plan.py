@@ -1,4 +1,4 @@
-"""What is decided before a weight is hung."""
+"""A plan is checked against the configuration before a weight is hung."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_a_weight_beyond_the_torque_limit_is_refused_with_key_value_and_bound(co
         require_possible(Plan(("right_sweep",)), configuration)
     message = str(refused.value)
     assert "limits.torque_nm = 0.75: must be at least 1.25 for 800 g at 12 cm" in message
-    assert "set it to 1.25, current_limit_a of all drives to 18.1" in message  # what k_t = 0.0719 wants is 17.4
+    assert "set it to 1.25, current_limit_a of all drives to 18.1" in message  # 17.4 for k_t = 0.0719
     assert "at most 400 g of them" in message
     require_possible(Plan(("right_sweep",), weights_g=(100.0, 400.0)), configuration)
 

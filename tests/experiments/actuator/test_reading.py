@@ -1,4 +1,4 @@
-"""A simulated joint is read as a real one would be: level, from both sides, settled."""
+"""A simulated joint is read like a real one: level, after an approach from each side, and settled."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_weight_is_read_level_and_without_friction(joint: str, tmp_path: Path)
     sensed_nm = abs(loaded.current_a - empty.current_a) * TRUE_CONSTANT_NM_A
     assert sensed_nm == pytest.approx(external_nm, abs=0.5 * COULOMB_NM)
     assert abs(degrees(loaded.angle_rad)) < 0.1 and abs(degrees(empty.angle_rad)) < 0.1
-    assert abs(degrees(loaded.below.held_rad)) > 2.0  # without that the arm would hang down so far
+    assert abs(degrees(loaded.below.held_rad)) > 2.0  # without levelling the arm would hang this low
     assert 0.4 * COULOMB_NM < empty.rest_friction_a * TRUE_CONSTANT_NM_A < 1.3 * COULOMB_NM
 
 
@@ -81,7 +81,7 @@ def test_a_load_that_the_motor_does_not_lift_is_reported(tmp_path: Path) -> None
         hand.hold_level(joint, nothing)
         arm(robot)
         held = HeldJoint(robot, joint)
-        with pytest.raises(MovedError, match="cannot bring the arm level"):  # a hand holds it 30 degrees down
+        with pytest.raises(MovedError, match="cannot bring the arm level"):  # held 30 degrees down
             robot.lockstep.robot.plant.arms[1].adduction_rad = -0.55
             held.read()
     finally:

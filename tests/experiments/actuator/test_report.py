@@ -1,4 +1,4 @@
-"""What the report of a calibration shows."""
+"""The report of a calibration shows the results and their sources."""
 
 from __future__ import annotations
 

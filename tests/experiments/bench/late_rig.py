@@ -1,7 +1,7 @@
-"""A simulated robot on a busy computer: ticks are missed, or emulated drives run late, at random by a seed.
+"""A simulated robot on a busy computer: ticks are missed, or emulated drives run late, at random with a seed.
 
-A late drive obeys the commands that have waited for it, the newest last, and then catches up with the missed time, as
-the process that emulates drives in real time does.
+A late drive executes the waiting commands in their order and then catches up with the missed time, like the process
+that emulates drives in real time.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from firmware_host.ticker import Tick
 
 
 class LateRig(SimulatedRig):
-    """Punctual until `begin`."""
+    """A rig that runs on time until `begin`."""
 
     def __init__(self, configuration: Configuration) -> None:
-        self._missing_fraction = self._waiting_fraction = 0.0  # of ticks with which it begins
+        self._missing_fraction = self._waiting_fraction = 0.0  # of ticks that begin a delay
         self._longest = self._waits = 0  # ticks
         self._random = Random()
         super().__init__(configuration)

@@ -62,7 +62,7 @@ def test_a_joint_with_a_stuck_encoder_hardly_moves_and_is_reported(
     bench.stick_encoder()
     readings = list(check_nudge(bench.test_rig, joint))
     assert bench.farthest_rad < farthest_rad < UNSEEN_RAD
-    (reading,) = readings  # nothing more is tried on it
+    (reading,) = readings  # no further attempt follows
     assert not reading.good and f"{joint}: answer to a shake is 0 rad" in reading.message
     assert "turn it by hand while its torque is off" in reading.message
     assert not any(drive.torque_nm(bench.rig.now_s) > 0.01 for drive in bench.rig.robot.drives)
@@ -76,7 +76,7 @@ def test_a_joint_with_half_the_inertia_and_no_friction_hardly_moves_either(
     bench.without_friction()
     bench.stick_encoder()
     assert not shake_of(bench, joint).answered
-    bench.test_rig.run_for(0.3)  # nothing is left of its speed
+    bench.test_rig.run_for(0.3)  # until it has come to rest
     assert bench.farthest_rad < UNSEEN_RAD
 
 

@@ -30,7 +30,7 @@ from tests.experiments.bench.late_rig import LateRig
 
 @pytest.fixture
 def patient(configuration: Configuration) -> Configuration:
-    """Return bounds for drives that are emulated on the same computer: late messages are no fault yet."""
+    """Return a configuration for drives that are emulated on the same computer: late messages are no fault yet."""
     waits = {name: 0.5 for name in ("late_s", "quiet_s", "silence_s", "lag_s", "crawl_s", "fast_s")}
     return replace(configuration, faults=replace(configuration.faults, **waits, lag_fraction=1.0, jump_rad=2.0))
 
@@ -140,7 +140,7 @@ def test_a_drive_that_goes_idle_too_late_is_found_in_spite_of_missed_ticks(
     ends = {what.split(":")[0]: each for what, each in reported.items() if what.endswith("until no current flows")}
     assert ends.pop("right_sweep").value >= 6 > OFF_TICKS
     assert all(reading.good for reading in ends.values())
-    assert opened_rig.lateness.missed  # so the bench measures anew
+    assert opened_rig.lateness.missed  # so the bench repeats the check
 
 
 @pytest.fixture

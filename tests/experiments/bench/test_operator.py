@@ -1,4 +1,4 @@
-"""The operator at the bench: prompted on a real one, reading the mechanics of a simulated one."""
+"""The operator at a real bench answers prompts; at a simulated bench the answers come from the mechanics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rigs of the bench: real buses in real time, with no other program that commands the drives."""
+"""The rig of the bench uses real buses in real time and refuses other programs that command the drives."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path
 
 @pytest.fixture
 def local_robot(short_folder: Path, tmp_path: Path) -> Iterator[Configuration]:
-    """Yield the configuration of a simulated robot that runs in real time as a process of its own, on local buses."""
+    """Yield the configuration of a simulated robot that runs in real time, in its own process, on local buses."""
     path = write_local_setup(short_folder, tmp_path)
     command = [sys.executable, "-m", "simulation.harness.peer", "--config", str(path), "--on-blocks"]
     robot = subprocess.Popen(command, cwd=ROOT)
@@ -84,7 +84,7 @@ def opened_rig(local_robot: Configuration) -> Iterator[TestRig]:
     while not any(rig.overheard.frames.values()):
         rig.close()
         rig = HardwareRig(local_robot)
-    rig.close()  # it may have heard no more than the robot's start
+    rig.close()  # it may have received only the robot's first messages
     made = TestRig(rig := HardwareRig(local_robot), BenchOperator())
     yield made
     made.force_idle()

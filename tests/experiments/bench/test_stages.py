@@ -1,4 +1,4 @@
-"""The whole bench as an operator starts it: a refused one, a sound robot, and one whose encoder counts backwards."""
+"""The whole bench, as an operator starts it, is refused, passes a sound robot, and finds a reversed encoder."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_a_sound_robot_passes_every_stage(tmp_path: Path) -> None:
 
 
 def test_a_refused_bench_says_why_once_and_reports_it(short_folder: Path, tmp_path: Path) -> None:
-    """A daemon runs. The option -rN prevents a summary that would say it again."""
+    """A running daemon is the reason. The option -rN prevents a summary that would repeat the message."""
     path = write_local_setup(short_folder, tmp_path)
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as daemon:
         daemon.bind(str(short_folder / "mudskipper.sock"))

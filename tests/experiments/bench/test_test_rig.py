@@ -111,7 +111,7 @@ def test_a_drive_that_does_not_go_idle_is_reported(bench: StagedBench, rig: Simu
     )
 
     def feed_watchdog(rig: SimulatedRig) -> None:
-        """Acts as another program on the bus."""
+        """Feed the watchdog like another program on the bus."""
         drive.receive(zero_torque, rig.now_s)
 
     rig.others.append(feed_watchdog)
@@ -206,7 +206,7 @@ def test_an_unknown_value_is_never_good_and_is_null_in_json() -> None:
 
 
 def report_with(*outcomes: str) -> BenchReport:
-    """One test a stage, from the first stage on."""
+    """Return a report with one test per stage, from the first stage on."""
     report = BenchReport()
     for stage, outcome in enumerate(outcomes, 1):
         report.begin(stage, "test")

@@ -1,6 +1,6 @@
-"""Robots that are wired wrong: the right stage of the bench finds each, with a message that says what to do.
+"""The right stage of the bench finds each wiring error, with a message that says what to do.
 
-The stages are the very tests of tests/bench, called one after the other until one of them fails.
+The stages are the tests of tests/bench themselves, called one after the other until one of them fails.
 """
 
 from __future__ import annotations

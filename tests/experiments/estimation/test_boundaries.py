@@ -1,4 +1,4 @@
-"""Synthetic walks over borders: which strides are transitions, and after how many the estimate has followed."""
+"""In synthetic walks over borders the transitions and the strides until the estimate has followed are counted."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ def mud_estimate(k_p: float | None, depth_m: float = DEPTH_M) -> MudEstimate:
 
 @dataclass
 class Walk:
-    """The mud of each stride, and the estimate of k_p after it; both flippers alike."""
+    """The mud of each stride, and the estimate of k_p after it, the same for both flippers."""
 
     muds: Sequence[str]
     estimates: Sequence[float | None]
@@ -112,7 +112,7 @@ def test_the_estimate_is_evaluated_at_the_depth_of_the_stride(monkeypatch: pytes
 
 
 def test_the_next_border_ends_a_transition(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An estimate that is right again past the border has not followed before it."""
+    """An estimate that becomes right again only because the next mud begins has not followed."""
     walk = Walk(("soft", "firm", "firm", "soft", "soft"), (1e6, 1e6, 1e6, 1e6, 1e6))
     left = [each for each in walk.transitions(monkeypatch) if each.flipper == "left"]
     assert left == [transition(None), transition(1, before="firm", after="soft")]

@@ -1,4 +1,4 @@
-"""The plan of the experiment, and a short piece of it done for real."""
+"""The plan of the experiment, and a short part of it in simulation."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,7 +38,7 @@ SHORT = Plan(single=(STRONG,), walking=(STRONG,), seeds=1, single_strides=1, wal
 
 @cache
 def evaluated() -> tuple[Outcome, Sequence[tuple[int, int]]]:
-    """Two trials: a single flipper of one stride, a walk of two. Also what was shown of the progress."""
+    """Simulate a single flipper for one stride and a walk of two strides; return the outcome and the shown progress."""
     shown: list[tuple[int, int]] = []
     return evaluate(SHORT, lambda done, total: shown.append((done, total)), processes=1), shown
 
@@ -49,7 +49,7 @@ def outcome() -> Outcome:
 
 @cache
 def two_trials() -> list[Evaluation]:
-    """With a second seed: a trial has one latency, one surface and one torque constant, so alone it is chance."""
+    """Return evaluations of two seeds: a trial draws only one latency, surface and torque constant."""
     second = replace(SHORT, seeds=2).parts()[1::2]
     return outcome().evaluated + [each for part in second for each in run_part(part, SHORT).evaluated]
 
@@ -79,7 +79,7 @@ def test_the_plan_is_every_mud_and_seed_and_a_walk_over_borders_for_each_seed() 
     plan = Plan(seeds=3)
     parts = plan.parts()
     transitions, alone = [p for p in parts if len(p.muds) > 1], [p for p in parts if len(p.muds) == 1]
-    assert parts[: len(transitions)] == transitions  # the longest first
+    assert parts[: len(transitions)] == transitions  # the longest parts first
     assert parts[0].muds == parts[1].muds[::-1]
     assert [(p.setup, p.seed, p.strides) for p in transitions] == [(WALKING, seed, 24) for seed in (1, 2, 3)]
     for setup, muds, strides in ((SINGLE, plan.single, 2), (WALKING, plan.walking, 8)):
@@ -110,11 +110,11 @@ def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> N
         assert {each.parameters.fixed_base for each in methods_of(setup)} == {setup is SINGLE}
 
 
-# a short one, for real
+# a short one in simulation
 
 
 def rows_of(setup: str, coefficient: str, evaluated: Sequence[Evaluation]) -> dict[str, ErrorRow]:
-    """By method."""
+    """Return the rows of this setup and coefficient by method."""
     rows = error_rows(evaluated)
     return {row.method: row for row in rows if (row.setup, row.coefficient) == (setup, coefficient)}
 
@@ -187,8 +187,9 @@ def test_rows_torque_constants_and_times_are_disturbed_as_asked(
 
 
 def test_a_walk_over_a_border_reports_how_soon_the_estimate_followed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From soft to strong mud after 10 cm: the first stride goes in at l sin 30° = 6 cm, and each carries the body no
-    farther than the arms' 12 cm. In three strides at most, each flipper's transition is reported.
+    """Strong mud follows after 10 cm; the first stride goes in at l sin 30° = 6 cm, and each is at most 12 cm long.
+
+    So each flipper's transition is reported, and the estimate follows within three strides.
     """
     monkeypatch.setattr(experiments.estimation.evaluation, "COMPARTMENT_M", 0.1)
     soft = clay_of_water(51.2)

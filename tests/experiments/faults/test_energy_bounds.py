@@ -23,7 +23,7 @@ def test_a_motor_at_full_torque_and_speed_until_the_drives_idle_stays_within_the
 def test_a_joint_that_speeds_up_from_rest_at_full_torque_stays_within_the_bound() -> None:
     for ticks in (1, 5, 12, 30):
         turned_rad = 0.5 * BOUNDS.torque_nm / BOUNDS.inertia_kg_m2 * (ticks * PERIOD_S) ** 2
-        if turned_rad < 3.4:  # then it is at its end stop
+        if turned_rad < 3.4:  # beyond this it is at its end stop
             assert BOUNDS.torque_nm * turned_rad <= BOUNDS.stopping_j(ticks, Reaction.DRIVES_IDLE)
 
 

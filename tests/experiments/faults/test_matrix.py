@@ -1,4 +1,4 @@
-"""Every fault once in a simulated robot, and proof that the evaluation of a cell can fail."""
+"""Every fault occurs once in a simulated robot and the reaction passes; the evaluation of a cell can also fail."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from simulation.harness.drive_presets import DRIVES
 
 
 def one_cell_of_each_fault() -> list[CellKey]:
-    """Choose a phase for each fault, more often one that is reached soon, and a type of drive that can have it."""
+    """Choose a phase for each fault, preferably an early one, and a type of drive that can have the fault."""
     phases = cycle(("hold", "idle", "stance", "hold", "arming"))
     firsts = {mode.fault: mode for mode in reversed(FAILURE_MODES)}.values()
     return [CellKey(mode.name, next((p for _ in PHASES if (p := next(phases)) in mode.phases), mode.phases[0]), 1,
@@ -41,7 +41,7 @@ def one_cell_of_each_fault() -> list[CellKey]:
 
 @pytest.fixture(scope="module")
 def cells() -> Sequence[Cell]:
-    """Each is watched for twice the time in which the loop must notice that a drive takes torque again."""
+    """Run the cells; each lasts for twice the time in which the loop must notice that a drive takes torque again."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(experiments.faults.cell, "AFTER_S", 2.0 * FORBIDDEN_TICKS * PERIOD_S)
         return run_parallel([partial(run_cell, *key) for key in one_cell_of_each_fault()], lambda done, of: None)
@@ -86,7 +86,7 @@ def test_every_component_that_can_be_slow_lossy_or_full_of_garbage_has_a_failure
         if kind in kinds
     }
     named = {tuple(mode.how.split()) for mode in FAILURE_MODES if mode.fault == "degraded"}
-    assert degradable - named == {("loop", "slow"), ("clock", "garbage")}  # modes of kinds of fault of their own
+    assert degradable - named == {("loop", "slow"), ("clock", "garbage")}  # these have faults of their own
 
 
 def test_a_cell_follows_from_its_name_phase_and_seed() -> None:
@@ -153,7 +153,7 @@ def test_moteus_react_to_what_differs_from_drives_that_report_by_themselves(name
 
 
 def test_torque_of_another_program_must_end_with_that_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where each of its commands starts the drive again; elsewhere it must end once the drives are idle."""
+    """A moteus starts again with each foreign command; the torque of other drives must end once they are idle."""
     name = "foreign_commands"
     assert run_cell(name, "hold", 1, "moteus").ok
     monkeypatch.setitem(BY_TYPE, "moteus", {})

@@ -21,7 +21,7 @@ NM_A = CONFIGURATION.torque_constants_nm_a[RIGHT_SWEEP]
 
 
 def trial(joint: int, before_nm: float, after_nm: float) -> Log:
-    """In free air before the insertion and after the stride; at all other times the joint carries 1 N·m."""
+    """Return a log with these torques in air, before the insertion and after the stride; otherwise it is 1 N·m."""
     before, stride = make_ticks([Phase.REST] * 20), make_ticks([Phase.INSERTION] * 50, start_s=0.2)
     after = make_ticks([Phase.REST] * 50, start_s=0.7)
     after["mode"] = Mode.HOLD

@@ -34,9 +34,7 @@ SHORT = Plan((MUD,), trials=1, simulated=True)
 
 @cache
 def measured() -> tuple[dict[str, Entry], list[str]]:
-    """Entries of a short experiment in which the right sweep drive falls silent in the first stride, and what was
-    asked.
-    """
+    """Return entries and questions of a short experiment in which the robot is disarmed in the first insertion."""
     operator = ScriptedOperator()
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -48,7 +46,7 @@ def measured() -> tuple[dict[str, Entry], list[str]]:
 
 
 class FaultyOnce:
-    """A bed on which the first trial meets a fault: the robot is disarmed in the middle of its stride."""
+    """A bed on which the first trial fails: the robot is disarmed in its insertion."""
 
     def __init__(self, robot: LockstepRobot, bed: CarriedBed) -> None:
         self._bed = bed
@@ -58,10 +56,10 @@ class FaultyOnce:
 
     def prepare(self, trial: PlannedTrial) -> str:
         if not self._invalid:
-            self._robot.wait = self._fail_in_stance  # type: ignore[method-assign]
+            self._robot.wait = self._fail_in_insertion  # type: ignore[method-assign]
         return self._bed.prepare(trial)
 
-    def _fail_in_stance(self, duration_s: float) -> None:
+    def _fail_in_insertion(self, duration_s: float) -> None:
         self._wait(duration_s)
         if not self._invalid and self._robot.call("status")["phase"] == "insertion":
             self._invalid = True
@@ -72,7 +70,7 @@ def report(truth: dict[str, dict[str, float]] | None = None) -> FlipperReport:
     return report_of(SHORT, measured()[0], bench_configuration(), truth)
 
 
-# the configuration that it needs
+# the required configuration
 
 
 def test_a_robot_that_is_set_up_to_walk_is_refused_with_what_to_set() -> None:
@@ -114,7 +112,7 @@ def test_a_trial_that_a_fault_ended_is_reported_and_repeated() -> None:
 
 
 class SlidingRobot(LockstepRobot):
-    """A robot whose base is 60 mm further on in each status."""
+    """A robot whose base advances by 60 mm from status to status."""
 
     asked = 0
 
@@ -138,7 +136,7 @@ def test_a_trial_whose_base_moved_is_invalid_but_can_be_kept(tmp_path: Path) -> 
 
 
 def test_the_coefficients_are_those_of_the_load_cell() -> None:
-    """Within the uncertainty of a torque constant known to 3.2 %, and the default method's own bias in k_e."""
+    """They agree within the 3.2 % of the torque constant, and in k_e within the default method's own bias."""
     (mud,) = report().muds
     assert mud.truth is not None
     for name, fraction in (("k_p", 0.1), ("k_s", 0.1), ("k_e", 0.2)):
@@ -175,7 +173,7 @@ def test_the_law_follows_the_force_in_steady_stance() -> None:
 
 
 def entries_of(**values: list[float]) -> dict[str, Entry]:
-    """k_p of trials by mud."""
+    """Return entries of trials with these values of k_p by mud."""
     profile = next(iter(measured()[0].values()))["course"]
     return {
         f"{mud}/{number}": {
@@ -251,7 +249,7 @@ def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> Non
 
 
 def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
-    """The paper's own bench has one flipper (section II-C)."""
+    """Like this rig, the paper's own bench has one flipper (section II-C)."""
     plan = replace(SHORT, motors=2)
     robot, bed = flipper_bench(tmp_path, [MUD], 1, plan.simulated_rig)
     assert robot.configuration.rig.joints == ("right_sweep", "right_adduction")

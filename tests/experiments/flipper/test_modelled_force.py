@@ -17,7 +17,7 @@ DEPTHS_M = [-0.01, 0.0, 0.01, 0.02, 0.03]
 
 
 def lawful(phase: Phase, sweeps_deg: list[float], depths_m: list[float], across_nm: float = 0.0) -> StrideProfile:
-    """Return a stroke whose loads are those of a mud with the coefficients K, and whose forces are mapped from them."""
+    """Return a stroke in a mud that follows the laws with the coefficients K: its joint loads and the mapped forces."""
     profile = make_profile(phase, sweeps_deg, depths_m)
     for i, (sweep_rad, adduction_rad) in enumerate(zip(profile.sweep_rad, profile.adduction_rad, strict=True)):
         plate = submerged_plate(GEOMETRY, sweep_rad, adduction_rad)
@@ -49,7 +49,7 @@ def test_in_extraction_the_law_equals_the_measured_force_on_the_last_three_quart
 
 
 def test_in_stance_the_law_equals_the_measured_force_once_the_mud_is_mobilised() -> None:
-    """2.5 cm of sweep with an arm of 12 cm: from 30° to under 17°."""
+    """The mud is mobilised after 2.5 cm of sweep: with an arm of 12 cm from 30° to under 17°."""
     profile = lawful(Phase.STANCE, [30.0, 20.0, 15.0, 0.0, -30.0], [0.03] * 5)
     modelled_n = modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_x_n
     assert np.isnan(modelled_n[:2]).all()
@@ -57,7 +57,7 @@ def test_in_stance_the_law_equals_the_measured_force_once_the_mud_is_mobilised()
 
 
 def test_the_papers_laws_give_forces_from_the_depth_below_the_found_surface() -> None:
-    """At 3 cm under a surface that is 1 cm deep: 2 cm of an edge of 1 cm², and half of 4 cm² of a plate 2.5 cm wide."""
+    """At 3 cm the plate is 2 cm below the surface at 1 cm: V = 1 cm² of edge times 2 cm, and b z²/2 with b = 2.5 cm."""
     surface_m = 0.01
     inserted = make_profile(Phase.INSERTION, [30.0], [0.03])
     swept = make_profile(Phase.STANCE, [30.0, 0.0], [0.03, 0.03])

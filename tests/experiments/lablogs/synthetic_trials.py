@@ -1,4 +1,4 @@
-"""Trials whose estimates and errors say what a test wants."""
+"""Synthetic trials with given estimates and errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def make_stride(
     k_s: Estimate = INVALID,
     k_e: Estimate = INVALID,
 ) -> StrideEstimate:
-    """A stride of four seconds; both flippers begin the same stride with the same sample."""
+    """Return a stride of four seconds; both flippers begin the same stride with the same sample."""
     return StrideEstimate(
         flipper, index, 4.0 * index, 4.0 * index + 4.0, 1.0, 1.0, 1.0, k_p, k_s, k_e,
         0.0, 0.03, True, 2.0, 8.0, -2.0, UNKNOWN,
@@ -41,13 +41,13 @@ def make_trial(
     in_mud: bool = True,
     replays: Replays | None = None,
 ) -> LabTrial:
-    """A trial with the same strides by every method; a single flipper is on a fixed base."""
+    """Return a trial with the same strides by every method; a single flipper is on a fixed base."""
     same = Replays(strides) if replays is None else replays
     return LabTrial(name, flippers, len(flippers) == 1, in_mud, {method: same for method in METHODS})
 
 
 def make_walk(pairs: Sequence[tuple[Estimate, Estimate]], name: str = "walk_30N_trial1.csv.gz") -> LabTrial:
-    """A walk with k_s by the left and the right flipper in each stride."""
+    """Return a walk with k_s by the left and the right flipper in each stride."""
     strides = [
         make_stride(flipper, index, k_s=k_s)
         for index, pair in enumerate(pairs)

@@ -1,4 +1,4 @@
-"""Flippers that differ as they claim, contradicting bounds and values in air are counted as they were made."""
+"""In synthetic trials the differences of flippers, contradicting bounds and values in air are counted correctly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Disturbances act on the columns as they say, and mud is distinguished from air by torque."""
+"""Each disturbance changes the columns as it claims, and mud is distinguished from air by torque."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROW_S = 0.001
 
 
 def make_lab(stance_nm: float = 0.4, swing_nm: float = 0.06, rows: int = 1000, sign: float = 1.0) -> LabLog:
-    """Two strides of the right flipper; every current counts its row in addition."""
+    """Return two strides of the right flipper; both currents also encode the row number."""
     phase = np.resize(np.repeat([Phase.SWING, Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION], rows // 8), rows)
     torque_nm = np.select([phase == Phase.STANCE, phase == Phase.SWING], [-sign * stance_nm, swing_nm], 0.0)
     current_a = np.full((rows, 4), np.nan)
@@ -52,7 +52,7 @@ def test_a_delay_moves_the_currents_against_the_positions(delay_s: float) -> Non
     inside = np.arange(10, 990)
     assert np.abs(delayed.current_a[inside, 3] - (inside - rows)).max() <= 1.0  # the stamps are rounded
     assert np.array_equal(delayed.stamp_s, lab.stamp_s)
-    assert delayed.current_a[0, 3] == (0.0 if delay_s > 0.0 else 5.0)  # the first current is held before it came
+    assert delayed.current_a[0, 3] == (0.0 if delay_s > 0.0 else 5.0)  # before it arrives the first current is held
 
 
 def test_missing_rows_are_missing_in_every_column() -> None:
@@ -66,9 +66,9 @@ def test_missing_rows_are_missing_in_every_column() -> None:
 
 def test_a_stance_that_needs_more_than_friction_is_evidence_of_mud() -> None:
     assert LabRecording(make_lab(stance_nm=0.4)).has_evidence_of_mud()
-    assert LabRecording(make_lab(stance_nm=0.4, sign=-1.0)).has_evidence_of_mud()  # signs may be wrong
+    assert LabRecording(make_lab(stance_nm=0.4, sign=-1.0)).has_evidence_of_mud()  # the signs may be wrong
     assert not LabRecording(make_lab(stance_nm=0.07)).has_evidence_of_mud()
-    assert not LabRecording(make_lab(stance_nm=0.04, swing_nm=0.0)).has_evidence_of_mud()  # a swing that rested
+    assert not LabRecording(make_lab(stance_nm=0.04, swing_nm=0.0)).has_evidence_of_mud()  # a swing at rest
 
 
 def test_a_log_without_stance_is_not_declared_air() -> None:

@@ -17,7 +17,7 @@ from experiments.lablogs.repeatability import (
 from tests.experiments.lablogs.synthetic_trials import INVALID, make_bound, make_value
 
 LEVELS = (0.9, 1.0, 1.1)  # of three trials: a variation of exactly 10 %
-DECLINE = (1.0, 0.8, 0.7, 0.65, 0.6)  # of each stroke in the same hole
+DECLINE = (1.0, 0.8, 0.7, 0.65, 0.6)  # of the strokes in one hole
 
 
 def declining_trials(lengths: tuple[int, ...] = (5, 5, 5)) -> list[list[Estimate]]:
@@ -25,7 +25,7 @@ def declining_trials(lengths: tuple[int, ...] = (5, 5, 5)) -> list[list[Estimate
 
 
 def scattered_trials(claimed: float, trials: int = 60, strokes: int = 6) -> list[list[Estimate]]:
-    """Trials of one mud, each with a hole of its own depth, that scatter by 5 % and claim another error."""
+    """Return trials of one mud, each with another level of later strokes, with 5 % scatter and a claimed error."""
     random = np.random.default_rng(5)
     decline = 0.9 ** np.arange(strokes)
     first = 1.0 + 0.05 * random.standard_normal(trials)
@@ -62,7 +62,7 @@ def test_trials_of_different_lengths_are_compared_over_the_same_number_of_stroke
 
 def test_a_missing_later_stroke_does_not_lift_its_trial() -> None:
     trials = declining_trials()
-    trials[0][4] = INVALID  # the weakest of its hole
+    trials[0][4] = INVALID  # the weakest stroke of its hole
     trials[2][2] = make_bound(0.1)
     assert coefficient_of_variation(later_levels(trials)) == pytest.approx(0.1)
 

@@ -1,4 +1,4 @@
-"""The report of synthetic trials has the figures with which they were made."""
+"""The report of synthetic trials recovers the figures from which they were generated."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_groups_have_the_variation_and_the_counts_of_their_trials(trials: list[L
     firm, soft, walk = (groups[name]["k_s"] for name in groups)
     assert (firm.first_cv, firm.later_cv, firm.n, firm.n_later) == (0.15, 0.15, 3, 3)
     assert (soft.first_cv, soft.first_mean, soft.values) == (0.1, 1000000, 6)
-    assert soft.chi_between_trials == 1.0  # they scatter by 0.1e6 and claim that
+    assert soft.chi_between_trials == 1.0  # scatter and claimed error are 0.1e6
     assert (walk.first_cv, walk.n, walk.values, walk.bounds, walk.invalid) == (None, 0, 2, 1, 1)
     assert groups["12N"]["k_p"].invalid == 9
 

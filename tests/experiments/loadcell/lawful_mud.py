@@ -1,4 +1,4 @@
-"""Mud that obeys the laws of the coefficients exactly, on a stage, and the force that a load cell would feel."""
+"""A mud that follows the laws of the coefficients exactly, and the force that a load cell on a stage measures in it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ WIDTH_M, THICKNESS_M = 0.03, 0.004
 
 
 class LawfulMud:
-    """A CarriedPlate, upright: F = k_p V on the way down, k_e V on the way up, k_s b z²/2 along, each while it moves.
+    """An upright CarriedPlate: while it moves, F = k_p V downward, k_e V upward, and k_s b z²/2 along its path.
 
-    At rest it keeps its load but for a share that fades.
+    At rest it keeps its load except for the fraction `relaxation`, which fades.
     """
 
     def __init__(self, k_p: float, k_s: float, k_e: float, relaxation: float = 0.13) -> None:
@@ -55,7 +55,7 @@ def feel(
     cell_sign: float = 1.0,
     drift_n_s: float = 0.0,
 ) -> Recorded:
-    """One trial, started at any moment."""
+    """Return one trial of a motorised stage that starts at a random time."""
     random = Random(seed)
     stage = PlateStage(plate, StageParameters(acceleration_m_s2, cell_sign))
     stage.mean_force_n(0.0)

@@ -32,7 +32,7 @@ COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
 
 
 class EventfulBench(EmulatedBench):
-    """An emulated bench with events that happen at a set time."""
+    """An emulated bench that triggers events at set times."""
 
     def __init__(self, *devices: Any) -> None:
         self.events: list[tuple[float, Callable[[], None]]] = []
@@ -64,7 +64,7 @@ class Laboratory:
         encoder: StageEncoderParameters | None = None,
         encoder_baud: int = 115200,
     ) -> None:
-        """With an `encoder` the stage is pushed by a hand."""
+        """Emulate a motorised stage, or with an `encoder` one that is pushed by hand."""
         self.folder, self.operator = folder, operator
         if encoder is not None:
             stage = StageParameters(manual=ManualMotionParameters(), seed=seed)
@@ -106,7 +106,7 @@ Make = Callable[..., Laboratory]
 
 @contextmanager
 def laboratories(folder: Path) -> Iterator[Make]:
-    """Makes any number of them, calibrated, over mud that keeps the laws; closed at the end."""
+    """Yield a function that makes a calibrated laboratory with a mud that follows the laws; close all at the end."""
     made: list[Laboratory] = []
 
     def build(operator: ScriptedOperator | None = None, **options: Any) -> Laboratory:

@@ -1,4 +1,4 @@
-"""Variable projection, against a curve whose numbers are known."""
+"""Variable projection recovers the known parameters of a curve."""
 
 import numpy as np
 import pytest

@@ -38,7 +38,7 @@ def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
 
 
 def try_once(laboratory: Laboratory) -> list[str]:
-    """One insertion, and what was said of it."""
+    """Measure one insertion and return the reported messages."""
     trial = Trial("lawful", INSERTION, 1)
     laboratory.recorder.listen(1.0)
     laboratory.trial_bench.stage.prepare(trial, 1)

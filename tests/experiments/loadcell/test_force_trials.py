@@ -1,4 +1,4 @@
-"""Coefficients from nothing but force against time: muds with known ones, and clay against its own noise-free curve."""
+"""Coefficients from force against time alone, in muds with known ones and in clay against its noise-free curve."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_coefficients_of_a_mud_that_obeys_the_laws_come_out_within_three_per_cen
 
 
 def test_an_abrupt_stage_is_not_taken_for_mud_that_bears_more_when_it_is_slower() -> None:
-    """Five trials of one mud alone; a ramp of one sample."""
+    """Five trials of one mud suffice, although the stage speeds up within a single sample."""
     mud = LawfulMud(1.3e6, 0.6e6, 1.4e6)
     trials = [feel(mud, INSERTION, 4000 + i, acceleration_m_s2=8.0, noise_n=0.01) for i in range(5)]
     reported = analyse(trials, SETTINGS, look)
@@ -75,7 +75,7 @@ def test_coefficients_of_clay_are_those_of_its_noise_free_curve(water: float, ac
 
 
 def true_of_clay(water: float) -> dict[str, float]:
-    """By the definitions, without any of the code that is tested."""
+    """Return the coefficients by their definitions, without the tested code."""
     clay = clay_of_water(water)
     reported = measure_insertion(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1, RELAXATION, 3.0)
     shear_n = measure_shear(clay, PAPER_PLATE, 0.0, 0.0, 0.03, 0.1)
@@ -95,7 +95,7 @@ def true_slope(curve: LoadCurve, deepest_m: float) -> float:
 
 @pytest.fixture(scope="module")
 def clay_trials() -> list[AnalysedTrial]:
-    """Of one stage, started at any moment between two samples."""
+    """Return trials of one stage that start at random times between two samples."""
     return analyse([feel(clay_plate(49.5), INSERTION, 40 + i) for i in range(8)], SETTINGS, look)
 
 
@@ -103,7 +103,7 @@ def clay_trials() -> list[AnalysedTrial]:
 def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_the_law(
     clay_trials: list[AnalysedTrial], name: str
 ) -> None:
-    """Whatever the start of the stage: the ends of a stroke count by their way."""
+    """The start between two samples does not matter, because the first and last samples count by their distance."""
     true = true_of_clay(49.5)[name]
     reported = [trial.coefficients[name] for trial in clay_trials]
     errs = float(np.sqrt(np.mean([(each.value - true) ** 2 for each in reported])))
@@ -113,7 +113,7 @@ def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_th
 
 
 def test_the_error_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_least_squares() -> None:
-    """Of a force that bends from the law; an oracle with the bend as a second column."""
+    """The force deviates smoothly from the law, which plain least squares takes for scatter."""
     random, depths_m = np.random.default_rng(1), np.linspace(0.0, 0.03, 25)
     volumes_m3 = volume_m3(SETTINGS, depths_m)
     reported = [
@@ -125,7 +125,7 @@ def test_the_error_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_leas
     known = sm.OLS(profile_n(depths_m), volumes_m3).fit()
     assert float(np.mean([each.value for each in reported])) == pytest.approx(float(known.params[0]), rel=0.02)
     assert scatter == pytest.approx(0.01 / float(np.sqrt(volumes_m3 @ volumes_m3)), rel=0.15)
-    assert float(known.bse[0]) > 4.0 * scatter  # which takes the bend for scatter
+    assert float(known.bse[0]) > 4.0 * scatter  # plain least squares overestimates it
 
 
 def profile_n(depths_m: Array) -> Array:
@@ -169,7 +169,7 @@ def test_a_cell_of_the_opposite_sign_gives_the_same_coefficients(insertion: Reco
 
 
 def test_the_depth_found_is_that_of_the_stage(insertion: Recorded) -> None:
-    """Started at s, 2 cm above the mud: in it after (2 cm + v²/2a) / v, and 3 s at 3 cm."""
+    """The stage starts 2 cm above the mud at 0.1 m/s and rests for 3 s at 3 cm."""
     reported = one(insertion)
     depths_m = depths_of(reported, SETTINGS)
     assert depths_m is not None and reported.profile is not None and isinstance(reported.motion, Insertion)
@@ -191,10 +191,10 @@ def test_a_stage_slower_than_its_setting_is_measured_and_reported() -> None:
 
 
 def test_a_shear_is_read_where_the_stage_moved() -> None:
-    reported = one(feel(clay_plate(49.5), SHEAR, 3, speed_m_s=0.13))  # done after three quarters of the expected time
+    reported = one(feel(clay_plate(49.5), SHEAR, 3, speed_m_s=0.13))  # ends after 3/4 of the expected time
     assert isinstance(reported.motion, Shear)
     assert reported.motion.speed_m_s == pytest.approx(0.13, rel=0.08)
-    assert reported.motion.steady_to_s - reported.motion.begin_s < 0.2 / 0.13 + 0.13 / 2.0  # with its ramps
+    assert reported.motion.steady_to_s - reported.motion.begin_s < 0.2 / 0.13 + 0.13 / 2.0  # including its ramps
 
 
 @pytest.mark.parametrize("kind", [INSERTION, SHEAR])
@@ -249,7 +249,7 @@ def test_a_millimetre_of_depth_is_seven_per_cent_of_the_shear_and_three_of_the_o
 
 
 def test_a_speed_off_its_setting_is_as_uncertain_as_the_two_are_apart() -> None:
-    """Trials that agree at 0.097 m/s, and a stage set to 0.1: the truth may be either."""
+    """The trials agree on 0.097 m/s and the stage is set to 0.1 m/s: the uncertainty covers both."""
     agreed, far = (
         common_pace([Pace(speed * factor, 2.0, 0.005, 0.1) for factor in (0.99, 1.0, 1.01)], SETTINGS)
         for speed in (0.1, 0.097)
@@ -268,7 +268,7 @@ def test_the_error_of_a_mud_contains_scatter_calibration_and_shared_speed(insert
 
 
 def test_the_error_of_a_mean_contains_the_mean_of_the_shared_errors() -> None:
-    """Synthetic trials, one pushed far quicker than the others: a rate that is wrong moves each by its own share."""
+    """One of the synthetic trials is pushed much faster, so a wrong rate shifts it much further than the others."""
     random, moves, errors, uncertainties = (
         np.random.default_rng(1),
         np.array([0.004, 0.004, 0.004, 0.004, 0.03]),
@@ -291,7 +291,7 @@ def test_the_error_of_a_mean_contains_the_mean_of_the_shared_errors() -> None:
 
 
 def test_a_stage_that_stutters_is_remarked(insertion: Recorded) -> None:
-    """It stood still for 0.1 s, half-way down."""
+    """It stands still for 0.1 s on its way down."""
     reported = one(insertion)
     assert isinstance(reported.motion, Insertion) and reported.remark == ""
     half_s = reported.motion.surface_s + 0.15

@@ -135,7 +135,7 @@ def test_a_drag_that_stopped_early_is_left_to_the_force(drag: Recorded) -> None:
 
 
 def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> None:
-    """r = c 0.1^0.4 / (1 + c 0.1^0.4), which the mud's give of a millimetre blurs."""
+    """r = c 0.1^0.4 / (1 + c 0.1^0.4) within 0.05, because the mud yields gradually over a millimetre."""
     true = RATE_COEFFICIENT * 0.1**0.4 / (1.0 + RATE_COEFFICIENT * 0.1**0.4)
     reported = one(drag)
     assert reported.alignment is not None and np.isnan(reported.alignment.lag_s)
@@ -144,11 +144,11 @@ def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> No
 
 @pytest.mark.parametrize(("kind", "name"), [("drag", "k_s"), ("insertion", "k_p"), ("insertion", "k_e")])
 def test_an_uncertain_rate_is_shared_by_all_trials(kind: str, name: str, request: pytest.FixtureRequest) -> None:
-    """No number of them takes it away."""
+    """Averaging over more trials does not reduce it."""
     reported = one(request.getfixturevalue(kind))
-    doubted = reported.shared_uncertainty * reported.coefficients[name].value
-    assert doubted > reported.coefficients[name].std_error / 10.0
-    assert gather_trials([reported] * 100, name, 0.0).trials_error > doubted
+    shared = reported.shared_uncertainty * reported.coefficients[name].value
+    assert shared > reported.coefficients[name].std_error / 10.0
+    assert gather_trials([reported] * 100, name, 0.0).trials_error > shared
 
 
 def test_an_uncertain_rate_makes_an_insertion_uncertain(insertion: Recorded) -> None:
@@ -169,7 +169,7 @@ def test_trials_share_lag_and_rate() -> None:
     drags = [Alignment(float("nan"), rate, float("inf"), 0.01) for rate in (0.1, 0.12)]
     common = common_alignment([*insertions, *drags])
     assert (common.lag_s, common.rate_fraction) == pytest.approx((0.011, 0.11))
-    assert common.lag_uncertainty_s > 0.005  # they do not agree
+    assert common.lag_uncertainty_s > 0.005  # the trials do not agree
     assert common_alignment([]) == WIDE
 
 

@@ -22,7 +22,7 @@ def test_the_mean_of_an_even_motion_is_its_middle() -> None:
 
 
 def test_straight_lines_are_off_by_no_more_than_is_said() -> None:
-    """Half a g for a quarter of a second, in lines of 20 a second."""
+    """The stage accelerates at 5 m/s² and its encoder sends 20 positions per second."""
     times_s = np.arange(0.0, 1.0, 0.05)
     track = StageTrack(StagePositions(times_s, 2.5 * times_s**2))
     fine_s = np.linspace(0.06, 0.94, 400)

@@ -1,4 +1,4 @@
-"""The trials over an emulated amplifier's serial port: measurement, checks, and recovery."""
+"""Trials are measured, checked and recovered over the serial port of an emulated amplifier."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Idle(SimulatedStage):
 
 
 def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
-    """One trial, and what was said of it."""
+    """Measure one trial and return the reported messages."""
     trial = Trial("lawful", kind, 1)
     laboratory.recorder.listen(1.0)
     laboratory.trial_bench.stage.prepare(trial, 1)
@@ -90,7 +90,7 @@ def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:
     lines = laboratory.port.lines
     laboratory.measure()
     assert laboratory.notebook.entries == before
-    assert laboratory.port.lines < lines + 400  # it listened, and no more
+    assert laboratory.port.lines < lines + 400  # it only read the port for a moment
     assert "calibration from" in laboratory.operator.reported[-1]
 
 
