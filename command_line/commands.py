@@ -9,8 +9,8 @@ COMMANDS = {  # module of options/ -> command -> function, help
         "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
         "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
         "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
-        "stop": ("operation.confirmed_stop.stop", "End the walk, raise the flippers and hold the pose."),
-        "disarm": ("operation.confirmed_stop.disarm", "Switch torque off at once, in any state."),
+        "stop": ("operation.confirmed_stop.end_motion", "End the walk, raise the flippers and hold the pose."),
+        "disarm": ("operation.confirmed_stop.end_motion", "Switch torque off at once, in any state."),
         "clear": ("operation.operation.clear", "Clear a fault and the errors of the drives."),
         "check": (
             "operation.operation.check",

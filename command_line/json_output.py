@@ -28,6 +28,7 @@ EXPERIMENTS = (
 SCHEMAS = {  # what prints it -> version
     "status": 2,
     "error": 1,
+    "operation": 1,
     "failures": 1,
     "demo": 1,
     "drives-find": 1,

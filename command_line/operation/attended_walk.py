@@ -4,11 +4,13 @@ Ctrl-C stops the robot and waits until it holds. If this program dies or hangs f
 stops the robot.
 """
 
+import argparse
 import sys
 import time
 from typing import Any
 
 from command_line import exit_codes
+from command_line.operation.mode_output import print_mode
 from command_line.screen import complain
 from experiments.reports.text_tables import number
 from firmware_host.operator.status_client import CallRefusedError, StatusClient
@@ -19,21 +21,21 @@ MOVING = ("walking", "stopping", "damping")
 MILD = ("none", "warn")  # reactions that do not end a walk
 
 
-def attend(client: StatusClient, params: dict[str, Any]) -> int:
+def attend(client: StatusClient, options: argparse.Namespace, params: dict[str, Any]) -> int:
     """Walks, and returns when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
     try:
-        report, status = _renew(client), exit_codes.OK
+        report, status = _renew(client, options), exit_codes.OK
     except KeyboardInterrupt:
         client.call("stop")
-        report, status = _renew(client), exit_codes.INTERRUPTED
+        report, status = _renew(client, options), exit_codes.INTERRUPTED
     client.call("release")
-    return _conclude(report, status)
+    return _conclude(report, options, status)
 
 
-def _renew(client: StatusClient) -> dict[str, Any]:
+def _renew(client: StatusClient, options: argparse.Namespace) -> dict[str, Any]:
     """Renews the lease until the walk ends; returns the last status."""
-    line = LiveLine()
+    line = LiveLine(silent=options.json)
     while True:
         report: dict[str, Any] = client.call("status")
         if report["mode"] not in MOVING:
@@ -49,21 +51,23 @@ def _renew(client: StatusClient) -> dict[str, Any]:
         time.sleep(RENEWAL_S)
 
 
-def _conclude(report: dict[str, Any], status: int) -> int:
+def _conclude(report: dict[str, Any], options: argparse.Namespace, status: int) -> int:
     """Prints why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
-    print(report["mode"])
     fault = report["fault"]
-    if report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD):
+    is_sound = report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD)
+    print_mode(options, report["mode"], reached=is_sound)
+    if is_sound:
         return status
     complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))
     return exit_codes.REFUSED
 
 
 class LiveLine:
-    """Overwrites one line on a terminal; prints one line per stride elsewhere."""
+    """Overwrites one line on a terminal; prints one line per stride elsewhere, and nothing if it is silent."""
 
-    def __init__(self) -> None:
-        self._live = sys.stdout.isatty()
+    def __init__(self, silent: bool = False) -> None:
+        self._silent = silent
+        self._live = sys.stdout.isatty() and not silent
         self._shown = ""
 
     def show(self, report: dict[str, Any]) -> None:
@@ -72,7 +76,7 @@ class LiveLine:
             depth_cm, x_m = 100.0 * report["depth_m"], number(report["body_x_m"])
             text = f"{summary}, {report['phase']}, depth {depth_cm:.1f} cm, body {x_m} m; Ctrl-C stops"
             print(f"\r\033[K{text}", end="", flush=True)
-        elif summary != self._shown:
+        elif summary != self._shown and not self._silent:
             print(summary, flush=True)
         self._shown = summary
 

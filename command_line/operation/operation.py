@@ -13,6 +13,7 @@ from command_line import exit_codes
 from command_line.drive_state import torque_state
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
+from command_line.operation.mode_output import print_mode
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain
 from experiments.reports.text_tables import number, table
 from firmware_host.operator.counted_nouns import counted
@@ -68,7 +69,7 @@ def status(options: Options) -> int:
 
 def arm(options: Options) -> int:
     params = {"force": options.force, "take_over": options.take_over}
-    return with_daemon(options, lambda client: _request(client, "arm", ("hold",), ARMING_S, **params))
+    return with_daemon(options, lambda client: _request(client, options, "hold", ARMING_S, params))
 
 
 def walk(options: Options) -> int:
@@ -76,8 +77,8 @@ def walk(options: Options) -> int:
     if options.depth is not None:
         params["depth_m"] = options.depth / 100.0
     if options.attended:
-        return with_daemon(options, lambda client: attend(client, params))
-    return with_daemon(options, lambda client: _request(client, "walk", ("walking",), ARMING_S, **params))
+        return with_daemon(options, lambda client: attend(client, options, params))
+    return with_daemon(options, lambda client: _request(client, options, "walking", ARMING_S, params))
 
 
 def move(options: Options) -> int:
@@ -96,8 +97,9 @@ def move(options: Options) -> int:
         except KeyboardInterrupt:
             client.call("stop")
             raise
-        print(report["mode"])
-        if report["mode"] == "hold" and not report["notice"]:
+        arrived = report["mode"] == "hold" and not report["notice"]
+        print_mode(options, report["mode"], reached=arrived)
+        if arrived:
             return exit_codes.OK
         complain(report["notice"] or f"the robot is in {report['mode']}")
         return exit_codes.REFUSED
@@ -113,7 +115,7 @@ def clear(options: Options) -> int:
         )
         messages = [fault["message"] for fault in stopping_faults(report)]
         if report["mode"] in ("idle", "boot") and not messages:
-            print(report["mode"])
+            print_mode(options, report["mode"])
             return exit_codes.OK
         complain(f"the cause is still there: {' '.join(messages) or report['mode']}")
         return exit_codes.REFUSED
@@ -126,18 +128,12 @@ def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
-def _request(client: StatusClient, method: str, modes: tuple[str, ...], longest_s: float, **params: Any) -> int:
-    """Sends a request and waits until the robot is in one of `modes`."""
-    client.call(method, **params)
-    return _await(client, modes, longest_s)
-
-
-def _await(client: StatusClient, modes: tuple[str, ...], longest_s: float) -> int:
-    report = _poll(client, lambda status: status["mode"] in (*modes, "fault"), longest_s)
-    if report["mode"] in modes:
-        print(report["mode"])
-        if report["notice"]:
-            complain(report["notice"])
+def _request(client: StatusClient, options: Options, mode: str, longest_s: float, params: dict[str, Any]) -> int:
+    """Sends the command and waits until the robot is in the mode that it asks for."""
+    client.call(options.command, **params)
+    report = _poll(client, lambda status: status["mode"] in (mode, "fault"), longest_s)
+    if report["mode"] == mode:
+        print_mode(options, mode, report["notice"])
         return exit_codes.OK
     if report["mode"] == "fault":
         complain(report["fault"]["message"] if report["fault"] else report["notice"])

@@ -14,6 +14,7 @@ def add_status(status: Parser) -> None:
 
 def add_arm(arm: Parser) -> None:
     add_socket(arm)
+    add_json(arm)
     arm.add_argument("--force", action="store_true", help="overrule failed checks that are not mandatory")
     _add_take_over(arm)
 
@@ -22,6 +23,7 @@ def add_walk(walk: Parser) -> None:
     from command_line.option_types import any_depth_cm, whole
 
     add_socket(walk)
+    add_json(walk)
     depth = walk.add_mutually_exclusive_group()
     depth.add_argument("--depth", type=any_depth_cm, metavar="CM", help="insertion depth of every stride")
     depth.add_argument("--adaptive", action="store_true", help="choose the depth from the mud once a stride (default)")
@@ -34,6 +36,7 @@ def add_move(move: Parser) -> None:
     from command_line.option_types import joint_angle
 
     add_socket(move)
+    add_json(move)
     move.add_argument("angles", type=joint_angle, nargs="+", metavar="JOINT=DEG", help="left_sweep=10 ...")
     _add_take_over(move)
 
@@ -44,14 +47,17 @@ def _add_take_over(parser: Parser) -> None:
 
 def add_stop(stop: Parser) -> None:
     add_socket(stop)
+    add_json(stop)
 
 
 def add_disarm(disarm: Parser) -> None:
     add_socket(disarm)
+    add_json(disarm)
 
 
 def add_clear(clear: Parser) -> None:
     add_socket(clear)
+    add_json(clear)
 
 
 def add_check(check: Parser) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from http import HTTPStatus
+from json import loads
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,17 @@ from command_line import exit_codes
 from command_line.live.page_server import stop_robot
 from command_line.operation import confirmation, operation
 from command_line.operation.confirmation import LONGEST_S, TORQUE_UNKNOWN, unconfirmed_drives
-from command_line.operation.confirmed_stop import disarm, stop
+from command_line.operation.confirmed_stop import end_motion
 from command_line.watch.orders import send_order
 from control.records import JOINTS
 from firmware_host.operator.status_client import NotPermittedError
 
-OPTIONS = Namespace(socket=Path("/none"))
+SOCKET = Path("/none")
 Report = dict[str, Any]
+
+
+def ended(command: str, json: bool = False) -> int:
+    return end_motion(Namespace(socket=SOCKET, command=command, json=json))
 
 
 def report(mode: str, closed_loop: bool, age_s: float | None = 0.0, changed: Report | None = None) -> Report:
@@ -71,28 +76,41 @@ def robot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(confirmation, "LONGEST_S", dict.fromkeys(LONGEST_S, 0.15))
 
 
-@pytest.mark.parametrize("command", [stop, disarm])
+@pytest.mark.parametrize("command", ["stop", "disarm"])
 @pytest.mark.parametrize("mode", ["idle", "fault"])
-def test_confirmed_idle_drives_are_a_success(command: Any, mode: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_confirmed_idle_drives_are_a_success(command: str, mode: str, capsys: pytest.CaptureFixture[str]) -> None:
     Robot.reports = [report("walking", True, -1.0), report(mode, True, -1.0), report(mode, False, -1.0)]
-    assert command(OPTIONS) == exit_codes.OK
+    assert ended(command) == exit_codes.OK
     assert capsys.readouterr() == (f"{mode}\n", "")
+
+
+def test_programs_read_the_mode_of_a_confirmed_stop_and_nothing_else_of_another(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """`main` adds the error object where a command has printed no JSON."""
+    Robot.reports = [report("hold", True, -1.0)]
+    assert ended("stop", json=True) == exit_codes.OK
+    confirmed = {"schema": "operation/1", "command": "stop", "mode": "hold", "notice": ""}
+    assert loads(capsys.readouterr().out) == confirmed
+    Robot.reports = [report("hold", True, -1.0, {"heartbeat_age_s": 3.0})]
+    assert ended("stop", json=True) == exit_codes.TORQUE_UNKNOWN
+    assert capsys.readouterr().out == ""
 
 
 def test_a_held_pose_is_the_success_of_a_stop_alone(capsys: pytest.CaptureFixture[str]) -> None:
     Robot.reports = [report("hold", True, -1.0)]
-    assert stop(OPTIONS) == exit_codes.OK
-    assert disarm(OPTIONS) == exit_codes.TIMED_OUT
+    assert ended("stop") == exit_codes.OK
+    assert ended("disarm") == exit_codes.TIMED_OUT
     assert TORQUE_UNKNOWN in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [stop, disarm])
+@pytest.mark.parametrize("command", ["stop", "disarm"])
 @pytest.mark.parametrize("changed", [{"closed_loop": True}, {"heartbeat_age_s": None}, {"heartbeat_age_s": 3.0}])
 def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
-    command: Any, changed: Report, capsys: pytest.CaptureFixture[str]
+    command: str, changed: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Robot.reports = [report("fault", False, -1.0, changed)]
-    assert command(OPTIONS) == exit_codes.TORQUE_UNKNOWN
+    assert ended(command) == exit_codes.TORQUE_UNKNOWN
     printed = capsys.readouterr()
     assert printed.out == "fault\n"
     assert "left_adduction" in printed.err and "right" not in printed.err and TORQUE_UNKNOWN in printed.err
@@ -100,13 +118,13 @@ def test_a_drive_that_does_not_confirm_is_named_and_the_power_is_to_be_cut(
 
 def test_the_page_and_the_screen_wait_for_every_drive_as_well() -> None:
     Robot.reports = [report("walking", True, -1.0), report("hold", True, -1.0)]
-    assert stop_robot(OPTIONS.socket) == (HTTPStatus.OK, b"stop: every drive has confirmed it")
+    assert stop_robot(SOCKET) == (HTTPStatus.OK, b"stop: every drive has confirmed it")
     Robot.reports = [report("hold", True, -1.0, {"heartbeat_age_s": 3.0})]
-    status, text = stop_robot(OPTIONS.socket)
+    status, text = stop_robot(SOCKET)
     assert status == HTTPStatus.CONFLICT
     assert (
         text.decode()
-        == send_order(OPTIONS.socket, "stop")
+        == send_order(SOCKET, "stop")
         == f"{TORQUE_UNKNOWN}. stop is not confirmed by " + ("left_adduction")
     )
 
@@ -119,5 +137,5 @@ def test_a_user_who_may_not_see_the_status_reads_that_the_stop_was_accepted(monk
             return "accepted"
 
     monkeypatch.setattr(confirmation, "StatusClient", Blind)
-    text = send_order(OPTIONS.socket, "stop")
+    text = send_order(SOCKET, "stop")
     assert "accepted" in text and "group mud " in text and "refused" not in text and TORQUE_UNKNOWN in text

@@ -30,7 +30,7 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     assert bench.run("check").returncode == exit_codes.OK
     too_early = bench.run("walk")
     assert too_early.returncode == exit_codes.REFUSED and "mudskipper arm" in too_early.stderr
-    assert bench.run("arm").stdout == "hold\n"
+    assert json.loads(bench.run("arm", "--json").stdout)["mode"] == "hold"
     assert bench.run("move", "left_sweep=10", "right_sweep=10").stdout == "hold\n"
     assert abs(json.loads(bench.run("status", "--json").stdout)["drives"][0]["angle_rad"] - 0.1745) < 0.03
     assert bench.run("move", "left_sweep=170").returncode == exit_codes.REFUSED
