@@ -48,6 +48,11 @@ class DriveParameters:
     answers_only: ClassVar[bool] = False  # it sends nothing unless it is asked, which each tick does once
 
     @property
+    def asking_ends_torque(self) -> bool:
+        """Whether the drive can only be asked for its signals by a command, which ends its torque."""
+        return False
+
+    @property
     def reports_settings(self) -> bool:
         """Whether its protocol can read the drive's watchdog, version and serial number back."""
         return True

@@ -11,6 +11,10 @@ A set-point of zero is also what a drive reports that left closed loop by itself
 reports count only when the next heartbeat still says closed loop.
 
 A drive may reduce torque near its velocity limit without reporting it. A set-point that this explains does not count.
+
+A drive that reports no set-point may be judged by the torque that it measures, of which only the first of several
+reports in a row that differ counts: torque that stays away for a while is missing (control/monitors/joint_monitor.py),
+torque that is another one again and again is another program's.
 """
 
 from collections import deque
@@ -29,9 +33,18 @@ class SetpointMonitor:
     """Torques are the motor's. Owns the last commands."""
 
     def __init__(
-        self, command_delay_s: float, velocity_limit_turn_s: float = inf, velocity_gain_nm_s_turn: float = inf
+        self,
+        command_delay_s: float,
+        velocity_limit_turn_s: float = inf,
+        velocity_gain_nm_s_turn: float = inf,
+        tolerance_nm: float = TOLERANCE_NM,
+        measured: bool = False,
     ) -> None:
-        """The drive may report any command of the last `command_delay_s`, and clamps torque to its velocity limit."""
+        """The drive may report any command of the last `command_delay_s`, and clamps torque to its velocity limit.
+
+        `measured`: it reports torque and no set-point.
+        """
+        self._tolerance_nm, self._measured = tolerance_nm, measured
         followed = max(round(command_delay_s / PERIOD_S), 1)  # any of so many commands
         self._commands: deque[float] = deque(maxlen=followed)
         self._clamp_from_rad_s = (velocity_limit_turn_s - SPEED_UP_TURN_S) * TURN_RAD
@@ -41,6 +54,7 @@ class SetpointMonitor:
     def reset(self) -> None:
         self.forget_commands()
         self._score = 0
+        self._differed = False  # the last report
         self._absent = 0  # reports without torque since the last heartbeat
         self.found = False
         self.example = (0.0, 0.0)  # set-point and command of the last report that differed
@@ -57,10 +71,15 @@ class SetpointMonitor:
     def on_report(self, setpoint_nm: float, velocity_rad_s: float) -> None:
         """Compares a report of a drive in closed loop."""
         difference_nm = setpoint_nm - self._newest_nm
-        if -TOLERANCE_NM < difference_nm < TOLERANCE_NM or self._may_follow(setpoint_nm, velocity_rad_s):
+        if -self._tolerance_nm < difference_nm < self._tolerance_nm or self._may_follow(setpoint_nm, velocity_rad_s):
+            self._differed = False
             if self._score:
                 self._fall()
-        elif setpoint_nm == 0.0 or not isfinite(setpoint_nm):
+            return
+        again, self._differed = self._differed, True
+        if again and self._measured:
+            return
+        if setpoint_nm == 0.0 or not isfinite(setpoint_nm):
             self._absent += 1
             self.example = (0.0, self._newest_nm)
         else:
@@ -71,7 +90,7 @@ class SetpointMonitor:
         """Returns whether the set-point belongs to one of the last commands, or the drive may clamp it."""
         lowest_nm, highest_nm = min(self._commands), max(self._commands)
         largest_nm = max(-lowest_nm, highest_nm)
-        tolerance_nm = TOLERANCE_NM + TOLERANCE_FRACTION * largest_nm
+        tolerance_nm = self._tolerance_nm + TOLERANCE_FRACTION * largest_nm
         if setpoint_nm > highest_nm + tolerance_nm:
             return self._may_clamp(-velocity_rad_s, largest_nm)
         if setpoint_nm < lowest_nm - tolerance_nm:

@@ -5,9 +5,9 @@ command as their stamp and their torque is that of the command before. No code i
 tick commands a drive that is to be idle to leave the mode; a lost command is repeated by the next tick.
 
 A Damiao's answer says whether it follows torque. A CubeMars's does not: it counts as following from its first answer
-without a fault after the command to enter, until the command to leave or a restart. drivers/answer_counter.py finds
-restarts and a second drive with this id. A command that arrives here comes from another program. The torque of the
-answers is measured, so they cannot show that the drive follows another program's command that was not seen.
+without a fault after the command to enter, until a command to leave, also another program's, or a restart.
+drivers/answer_counter.py finds restarts and a second drive with this id. A command that arrives here comes from another
+program; one that does not, such as a command on the drive's serial line, shows in the torque that the answers measure.
 """
 
 from collections.abc import Callable
@@ -20,6 +20,7 @@ from drivers.drive import DriveHealth, Outlet
 from drivers.mit import codec
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import MitSettings
+from drivers.setpoint_monitor import TOLERANCE_NM, SetpointMonitor
 
 MASTER_ID = 0  # under which older CubeMars answer, all of a bus
 TURN_RAD = 2.0 * pi
@@ -37,6 +38,8 @@ class MitAxis:
         self._zero_rad = TURN_RAD * parameters.zero_turn
         self._amperes_per_nm = parameters.sign / parameters.reported_constant_nm_a
         self.settings = MitSettings(parameters)
+        tolerance_nm = TOLERANCE_NM + self._ranges.torque_step_nm
+        self.setpoints = SetpointMonitor(parameters.command_delay_s, tolerance_nm=tolerance_nm, measured=True)
         self._answers = AnswerCounter()
         self.reset()
 
@@ -49,6 +52,7 @@ class MitAxis:
         self._foreign_commands = self._restarts = 0
         self._answers.reset()
         self.settings.reset()
+        self.setpoints.reset()
         self._health: DriveHealth | None = None
 
     def begin_read(self, now_s: float) -> None:
@@ -106,6 +110,9 @@ class MitAxis:
         else:
             follows = self._following and not answer.fault
             self._receive_status(codec.ENABLED if follows else codec.DISABLED, answer.fault)
+        if self.closed_loop:
+            self.setpoints.on_report(answer.torque_nm, answer.velocity_rad_s)
+        self.setpoints.on_heartbeat(self.closed_loop)
 
     def _receive_status(self, status: int, flags: int) -> None:
         """Handles status and fault. A drive that left the mode by itself is not commanded back into it."""
@@ -116,8 +123,10 @@ class MitAxis:
         self.closed_loop = status == codec.ENABLED
 
     def _receive_foreign(self, data: bytes, now_s: float) -> None:
-        """Counts commands of another program, which the drive answers too."""
+        """Counts commands of another program, which the drive answers too. It may have left the mode by one."""
         self._answers.on_question(self._read_s)
+        if data == codec.LEAVE:
+            self._following = False
         if data not in HARMLESS:
             self._foreign_commands += 1
             self._health = None
@@ -155,7 +164,11 @@ class MitAxis:
     def health(self) -> DriveHealth:
         """The drive's report about itself, built again only when it has changed."""
         health = self._health
-        if health is None or health.duplicate_id is not self._answers.duplicates(self._read_s):
+        if (
+            health is None
+            or health.duplicate_id is not self._answers.duplicates(self._read_s)
+            or bool(health.setpoint_problem) is not self.setpoints.found
+        ):
             self._health = health = self._build_health()
         return health
 
@@ -172,6 +185,7 @@ class MitAxis:
             restarts=self._restarts,
             duplicate_id=self._answers.duplicates(self._read_s),
             foreign_commands=self._foreign_commands,
+            setpoint_problem=self._setpoint_text() if self.setpoints.found else "",
             setting_problem=settings.problem,
             serial_number=settings.serial_number,
             expected_serial_number=self.parameters.serial_number,
@@ -179,18 +193,24 @@ class MitAxis:
             errors=codec.error_text(self._error_flags),
         )
 
+    def _setpoint_text(self) -> str:
+        exerted_nm, commanded_nm = (self.parameters.sign * torque_nm for torque_nm in self.setpoints.example)
+        return f"{exerted_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
+
     def poll(self) -> None:
         self._transmit(codec.LEAVE)
 
     def send_torque(self, torque_nm: float) -> None:
         """Commands torque; to a drive that is to be idle zero torque is no command, but the one to leave the mode."""
+        motor_nm = self.parameters.sign * torque_nm
+        self.setpoints.on_command(motor_nm)
         if self._following or torque_nm != 0.0:
-            self._transmit(codec.encode_torque(self.parameters.sign * torque_nm, self._ranges.torque_nm))
+            self._transmit(codec.encode_torque(motor_nm, self._ranges.torque_nm))
         else:
             self._transmit(codec.LEAVE)
 
     def forget_commands(self) -> None:
-        """Does nothing: the answers state no torque that was commanded."""
+        self.setpoints.forget_commands()
 
     def prepare(self) -> None:
         """Replaces the command that the drive remembers, which it would follow as soon as it enters the mode."""

@@ -32,6 +32,10 @@ class MitParameters(DriveParameters):
         return model._replace(torque_nm=self.torque_range_nm) if self.torque_range_nm else model
 
     @property
+    def asking_ends_torque(self) -> bool:
+        return True
+
+    @property
     def reports_settings(self) -> bool:
         return self.ranges.has_registers
 

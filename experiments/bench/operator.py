@@ -48,6 +48,10 @@ class BenchOperator:
         """
         return False
 
+    def allows_unknown_watchdogs(self, what: str, meanwhile: Callable[[], None]) -> bool:
+        """Ask whether to arm drives by force whose watchdogs cannot be read."""
+        return False
+
     def start_observing(self) -> None:
         """Start before one joint moves; `observe_farthest` follows at its farthest position."""
 
@@ -84,6 +88,11 @@ class PromptedBenchOperator(BenchOperator):
         """Ask even if motion is allowed in advance: the faults were not known then."""
         answers = {CLEAR: "clear it and go on", LEAVE: "end here"}
         return self._operator.ask(f"{faults} Is the cause gone?", answers, meanwhile) == CLEAR
+
+    def allows_unknown_watchdogs(self, what: str, meanwhile: Callable[[], None]) -> bool:
+        """Ask even if motion is allowed in advance: only the power switch is certain."""
+        question = f"{what} Is a hand on the power switch, and may the robot be armed by force?"
+        return self._operator.ask(question, {GO_ON: "go on", "n": "no, end here"}, meanwhile) == GO_ON
 
     def observed_motion(self, joint: str, meanwhile: Callable[[], None]) -> Observation:
         side, kind = joint.split("_")
@@ -123,6 +132,9 @@ class SimulatedBenchOperator(BenchOperator):
         self._turning = 0  # index of the joint that is turned along the profile
         self._profile: deque[float] = deque()
         rig.others.append(lambda _: self._hold())
+
+    def allows_unknown_watchdogs(self, what: str, meanwhile: Callable[[], None]) -> bool:
+        return True
 
     def start_observing(self) -> None:
         self._from_rad = self._plant.angles_rad

@@ -55,6 +55,8 @@ class TestRig:
         self._rest = self.level  # joint angles in which the flippers lie without torque
         self.lateness = Lateness()  # of one measurement, while torque is on
         self.lateness_so_far = Lateness()  # of all measurements
+        self._unreadable = [joint for joint, drive in self.configuration.drive.items() if not drive.reports_settings]
+        self.forced = False  # the operator allows torque without a known watchdog
 
     def tick(self) -> Sample:
         aim, loop = self.controller.joint_targets, self.loop
@@ -85,13 +87,18 @@ class TestRig:
         self.run_for(POLL_S)
 
     def tick_silently(self, others: Sequence[tuple[CanPort, Frame]] = ()) -> Sample:
-        """Read the drives for one tick and send nothing but the frames of `others`, as another program would."""
+        """Read the drives for one tick and send nothing but the frames of `others`, as another program would.
+
+        Drives that answer only when asked are asked, where that commands nothing and feeds no watchdog.
+        """
         tick = self.rig.wait()
         for port, frame in others:
             port.send(frame)
         states = self.drives.read(tick.now_s)
-        self.drives.poll()  # which commands nothing, and feeds no watchdog
-        if self._torque_on():
+        asked = [axis for axis in self.drives.axes if not axis.parameters.asking_ends_torque]
+        for axis in asked:
+            axis.poll()
+        if self._torque_on() and len(asked) == len(states):
             self._update_lateness(tick, states)
         return Sample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
@@ -111,11 +118,12 @@ class TestRig:
 
     def arm(self, law: HoldLaw | None = None) -> None:
         """Arm the robot into HOLD, with a hold law from the first torque on. Raises BenchError."""
+        self._ask_about_watchdogs()
         self._wait_until_armable()
         self.controller.hold_law = law
         last_blocking: Sequence[Fault] = ()
         for _ in range(round(ARMING_S / PERIOD_S)):
-            blocking = self.loop.faults.blocking()
+            blocking = self.loop.faults.blocking(self.forced)
             if self.loop.mode is Mode.IDLE and not blocking:
                 self._ask_for_torque()  # again, where a fault such as a sinking joint began in the tick of the request
             if self.tick_checked().mode is Mode.HOLD:
@@ -125,14 +133,23 @@ class TestRig:
 
     def _ask_for_torque(self) -> None:
         self._rest = measured_angles(self.loop.states)
-        refused = self.loop.request(Request.ARM, self.rig.now_s)
+        refused = self.loop.request(Request.ARM, self.rig.now_s, forced=self.forced)
         if refused:
             raise BenchError(f"The robot cannot be armed: {refused}")
+
+    def _ask_about_watchdogs(self) -> None:
+        """Ask once whether to arm by force. Raises BenchError where the operator does not allow it."""
+        if self.forced or not self._unreadable:
+            return
+        what = f"{', '.join(self._unreadable)}: no watchdog can be read; stage 5 measures whether it ends the torque."
+        if not self.operator.allows_unknown_watchdogs(what, self._tick_during_prompt):
+            raise BenchError(f"The robot cannot be armed: {what} An operator at a terminal must allow it.")
+        self.forced = True
 
     def _wait_until_armable(self) -> None:
         if self._is_armable_soon():
             return
-        faults = _advice(self.loop.faults.blocking())
+        faults = _advice(self.loop.faults.blocking(self.forced))
         if faults and self.operator.allows_clearing(faults, self._tick_during_prompt):
             self.loop.request(Request.CLEAR, self.rig.now_s)
             if self._is_armable_soon():
@@ -144,7 +161,7 @@ class TestRig:
 
     def _is_armable_soon(self) -> bool:
         for _ in range(round(ARMING_S / PERIOD_S)):
-            if self.tick().mode is Mode.IDLE and not self.loop.faults.blocking():
+            if self.tick().mode is Mode.IDLE and not self.loop.faults.blocking(self.forced):
                 return True
         return False
 

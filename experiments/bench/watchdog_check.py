@@ -5,17 +5,22 @@ program sends nothing more. A heartbeat reports idle with a delay of up to one p
 
 Then the same again among frames of each kind that another program may send at any time. A watchdog that they feed keeps
 the torque of a dead controller for as long as anything on the bus asks for telemetry.
+
+A drive that can only be asked by a command is not asked meanwhile: its watchdog would be fed. Its answer to the first
+command states torque and status of before that command. So it is asked twice, shortly before and shortly after its
+time-out. Where the time-out cannot be read, the torque must be gone after the longest one that is allowed.
 """
 
 from collections.abc import Sequence
-from math import fsum, nan
+from math import fsum, inf, isnan, nan
 
 from control.rate import PERIOD_S
 from control.records import DriveStates, Joints, Torques
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
+from drivers.drive import DriveHealth
 from drivers.drive_types import type_of
-from experiments.bench.reading import Reading, Readings
+from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.test_rig import Sample, TestRig, first_lasting
 
 PRESSING_NM = 0.08  # down, twice the weight of an arm; none for a sweep joint, which would move
@@ -49,10 +54,23 @@ def let_watchdogs_trip(test_rig: TestRig, others: Others = ()) -> tuple[list[Sam
 
 
 def check_watchdog_times(test_rig: TestRig) -> Readings:
+    if not all(_asked_by_command(test_rig)):
+        yield from _observed_times(test_rig)
+    if any(_asked_by_command(test_rig)):
+        yield from _asked_times(test_rig)
+
+
+def _asked_by_command(test_rig: TestRig) -> list[bool]:
+    return [axis.parameters.asking_ends_torque for axis in test_rig.drives.axes]
+
+
+def _observed_times(test_rig: TestRig) -> Readings:
     pressed, silence = let_watchdogs_trip(test_rig)
     late_s = LATE_TICKS * PERIOD_S
-    for index, health in enumerate(test_rig.drives.health):
+    for index, (health, by_command) in enumerate(zip(test_rig.drives.health, _asked_by_command(test_rig), strict=True)):
         timeout_s, joint = health.watchdog_s, health.joint
+        if by_command:
+            continue
         advice = f"set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
         idle_s = _idle_s(pressed, silence, index)
         latest_s = timeout_s + late_s + test_rig.configuration.drive[joint].heartbeat_period_s
@@ -61,6 +79,53 @@ def check_watchdog_times(test_rig: TestRig) -> Readings:
             gone_s = _gone_s(pressed, silence, index)
             yield Reading(f"{joint}: no current after it", gone_s, "s", timeout_s - late_s, timeout_s + late_s, advice)
     yield from _reasons(test_rig)
+
+
+def _asked_times(test_rig: TestRig) -> Readings:
+    known_s = [health.watchdog_s for health in test_rig.drives.health if health.watchdog_s > 0.0]
+    late_s = LATE_TICKS * PERIOD_S
+    if known_s:
+        yield from _asked_readings(test_rig, min(known_s) - late_s, True, "after the last command")
+        clear(test_rig)
+    yield from _asked_readings(test_rig, _longest_s(test_rig) + late_s, False, "after the last command")
+    yield from _reasons(test_rig)
+
+
+def _longest_s(test_rig: TestRig) -> float:
+    """Return the longest time-out of the drives; the longest that is allowed where one is unknown."""
+    unknown_s = test_rig.configuration.faults.longest_watchdog_s
+    return max(unknown_s if isnan(health.watchdog_s) else health.watchdog_s for health in test_rig.drives.health)
+
+
+def _asked_readings(test_rig: TestRig, silence_s: float, energised: bool, when: str, others: Others = ()) -> Readings:
+    """Ask the drives that must be asked by a command, after a silence, whether they still have torque."""
+    before, answers = ask_after_silence(test_rig, silence_s, others)
+    for index, (joint, drive) in enumerate(test_rig.configuration.drive.items()):
+        if not drive.asking_ends_torque:
+            continue
+        what, advice = f"{silence_s:.2f} s {when}", f"set the watchdog of {joint}; see the guide of its type of drive"
+        if drive.reports_settings:
+            status = float(answers[index].closed_loop)
+            yield Reading(f"{joint}: in closed loop {what}", status, "", energised, energised, advice)
+        if "adduction" in joint:
+            fraction = answers[index].current_a / before[index].current_a
+            low, high = (GONE_FRACTION, inf) if energised else (-inf, GONE_FRACTION)
+            yield Reading(f"{joint}: part of its current {what}", fraction, "", low, high, advice)
+        elif not drive.reports_settings:  # no torque can be held on a joint that swings freely
+            yield left_out(f"{joint}: part of its current {what}")
+
+
+def ask_after_silence(test_rig: TestRig, silence_s: float, others: Others = ()) -> tuple[DriveStates, DriveStates]:
+    """Return the last states with torque, and the answers to the command that ends a silence."""
+    test_rig.arm(press)
+    before = test_rig.run_for(PRESSING_S)[-1].states
+    for _ in range(round(silence_s / PERIOD_S)):
+        test_rig.tick_silently(others)
+    test_rig.drives.disarm(test_rig.rig.now_s, at_once=True)
+    for _ in range(LATE_TICKS):
+        answered = test_rig.tick_silently()
+    test_rig.switch_off()
+    return before, answered.states
 
 
 def check_what_feeds_watchdogs(test_rig: TestRig) -> Readings:
@@ -72,17 +137,35 @@ def check_what_feeds_watchdogs(test_rig: TestRig) -> Readings:
 
 
 def _readings_among(test_rig: TestRig, kind: str, others: Others) -> Readings:
+    if any(_asked_by_command(test_rig)):
+        latest_s = _longest_s(test_rig) + LATE_TICKS * PERIOD_S
+        yield from _asked_readings(test_rig, latest_s, False, f"among {kind}", others)
+        clear(test_rig)
+    if not all(_asked_by_command(test_rig)):
+        yield from _observed_among(test_rig, kind, others)
+
+
+def _observed_among(test_rig: TestRig, kind: str, others: Others) -> Readings:
     pressed, silence = let_watchdogs_trip(test_rig, others)
     late_s = LATE_TICKS * PERIOD_S
     for index, health in enumerate(test_rig.drives.health):
         joint, timeout_s = health.joint, health.watchdog_s
+        if _asked_by_command(test_rig)[index]:
+            continue
         idle_s = _idle_s(pressed, silence, index)
         latest_s = timeout_s + late_s + test_rig.configuration.drive[joint].heartbeat_period_s
         advice = f"{kind} feed its watchdog: no program may send them while torque is on; update its firmware"
         yield Reading(f"{joint}: idle among {kind}", idle_s, "s", timeout_s - late_s, latest_s, advice)
+    clear(test_rig)
+
+
+def clear(test_rig: TestRig) -> Sequence[DriveHealth]:
+    """Wait for the drives' reports, which are returned, and clear the fault that the check has caused."""
     for _ in range(round(REPORTING_S / PERIOD_S)):
         test_rig.tick()
+    reported = test_rig.drives.health
     test_rig.clear_fault()
+    return reported
 
 
 def _idle_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
@@ -101,10 +184,10 @@ def _gone_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
 
 def _reasons(test_rig: TestRig) -> Readings:
     """Check the reason that the drives report, and clear it."""
-    for _ in range(round(REPORTING_S / PERIOD_S)):
-        test_rig.tick()
-    reported = test_rig.drives.health
-    test_rig.clear_fault()
-    for health in reported:
+    readable = [drive.reports_settings for drive in test_rig.configuration.drive.values()]
+    for health, can_report in zip(clear(test_rig), readable, strict=True):
+        if not can_report:
+            yield left_out(f"{health.joint}: switched off by its watchdog")
+            continue
         advice = f"the drive reports {health.errors or 'no reason'}, not its watchdog: see the watchdog in stage 1"
         yield Reading(f"{health.joint}: switched off by its watchdog", health.watchdog_expired, "", 1, 1, advice)

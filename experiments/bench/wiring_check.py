@@ -15,7 +15,7 @@ from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, DriveParameters, FrameContent
 from drivers.drive_types import read_frame, traffic_of, type_of
 from experiments.bench.lateness import BUSY
-from experiments.bench.reading import Reading, Readings
+from experiments.bench.reading import Reading, Readings, left_out
 from experiments.bench.test_rig import TestRig
 
 ASKING_S = 3.0  # longest, for versions and then for watchdogs: asked every 0.5 s
@@ -129,13 +129,22 @@ def check_bus_loads(test_rig: TestRig) -> Readings:
 
 def check_firmware(test_rig: TestRig) -> Readings:
     """Check that the firmware version is supported."""
-    _ask(test_rig, lambda health: bool(health.firmware))
+    readable = _readable(test_rig)
+    _ask(test_rig, lambda health: bool(health.firmware) or health.joint not in readable)
     for health in test_rig.drives.health:
+        if health.joint not in readable:
+            yield left_out(f"{health.joint}: firmware supported")
+            continue
         supported = float(health.firmware_supported) if health.firmware else nan
         advice = (
             f"it is {health.firmware or 'unknown'}: install {health.supported_firmware}, or see whether requests arrive"
         )
         yield Reading(f"{health.joint}: firmware supported", supported, "", 1, 1, advice)
+
+
+def _readable(test_rig: TestRig) -> set[str]:
+    """Return the joints whose drives report version and watchdog."""
+    return {joint for joint, drive in test_rig.configuration.drive.items() if drive.reports_settings}
 
 
 def _ask(test_rig: TestRig, known: Callable[[DriveHealth], bool]) -> None:
@@ -148,9 +157,13 @@ def _ask(test_rig: TestRig, known: Callable[[DriveHealth], bool]) -> None:
 
 def check_watchdogs(test_rig: TestRig) -> Readings:
     """Check that the drives report a watchdog with a short enough timeout."""
-    _ask(test_rig, lambda health: isfinite(health.watchdog_s))
+    readable = _readable(test_rig)
+    _ask(test_rig, lambda health: isfinite(health.watchdog_s) or health.joint not in readable)
     longest_s = test_rig.configuration.faults.longest_watchdog_s
     for health in test_rig.drives.health:
+        if health.joint not in readable:  # stage 5 measures it
+            yield left_out(f"{health.joint}: watchdog")
+            continue
         set_it = "set enable_watchdog and watchdog_timeout = 0.1, and save"
         advice = f"{health.watchdog_advice if isnan(health.watchdog_s) else set_it}; {SETTING_UP}"
         yield Reading(f"{health.joint}: watchdog", health.watchdog_s, "s", 0.001, longest_s, advice)

@@ -53,6 +53,7 @@ class FaultBench(Lockstep):
         super().__init__(configuration, track, seed, recorder=self.rows, failures=failures)
         self._foreign_ports = {name: bus.open() for name, bus in self.buses.items()}
         self._acts: list[Act] = []  # called in every step, after the robot's and before the loop's
+        self._late_acts: list[Act] = []  # called after the loop's
         self.loop_ticks = 0
         self.stalled_steps = 0  # coming periods in which the loop does nothing
         self.dead = False
@@ -73,6 +74,8 @@ class FaultBench(Lockstep):
             self._missed += 1
             return
         self._tick()
+        for act in tuple(self._late_acts):
+            act()
 
     def _tick(self) -> None:
         for failure in self.failures.update(self.now_s):
@@ -95,11 +98,12 @@ class FaultBench(Lockstep):
         super().arm(forced or self.forced)
 
     @contextmanager
-    def every_step(self, act: Act) -> Iterator[None]:
-        """Call `act` in every step within this context."""
-        self._acts.append(act)
+    def every_step(self, act: Act, late: bool = False) -> Iterator[None]:
+        """Call `act` in every step within this context; `late`: after the loop's tick."""
+        acts = self._late_acts if late else self._acts
+        acts.append(act)
         yield
-        self._acts.remove(act)
+        acts.remove(act)
 
     def send_foreign(self, joint: str, frame: Frame) -> None:
         """Sends a frame on the bus of a joint's drive that is from neither drive nor loop."""

@@ -248,8 +248,15 @@ def recovery_given_up(bench: FaultBench, joint: str) -> None:
     bench.run_until(lambda: bool(bench.loop.controller.recovery.given_up), 5.0)
 
 
-@in_every_step
-def current_reversed(bench: FaultBench, joint: str) -> None:
-    """Report a current against the commanded torque."""
-    drive, sent_nm = bench.drive(joint), bench.loop.sent.torques_nm[bench.index_of(joint)]
-    bench.send_foreign(joint, drive.forge_current(-copysign(4.0, sent_nm) * drive.parameters.sign))
+@contextmanager
+def current_reversed(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Report a current against the commanded torque. The answer to a question follows the command that asks."""
+    drive, index = bench.drive(joint), bench.index_of(joint)
+    own = bench.loop.configuration.drive[joint]
+
+    def report() -> None:
+        current_a = -copysign(4.0, bench.loop.sent.torques_nm[index]) * drive.parameters.sign
+        bench.send_foreign(joint, drive.forge_current(current_a))
+
+    with bench.every_step(report, late=type_of(own).query(own.node_id) is not None):
+        yield

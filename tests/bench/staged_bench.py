@@ -142,7 +142,7 @@ class BenchReport:
         """Count the checks that were left out without an operator."""
         of_stage = [test for test in self.tests if test["stage"] == stage]
         count = sum(reading.left_out for test in of_stage for reading in test["readings"])
-        return f", without {count} checks that need an operator" if count else ""
+        return f", without {count} checks that were left out" if count else ""
 
 
 class StagedBench:

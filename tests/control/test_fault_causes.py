@@ -33,6 +33,12 @@ def test_a_dead_bus_is_one_cause_with_everything_that_its_drives_report() -> Non
     assert causes(*dead_bus("left")) == [(K.BUS_OFF, ["left"], 11)]
 
 
+@pytest.mark.parametrize("loop", [K.LOOP_LAGGING, K.LOOP_CRAWLING, K.LOOP_STALLED])
+def test_drives_that_a_late_loop_did_not_ask_follow_from_it(loop: FaultKind) -> None:
+    unasked = [kind.fault(joint) for joint in JOINTS for kind in (K.DRIVE_LATE, K.DRIVE_QUIET, K.DRIVE_SILENT)]
+    assert causes(*unasked, loop.fault()) == [(loop, [""], 12)]
+
+
 def test_two_dead_buses_are_one_cause() -> None:
     assert causes(*dead_bus("left"), *dead_bus("right")) == [(K.BUS_OFF, ["left", "right"], 22)]
 

@@ -142,7 +142,7 @@ def test_left_out_checks_are_not_reported_as_passed() -> None:
     report.add(left_out("left_sweep: turned by hand"))
     report.end()
     lines = [line for line, _ in report.lines(brief=False)]
-    assert "stage 3, zeros: passed, without 1 checks that need an operator" in lines
+    assert "stage 3, zeros: passed, without 1 checks that were left out" in lines
     assert report.as_json["tests"][0]["readings"][0]["left_out"] is True
 
 

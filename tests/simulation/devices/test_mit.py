@@ -204,6 +204,11 @@ class Robot:
         for device in self.devices:
             device.torque_nm(self.now_s)
 
+    def follow_another(self, torque_nm: float) -> None:
+        """Lets the first drive obey a command that is not on the bus."""
+        self.devices[0].receive(self.devices[0].forge_torque(torque_nm), self.now_s)
+        self.devices[0].torque_nm(self.now_s)
+
     def arm(self) -> None:
         self.drives.arm(self.now_s, at_once=True)
         self.drives.arm(self.now_s + 1.0)
@@ -324,6 +329,50 @@ def test_commands_of_another_program_are_counted(model: str, data: bytes, counte
     robot.tick()
     assert robot.axis.health.foreign_commands == counted
     assert robot.drives.axes[1].health.foreign_commands == 0
+
+
+@pytest.mark.parametrize("model", ["DM4310", "AK80-9"])
+def test_a_drive_that_another_program_makes_leave_the_mode_is_idle(model: str) -> None:
+    """No answer of a CubeMars states it."""
+    robot = Robot(model=model)
+    robot.tick(count=30)
+    robot.arm()
+    assert robot.axis.closed_loop
+    robot.far.send(Frame(1, codec.LEAVE))
+    robot.devices[0].energised = False
+    robot.tick(idle=False, torque_nm=0.2, count=2)
+    assert not robot.axis.closed_loop and not robot.devices[0].energised
+    assert robot.drives.axes[1].closed_loop
+
+
+@pytest.mark.parametrize("model", ["DM4310", "AK80-9", "AK80-64"])
+@pytest.mark.parametrize("every", [2, 10])
+def test_commands_of_another_program_that_are_not_seen_show_in_the_measured_torque(model: str, every: int) -> None:
+    robot = Robot(model=model)
+    robot.tick(count=30)
+    robot.arm()
+    for number in range(200):
+        robot.tick(idle=False, torque_nm=0.2)
+        assert not robot.axis.health.setpoint_problem
+        if number % 40 == 7:  # a single outlier now and then is none
+            robot.devices[0].receive(robot.devices[0].forge_torque(1.0), robot.now_s)
+    for number in range(100):
+        robot.tick(idle=False, torque_nm=0.2)
+        if number % every == 0:
+            robot.follow_another(1.0)
+    assert "N·m where 0.2 N·m was commanded" in robot.axis.health.setpoint_problem
+    assert not robot.drives.axes[1].health.setpoint_problem
+
+
+def test_torque_that_is_missing_for_a_while_is_no_other_programs_command() -> None:
+    """A supply that sags, or the speed, may limit the torque; the joint's monitor finds what lasts."""
+    robot = Robot({"motor_current_limit_a": 1.0})
+    robot.tick(count=30)
+    robot.arm()
+    for _ in range(4):
+        robot.tick(idle=False, torque_nm=0.4, count=30)
+        robot.tick(idle=False, torque_nm=0.05, count=30)
+        assert not robot.axis.health.setpoint_problem
 
 
 def test_a_register_that_another_program_writes_counts_for_its_drive() -> None:
