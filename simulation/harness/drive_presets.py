@@ -16,9 +16,9 @@ from drivers.mit.models import MODELS
 
 DRIVES = (*DRIVE_TYPES, *(f"mit:{model}" for model in MODELS))  # types of drive, and models of motor
 DATA_BIT_RATE_KBIT_S = 5000
-# Answers to questions are a whole tick old, so the loop's delay is 1.5 ticks, 3.9 ms. With the default gains (8 and 0.06,
-# 10 and 0.08) the phase margins are 12 and 14 degrees, and joints oscillate after a flipper has broken free at full
-# torque; with these 17 and 18, nearly those of drives that report by themselves.
+# Answers to questions are a whole tick old, so the loop's delay is 1.5 ticks, 3.9 ms. The default gains (8 and 0.06, 10
+# and 0.08) then have phase margins of 12 and 15 degrees, and joints oscillate after a flipper has broken free at full
+# torque; with these 17 and 20, nearly those of drives that report by themselves.
 GAINS = {
     "sweep_stiffness_nm_rad": 6.4,
     "sweep_damping_nm_s_rad": 0.054,
