@@ -51,7 +51,8 @@ def zero(options: argparse.Namespace) -> int:
             if joint not in configuration.rig.joints:
                 raise ConfigurationError([f"{joint}: this robot has {', '.join(configuration.rig.joints)}"])
         readings = _read(configuration, list(dict.fromkeys(options.joint)))
-        after = changed_text(text, {("drive", each.joint, "zero_turn"): each.new_turn for each in readings})
+        moved = [each for each in readings if each.new_turn != each.old_turn]
+        after = changed_text(text, {("drive", each.joint, "zero_turn"): each.new_turn for each in moved})
         for each in readings:
             print(
                 f"{each.joint}: zero_turn {each.old_turn:g} -> {each.new_turn:g}; the joint stood at"

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from command_line import exit_codes
+from command_line.init.bus_scan import scan, with_found, with_identities
 from command_line.init.plate_file import RECTANGLE, plate_answer, read_corners
 from command_line.init.questions import Ask, ask, number, one_of, whole_number
 from command_line.screen import complain
@@ -13,6 +14,7 @@ from control.geometry import FlipperGeometry
 from control.plate.outline import Corner
 from control.records import FLIPPERS, Rig
 from drivers.drive_types import DRIVE_TYPES
+from firmware_host.buses import BusError
 from firmware_host.configuration.key_reference import Key, configuration_keys
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.new_file import NewRobot, drive_keys, new_file
@@ -33,6 +35,9 @@ def init(options: argparse.Namespace) -> int:
     except ConfigurationError as problem:
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
+    except BusError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
     except EOFError:
         return exit_codes.INTERRUPTED
     if options.file == PRINTED:
@@ -45,17 +50,31 @@ def init(options: argparse.Namespace) -> int:
 
 
 def answers(options: argparse.Namespace, read: Ask | None) -> NewRobot:
-    """Returns the robot of the options; `read` asks for what they leave open. Raises ConfigurationError."""
+    """Returns the robot of the options; `read` asks for what is left open. Raises ConfigurationError and BusError."""
     default = NewRobot()
     name = options.name or ask("name of the robot", default.name, str, read)
     wanted = options.flippers or ask("flippers: left, right or both", "both", one_of((*FLIPPERS, "both")), read)
     rig = Rig(FLIPPERS if wanted == "both" else (wanted,))
     base = options.base or ask("base: fixed or moves", "moves", one_of(("fixed", "moves")), read)
+    if options.from_bus:
+        return _from_bus(options, NewRobot(name, rig, base == "fixed"), read)
     types = tuple(DRIVE_TYPES)
     drive_type = options.drive or ask(f"drives: {' or '.join(types)}", default.drive_type, one_of(types), read)
     interface = options.interface or ask("interface of python-can", default.interface, str, read)
     robot = NewRobot(name, rig, base == "fixed", drive_type, interface, _channels(options, rig, read))
     return robot._replace(node_ids=_node_ids(options, robot, read), geometry=_geometry(options, read))
+
+
+def _from_bus(options: argparse.Namespace, robot: NewRobot, read: Ask | None) -> NewRobot:
+    """Scans the buses, and asks which drive moves which joint. Raises ConfigurationError and BusError."""
+    interface = options.interface or ask("interface of python-can", robot.interface, str, read)
+    robot = robot._replace(interface=interface, channels=_channels(options, robot.rig, read))
+    found = scan(robot, options.fd, options.drive)
+    for channel, drives in found.items():
+        print(f"found on {channel}: {', '.join(f'{each.type} {each.node_id}' for each in drives)}", file=sys.stderr)
+    robot = with_found(robot, found, dict(options.node or ()))
+    robot = robot._replace(node_ids=_node_ids(options, robot, read))
+    return with_identities(robot, found)._replace(geometry=_geometry(options, read))
 
 
 def _channels(options: argparse.Namespace, rig: Rig, read: Ask | None) -> tuple[str, ...]:

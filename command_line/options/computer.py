@@ -43,6 +43,8 @@ def add_init(init: Parser) -> None:
     option("--base", choices=("fixed", "moves"), help="a bench, or a body that the flippers move")
     option("--drive", choices=tuple(DRIVE_TYPES), help="protocol of the drives")
     option("--interface", metavar="NAME", help="of python-can, such as socketcan")
+    option("--from-bus", action="store_true", help="search its channels for drives, and write what is found")
+    option("--fd", action="store_true", help="with --from-bus: it carries CAN FD")
     option(
         "--channel", action="append", metavar="NAME", help="such as can0; twice: the left and the right flipper's own"
     )

@@ -87,4 +87,4 @@ def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDr
         problem = f"it answers under id {min(ids)}: set MST_ID (register 7) to {node_id + 16}"
     numbers = [f"{int(each):08x}" for each in sorted(values.get(SERIAL, ()))] or [""]
     for number in numbers if len(numbers) > 1 else numbers * len(ids):
-        yield FoundDrive(NAME, node_id, " or ".join(models), firmware, number, problem)
+        yield FoundDrive(NAME, node_id, " or ".join(models), firmware, number, problem, next(iter(models), ""))

@@ -35,6 +35,8 @@ class NewRobot(NamedTuple):
     channels: tuple[str, ...] = ("can0",)  # one for all flippers, or one for each
     node_ids: Mapping[str, int] = {}  # by joint; the others are counted up
     geometry: FlipperGeometry = FlipperGeometry()
+    serial_numbers: Mapping[str, str] = {}  # by joint, where they are known
+    models: Mapping[str, str] = {}  # of the motors, by joint, where the drives have them
 
     def node_id(self, joint: str) -> int:
         lowest = next(key.bounds for key in drive_keys(self.drive_type) if key.name == "node_id" and key.bounds).minimum
@@ -65,8 +67,14 @@ def _sections(robot: NewRobot) -> Iterator[str]:
             drive = {"bus": robot.bus_of(flipper), "node_id": robot.node_id(joint), "type": robot.drive_type}
             defaults = {key.name: key.default for key in drive_keys(robot.drive_type)}
             wanted = ("sign", "zero_turn", "torque_constant_nm_a", "current_limit_a")
-            values = drive | {name: defaults[name] for name in wanted}
+            values = drive | {name: defaults[name] for name in wanted} | _identity(robot, joint)
             yield _section(f"drive.{joint}", values, drive_keys(robot.drive_type))
+
+
+def _identity(robot: NewRobot, joint: str) -> dict[str, str]:
+    """Returns what was found of one drive; a serial number of zeros is none."""
+    found = {"model": robot.models.get(joint, ""), "serial_number": robot.serial_numbers.get(joint, "")}
+    return {name: text for name, text in found.items() if text.strip("0")}
 
 
 def _common(robot: NewRobot) -> dict[str, dict[str, Any]]:
