@@ -10,8 +10,8 @@ that slides at its yield force holds every piece below the mud's surface (mud_sp
 
 with the strength s_u at the depth of the piece (for a strip, the mean over its height), times the rate factor of the
 plate's speed. The laws and their constants are those of the clay. A slanted edge that looks down bears on its extent
-across, one that looks up (as the top) does not. The narrow sides press at the middle of each one's range outward, and
-stick with the columns, in proportion to the panels' areas. Adhesion does not depend on pressure (undrained), so across
+across, one that looks up (as the top) does not. The narrow sides press, and those of a plate that is no rectangle
+stick, at the middle of each one's range outward. Adhesion does not depend on pressure (undrained), so across
 and along are independent. Lean, cross-coupling and lateral pull follow from the sum.
 
 At rest loads relax: they fade by up to `relaxation` within half a second, and motion loads the springs again.
@@ -42,10 +42,10 @@ WAKING_M = 0.001
 
 
 class PanelContact:
-    """Owns the mud on one panel: two columns of both faces with a part of the narrow sides, and the lower edge."""
+    """Owns the mud on one panel: two columns of both faces, and the lower edge."""
 
     def __init__(self, size: PlateSize, panel: Panel, side_m: float) -> None:
-        """`side_m`: of the thickness of each narrow side, the part that a column of this panel counts."""
+        """`side_m`: thickness of the narrow side that a column counts."""
         self.panel = panel
         self._side_m = side_m
         self._pressed = [PressedColumn(size.width_m, SIDEWAYS_YIELD_M) for _ in range(2)]
@@ -89,18 +89,16 @@ class PlateContact:
         self.size = size
         self.relaxation = relaxation
         self._strip_m = size.height_m / STRIPS
-        panels = panels_of(size)
-        area_m2 = sum(panel.area_m2 for panel in panels)
-        self._panels = [
-            PanelContact(size, panel, size.thickness_m * ((panel.outer_m - panel.inner_m) * size.height_m / area_m2))
-            for panel in panels
-        ]
+        side_m = 0.0 if size.corners_m else size.thickness_m  # a rectangle's columns count its narrow sides
+        self._panels = [PanelContact(size, panel, side_m) for panel in panels_of(size)]
         self._sides_m = sides_m(size, STRIPS)
         self._inner_side, self._outer_side = (PressedColumn(size.thickness_m, LENGTHWAYS_YIELD_M) for _ in range(2))
+        self._rubbed_sides = [(RubbedColumn(), side_m) for side_m in self._sides_m] if size.corners_m else []
         self._parts: tuple[Springs[Any], ...] = (
             *(part for panel in self._panels for part in panel.parts),
             self._inner_side,
             self._outer_side,
+            *(side for side, _ in self._rubbed_sides),
         )
         self.reset()
 
@@ -131,12 +129,11 @@ class PlateContact:
 
     def _wrench(self, step: PlateStep) -> Wrench:
         """Returns the sum over all pieces."""
-        total = self._panels[0].step(step)
-        for panel in self._panels[1:]:
-            total = tuple([a + b for a, b in zip(total, panel.step(step), strict=True)])
+        parts = [panel.step(step) for panel in self._panels]
+        parts += [self._rub_side(step, side, outward_m) for side, outward_m in self._rubbed_sides]
+        n, r, s, n_u, n_s, r_s, s_u = parts[0] if len(parts) == 1 else map(sum, zip(*parts, strict=True))
         inner_n, inner_nm = self._step_side(step, self._inner_side, self._sides_m[0])
         outer_n, outer_nm = self._step_side(step, self._outer_side, self._sides_m[1])
-        n, r, s, n_u, n_s, r_s, s_u = total
         return Wrench(n, r + inner_n + outer_n, s, n_u, n_s, r_s + inner_nm + outer_nm, s_u)
 
     def _relax(self, dt_s: float, speed_m_s: float) -> None:
@@ -149,6 +146,14 @@ class PlateContact:
         remaining = (1.0 - self.relaxation * self._rested) / (1.0 - self.relaxation * before)
         for part in self._parts:
             part.fade(remaining)
+
+    def _rub_side(self, step: PlateStep, side: RubbedColumn, outward_m: float) -> tuple[float, ...]:
+        """Returns the part of the mud that sticks to a narrow side in the wrench."""
+        _, v_r, v_s, _, _, r_s, s_u = step.twist
+        strips = strips_at(step, outward_m, 0.0, self._strip_m)
+        velocity_m_s = complex(v_r, v_s + s_u * outward_m)
+        along_n, outward_nm = side.step(step, strips, self.size.thickness_m, velocity_m_s, r_s)
+        return 0.0, along_n.real, along_n.imag, 0.0, 0.0, outward_nm, along_n.imag * outward_m
 
     def _step_side(self, step: PlateStep, side: PressedColumn, outward_m: float) -> tuple[float, float]:
         """Returns the force outward, and its moment upward."""

@@ -27,10 +27,6 @@ class Panel(NamedTuple):
     length_m: float  # from there to the upper boundary
     length_slope: float
 
-    @property
-    def area_m2(self) -> float:
-        return (self.outer_m - self.inner_m) * self.length_at_m((self.inner_m + self.outer_m) / 2.0)
-
     def foot_at_m(self, outward_m: float) -> float:
         return self.foot_m + self.foot_slope * outward_m
 
