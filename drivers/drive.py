@@ -44,8 +44,10 @@ class DriveParameters:
         str, Meaning("of the drive; the robot is not armed with another one; empty: not compared")
     ] = ""
 
-    serial_digits: ClassVar[int] = 12  # hexadecimal ones, of a serial number of this type of drive
+    serial_digits: ClassVar[int] = 12  # hexadecimal ones, of a serial number of this type of drive; 0: it reports none
     answers_only: ClassVar[bool] = False  # it sends nothing unless it is asked, which each tick does once
+    unreported: ClassVar[frozenset[str]] = frozenset()  # signals that this type of drive does not have
+    holds_idle_current: ClassVar[bool] = False  # switched off, it reports its last current until its next heartbeat
 
     @property
     def asking_ends_torque(self) -> bool:

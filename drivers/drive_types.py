@@ -18,11 +18,16 @@ from drivers.mit.drive_type import Mit
 from drivers.moteus.bench import MoteusBench
 from drivers.moteus.drive_type import Moteus
 from drivers.odrive.bench import OdriveBench
-from drivers.odrive.drive_type import Odrive
+from drivers.odrive.drive_type import Odrive, Odrive05
 from drivers.transmit_gate import TransmitGate
 
 DEFAULT = "odrive"
-DRIVE_TYPES: Mapping[str, DriveType] = {"odrive": Odrive(), "moteus": Moteus(), "mit": Mit()}
+DRIVE_TYPES: Mapping[str, DriveType] = {
+    "odrive": Odrive(),
+    "moteus": Moteus(),
+    "mit": Mit(),
+    "odrive05": Odrive05(),
+}
 # In the order in which a bus is searched: the questions of the first disturb no other drive.
 DRIVE_BENCHES: Mapping[str, DriveBench] = {"odrive": OdriveBench(), "mit": MitBench(), "moteus": MoteusBench()}
 

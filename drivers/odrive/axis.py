@@ -1,143 +1,46 @@
-"""One ODrive as one joint: the newest report of every signal, its restarts, and the frames that command it.
+"""One ODrive with firmware 0.6 as one joint: its errors and temperature, and the settings that it is asked for.
 
-A joint's sign inverts angle, velocity, current and torque of a mirrored motor alike. A drive counts as restarted when
-it is heard again after a silence of RESTART_SILENCE_S, or reports that it initialises, or that its axis has no state
-yet. Its version and watchdog settings are then unknown again. Everything that is read in one tick arrived since the
-tick before, so a stall of this program is not taken for a silence of the drive.
-
-A command for this drive that arrives here comes from another program, because a port does not receive its own frames.
-Emergency stops are no such commands, and neither are requests to read: any program may send them.
+cansimple_axis.py has all that both firmwares have in common.
 """
 
-from collections.abc import Callable, Sequence
-from math import isfinite, isnan, nan, pi
+from collections.abc import Callable, Mapping, Sequence
 
-from control.records import NEVER_S, UNKNOWN, DriveState
-from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, Outlet, WatchdogEndpoints
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
+from drivers.odrive.cansimple_axis import CanSimpleAxis
+from drivers.odrive.codec import Message
 from drivers.odrive.drive_settings import SUPPORTED, DriveSettings
-from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
 from drivers.odrive.parameters import OdriveParameters
-from drivers.setpoint_monitor import SetpointMonitor
-
-RESTART_SILENCE_S = 0.3  # three heartbeats
-LARGEST_FLOAT = 3.4e38  # of binary32
-TURN_RAD = 2.0 * pi
-QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)  # in which nothing runs by itself
 
 
-class OdriveAxis:
-    """Owns everything that is known about one drive; each field contains the newest value that arrived."""
+class OdriveAxis(CanSimpleAxis):
+    COMMANDS = codec.COMMANDS
+    CLEAR_ERRORS = codec.CLEAR_ERRORS.encode(0)  # without blinking
 
     def __init__(
         self, joint: str, parameters: OdriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints] = ()
     ) -> None:
-        self.joint = joint
-        self.parameters = parameters
-        self._outlet = outlet
-        self.settings = DriveSettings(parameters.serial_number, endpoints)
-        self._rad_per_turn = parameters.sign * TURN_RAD
-        self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
-        self._duplicates = DuplicateNodeMonitor(parameters.heartbeat_period_s)
-        self.setpoints = SetpointMonitor(
-            parameters.command_delay_s, parameters.velocity_limit_turn_s, parameters.velocity_gain_nm_s_turn
-        )
-        self.reset()
+        super().__init__(joint, parameters, outlet, DriveSettings(parameters.serial_number, endpoints))
 
     def reset(self) -> None:
-        self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
-        self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = NEVER_S
-        self._temperature_c = self._bus_voltage_v = UNKNOWN
-        self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
-        self._read_s = self._read_before_s = NEVER_S
-        self.closed_loop = False
-        self.busy_state = 0  # a calibration, homing or other axis state that this program has not asked for
-        self._error_flags = 0
+        super().reset()
         self.disarm_reason = 0
-        self.restarts = 0
-        self._starting = True  # until the drive has reported a state; a restart meanwhile is not counted again
-        self._foreign_commands = 0
-        self._duplicates.reset()
-        self.setpoints.reset()
-        self.settings.reset()
-        self._health: DriveHealth | None = None
-
-    def begin_read(self, now_s: float) -> None:
-        """Begins a read: the frames that follow arrived between the previous call and `now_s`."""
-        self._read_before_s, self._read_s = self._read_s, now_s
 
     @property
-    def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
-        """The handler for the payload of each arbitration id that this drive sends."""
-        table: dict[Message, Callable[[bytes, float], None]] = {
-            codec.GET_ENCODER_ESTIMATES: self._receive_encoder,
-            codec.GET_IQ: self._receive_current,
+    def _reports(self) -> Mapping[Message, Callable[[bytes, float], None]]:
+        return {
+            **super()._reports,
             codec.HEARTBEAT: self._receive_heartbeat,
             codec.GET_ERROR: self._receive_error,
             codec.GET_TEMPERATURE: self._receive_temperature,
-            codec.GET_BUS_VOLTAGE_CURRENT: self._receive_bus_voltage,
-            codec.GET_VERSION: self._receive_version,
             codec.TX_SDO: self._receive_parameter,
             codec.ADDRESS: self._receive_address,
             codec.RX_SDO: self._receive_foreign_access,
         }
-        own = {message.command: receive for message, receive in table.items()}
-        foreign = dict.fromkeys(codec.COMMANDS - {codec.ESTOP.command}, self._receive_foreign_command)
-        return {self.parameters.node_id << 5 | command: receive for command, receive in (own | foreign).items()}
-
-    def _receive_encoder(self, data: bytes, now_s: float) -> None:
-        turns, turns_s = codec.GET_ENCODER_ESTIMATES.decode(data)
-        _require_finite(turns + turns_s)
-        if now_s - self._angle_stamp_s > RESTART_SILENCE_S:
-            self._on_silence()
-        self._duplicates.on_reading(turns, self._read_s)
-        self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
-        self._velocity_rad_s = turns_s * self._rad_per_turn
-        self._angle_stamp_s = now_s
-
-    def _receive_current(self, data: bytes, now_s: float) -> None:
-        setpoint_a, measured_a = codec.GET_IQ.decode(data)
-        if isnan(measured_a) and not self.closed_loop:  # the drive measures no current while idle
-            measured_a = 0.0
-        _require_finite(measured_a)
-        if now_s - self._current_stamp_s > RESTART_SILENCE_S:
-            self._on_silence()
-        self._current_a = self.parameters.sign * measured_a
-        self._current_stamp_s = now_s
-        if self.closed_loop:
-            parameters = self.parameters
-            velocity_rad_s = parameters.sign * self._velocity_rad_s
-            self.setpoints.on_report(setpoint_a * parameters.torque_constant_nm_a, velocity_rad_s)
 
     def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
         self._error_flags, state, _, _ = codec.HEARTBEAT.decode(data)
-        if now_s - self._heartbeat_stamp_s > RESTART_SILENCE_S:
-            self._on_silence()
-        if state == AxisState.UNDEFINED or self._error_flags & codec.ERROR_INITIALIZING:
-            self._on_restart()
-        else:
-            self._starting = False
-        self._duplicates.on_heartbeat(self._read_s, self._read_before_s)
-        self.closed_loop = state == AxisState.CLOSED_LOOP
-        self.setpoints.on_heartbeat(self.closed_loop)
-        self.busy_state = 0 if state in QUIET_STATES else state
-        self._heartbeat_stamp_s = now_s
-        self._health = None
-
-    def _on_silence(self) -> None:
-        """Counts a restart if all messages were missing, not one of them alone, while this program was reading."""
-        heard_s = max(self._angle_stamp_s, self._current_stamp_s, self._heartbeat_stamp_s)
-        if isfinite(heard_s) and self._read_before_s - heard_s > RESTART_SILENCE_S:
-            self._on_restart()
-
-    def _on_restart(self) -> None:
-        if not self._starting:
-            self.restarts += 1
-        self._starting = True
-        self.settings.forget()
-        self._health = None
+        self._receive_state(state, bool(self._error_flags & codec.ERROR_INITIALIZING), now_s)
 
     def _receive_error(self, data: bytes, now_s: float) -> None:
         self._error_flags, self.disarm_reason = codec.GET_ERROR.decode(data)
@@ -147,14 +50,6 @@ class OdriveAxis:
         _, self._temperature_c = codec.GET_TEMPERATURE.decode(data)
         self._temperature_stamp_s = now_s
 
-    def _receive_bus_voltage(self, data: bytes, now_s: float) -> None:
-        self._bus_voltage_v, _ = codec.GET_BUS_VOLTAGE_CURRENT.decode(data)
-        self._bus_voltage_stamp_s = now_s
-
-    def _receive_version(self, data: bytes, now_s: float) -> None:
-        self.settings.on_version(data)
-        self._health = None
-
     def _receive_parameter(self, data: bytes, now_s: float) -> None:
         self.settings.on_parameter(data)
         self._health = None
@@ -163,52 +58,14 @@ class OdriveAxis:
         self.settings.on_address(data)
         self._health = None
 
-    def _receive_foreign_command(self, data: bytes, now_s: float) -> None:
-        self._foreign_commands += 1
-        self._health = None
-
     def _receive_foreign_access(self, data: bytes, now_s: float) -> None:
         if data and data[0] != codec.SDO_READ:
             self._receive_foreign_command(data, now_s)
 
-    @property
-    def duplicates(self) -> bool:
-        """Returns whether two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
-        return self._duplicates.found
-
-    @property
-    def state(self) -> DriveState:
-        return DriveState(
-            self._angle_rad,
-            self._velocity_rad_s,
-            self._angle_stamp_s,
-            self._current_a,
-            self._current_stamp_s,
-            self.closed_loop,
-            self._error_flags,
-            self._heartbeat_stamp_s,
-            self._temperature_c,
-            self._temperature_stamp_s,
-            self._bus_voltage_v,
-            self._bus_voltage_stamp_s,
-        )
-
-    @property
-    def health(self) -> DriveHealth:
-        """The drive's report about itself, built again only when it has changed."""
-        health = self._health
-        if (
-            health is None
-            or health.duplicate_id is not self.duplicates
-            or bool(health.setpoint_problem) is not self.setpoints.found
-        ):
-            self._health = health = self._build_health()
-        return health
-
     def _build_health(self) -> DriveHealth:
         flags, settings = self._error_flags | self.disarm_reason, self.settings
-        return DriveHealth(
-            joint=self.joint,
+        common = super()._build_health()
+        return common._replace(
             firmware=".".join(map(str, settings.version)) if settings.version else "",
             supported_firmware=".".join(map(str, SUPPORTED)),
             firmware_supported=settings.supported,
@@ -216,65 +73,8 @@ class OdriveAxis:
             watchdog_s=settings.watchdog_s,
             watchdog_advice=f"name the parameter numbers of firmware {settings.hardware} in [[watchdog_endpoints]]",
             watchdog_expired=bool(flags & codec.ERROR_WATCHDOG),
-            restarts=self.restarts,
-            duplicate_id=self.duplicates,
-            foreign_commands=self._foreign_commands,
-            setpoint_problem=self._setpoint_text() if self.setpoints.found else "",
             serial_number=settings.serial_number,
             expected_serial_number=settings.expected_serial_number,
-            busy_state=f"axis state {self.busy_state}" if self.busy_state else "",
             active_errors=codec.error_text(self._error_flags),
             errors=codec.error_text(flags),
         )
-
-    def _setpoint_text(self) -> str:
-        followed_nm, commanded_nm = (self.parameters.sign * torque_nm for torque_nm in self.setpoints.example)
-        return f"{followed_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
-
-    def send_torque(self, torque_nm: float) -> None:
-        if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
-            torque_nm = nan
-        motor_nm = self.parameters.sign * torque_nm
-        self.setpoints.on_command(motor_nm)
-        self._outlet.send(Frame(self._torque_id, codec.SET_INPUT_TORQUE.encode(motor_nm)))
-
-    def prepare(self) -> None:
-        """Sets torque mode, limits, velocity gain and zero torque.
-
-        In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain without reporting
-        it. Both are set so that the clamp lies above every torque for a joint within its own velocity limit, and
-        removes the torque of a faster joint, even when this program is dead and its last command is still in force.
-        """
-        parameters = self.parameters
-        self._transmit(codec.SET_CONTROLLER_MODE, codec.TORQUE_CONTROL, codec.PASSTHROUGH)
-        self._transmit(codec.SET_LIMITS, parameters.velocity_limit_turn_s, parameters.current_limit_a)
-        self._transmit(codec.SET_VEL_GAINS, parameters.velocity_gain_nm_s_turn, 0.0)
-        self._transmit(codec.SET_INPUT_TORQUE, 0.0)
-
-    def close_loop(self) -> None:
-        self._transmit(codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
-
-    def disarm(self) -> None:
-        self._transmit(codec.SET_INPUT_TORQUE, 0.0)
-        self._transmit(codec.SET_AXIS_STATE, AxisState.IDLE)
-
-    def clear_errors(self) -> None:
-        self._transmit(codec.CLEAR_ERRORS, 0)
-
-    def forget_commands(self) -> None:
-        self.setpoints.forget_commands()
-
-    def poll(self) -> None:
-        """Does nothing: an ODrive reports by itself."""
-
-    def request_settings(self, now_s: float) -> None:
-        for frame in self.settings.due_requests(self.parameters.node_id, now_s):
-            self._outlet.send(frame)
-
-    def _transmit(self, message: Message, *values: float) -> None:
-        self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values)))
-
-
-def _require_finite(value: float) -> None:
-    if not isfinite(value):
-        raise MalformedMessageError("not a finite number")

@@ -1,4 +1,4 @@
-"""ODrive CANSimple, firmware 0.6: the bytes of each message, in both directions.
+"""ODrive CANSimple, firmware 0.6: the bytes of each message, in both directions. codec05.py has those of 0.5.
 
 An 11-bit arbitration id is (node id << 5) | command; payloads are little-endian, floats IEEE-754 binary32, positions
 in turns. A remote frame with the id of a value asks for that value. Source: ODrive's CANSimple documentation and its
@@ -6,6 +6,7 @@ published DBC for 0.6.10, with which the tests compare this table. Some commands
 program reads a drive's version before it arms it.
 """
 
+from collections.abc import Mapping
 from enum import IntEnum
 from struct import Struct, error
 from typing import Any
@@ -101,10 +102,10 @@ ERROR_NAMES = {
 }
 
 
-def error_text(flags: int) -> str:
+def error_text(flags: int, known: Mapping[int, str] = ERROR_NAMES) -> str:
     """Names the active errors; unknown bits appear as a number."""
-    names = [name for bit, name in ERROR_NAMES.items() if flags & bit]
-    unknown = flags & ~sum(ERROR_NAMES)
+    names = [name for bit, name in known.items() if flags & bit]
+    unknown = flags & ~sum(known)
     return ", ".join(names + ([f"unknown flag 0x{unknown:x}"] if unknown else []))
 
 

@@ -1,4 +1,7 @@
-"""ODrive as a drive type: its parameters, its drives, and how to read and forge its frames without commanding one."""
+"""ODrive as a drive type: its parameters, its drives, and how to read and forge its frames without commanding one.
+
+Firmware 0.6 and 0.5 are two types, because several of their messages have the same id and another meaning.
+"""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -8,20 +11,27 @@ from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
 from drivers.can.frames import Frame
 from drivers.drive import DriveParameters, FrameContent, Outlet, WatchdogEndpoints
-from drivers.odrive import codec
+from drivers.odrive import codec, codec05
 from drivers.odrive.axis import OdriveAxis
+from drivers.odrive.axis05 import Odrive05Axis
 from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
-from drivers.odrive.gate_tables import gate_table
-from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.gate_tables import gate_table, gate_table_05
+from drivers.odrive.parameters import Odrive05Parameters, OdriveParameters
 from drivers.transmit_gate import FrameKind, GateTable
 
-SIGNALS: Mapping[int, tuple[str, ...]] = {
+COMMON_SIGNALS: Mapping[int, tuple[str, ...]] = {  # by the number of the message
     codec.GET_ENCODER_ESTIMATES.command: ("position",),
     codec.GET_IQ.command: ("current",),
     codec.HEARTBEAT.command: ("heartbeat", "error"),
-    codec.GET_ERROR.command: ("error",),
-    codec.GET_TEMPERATURE.command: ("temperature",),
     codec.GET_BUS_VOLTAGE_CURRENT.command: ("voltage",),
+}
+SIGNALS = {**COMMON_SIGNALS, codec.GET_ERROR.command: ("error",), codec.GET_TEMPERATURE.command: ("temperature",)}
+SIGNALS_05 = {
+    **COMMON_SIGNALS,
+    codec05.GET_ENCODER_COUNT.command: ("position",),
+    codec05.GET_MOTOR_ERROR.command: ("error",),
+    codec05.GET_ENCODER_ERROR.command: ("error",),
+    codec05.GET_CONTROLLER_ERROR.command: ("error",),
 }
 REPORT_BYTES = 8  # of every cyclic message
 FAST_HZ, SLOW_HZ = 500.0, 10.0  # cyclic messages every 2 and every 100 ms, as docs/how-to/odrive.md sets them
@@ -30,7 +40,7 @@ UNUSED_NODE = 62  # the last one: ids are given from 0 on
 
 
 class Odrive:
-    """Describes the ODrive protocol, as DriveType requires."""
+    """Describes the protocol of ODrive's firmware 0.6, as DriveType requires."""
 
     parameters = OdriveParameters
     kind = FrameKind()
@@ -63,7 +73,7 @@ class Odrive:
         return FrameContent(node_id, command in codec.COMMANDS, SIGNALS.get(command, ()))
 
     def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
-        """Firmware 0.5 counts every frame to a drive as its controller's."""
+        """Firmware 0.5 counts every frame to a drive as its controller's; 0.6 should not."""
         return {
             "requests of the position": Frame(arbitration_id(node_id, codec.GET_ENCODER_ESTIMATES), is_remote=True),
             "requests of the version": Frame(arbitration_id(node_id, codec.GET_VERSION), is_remote=True),
@@ -77,4 +87,52 @@ class Odrive:
                 return codec.GET_ERROR.encode(errors | flags, reason | flags)
             errors, state, result, done = codec.HEARTBEAT.decode(frame.data)
             return codec.HEARTBEAT.encode(errors | flags, AxisState.IDLE if idle else state, result, done)
+        return frame.data
+
+
+class Odrive05:
+    """Describes the protocol of ODrive's firmware 0.5.6, as DriveType requires."""
+
+    parameters = Odrive05Parameters
+    kind = FrameKind()
+    example_error = codec05.ERROR_MOTOR
+    command = Odrive.command
+    reports = (
+        FrameRate(REPORT_BYTES, FAST_HZ),  # encoder
+        FrameRate(REPORT_BYTES, FAST_HZ),  # current
+        *(FrameRate(REPORT_BYTES, SLOW_HZ),) * 5,  # heartbeat, errors of motor, encoder and controller, voltage
+    )
+
+    def gate_table(self, parameters: DriveParameters) -> GateTable:
+        return gate_table_05(cast(Odrive05Parameters, parameters))
+
+    def make_axis(
+        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
+    ) -> Odrive05Axis:
+        return Odrive05Axis(joint, cast(Odrive05Parameters, parameters), outlet)
+
+    def query(self, node_id: int) -> None:
+        """An ODrive reports by itself."""
+
+    def announces(self, node_id: int) -> Frame:
+        """Returns the counts of an encoder, which firmware 0.6 does not report."""
+        return Frame(arbitration_id(node_id, codec05.GET_ENCODER_COUNT), codec05.GET_ENCODER_COUNT.encode(0, 0))
+
+    def read_frame(self, frame: Frame) -> FrameContent | None:
+        if frame.is_extended or frame.is_error or frame.is_fd:
+            return None
+        node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
+        return FrameContent(node_id, command in codec05.COMMANDS, SIGNALS_05.get(command, ()))
+
+    def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
+        """Every frame to the drive feeds its watchdog, requests as well: only those to others are harmless."""
+        return {"reports of another drive": self.announces(UNUSED_NODE)}
+
+    def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
+        """Changes heartbeats; the errors of motor, encoder and controller are details of them."""
+        if frame.arbitration_id & codec.LAST_COMMAND != codec05.HEARTBEAT.command:
+            return frame.data
+        with suppress(MalformedMessageError):
+            errors, state, *parts = codec05.HEARTBEAT.decode(frame.data)
+            return codec05.HEARTBEAT.encode(errors | flags, AxisState.IDLE if idle else state, *parts)
         return frame.data

@@ -1,13 +1,15 @@
 """Lists what may pass the transmit gate for one ODrive: the messages that this program uses, with their payloads only.
 
-Idle, torque mode, the configured limits and the clearing of errors may always leave, and so may the reading of any
-parameter. Closed loop may be asked for only while the gate is open.
+Idle, torque mode, the configured limits and the clearing of errors may always leave, and so may requests to read.
+Closed loop may be asked for only while the gate is open. The firmwares differ in how errors are cleared and settings
+are read: the ids by which 0.6 reads parameters and its serial number do nothing in 0.5, or set a new node id.
 """
 
+from collections.abc import Callable, Mapping
 from math import nan
 
 from drivers.can.frames import Frame
-from drivers.odrive import codec
+from drivers.odrive import codec, codec05
 from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import GateTable
@@ -16,12 +18,28 @@ READ_BYTES = 4  # of a request to read a parameter
 
 
 def gate_table(drive: OdriveParameters) -> GateTable:
+    """Lists what may leave for a drive with firmware 0.6."""
+    clearing = {codec.CLEAR_ERRORS: codec.CLEAR_ERRORS.encode(0)}  # without blinking
+    return _table(drive, clearing, (codec.GET_VERSION, codec.ADDRESS), {codec.RX_SDO: _reads_parameter})
+
+
+def gate_table_05(drive: OdriveParameters) -> GateTable:
+    clearing = {codec05.CLEAR_ERRORS: codec05.CLEAR_ERRORS.encode()}
+    return _table(drive, clearing, (codec.GET_VERSION, codec05.GET_ENCODER_COUNT), {})
+
+
+def _table(
+    drive: OdriveParameters,
+    clearing: Mapping[Message, bytes],
+    requests: tuple[Message, ...],
+    checks: Mapping[Message, Callable[[bytes], bool]],
+) -> GateTable:
     always: dict[Message, bytes] = {
         codec.SET_LIMITS: codec.SET_LIMITS.encode(drive.velocity_limit_turn_s, drive.current_limit_a),
         codec.SET_VEL_GAINS: codec.SET_VEL_GAINS.encode(drive.velocity_gain_nm_s_turn, 0.0),
         codec.SET_AXIS_STATE: codec.SET_AXIS_STATE.encode(AxisState.IDLE),
         codec.SET_CONTROLLER_MODE: codec.SET_CONTROLLER_MODE.encode(codec.TORQUE_CONTROL, codec.PASSTHROUGH),
-        codec.CLEAR_ERRORS: codec.CLEAR_ERRORS.encode(0),  # without blinking
+        **clearing,
     }
     closed_loop = codec.SET_AXIS_STATE.encode(AxisState.CLOSED_LOOP)
     return GateTable(
@@ -31,11 +49,8 @@ def gate_table(drive: OdriveParameters) -> GateTable:
         decode_torque=_decode_torque,
         always={arbitration_id(drive.node_id, message): frozenset({data}) for message, data in always.items()},
         while_open={arbitration_id(drive.node_id, codec.SET_AXIS_STATE): frozenset({closed_loop})},
-        checks={arbitration_id(drive.node_id, codec.RX_SDO): _reads_parameter},
-        requests=frozenset(
-            Frame(arbitration_id(drive.node_id, message), is_remote=True)
-            for message in (codec.GET_VERSION, codec.ADDRESS)
-        ),
+        checks={arbitration_id(drive.node_id, message): check for message, check in checks.items()},
+        requests=frozenset(Frame(arbitration_id(drive.node_id, message), is_remote=True) for message in requests),
     )
 
 

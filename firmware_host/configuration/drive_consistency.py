@@ -43,7 +43,7 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
             yield f"drive.{joint}.node_id = {drive.node_id}: {duplicate} has the same on bus {drive.bus!r}"
         digits = drive.serial_digits
         if not re.fullmatch(f"([0-9a-f]{{{digits}}})?", drive.serial_number):
-            must = f"must be {digits} hexadecimal digits in lower case"
+            must = f"must be {digits} hexadecimal digits in lower case" if digits else "must be empty: it reports none"
             yield f"drive.{joint}.serial_number = {drive.serial_number!r}: {must}"
         for value, problem in drive.torque_problems(configuration.limits.torque_nm):  # it would clamp without a report
             yield f"drive.{joint}.{value}: {problem}"

@@ -26,6 +26,7 @@ class SimulatedDriveParameters:
     current_lag_s: Annotated[float, Bounds(0.0, 0.1)] = 0.0  # time constant
     current_noise_a: Annotated[float, Bounds(0.0, 10.0)] = 0.1
     encoder_counts: Annotated[int, Bounds(16, 16777216)] = 16384
+    encoder_direction: Annotated[int, Bounds(-1, 1)] = 1  # of the phases, by which some drives report current
     encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # reported minus true angle of the joint
     encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
     encoder_frozen: bool = False  # the last angle for ever, and exactly zero velocity: a magnet that came off

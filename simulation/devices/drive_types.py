@@ -6,10 +6,12 @@ from random import Random
 from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
 from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.moteus.device import SimulatedMoteus
-from simulation.devices.odrive import SimulatedOdrive
+from simulation.devices.odrive.device import SimulatedOdrive
+from simulation.devices.odrive.device05 import SimulatedOdrive05
 
 SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
     "odrive": SimulatedOdrive,
+    "odrive05": SimulatedOdrive05,
     "moteus": SimulatedMoteus,
     "mit": SimulatedMit,
 }

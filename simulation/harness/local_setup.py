@@ -10,7 +10,7 @@ from pathlib import Path
 
 from control.records import TWO_FLIPPERS, Rig
 from drivers.can.run_folder import make_own_folder, run_folder, write_private_file
-from simulation.devices.odrive_settings import BUILD
+from simulation.devices.odrive.settings import BUILD
 
 HEAD = """\
 # A robot whose drives are simulated on local buses.

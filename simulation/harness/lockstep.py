@@ -33,7 +33,7 @@ from simulation.mud.track import Track
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
     """Returns simulated drives with the configuration's ids, signs, zeros, models and torque constants."""
     of_all = ("type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a", "serial_number")
-    given = (*of_all, "model", "torque_range_nm")
+    given = (*of_all, "model", "torque_range_nm", "encoder_counts", "encoder_direction", "watchdog_s")
     return {
         joint: SimulatedDriveParameters(
             **({name: getattr(drive, name) for name in given if hasattr(drive, name)} | changes)

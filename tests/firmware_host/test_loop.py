@@ -242,7 +242,7 @@ def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:
 
 
 def test_firmware_of_another_family_is_not_armed(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simulation.devices.odrive.VERSION_FIELDS", (2, 3, 6, 56, 0, 5, 6, 0))
+    monkeypatch.setattr("simulation.devices.odrive.device.VERSION_FIELDS", (2, 3, 6, 56, 0, 5, 6, 0))
     robot = Lockstep(configuration, FIRM)
     robot.run_for(1.0)
     refused = robot.loop.request(Request.ARM, robot.now_s)

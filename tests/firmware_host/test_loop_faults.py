@@ -22,7 +22,7 @@ from drivers.odrive.codec import Message
 from firmware_host.configuration.configuration import Configuration
 from simulation.devices.drive import DriveError
 from simulation.devices.motion_capture import SimulatedPose
-from simulation.devices.odrive import SimulatedOdrive
+from simulation.devices.odrive.device import SimulatedOdrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB

@@ -23,7 +23,11 @@ SUBJECTS = (
         ("drivers/test_transmit_gate.py", "drivers/moteus/test_gate_table.py", "drivers/mit/test_gate_table.py"),
         EVERY_MUTANT,
     ),
-    Subject("drivers.odrive.gate_tables", ("drivers/test_transmit_gate.py",), EVERY_MUTANT),
+    Subject(
+        "drivers.odrive.gate_tables",
+        ("drivers/test_transmit_gate.py", "drivers/odrive/test_gate_table05.py"),
+        EVERY_MUTANT,
+    ),
     Subject("drivers.moteus.gate_tables", ("drivers/moteus/test_gate_table.py",)),
     Subject("drivers.mit.gate_tables", ("drivers/mit/test_gate_table.py",)),
     Subject(

@@ -7,7 +7,7 @@ watchdog runs in the mode only and is fed by commands alone. Once it expires, a 
 the mini cheetah do, and reports nothing. Sources: Core/Src/can.c and fsm.c of bgkatz/motorcontrol; damiao-motor 1.0.6.
 
 It sends nothing but the answer to a command, with the values of before. Between the drive and the joint lie the same
-imperfections as in simulation/devices/odrive.py.
+imperfections as in simulation/devices/odrive/device.py.
 """
 
 from collections.abc import Iterable

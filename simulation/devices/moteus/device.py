@@ -7,7 +7,7 @@ the drive does what `servo.timeout_mode` says: 12 damps with the scale of kd of 
 (ISR_DoZeroVelocity of fw/bldc_servo_control.h), 15 shorts the windings, 10 holds the position, 0 lets go.
 
 It sends nothing unless it is asked. An answer has the current, mode and torque of before the frame's command. Between
-the drive and the joint lie the same imperfections as in simulation/devices/odrive.py.
+the drive and the joint lie the same imperfections as in simulation/devices/odrive/device.py.
 """
 
 from collections.abc import Iterable, Mapping

@@ -13,7 +13,7 @@ from drivers.bench.drive_setup import DriveSetup, same
 from drivers.bench.settings_change import Change, Names, Outcome, change_settings
 from drivers.drive_types import DRIVE_BENCHES, DRIVE_TYPES
 from simulation.devices.drive import SimulatedDrive
-from simulation.devices.odrive_settings import BUILD
+from simulation.devices.odrive.settings import BUILD
 from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
 
 ID, LONGEST_S = 3, 0.3

@@ -26,6 +26,8 @@ from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPor
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
 from drivers.moteus import codec as moteus
+from drivers.odrive import codec05
+from drivers.odrive.codec import arbitration_id
 from firmware_host.configuration.configuration import Configuration
 
 ENCODER = Frame(0x009, bytes(range(8)))
@@ -241,6 +243,7 @@ def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(c
         nodes = [drive.node_id for drive in configuration.drive.values() if drive.bus == name]
         wanted |= {moteus.reply_id(node_id) for node_id in nodes}  # a drive of that type would answer so
         wanted |= {node_id + 16 for node_id in nodes}  # and a Damiao
+        wanted |= {arbitration_id(node_id, codec05.GET_ENCODER_COUNT) for node_id in nodes}  # and one of firmware 0.5
         assert {word for word in range(0x800) if passes(filters, word)} == wanted
         for identifier in wanted:
             assert not passes(filters, identifier | constants.CAN_RTR_FLAG)

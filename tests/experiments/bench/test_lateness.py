@@ -20,7 +20,7 @@ from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
-from simulation.devices.odrive import SimulatedOdrive
+from simulation.devices.odrive.device import SimulatedOdrive
 from simulation.harness.blocks import on_blocks
 from simulation.harness.peer import track_of
 from simulation.harness.world import World

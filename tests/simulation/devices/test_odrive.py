@@ -36,7 +36,7 @@ from drivers.odrive.codec import (
     arbitration_id,
 )
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.odrive import BOOT_S, SimulatedOdrive
+from simulation.devices.odrive.device import BOOT_S, SimulatedOdrive
 
 NODE = 3
 ANSWERED = [

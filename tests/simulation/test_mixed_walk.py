@@ -1,4 +1,4 @@
-"""Walks with moteus, with ODrives, and with both on one robot, in lockstep: the mud is the same."""
+"""Walks with every type of drive, and with two of them on one robot, in lockstep: the mud is the same."""
 
 from collections.abc import Mapping
 from statistics import median
@@ -23,10 +23,10 @@ EXAMPLE = (ROOT / "systemd" / "mudskipper.toml").read_text(encoding="utf-8")
 STRIDES = 12
 
 
-def mixed(text: str) -> str:
-    """A left flipper of ODrives and a right one of moteus."""
+def mixed(text: str, other_type: str) -> str:
+    """A left flipper of ODrives and a right one of another type."""
     left, right = text.split("[bus.right]")
-    other = with_drive_type(text, "moteus").split("[bus.right]")[1]
+    other = with_drive_type(text, other_type).split("[bus.right]")[1]
     for joint in ("left_sweep", "left_adduction"):
         section = f"[drive.{joint}]"
         own = right[right.index(section) : right.index("\n\n", right.index(section))]
@@ -35,7 +35,8 @@ def mixed(text: str) -> str:
     return left + "[bus.right]" + other
 
 
-ROBOTS = {name: with_drive_type(EXAMPLE, name) for name in DRIVE_TYPES} | {"mixed": mixed(EXAMPLE)}
+ROBOTS = {name: with_drive_type(EXAMPLE, name) for name in DRIVE_TYPES}
+ROBOTS |= {"mixed": mixed(EXAMPLE, "moteus"), "both firmwares": mixed(EXAMPLE, "odrive05")}
 
 
 def robot_with(drives: str) -> Lockstep:
@@ -60,7 +61,7 @@ def mud() -> Mapping[str, float]:
     return walked("odrive")
 
 
-@pytest.mark.parametrize("drives", ["moteus", "mit", "mixed"])
+@pytest.mark.parametrize("drives", ["odrive05", "moteus", "mit", "mixed", "both firmwares"])
 def test_the_mud_is_the_same_whatever_the_drives(drives: str, mud: Mapping[str, float]) -> None:
     assert walked(drives) == pytest.approx(dict(mud), rel=0.02)
 

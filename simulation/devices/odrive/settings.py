@@ -11,7 +11,7 @@ from struct import error
 from drivers.odrive import codec
 from drivers.odrive.setup import CAN, CONTROLLER, ENABLE, LAYOUTS, MOTOR, SDO_WRITE, TIMEOUT
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.odrive_forgeries import ENABLE_WATCHDOG_ENDPOINT, WATCHDOG_TIMEOUT_ENDPOINT
+from simulation.devices.odrive.forgeries import ENABLE_WATCHDOG_ENDPOINT, WATCHDOG_TIMEOUT_ENDPOINT
 
 SLOW = ("error", "temperature", "bus_voltage")
 PERIODS = {

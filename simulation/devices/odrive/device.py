@@ -1,4 +1,4 @@
-"""Simulates a motor drive on the bus: ODrive CANSimple 0.6, byte for byte.
+"""Simulates a motor drive on the bus: ODrive CANSimple 0.6, byte for byte. device05.py has what differs in 0.5.
 
 It has the axis state machine (idle, closed loop), the error word with the disarm reason, the watchdog, torque mode with
 the velocity-limit clamp, the current limits and, where it is on, the overspeed trip, cyclic messages, and requests by
@@ -11,10 +11,11 @@ and may freeze; the current has noise. Messages arrive in order, late by uniform
 old values.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from math import exp, isfinite, pi
 from random import Random
+from typing import Any, ClassVar
 
 from control.records import NEVER_S
 from drivers.can.frames import Frame
@@ -24,14 +25,15 @@ from drivers.odrive.setup import SAVE
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages
 from simulation.devices.motor import encoder_turns, joint_torque_nm
-from simulation.devices.odrive_forgeries import forged_current, forged_frame, forged_torque
-from simulation.devices.odrive_settings import OdriveSettings
+from simulation.devices.odrive import forgeries
+from simulation.devices.odrive.settings import OdriveSettings
 
 TURN_RAD = 2.0 * pi
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
 TORQUE_MODES = (codec.TORQUE_CONTROL, codec.PASSTHROUGH)
 ERROR_FLAGS = {DriveError.OVERCURRENT: 0x400, DriveError.WATCHDOG: codec.ERROR_WATCHDOG, DriveError.OVERSPEED: 0x8000}
+SLOW_MESSAGES = (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)
 BOOT_S = 1.0  # silence of a drive that restarts
 
 
@@ -44,6 +46,11 @@ def finite(values: tuple[float, ...]) -> tuple[float, ...]:
 
 class SimulatedOdrive:
     """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
+
+    ERROR_FLAGS: ClassVar[Mapping[DriveError, int]] = ERROR_FLAGS
+    ESTOP_FLAG: ClassVar[int] = codec.ERROR_ESTOP
+    HEARTBEAT: ClassVar[Message] = codec.HEARTBEAT
+    SLOW_MESSAGES: ClassVar[tuple[Message, ...]] = SLOW_MESSAGES
 
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self.parameters = parameters
@@ -72,8 +79,8 @@ class SimulatedOdrive:
         self._schedule: list[tuple[float, tuple[Message, ...]]] = [
             (periods.encoder_period_s, (codec.GET_ENCODER_ESTIMATES,)),
             (periods.current_period_s, (codec.GET_IQ,)),
-            (periods.heartbeat_period_s, (codec.HEARTBEAT,)),
-            (periods.slow_period_s, (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)),
+            (periods.heartbeat_period_s, (self.HEARTBEAT,)),
+            (periods.slow_period_s, self.SLOW_MESSAGES),
         ]
         # Boards are switched on at different times, so their messages do not all come in the same tick.
         self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
@@ -119,7 +126,7 @@ class SimulatedOdrive:
         elif command == codec.CLEAR_ERRORS.command:
             self.errors = 0
         elif command == codec.ESTOP.command:
-            self._disarm(codec.ERROR_ESTOP)
+            self._disarm(self.ESTOP_FLAG)
         elif command == codec.REBOOT.command:
             if codec.REBOOT.decode(data)[0] == SAVE:
                 self._settings.save()
@@ -161,33 +168,35 @@ class SimulatedOdrive:
         return self.errors != 0
 
     def trip(self, error: DriveError) -> None:
-        self._disarm(ERROR_FLAGS[error])
+        self._disarm(self.ERROR_FLAGS[error])
 
     def forge(self, forgery: Forgery) -> Frame:
-        return forged_frame(self.parameters.node_id, forgery)
+        return forgeries.forged_frame(self.parameters.node_id, forgery)
 
     def forge_current(self, current_a: float) -> Frame:
-        return forged_current(self.parameters.node_id, self._setpoint_a, current_a)
+        return forgeries.forged_current(self.parameters.node_id, self._setpoint_a, current_a)
 
     def forge_torque(self, torque_nm: float) -> Frame:
-        return forged_torque(self.parameters.node_id, self.parameters.sign * torque_nm)
+        return forgeries.forged_torque(self.parameters.node_id, self.parameters.sign * torque_nm)
 
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""
-        parameters = self.parameters
-        if self.axis_state is AxisState.CLOSED_LOOP:
-            fastest_turn_s = parameters.overspeed_fraction * self._velocity_limit_turn_s
-            if 0.0 < parameters.watchdog_s < now_s - self._fed_s:
-                self.trip(DriveError.WATCHDOG)
-            elif 0.0 < fastest_turn_s < abs(self._turns_s):
-                self.trip(DriveError.OVERSPEED)
+        self._trip_if_due(now_s)
         torque_nm = 0.0
         if self.axis_state is AxisState.CLOSED_LOOP and self._modes == TORQUE_MODES:
             torque_nm = self._computed_nm(now_s)
         else:
             self._current_a = self._setpoint_a = 0.0
         self._stepped_s = now_s
-        return joint_torque_nm(parameters, torque_nm, self._turns)
+        return joint_torque_nm(self.parameters, torque_nm, self._turns)
+
+    def _trip_if_due(self, now_s: float) -> None:
+        if self.axis_state is AxisState.CLOSED_LOOP:
+            fastest_turn_s = self.parameters.overspeed_fraction * self._velocity_limit_turn_s
+            if 0.0 < self.parameters.watchdog_s < now_s - self._fed_s:
+                self.trip(DriveError.WATCHDOG)
+            elif 0.0 < fastest_turn_s < abs(self._turns_s):
+                self.trip(DriveError.OVERSPEED)
 
     def _computed_nm(self, now_s: float) -> float:
         """Returns the torque by the drive's own torque constant, after its clamps and the lag of the current."""
@@ -274,7 +283,7 @@ class SimulatedOdrive:
     def _address(self) -> bytes:
         return codec.encode_address(self.parameters.node_id, int(self.parameters.serial_number or "0", 16))
 
-    _PAYLOADS = {
+    _PAYLOADS: ClassVar[Mapping[Message, Callable[[Any], bytes]]] = {
         codec.GET_ENCODER_ESTIMATES: _encoder,
         codec.GET_IQ: _iq,
         codec.HEARTBEAT: _heartbeat,

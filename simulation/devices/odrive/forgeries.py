@@ -1,27 +1,39 @@
-"""Forges ODrive frames that a bus carries in the name of a drive, or to it, though neither drive nor loop sent them."""
+"""Forges ODrive frames that a bus carries in the name of a drive, or to it, though neither drive nor loop sent them.
+
+OLD_FIRMWARE is a firmware other than the drive's type says. Firmware 0.5 reports no settings and no serial number.
+"""
 
 from collections.abc import Mapping
 
 from drivers.can.frames import Frame
-from drivers.odrive import codec
+from drivers.odrive import codec, codec05
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from simulation.devices.drive import Forgery
 
 WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
 OLD_FIRMWARE = (2, 4, 4, 58, 0, 5, 6, 0)
 
-FORGERIES: Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]] = {  # message, values, and bytes after them
+Forgeries = Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]]  # message, values, and bytes after them
+COMMON: Forgeries = {
     Forgery.EMERGENCY_STOP: (codec.ESTOP, (), b""),
     Forgery.CLOSE_LOOP: (codec.SET_AXIS_STATE, (AxisState.CLOSED_LOOP,), b""),
+}
+FORGERIES: Forgeries = {
+    **COMMON,
     Forgery.OLD_FIRMWARE: (codec.GET_VERSION, OLD_FIRMWARE, b""),
     Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
     Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
     Forgery.OTHER_DRIVE: (codec.ADDRESS, (0, 0xABCDEF, 0), b""),
 }
+FORGERIES_05: Forgeries = {
+    **COMMON,
+    Forgery.OLD_FIRMWARE: (codec.GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0), b""),
+    Forgery.STARTING: (codec05.HEARTBEAT, (0, AxisState.UNDEFINED, 0, 0, 0), b""),
+}
 
 
-def forged_frame(node_id: int, forgery: Forgery) -> Frame:
-    message, values, value = FORGERIES[forgery]
+def forged_frame(node_id: int, forgery: Forgery, forgeries: Forgeries = FORGERIES) -> Frame:
+    message, values, value = forgeries[forgery]
     return Frame(arbitration_id(node_id, message), message.encode(*values) + value)
 
 
