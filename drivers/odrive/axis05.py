@@ -26,7 +26,8 @@ from drivers.odrive.watchdog_proof import WatchdogProof
 FIRMWARE = "0.5"
 ABSENT = bytes(8)  # position and velocity of a drive that has not been in closed loop
 SAME_TURNS = 0.05  # by which counts and position may differ, in a joint that is moved by hand
-VELOCITY_FRACTION = 0.1  # of the newest difference of two counts; a count is some 0.3 rad/s in one tick
+JUMP_TURNS = 0.04  # in one tick: 95 rad/s
+LONGEST_GAP_S = 0.03  # between two counts, whose difference is the velocity: one count in one tick is some 0.3 rad/s
 
 
 class Odrive05Axis(CanSimpleAxis):
@@ -44,8 +45,8 @@ class Odrive05Axis(CanSimpleAxis):
         self._following = False  # commanded by this program
         self._expired_idle = self._expired = False
         self._absent = False  # position and velocity
-        self._turns, self._turns_s = 0.0, 0.0
-        self._current_data = b""
+        self._turns = 0.0  # by the newest counts
+        self._idle_data = b""  # of the current
         self._proof.reset()
         super().reset()
         self._forget_counts()
@@ -74,7 +75,7 @@ class Odrive05Axis(CanSimpleAxis):
         self._expired = expired
         self._error_flags = flags & ~codec05.ERROR_WATCHDOG if self._expired_idle else flags
         if self.closed_loop and state != AxisState.CLOSED_LOOP:
-            self._following = False
+            self._following, self._current_a, self._idle_data = False, 0.0, b""
         self._receive_state(state, False, now_s)
         fit = state == AxisState.IDLE and not self._error_flags and not self._following
         self._proof.on_heartbeat(expired, fit, self._read_s, self._read_before_s)
@@ -100,17 +101,14 @@ class Odrive05Axis(CanSimpleAxis):
         if not self._absent:
             self._compare_counts(count, turns)
         elif self._proof.concluded:
-            self._receive_motion(turns, self._counted_turns_s(turns, now_s), now_s)
+            self._receive_motion(turns, self._turns_s(turns - self._turns, now_s - self._angle_stamp_s), now_s)
         self._turns = turns
 
-    def _counted_turns_s(self, turns: float, now_s: float) -> float:
-        """Returns the velocity of an idle joint, filtered."""
-        elapsed_s = now_s - self._angle_stamp_s
-        if not 0.0 < elapsed_s < 1.0:
-            self._turns_s = 0.0
+    def _turns_s(self, moved_turns: float, elapsed_s: float) -> float:
+        """Returns the velocity between two positions; zero after a gap, and after a jump that no joint can make."""
+        if not 0.0 < elapsed_s < LONGEST_GAP_S or abs(moved_turns) > JUMP_TURNS:
             return 0.0
-        self._turns_s += VELOCITY_FRACTION * ((turns - self._turns) / elapsed_s - self._turns_s)
-        return self._turns_s
+        return moved_turns / elapsed_s
 
     def _compare_counts(self, count: int, turns: float) -> None:
         reported = self._angle_rad / self._rad_per_turn + self.parameters.zero_turn
@@ -122,7 +120,8 @@ class Odrive05Axis(CanSimpleAxis):
             self._counts_problem, self._health = problem, None
 
     def _idle_current_a(self, data: bytes, measured_a: float) -> float:
-        repeated, self._current_data = data[4:] == self._current_data, data[4:]
+        """Returns the current of an idle drive: none, unless it differs from the one that was reported before."""
+        repeated, self._idle_data = self._idle_data in (b"", data[4:]), data[4:]
         return 0.0 if repeated else super()._idle_current_a(data, measured_a)
 
     def _on_restart(self) -> None:

@@ -112,7 +112,8 @@ def _off_readings(
     quiet = first_lasting([abs(sample.states[index].current_a) < QUIET_A for sample in samples], QUIET_TICKS)
     advice = "the drive does not obey 'idle': have the power switch at hand, and check its firmware"
     ticks = ticks_until(None if quiet is None else samples[quiet], pushed[-1]) - 1  # 'idle' leaves in the next one
-    yield Reading(f"{joint}: torque off, until no current flows", ticks, "ticks", 0, OFF_TICKS, advice)
+    latest = OFF_TICKS + (round(drive.heartbeat_period_s / PERIOD_S) if drive.holds_idle_current else 0)
+    yield Reading(f"{joint}: torque off, until no current flows", ticks, "ticks", 0, latest, advice)
     idle = next((sample for sample in samples if not sample.states[index].closed_loop), None)
     idle_s = PERIOD_S * ticks_until(idle, pushed[-1])
     latest_s = drive.heartbeat_period_s + OFF_TICKS * PERIOD_S

@@ -1,7 +1,8 @@
 """Checks that the drives switch off by themselves when commands stop, also while other frames arrive.
 
 The flippers lie, and the adduction motors press them down a little, so that a current flows and nothing moves. Then the
-program sends nothing more. A heartbeat reports idle with a delay of up to one period; the current is exact to a tick.
+program sends nothing more. A heartbeat reports idle with a delay of up to one period. The current is exact to a tick,
+unless the drive repeats its last current until its next heartbeat.
 
 Then the same again among frames of each kind that another program may send at any time. A watchdog that they feed keeps
 the torque of a dead controller for as long as anything on the bus asks for telemetry.
@@ -73,11 +74,13 @@ def _observed_times(test_rig: TestRig) -> Readings:
             continue
         advice = f"set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
         idle_s = _idle_s(pressed, silence, index)
-        latest_s = timeout_s + late_s + test_rig.configuration.drive[joint].heartbeat_period_s
+        drive = test_rig.configuration.drive[joint]
+        latest_s = timeout_s + late_s + drive.heartbeat_period_s
         yield Reading(f"{joint}: idle after the last command", idle_s, "s", timeout_s - late_s, latest_s, advice)
         if "adduction" in joint:
             gone_s = _gone_s(pressed, silence, index)
-            yield Reading(f"{joint}: no current after it", gone_s, "s", timeout_s - late_s, timeout_s + late_s, advice)
+            latest_s = latest_s if drive.holds_idle_current else timeout_s + late_s
+            yield Reading(f"{joint}: no current after it", gone_s, "s", timeout_s - late_s, latest_s, advice)
     yield from _reasons(test_rig)
 
 

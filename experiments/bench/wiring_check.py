@@ -95,6 +95,8 @@ def check_message_rates(test_rig: TestRig) -> Readings:
             yield Reading(f"{joint}: answers", _rate_hz(test_rig, drive, "position"), "Hz", ANSWERED_HZ, inf, advice)
             continue
         for name, (signal, least_hz) in RATES.items():
+            if signal in drive.unreported:
+                continue
             advice = f"set the drive's message period; {SETTING_UP}"
             yield Reading(f"{joint}: {name}", _rate_hz(test_rig, drive, signal), "Hz", least_hz, inf, advice)
         usual_hz = 1.0 / drive.heartbeat_period_s

@@ -55,7 +55,8 @@ def _configuration(hopeless: bool, drive_type: str) -> Configuration:
 
 
 def _as_real(drive: DriveParameters) -> DriveParameters:
-    serial_number = f"{drive.node_id:0{drive.serial_digits}x}" if drive.reports_settings else ""
+    has_number = drive.reports_settings and drive.serial_digits
+    serial_number = f"{drive.node_id:0{drive.serial_digits}x}" if has_number else ""
     return replace(drive, serial_number=serial_number, command_delay_s=DriveParameters.command_delay_s)
 
 

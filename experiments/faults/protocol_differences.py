@@ -119,7 +119,24 @@ MOTEUS: Table = {
     ),
 }
 ODRIVE: Table = {"drive_settings": Difference("no setting but the watchdog is read back")}
-BY_TYPE: dict[str, Table] = {"odrive": ODRIVE, "moteus": MOTEUS, "mit": MIT}
+NO_TEMPERATURE = "its messages have no temperature: the winding's is computed from the current"
+COUNTED = "before its first closed loop its position is asked for, and not while its watchdog is tried"
+LOST_COUNTS = _also(COUNTED, "drive_late", "position_stale", "position_silent")
+ODRIVE05: Table = {
+    **dict.fromkeys(("drive_silent", "drive_restarted", "watchdog_unknown"), LOST_COUNTS),
+    **dict.fromkeys(("bus_off", "bus_refuses", "daemon_hung"), LOST_COUNTS),
+    "drive_energised": _instead(
+        "a watchdog that has expired keeps an idle drive from closed loop, and the command is seen", "foreign_commands"
+    ),
+    "joint_position": _also("the velocity before the first closed loop is that of two positions", "joint_velocity"),
+    "drive_settings": Difference("no setting is read back"),
+    "wrong_drive": Difference("no message has its serial number"),
+    "watchdog_off": Difference("its watchdog is proven once after each start, and not read back"),
+    "temperature_silent": Difference(NO_TEMPERATURE),
+    "motor_overheating": _waived(NO_TEMPERATURE),
+    "motor_hot": _waived(NO_TEMPERATURE),
+}
+BY_TYPE: dict[str, Table] = {"odrive": ODRIVE, "odrive05": ODRIVE05, "moteus": MOTEUS, "mit": MIT}
 
 
 def differences(drive: str) -> Table:

@@ -55,6 +55,12 @@ class SimulatedOdrive05(SimulatedOdrive):
             frame = frame._replace(is_remote=True)
         return super().receive(frame, now_s)
 
+    def _execute(self, command: int, data: bytes, now_s: float) -> None:
+        if command == codec.REBOOT.command:  # of any payload
+            self.restart(now_s)
+        else:
+            super()._execute(command, data, now_s)
+
     def _read_parameter(self, data: bytes) -> list[Frame]:
         """Answers nothing: a data frame with this id means nothing here."""
         return []
