@@ -8,6 +8,7 @@ from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.odrive.device import SimulatedOdrive
 from simulation.devices.odrive.device05 import SimulatedOdrive05
+from simulation.devices.odrive.settings import BUILD
 
 SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
     "odrive": SimulatedOdrive,
@@ -15,6 +16,7 @@ SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], Simu
     "moteus": SimulatedMoteus,
     "mit": SimulatedMit,
 }
+PUBLISHED_NUMBERS = BUILD  # of the simulated drives' parameters, where a maker publishes them in a file
 
 
 def make_simulated_drive(parameters: SimulatedDriveParameters, random: Random) -> SimulatedDrive:

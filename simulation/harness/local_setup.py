@@ -10,7 +10,7 @@ from pathlib import Path
 
 from control.records import TWO_FLIPPERS, Rig
 from drivers.can.run_folder import make_own_folder, run_folder, write_private_file
-from simulation.devices.odrive.settings import BUILD
+from simulation.devices.drive_types import PUBLISHED_NUMBERS
 
 HEAD = """\
 # A robot whose drives are simulated on local buses.
@@ -114,7 +114,7 @@ def write_local_setup(folder: Path, logs: Path) -> Path:
     make_buses(folder)
     path = folder / "mudskipper.toml"
     write_private_file(path, configuration_text(folder, logs.absolute()))
-    write_private_file(folder / "flat_endpoints.json", json.dumps(BUILD, indent=1))  # as the drives' maker does
+    write_private_file(folder / "flat_endpoints.json", json.dumps(PUBLISHED_NUMBERS, indent=1))  # as the drives' maker does
     return path
 
 
