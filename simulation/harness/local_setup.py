@@ -114,7 +114,9 @@ def write_local_setup(folder: Path, logs: Path) -> Path:
     make_buses(folder)
     path = folder / "mudskipper.toml"
     write_private_file(path, configuration_text(folder, logs.absolute()))
-    write_private_file(folder / "flat_endpoints.json", json.dumps(PUBLISHED_NUMBERS, indent=1))  # as the drives' maker does
+    write_private_file(
+        folder / "flat_endpoints.json", json.dumps(PUBLISHED_NUMBERS, indent=1)
+    )  # as the drives' maker does
     return path
 
 
