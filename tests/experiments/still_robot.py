@@ -10,7 +10,7 @@ from tests.experiments.synthetic_strides import CONFIGURATION
 
 
 class StillRobot:
-    """A BenchRobot without its `call`, which each test defines."""
+    """A BenchRobot without `call`, which each test defines."""
 
     configuration: Configuration = CONFIGURATION
 

@@ -1,4 +1,4 @@
-"""Logs and estimates that say what a test wants."""
+"""Synthetic logs, estimates and strides with given contents."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RIGHT_SWEEP, RIGHT_ADDUCTION = 2, 3
 
 
 def make_ticks(phases: list[Phase], stride: int = 0, start_s: float = 0.0) -> NDArray[np.void]:
-    """A row of a walk for each phase, a hundredth of a second apart."""
+    """Return a row of a walk for each phase, a hundredth of a second apart."""
     ticks = np.zeros(len(phases), tick_type())
     ticks["stamp_s"] = start_s + 0.01 * np.arange(len(phases))
     ticks["mode"], ticks["stride"], ticks["phase"] = Mode.WALKING, stride, phases
@@ -43,7 +43,7 @@ def make_stride(**others: Any) -> dict[str, Any]:
 
 
 def make_profile(phase: Phase, sweeps_deg: list[float], depths_m: list[float], **others: list[float]) -> StrideProfile:
-    """In the pose that puts the edge at each depth."""
+    """Return a profile whose adduction angles put the edge at each depth."""
     count = len(depths_m)
     sweeps_rad = [radians(sweep_deg) for sweep_deg in sweeps_deg]
     columns: dict[str, Any] = {name: np.zeros(count) for name in StrideProfile._fields} | {

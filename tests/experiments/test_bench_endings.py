@@ -1,4 +1,4 @@
-"""However an experiment ends, its flippers are out of the mud before the torque is off."""
+"""At every ending of an experiment the flippers are out of the mud before the torque is off."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
 OPERATOR = AutomaticOperator(lambda message: None)
-ARMED_S = 0.01  # and closed loop of all drives not there yet
+ARMED_S = 0.01  # before all drives have reported closed loop
 
 
 class InterruptedRobot(LockstepRobot):
-    """Ctrl-C is pressed in one of the places where an experiment waits."""
+    """A robot on which Ctrl-C is pressed in the nth wait of the experiment."""
 
     waits_left = -1
-    sinks = 0  # times that a flipper begins to sink just when the robot is armed
-    ended_by = ""  # what somebody else asks for as soon as it is
+    sinks = 0  # how many requests to arm a sinking flipper prevents
+    ended_by = ""  # the method that another client calls right after arming
     arms = 0
 
     def call(self, method: str, **params: Any) -> Any:
@@ -71,7 +71,7 @@ def experiment(robot: InterruptedRobot) -> None:
 
 
 def last_angles_rad(folder: Path) -> np.ndarray:
-    """Of both adduction joints, when the torque went off."""
+    """Return the angles of both adduction joints when the torque went off."""
     ticks = read_log(folder / "log.mcap").ticks
     assert Mode(ticks["mode"][-1]) is Mode.IDLE and not ticks["torque_command_nm"][-1].any()
     energised = np.flatnonzero(np.isin(ticks["mode"], [int(mode) for mode in ENERGISED]))
@@ -94,7 +94,7 @@ def test_ctrl_c_wherever_an_experiment_waits_ends_it_with_raised_flippers(
 
 
 def hold_in_stance(robot: InterruptedRobot) -> None:
-    """A current that is late for a moment holds the walk where it is, in the mud."""
+    """Interrupt one current for a moment, so that the robot stops its walk and holds its pose in the mud."""
     arm(robot, OPERATOR)
     robot.call("walk", depth_m=0.03)
     loop = robot.lockstep.loop

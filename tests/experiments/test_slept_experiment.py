@@ -1,4 +1,4 @@
-"""An experiment begins where it may, and may find its lease gone, after it was suspended or its computer slept."""
+"""An experiment begins only if it is permitted to, and handles a lease that expired while its computer slept."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LOST = {"name": "lease_lost"}
 
 
 class ScriptedDaemon:
-    """A StatusClient whose daemon lets a lease lapse when a test says so."""
+    """A StatusClient with a scripted daemon, whose lease expires when a test calls `lapse`."""
 
     def __init__(self) -> None:
         self.lease: str | None = None
@@ -58,7 +58,7 @@ def daemon(monkeypatch: pytest.MonkeyPatch) -> ScriptedDaemon:
 def test_who_may_not_read_the_log_is_refused_before_anything_moves_and_leaves_no_lease(
     daemon: ScriptedDaemon, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One that lapsed would take the torque of whoever holds the robot without a lease."""
+    """A lease that expires later would switch off the torque of an operator who uses the robot without a lease."""
 
     def refuse(path: Path) -> list[Path]:
         raise PermissionError(errno.EACCES, "Permission denied", "/logs")
@@ -73,7 +73,7 @@ def test_who_may_not_read_the_log_is_refused_before_anything_moves_and_leaves_no
 @pytest.mark.parametrize("overruled", [False, True])
 @pytest.mark.parametrize("mode", ["arming", "hold", "walking"])
 def test_a_robot_that_another_program_armed_is_left_alone(daemon: ScriptedDaemon, mode: str, overruled: bool) -> None:
-    """Hands are in the mud, and the question on the screen says that torque is off."""
+    """The experiment's open question may say that torque is off, and hands may be in the mud."""
     robot = DaemonRobot(Path("x"))
     daemon.lapse(mode, [])
     daemon.overruled = overruled

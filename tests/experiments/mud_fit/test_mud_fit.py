@@ -32,7 +32,7 @@ SLOPES = {0.03: 3.0, 0.05: -2.0}  # cm/s for each e-fold of strength
 
 
 def synthetic_speeds(grounds: Iterable[Ground], *rest: Any) -> dict[Ground, dict[float, float]]:
-    """A world without noise in which both depths tell strength, and only their sum tells damping."""
+    """Return noise-free speeds: strength changes their difference, and damping shifts both depths alike."""
     return {
         ground: {
             depth_m: 5.0 + slope * log(ground.strength_pa / 1500.0) - 0.4 * (ground.damping_n_s_m - TRUE_DAMPING)
@@ -57,7 +57,7 @@ def synthetic_world(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(experiments.mud_fit.mud_fit, "TARGETS", synthetic_targets())
 
 
-# what it is fitted to
+# the cells of the fit
 
 
 def test_it_is_fitted_to_the_six_fixed_cells_and_no_adaptive_one() -> None:
@@ -90,7 +90,10 @@ def test_the_finer_grid_lies_around_the_best() -> None:
 
 
 def test_the_fit_recovers_a_synthetic_truth(synthetic_world: None) -> None:
-    """To half of the finer grid's steps: 0.25 N·s/m, and strengths that 0.1 N·s/m of misfit may shift by a step."""
+    """The tolerances are half a step of the finer grid in damping, 0.25 N·s/m, and one and a half in strength, 4.5 %.
+
+    A misfit of 0.1 N·s/m in damping may shift a strength by a step of 3 %.
+    """
     best = run(Plan(), lambda done, total: None).fitted
     assert best.rail_damping_n_s_m == pytest.approx(TRUE_DAMPING, abs=0.25)
     for mud, strength_pa in TRUTH.items():
@@ -101,7 +104,7 @@ def test_the_fit_recovers_a_synthetic_truth(synthetic_world: None) -> None:
 def test_the_range_of_a_strength_is_where_chi2_rises_by_one() -> None:
     grounds = [Ground(5.0, strength) for strength in (900.0, 950.0, 1000.0, 1050.0, 1100.0)]
     speeds = {ground: {0.03: ground.strength_pa / 100.0} for ground in grounds}
-    speeds[Ground(6.0, 2000.0)] = {0.03: 10.0}  # with another damping
+    speeds[Ground(6.0, 2000.0)] = {0.03: 10.0}  # has another damping, so it does not count
     assert strength_range_pa("a", 5.0, speeds, {"a": {0.03: Speed(10.0, 0.5)}}) == [950.0, 1050.0]
 
 
@@ -118,11 +121,11 @@ def test_the_report_has_fit_present_values_and_the_six_cells(synthetic_world: No
     json.dumps(to_json(report), allow_nan=False)
 
 
-# for real
+# in simulation
 
 
 def test_more_damping_is_slower() -> None:
-    """Two strides each in a firm mud: 0.5 m/s against 6 N·s/m more are 3 N, as much as the rail's dry drag."""
+    """At 0.5 m/s another 8 N·s/m are 4 N, more than the rail's dry drag of 2.5 N."""
     loose, tight = (fixed_speed_cm_s(Ground(damping, 2800.0), 0.03, 1, strides=2) for damping in (2.0, 10.0))
     assert 0.0 < tight < 0.95 * loose
 

@@ -1,4 +1,4 @@
-"""One walk out of a log: of ours against the log's own rows, of the authors' form against the replay."""
+"""A walk from this project's log agrees with the log's rows, and one from an authors' log agrees with the replay."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_nothing_is_missing_from_a_log_with_a_pose(two_walks: Path) -> None:
     assert read_walk(two_walks).missing == []
 
 
-def test_a_mud_begins_with_the_stride_that_told_of_it(two_walks: Path) -> None:
+def test_a_mud_begins_with_the_stride_that_revealed_it(two_walks: Path) -> None:
     strides = [
         {"flipper": 1, "t_start_s": 1.0, "stamp_s": 2.0},
         {"flipper": 0, "t_start_s": 2.9, "stamp_s": 4.0},
@@ -80,7 +80,7 @@ def test_a_mud_begins_with_the_stride_that_told_of_it(two_walks: Path) -> None:
 
 
 def test_another_mud_is_noticed_where_there_is_one(tmp_path: Path, configuration: Configuration) -> None:
-    """A short piece of firm mud, then the softest: the event of the loop comes back as a border of the walk."""
+    """After 0.3 m of firm mud comes the softest one; the event of the loop becomes a border of the walk."""
     path = tmp_path / "border.mcap"
     recorder = Recorder(path, configuration.text, {"robot": "test"})
     robot = Lockstep(configuration, Track([(0.3, MUDS["45.3"]), (1.0, MUDS["53.1"])]), recorder=recorder)
@@ -137,7 +137,7 @@ def test_strides_of_the_authors_form_are_those_of_the_replay(as_csv: Path) -> No
 
 
 def test_the_authors_form_gives_depth_and_force_as_our_log_does(as_csv: Path, two_walks: Path) -> None:
-    """Where the flippers stand in mud; without velocities and the arm's weight the force is a little off."""
+    """In stance the force differs slightly because the authors' form has no velocities and no arm weight."""
     ours, theirs = read_walk(two_walks, 1), read_walk(as_csv)
     first = int(np.argmax(read_log(two_walks).ticks["mode"] == Mode.WALKING))
     rows = slice(first, first + len(ours.time_s))

@@ -1,4 +1,4 @@
-"""The flipper from the side, against the kinematics of control/ and the plate's integrals."""
+"""The side view of the flipper agrees with the kinematics of control/ and with the plate's integrals."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ ADDUCTIONS = st.floats(-1.2, 0.6)
 
 
 def area_m2(polygon: list[Point]) -> float:
-    """Of a polygon, positive where it runs counter-clockwise."""
+    """Return the area of a polygon, positive if it runs counter-clockwise."""
     pairs = zip(polygon, [*polygon[1:], *polygon[:1]], strict=True)
     return sum(x1 * z2 - x2 * z1 for (x1, z1), (x2, z2) in pairs) / 2.0
 
 
 def below(polygon: list[Point], z_m: float) -> list[Point]:
-    """What of a convex polygon lies below a level."""
+    """Return the part of a convex polygon below a level."""
     kept: list[Point] = []
     for (x1, z1), (x2, z2) in zip(polygon, [*polygon[1:], polygon[0]], strict=True):
         if z1 <= z_m:
@@ -50,7 +50,7 @@ def test_the_edge_is_where_the_kinematics_put_it(sweep_rad: float, adduction_rad
 
 @given(SWEEPS, ADDUCTIONS)
 def test_arm_and_plate_keep_their_lengths_seen_square_on(sweep_rad: float, adduction_rad: float) -> None:
-    """The arm lies in the frame that tilts: seen along y, l sin α of it goes forward and l cos α sin β upward."""
+    """The arm lies in the frame that tilts: seen along y it extends l sin α forward and l cos α sin β upward."""
     view = view_from_side(GEOMETRY, sweep_rad, adduction_rad)
     forward_m, up_m = (wrist - shoulder for wrist, shoulder in zip(view.wrist, view.shoulder, strict=True))
     outward_m = GEOMETRY.flipper_length_m * cos(sweep_rad)
@@ -61,7 +61,7 @@ def test_arm_and_plate_keep_their_lengths_seen_square_on(sweep_rad: float, adduc
 
 @given(SWEEPS, ADDUCTIONS, st.integers(0, 2**32 - 1))
 def test_every_point_of_the_plate_is_seen_within_its_outline(sweep_rad: float, adduction_rad: float, seed: int) -> None:
-    """Against matrices: turn about z by the sweep, then about x by the adduction."""
+    """The reference is a rotation about z by the sweep and then about x by the adduction, with matrices."""
     random = np.random.default_rng(seed)
     size = np.array([GEOMETRY.plate_thickness_m, GEOMETRY.plate_width_m, GEOMETRY.plate_height_m])
     inside = random.uniform(-0.5, 0.5, (20, 3)) * size + [0.0, GEOMETRY.flipper_length_m, size[2] / 2 - GEOMETRY.drop_m]
@@ -78,8 +78,9 @@ def test_every_point_of_the_plate_is_seen_within_its_outline(sweep_rad: float, a
 
 @given(SWEEPS, ADDUCTIONS)
 def test_a_thin_plate_shows_its_face_by_the_sine_of_the_sweep(sweep_rad: float, adduction_rad: float) -> None:
-    """Its normal (cos α, -sin α cos β, -sin α sin β): what is seen along y is the face times sin α cos β, of the part
-    in the mud too, whose area control/plate integrates.
+    """The plate's normal is (cos α, -sin α cos β, -sin α sin β): the area seen along y is the face times sin α cos β.
+
+    The same holds for the part in the mud, whose area control/plate integrates.
     """
     outline, fraction = view_from_side(SHEET, sweep_rad, adduction_rad).plate, abs(sin(sweep_rad)) * cos(adduction_rad)
     face_m2 = SHEET.plate_width_m * SHEET.plate_height_m

@@ -1,4 +1,4 @@
-"""Which strides and which of their moments are shown, of walks made up row by row."""
+"""The strides and moments to be shown are chosen correctly from walks that are synthesised row by row."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STEP_M = 0.12  # 2 l sin 30°
 
 
 def stride_row(index: int, step_m: float, released: bool = True, flipper: int = 1) -> dict[str, Any]:
-    """Of the stride that begins with row 40 index, and closes on the first row of its swing."""
+    """Return the row of a stride that begins at row 40 * index and closes on the first row of its swing."""
     first_s = 0.1 * ROWS * len(STROKES) * index
     return {
         "index": index,

@@ -1,4 +1,4 @@
-"""Coefficients over trials, beside a load cell's, and the files that they come from."""
+"""Coefficients over trials, next to those of a load cell, and the files from which they are read."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ def test_trials_make_a_mean_with_its_error_and_scatter() -> None:
 
 
 def test_the_part_of_an_estimators_error_beyond_the_scatter_is_shared() -> None:
-    """Of 10 % in all, trials that scatter by 6 % share 8 %."""
+    """Trials with standard errors of 10 % and a scatter of 6 % share an error of 8 %."""
     scattered = gather_coefficient(make_estimate(value, std_error=1e5) for value in (0.94e6, 1e6, 1.06e6))
     assert scattered.shared_error == pytest.approx(8e4)
     assert scattered.std_error is not None and scattered.trials_error is not None
     assert scattered.std_error == pytest.approx(hypot(scattered.trials_error, 8e4))
     large = gather_coefficient(make_estimate(value, std_error=1e4) for value in (0.8e6, 1e6, 1.2e6))
-    assert large.shared_error == pytest.approx(0.032e6)  # at least that of a motor
+    assert large.shared_error == pytest.approx(0.032e6)  # at least the error of a motor's constant
 
 
 def test_two_standard_errors_contain_the_truth_19_times_in_20_with_a_shared_error() -> None:
-    """Synthetic trials, each off by 4 % of its own and by 4 % that all share, and doubted so."""
+    """Each synthetic trial has an own and a shared error of 4 %, and the corresponding standard error."""
     random, held = np.random.default_rng(1), 0
     for _ in range(1000):
         values = 1e6 * (1.0 + 0.04 * random.standard_normal() + 0.04 * random.standard_normal(3))
@@ -71,7 +71,7 @@ def test_bounds_do_not_mix_with_values() -> None:
 
 
 def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
-    """Of 1e6 in truth, each told wrong by 5 %: where it resists more than `limit` a stride tells no more than that."""
+    """Return estimates of 1e6 with a scatter of 5 %; one that would exceed `limit` is a bound at `limit`."""
     errors = 0.05 * np.random.default_rng(1).standard_normal(200)
     return [
         make_estimate(1e6 * (1.0 + error)) if 1e6 * (1.0 + error) < limit else make_estimate(limit, at_least=True)
@@ -80,7 +80,7 @@ def strides_in_mud_that_gives_way_at(limit: float) -> list[dict[str, Any]]:
 
 
 def test_a_few_strides_in_which_solid_mud_yielded_do_not_count() -> None:
-    """Alone they would tell 7 % too little, and their scatter would not show it."""
+    """Their mean alone would be 7 % too low, and their scatter would not show it."""
     strides = strides_in_mud_that_gives_way_at(0.95e6)
     alone = gather_coefficient(each for each in strides if not each["at_least"])
     assert alone.value is not None and alone.trials_error is not None

@@ -1,4 +1,4 @@
-"""Tables of errors from estimates and truths that are synthetic, with numbers that anyone can check."""
+"""Tables of errors from synthetic estimates and truths, with numbers that are easy to check."""
 
 from math import nan
 from typing import Any, TypeVar
@@ -36,10 +36,10 @@ def only(rows: list[Row]) -> Row:
 
 
 def test_median_and_95th_percentile_are_of_the_size_of_the_error() -> None:
-    """-10, 0, 20, 30 and 40 %: the 95th percentile lies four fifths of the way from 30 to 40."""
+    """The errors are -10, 0, 20, 30 and 40 %; the 95th percentile lies at four fifths between 30 and 40 %."""
     row = only(error_rows([evaluated(value) for value in (90.0, 100.0, 120.0, 130.0, 140.0)]))
     assert (row.median, row.p95, row.bias, row.strides) == (0.2, 0.38, 0.2, 5)
-    assert only(error_rows([evaluated(value) for value in (80.0, 90.0, 150.0)])).bias == -0.1  # has a sign
+    assert only(error_rows([evaluated(value) for value in (80.0, 90.0, 150.0)])).bias == -0.1  # the bias is signed
 
 
 def test_the_error_is_relative_to_each_ones_own_truth() -> None:
@@ -107,8 +107,8 @@ def test_there_is_a_row_for_each_setup_mud_coefficient_and_method_in_their_order
 @pytest.mark.parametrize(
     ("value", "truth", "parts"),
     [
-        (104.0, 100.0, (0.8, 1.3, 0.8333)),  # 0.25 of a difference of 0.30 is the lean
-        (80.0, 100.0, (0.8, 1.0, 0.5)),  # the lean adds 0.25 and the estimate takes it off again
+        (104.0, 100.0, (0.8, 1.3, 0.8333)),  # the lean explains 0.25 of a difference of 0.30
+        (80.0, 100.0, (0.8, 1.0, 0.5)),  # the lean adds 0.25 and the estimate subtracts it again
         (80.0, 80.0, (1.0, 1.0, 0.0)),  # no difference
     ],
 )

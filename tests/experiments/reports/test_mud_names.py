@@ -1,4 +1,4 @@
-"""A water content is told as one, however it is written; a name that a person gave a mud is left alone."""
+"""A water content is recognised in every spelling; a name that an operator gave a mud stays unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A report is one page that needs nothing beside it, and its numbers and pictures apart."""
+"""A report is one self-contained page, with its numbers and pictures also in files of their own."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SECTION = Section(
 
 
 class Elements(HTMLParser):
-    """Counts what is opened and closed."""
+    """Collects the text of a page, and checks that its elements are closed in order."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -84,7 +84,7 @@ def test_pictures_can_have_further_forms_and_sections_further_tables(tmp_path: P
 def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
     place: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Up to numbers, picture or page: what is written is on the disk up to a half."""
+    """The disk is full when the numbers, the picture or the page is written; half of that file fits."""
     before = {path: path.read_bytes() for path in write_report(tmp_path, {"k": 1}, "Before", [SECTION])}
     room, write = [place], Path.write_bytes
 

@@ -1,4 +1,4 @@
-"""A value is told with as many digits as its errors bear, and no fewer."""
+"""A value is printed with exactly as many digits as its errors justify."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same through a daemon's socket, in real time: the calls, the lease, and the log that is being written."""
+"""An experiment operates a robot through a daemon's socket in real time: its calls, its lease, and the growing log."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
 
-def run_beside(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """A command in another terminal, while the experiment waits and renews its lease."""
+def run_in_another_terminal(robot: DaemonRobot, bench: Bench, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a command as in another terminal, while the experiment waits and renews its lease."""
     with ThreadPoolExecutor(1) as terminals:
         command = terminals.submit(run_process, *arguments, MUDSKIPPER_SOCKET=str(bench.socket))
         with suppress(RobotInUseError):
@@ -54,7 +54,7 @@ def test_an_experiment_operates_the_daemon_and_reads_its_log(bench: Bench, tmp_p
 
 
 def test_the_robot_stops_where_the_experiment_dies(bench: Bench) -> None:
-    """Right behind its arm as well: the lease is older than the torque."""
+    """It also stops if the experiment dies right after `arm`, because it takes its lease before the torque."""
     robot = DaemonRobot(bench.socket)
     arm(robot)
     robot._client.close()
@@ -124,12 +124,12 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
             DaemonRobot(bench.socket)
         arm(first)
         for command in (("move", "left_sweep=3"), ("walk",), ("walk", "--attended")):
-            refused = run_beside(first, bench, *command)
+            refused = run_in_another_terminal(first, bench, *command)
             assert refused.returncode == exit_codes.REFUSED and "operates the robot" in refused.stderr
-        assert "the lease is held by uid" in run_beside(first, bench, "status").stdout
+        assert "the lease is held by uid" in run_in_another_terminal(first, bench, "status").stdout
         move(first, {"right_sweep": 0.05})
         disarm(first)
-        assert "operates the robot" in run_beside(first, bench, "arm").stderr
+        assert "operates the robot" in run_in_another_terminal(first, bench, "arm").stderr
     finally:
         first.close()
     bench.wait_for(lambda status: not status["faults"])  # the flippers have come down
@@ -139,7 +139,7 @@ def test_a_robot_that_another_program_operates_is_left_to_it(bench: Bench) -> No
 def test_a_robot_that_another_program_took_over_is_left_alone(bench: Bench) -> None:
     robot = DaemonRobot(bench.socket)
     arm(robot)
-    assert run_beside(robot, bench, "move", "--take-over", "left_sweep=3").returncode == exit_codes.OK
+    assert run_in_another_terminal(robot, bench, "move", "--take-over", "left_sweep=3").returncode == exit_codes.OK
     operations = (partial(robot.wait, 0.3), partial(move, robot, {"left_sweep": 0.0}), partial(disarm, robot))
     for operate in operations:
         with pytest.raises(BenchError, match="taken over: uid .* wanted the robot; begin again when it is free"):

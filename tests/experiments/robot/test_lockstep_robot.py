@@ -1,4 +1,4 @@
-"""An experiment operates a simulated robot through the daemon's calls, and finds in the log what it did."""
+"""An experiment operates a simulated robot through the daemon's calls, and the log contains what it did."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_a_robot_that_was_held_too_long_reports_why_it_let_go(robot: LockstepRob
     robot.lockstep.loop.controller.motion = MotionParameters(longest_hold_s=1.0)
     arm(robot)
     robot.wait(0.8)
-    move(robot, {"right_adduction": 0.2})  # somebody needs it
+    move(robot, {"right_adduction": 0.2})  # a request restarts the time of the hold
     robot.wait(0.8)
     require_hold(robot.call("status"))
     robot.wait(0.3)
@@ -150,14 +150,14 @@ def test_a_fault_that_ends_a_walk_is_reported_with_its_message(
 
 
 class Decided:
-    """An Operator who says the same of every fault."""
+    """An Operator who gives the same answer to every fault."""
 
     def __init__(self, answer: str) -> None:
         self.answer = answer
         self.asked: list[str] = []
 
     def ask(self, question: str, answers: Mapping[str, str], meanwhile: Callable[[], None]) -> str:
-        assert set(answers) == {CLEAR, LEAVE} and next(iter(answers)) == CLEAR  # which AutomaticOperator takes
+        assert set(answers) == {CLEAR, LEAVE} and next(iter(answers)) == CLEAR  # AutomaticOperator takes the first
         self.asked.append(question)
         meanwhile()
         return self.answer
@@ -170,7 +170,7 @@ class Decided:
 
 @pytest.fixture
 def faulty(robot: LockstepRobot) -> LockstepRobot:
-    """In FAULT: a drive was restarted under torque, some seconds ago."""
+    """Return a robot in FAULT: a drive was restarted under torque some seconds ago."""
     arm(robot)
     robot.lockstep.robot.restart_drive(JOINTS.index("right_sweep"))
     robot.wait(3.0)

@@ -1,4 +1,4 @@
-"""Of a daemon's run the segments that hold an experiment's time, whole, and enough to be read by themselves."""
+"""Copies contain all segments of a daemon's run that cover an experiment, whole, and can be read by themselves."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SEGMENT_TICKS = 380
 
 @pytest.fixture
 def segments(tmp_path: Path) -> list[Path]:
-    """Five of a second each, of which the last one is still being written."""
+    """Write five segments of a second each; the last one is still being written."""
     first = tmp_path / "logs" / ACTIVE / "run-0000.mcap"
     for number in range(5):
         metadata = OPENING["metadata"] | {"segment": str(number)}
@@ -88,7 +88,7 @@ def test_a_full_disk_leaves_no_copy_that_is_cut(
 def test_what_is_copied_is_replayed_and_reported_without_the_segments_before_it(
     tmp_path: Path, configuration: Configuration, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Another walk and a long rest come before the experiment's own."""
+    """Another walk and a long rest come before the experiment's own walk."""
     parameters = LogParameters(directory=str(tmp_path / "logs"), segment_s=1.0)
     first = first_path(tmp_path / "logs", "run")
     recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)

@@ -17,7 +17,7 @@ STD_ERROR = 0.04e6
 
 
 def estimates(value: float, std_error: float = STD_ERROR, at_least: bool = False, valid: bool = True) -> dict[str, Any]:
-    """A row of the log with the same value for each coefficient."""
+    """Return a row of the log with the same value for each coefficient."""
     row: dict[str, Any] = {"depth_m": 0.03}
     for name in COEFFICIENTS:
         row |= {name: value, f"{name}_std_error": std_error, f"{name}_valid": valid, f"{name}_at_least": at_least}

@@ -12,7 +12,7 @@ from tests.experiments.run_report.synthetic_runs import compared, estimates, ren
 
 
 def run_with(values: list[float], name: str = "run", mud: str = "48.5", speed_m_s: float = 0.05) -> ComparedRun:
-    """A stride for each value, the right flipper a hundredth above the left one; speeds scatter by 4 %."""
+    """Return a run with a stride for each value; the right flipper reads 1 % more, and the speeds scatter by 4 %."""
     return compared(
         [
             stride(mud, estimates(value), estimates(1.01 * value), speed_m_s * (0.96 if i % 2 else 1.04), 1.0)
@@ -47,7 +47,7 @@ def test_runs_of_two_robots_also_have_the_errors_that_each_shares_among_its_stri
 
 
 def test_equal_runs_differ_once_in_twenty() -> None:
-    """Eight values of 8 % scatter each: two standard errors are 95 %."""
+    """Each run has eight values with 8 % scatter; two standard errors contain 95 % of the differences."""
     random, count = np.random.default_rng(2), 400
     shown = 0
     for _ in range(count):

@@ -1,4 +1,4 @@
-"""Events and faults that repeat are one row each, and no number is lost."""
+"""Repeated events and faults become one row each, with their count and the range of their numbers."""
 
 from hypothesis import given
 from hypothesis import strategies as st

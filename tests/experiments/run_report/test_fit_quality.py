@@ -66,7 +66,7 @@ def figure_of(run: Run, monkeypatch: pytest.MonkeyPatch) -> Figure:
 def test_a_fit_is_drawn_next_to_its_residuals_in_units_of_its_coefficient(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A line's slope is k in N/cm³; residuals are those of its samples; both flippers have the same scales."""
+    """The slope of each line is k in N/cm³, the residuals are those of its samples, and both flippers share scales."""
     axes = figure_of(run, monkeypatch).axes
     for column, flipper in ((0, "left"), (2, "right")):
         samples = run.strides[0].samples(flipper, "k_p")

@@ -1,4 +1,4 @@
-"""The headline against a known truth: the simulated robot's own position, and strides with known values."""
+"""The headline agrees with a known truth: the simulated robot's true position, and strides with known values."""
 
 from math import sqrt
 from pathlib import Path
@@ -33,7 +33,7 @@ def read(path: Path, layout: MudLayout | None = None) -> Run:
 
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> tuple[Run, float]:
-    """Seven strides out of the first mud of the track into the second; the body's true travel."""
+    """Record seven strides from the first mud into the second; return the run and the body's true travel."""
     path = tmp_path_factory.mktemp("logs") / "walked.mcap"
     robot = record_walks(path, configuration, 7)
     return read(path, layout_of_lengths(MUDS)), robot.robot.plant.body_m
@@ -51,7 +51,7 @@ def test_distance_time_and_strides_are_those_of_the_simulated_robot(walked: tupl
 
 
 def test_each_stride_is_in_the_mud_in_which_the_plates_go_down(walked: tuple[Run, float]) -> None:
-    """By the true borders; a stride next to a border is in no mud."""
+    """The true borders are the reference; a stride near a border belongs to no mud."""
     run, _ = walked
     reach_m = run.walks[0].geometric_step_m / 2.0
     muds = {"w = 48.5 %": (-1.0, 0.61), "w = 53.1 %": (0.61, 1.22)}
@@ -72,7 +72,7 @@ def test_a_stride_lasts_from_insertion_to_insertion(walked: tuple[Run, float]) -
 
 
 def test_the_speed_of_a_mud_and_its_error_by_hand() -> None:
-    """Steps of 10, 12 and 11 cm in 2 s each: 5.5 cm/s; the last stride has no duration."""
+    """Steps of 10, 12 and 11 cm in 2 s each give 5.5 cm/s; the last stride has no duration."""
     good = estimates(1e6)
     strides = [stride("a", good, good, step_m, 2.0) for step_m in (0.10, 0.12, 0.11)]
     (result,) = headline_of(run_of([*strides, stride("a", good, good, 0.10, UNKNOWN)])).muds
@@ -82,7 +82,7 @@ def test_the_speed_of_a_mud_and_its_error_by_hand() -> None:
 
 
 def test_the_error_of_a_speed_covers_the_truth() -> None:
-    """Two standard errors around 95 of 100 speeds, also from few strides."""
+    """Two standard errors contain the truth in about 95 of 100 cases, even with five strides."""
     random, covered, count = np.random.default_rng(5), 0, 600
     good = estimates(1e6)
     for _ in range(count):
@@ -134,7 +134,7 @@ def test_only_faults_with_a_reaction_are_in_the_headline(two_walks: Path) -> Non
 def test_a_log_s_estimates_stand_even_if_this_version_would_estimate_otherwise(
     two_walks: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """They are the logged ones, and then without R², which would be that of another fit."""
+    """The report shows the logged values, without R² and residuals, which would belong to another fit."""
     log = read_log(two_walks)
     older = log._replace(strides=[row | {"k_p": 1.01 * row["k_p"]} for row in log.strides])
     monkeypatch.setattr("experiments.run_report.run.read_log", lambda *_: older)

@@ -1,4 +1,4 @@
-"""The plan of the depth sweep, its report and picture of synthetic walks, and a small sweep in simulation."""
+"""The depth sweep: its plan, its report and picture of synthetic walks, and a small sweep in simulation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ def stride(depth_m: float, step_m: float, pushed_back_m: float = 0.0) -> WalkedS
 
 
 def walked(order: MudWalk) -> Walk:
-    """At 2 cm the robot slips at 2 cm/s, at 5 cm it makes 6 cm/s. A method begins at 2 cm and fails once at 5 cm."""
+    """Return a synthetic walk: 2 cm/s with slip at 2 cm depth, 6 cm/s at 5 cm.
+
+    A method begins at 2 cm and fails once at 5 cm.
+    """
     if not order.rule.method:
         return Walk([stride(order.rule.depth_m, 0.04 if order.rule.depth_m < 0.03 else 0.12)] * 3, "")
     return Walk([stride(0.02, 0.04)] * 2 + [stride(0.05, 0.06, 0.05), stride(0.05, 0.12), stride(0.045, 0.12)], "")
@@ -79,7 +82,7 @@ def test_a_walk_that_a_fault_ended_early_has_no_depth_and_reports_the_fault() ->
 
 
 def short_walks(*arguments: Any) -> list[MudWalk]:
-    """Walks of two strides that count."""
+    """Return the walks over constant depths, each with only two strides that count."""
     return [order._replace(strides=STARTING + 2) for order in constant_walks(*arguments)]
 
 

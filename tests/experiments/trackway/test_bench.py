@@ -1,4 +1,4 @@
-"""Table I through the daemon's calls: every walk stops where it should, and the table is made from its log."""
+"""Table I is measured through the daemon's calls; every walk stops in time, and its log gives the table."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_a_robot_whose_pose_is_lost_stops(tmp_path: Path) -> None:
     walk, why, over_s = stopped_walk(tmp_path, lambda now_s, x_m: x_m if now_s < 4.0 else None)
     assert "pose of the body is lost" in walk.fault and walk.fault in why
     assert over_s < 4.0 + UNSEEN_S + 5.0
-    assert walk.strides  # from its log
+    assert walk.strides  # read from its log
 
 
 def test_a_pose_of_the_wrong_sign_stops_the_walk(tmp_path: Path) -> None:

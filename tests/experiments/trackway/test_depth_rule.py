@@ -1,4 +1,4 @@
-"""Which robot walks by which rule."""
+"""Each depth rule gives its walk order and configuration."""
 
 from typing import get_args
 

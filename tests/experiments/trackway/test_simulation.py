@@ -1,4 +1,4 @@
-"""The plan of the simulated trackway, its report of synthetic walks, and a short one in simulation."""
+"""The simulated trackway: its plan, its report of synthetic walks, and a short trackway in simulation."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_the_end_of_a_walk_is_described() -> None:
 
 
 def synthetic_report(**changes: Any) -> SimulatedReport:
-    """Every gait makes 6 cm/s in each mud, the best constant depth 8."""
+    """Return a report in which every gait makes 6 cm/s in each mud, and the best constant depth 8 cm/s."""
     plan = replace(Plan(rules=rules_of(["default", "paper"]), seeds=2), **changes)
     walks = [Walk([stride(mud, 1.8) for mud in NAMES for _ in range(3)], "")] * plan.seeds
     constant = {mud: {0.02: 7.0, 0.0275: 8.0} for mud in NAMES}
@@ -108,11 +108,11 @@ def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
     assert report.ends == {"3 cm": {"stuck in 53.1": 1}}
 
 
-# an interrupted one
+# an interrupted experiment
 
 
 class Quick(Plan):
-    """Nothing is simulated."""
+    """A plan whose walks are synthetic."""
 
     def walks(self) -> dict[str, Callable[[], Walk]]:
         return dict.fromkeys(super().walks(), quick)
@@ -147,7 +147,7 @@ def test_every_walk_has_a_key_of_its_own() -> None:
 
 
 class Short(Plan):
-    """Each constant depth is walked for a stride that counts, and the one before it."""
+    """A plan whose walks at a constant depth have only one stride that counts."""
 
     def constant_walks(self) -> list[MudWalk]:
         return [order._replace(strides=STARTING + 1) for order in super().constant_walks()]
@@ -158,7 +158,7 @@ SHORT = Short(compartment_m=0.2, seeds=1, constant_depths_m=(0.03,), constant_se
 
 @cache
 def short() -> SimulatedReport:
-    """Compartments of less than two steps, one seed, one constant depth."""
+    """Simulate compartments of less than two steps, with one seed and one constant depth."""
     with TemporaryDirectory() as folder:
         return run(SHORT, Notebook(Path(folder), SHORT.identity), lambda done, total: None)
 

@@ -1,4 +1,4 @@
-"""The walks of an experiment are drawn from the logs in its folder, whatever else the robot did meanwhile."""
+"""The walks of an experiment are drawn from the logs in its folder, without the robot's other activities."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.scripted_operator import ScriptedOperator
 
 @pytest.fixture
 def walks(tmp_path: Path, configuration: Configuration) -> list[LoggedTime]:
-    """Two, of one stride and of two, in segments of which those between them were not copied."""
+    """Record walks of one and of two strides; the log segments between them are not copied."""
     recorder = Recorder(
         first_path(tmp_path / "logs", "run"),
         configuration.text,

@@ -1,4 +1,4 @@
-"""Strides of a walk: where they begin and end, the names of their failures, and those of a log against the plant."""
+"""Strides of a walk: their begin and end, the names of their failures, and those of a log compared with the plant."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ GOOD = WalkedStride("firm", 0.0, 0.03, 0.12, 1.6, 0.0)
         (0.06, 0.0, ""),  # half an arm
         (0.0599, 0.0, SLIPPAGE),
         (-0.01, 0.0, SLIPPAGE),
-        (0.12, 0.01, ""),  # a flipper that comes out moves the body as much
+        (0.12, 0.01, ""),  # a normal extraction pushes the body back as much
         (0.12, 0.0101, EXTRACTION),
         (0.01, 0.08, EXTRACTION),  # the body lost its advance
     ],
@@ -79,7 +79,7 @@ def test_a_stride_belongs_to_the_mud_in_which_its_plates_went_down() -> None:
 
 PHASES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING, Phase.INSERTION, Phase.STANCE)
 STRIDES = (0, 0, 0, 0, 1, 1)
-POSITIONS_M = (0.00, 0.09, 0.06, 0.08, 0.10, 0.15)  # with 3 cm lost in the stance's end, which do not count
+POSITIONS_M = (0.00, 0.09, 0.06, 0.08, 0.10, 0.15)  # the loss of 3 cm at the end of the stance does not count
 
 
 def one_stride(
@@ -145,7 +145,7 @@ def mud_at(position_m: float) -> str:
 
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> LoggedWalks:
-    """Two walks one after the other, in one log; in the second one flippers get stuck, and no swing waits for them."""
+    """Record two walks in one log; in the second one flippers get stuck, and no swing waits for them."""
     path = tmp_path_factory.mktemp("log") / "walks.mcap"
     held = replace(configuration, recovery=replace(configuration.recovery, attempts=0))
     recorder = Recorder(path, held.text, {"robot": "test"})
@@ -158,7 +158,7 @@ def walks(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration
         while lockstep.loop.mode is Mode.WALKING:
             lockstep.step()
             record.update(tick_of(lockstep))
-        truth += record.strides[:COUNT]  # the next is the tick in which the walk ended
+        truth += record.strides[:COUNT]  # the tick in which the walk ends adds another record
         lockstep.run_until(lambda: lockstep.loop.mode is Mode.HOLD, 5.0)
     assert recorder.close(20.0) and recorder.dropped == 0
     return LoggedWalks(read_log(path), truth, held)
@@ -177,7 +177,7 @@ def test_the_log_gives_the_strides_that_the_plant_made(walks: LoggedWalks) -> No
 
 
 def test_the_walks_have_both_muds_and_both_depths_and_a_failure(walks: LoggedWalks) -> None:
-    """Or the comparison says nothing."""
+    """Otherwise the comparison would not cover them."""
     assert {stride.mud for stride in walks.truth} == {"soft", "firm"}
     assert EXTRACTION in {stride.failure(ARM_M) for stride in walks.truth}
     assert {stride.depth_m for stride in walks.truth} == set(DEPTHS_M)
@@ -210,13 +210,13 @@ def test_a_walk_has_the_ordered_length_and_is_deterministic() -> None:
 
 
 def test_strides_join_without_gaps() -> None:
-    """The next position is this one plus the step, since the arms are at the front of their sweep in both."""
+    """A stride's position plus its step is the next position: the arms are at the front of their sweep in both."""
     before, after = walked(0.03, 3000.0).strides[1:]
     assert after.position_m - before.position_m == pytest.approx(before.step_m, abs=0.002)  # the servo yields
 
 
 def test_firm_mud_carries_soft_mud_slips_and_deep_flippers_get_stuck() -> None:
-    """Both failures of the paper's section III-D."""
+    """Section III-D of the paper describes both failures."""
     names = [
         {stride.failure(ARM_M) for stride in walked(depth_m, strength_pa, strides).strides[1:]}
         for depth_m, strength_pa, strides in ((0.03, 3000.0, 3), (0.03, 500.0, 2), (0.05, 4000.0, 3))

@@ -1,4 +1,4 @@
-"""The latency between current and angle: the one that was asked for, in the samples alone."""
+"""Samples get the requested latency between current and angle, and no other change."""
 
 from functools import cache
 from math import cos, sin
@@ -18,7 +18,7 @@ RATE_RAD_S = 3.0
 
 
 def swinging(ticks: int = 400) -> list[Sample]:
-    """Joints whose current is in phase with the angle; messages come half a millisecond before the tick."""
+    """Return samples whose current is in phase with the angle; messages come half a millisecond before the tick."""
     samples = []
     for tick in range(ticks):
         now_s = tick * PERIOD_S
@@ -30,7 +30,7 @@ def swinging(ticks: int = 400) -> list[Sample]:
 
 
 def latency_of(samples: list[Sample]) -> float:
-    """How much later the current is than the angle: I - 2 θ = -2 θ' δ, by least squares."""
+    """Return the delay δ of the current after the angle, fitted to I - 2 θ = -2 θ' δ by least squares."""
     states = [sample.states.flippers[1].adduction for sample in samples[10:]]
     slopes = [-2.0 * state.velocity_rad_s for state in states]
     lags = [state.current_a - 2.0 * state.angle_rad for state in states]
@@ -49,7 +49,7 @@ def test_without_latency_the_samples_are_the_same() -> None:
 
 
 @pytest.mark.parametrize(("late_s", "late", "prompt"), [(0.005, (3, 4), (0, 1, 2)), (-0.005, (0, 1, 2), (3, 4))])
-def test_late_signals_bear_the_time_of_their_arrival_and_the_others_stay(
+def test_late_signals_have_the_time_of_their_arrival_and_the_others_stay(
     late_s: float, late: tuple[int, ...], prompt: tuple[int, ...]
 ) -> None:
     before, after = swinging(), with_latency(swinging(), late_s)

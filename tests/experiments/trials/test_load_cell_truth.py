@@ -1,4 +1,4 @@
-"""The truth of a stride against the clay's own numbers, worked out by hand for an upright plate, and along the arc.
+"""The truth of a stride agrees with the clay's laws, evaluated here for an upright plate and along the flipper's arc.
 
 At the depth z, with the edge's area A and the plate's girth G, the rate factor g and the strength s_u,
 
@@ -77,7 +77,7 @@ def slope(depths_m: np.ndarray, forces_n: np.ndarray) -> float:
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
 def test_penetration_of_an_upright_plate_is_bearing_and_adhesion(depth_m: float, clay: Clay) -> None:
-    """To 1 %: along the plate mud yields after a millimetre, in which it bears less."""
+    """They agree to 1 %, because mud along the plate carries less in the first millimetre, before it yields."""
     z = np.linspace(0.0, depth_m, 2001)
     forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (BEARING_FACTOR * EDGE_M2 + ADHESION * GIRTH_M * z)
     reported = truth(stride(clay, insertion=stroke(deepest_m=depth_m)))
@@ -87,7 +87,7 @@ def test_penetration_of_an_upright_plate_is_bearing_and_adhesion(depth_m: float,
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
 def test_extraction_of_an_upright_plate_is_suction_and_adhesion(depth_m: float, clay: Clay) -> None:
-    """To 0.2 %, steps of the carrier: over the last three quarters all mud has turned."""
+    """They agree to 0.2 %, the carrier's step: in the last three quarters of the path all loads have reversed."""
     z = np.linspace(0.0, (1.0 - REVERSAL_FRACTION) * depth_m, 2001)
     suction = DEEP_FACTOR * EDGE_M2 * np.minimum(z / SUCTION_FADE_M, 1.0)
     forces_n = rate_factor(SPEED_M_S) * clay.strength_pa * (suction + ADHESION * GIRTH_M * z)
@@ -98,7 +98,7 @@ def test_extraction_of_an_upright_plate_is_suction_and_adhesion(depth_m: float, 
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(51.2)])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.05])
 def test_shear_of_an_upright_plate_is_the_pressure_on_its_face(depth_m: float, clay: Clay) -> None:
-    """To rounding: once it has yielded the mud bears what the clay's sideways law says, at the stance's mean depth."""
+    """They agree up to rounding: mud that has yielded follows the clay's lateral law at the stance's mean depth."""
     mean_m = 0.9 * depth_m
     force_n = rate_factor(SPEED_M_S) * clay.lateral_n(mean_m, GEOMETRY.plate_width_m)
     reported = truth(stride(clay, stance=stroke(deepest_m=depth_m)))
@@ -115,7 +115,7 @@ def test_each_coefficient_is_of_its_own_strokes_speed(name: str) -> None:
     assert ratios == [1.0, 1.0]
 
 
-# the flipper's own way
+# the flipper's own path
 
 
 SWEEP_RAD = radians(30.0)
@@ -126,8 +126,9 @@ def leaning(depth_m: float = DEPTH_M) -> StrokeTruth:
 
 
 def arc_row(depth_m: float) -> tuple[float, float]:
-    """By hand, each piece by its own way per radian of adduction, (l + u) cos α along the plate and (h - s) cos α
-    outward: the leverage of the submerged volume, and the moment of edge, narrow sides and adhesion.
+    """Return the leverage of the submerged volume, and the moment of edge, narrow sides and adhesion.
+
+    Per radian of adduction each piece of the plate moves (l + u) cos α along the plate and (h - s) cos α outward.
     """
     lift_rad = GEOMETRY.adduction_rad(SWEEP_RAD, depth_m)
     u, s = np.meshgrid(np.linspace(-0.5, 0.5, 41) * GEOMETRY.plate_width_m, np.linspace(0.0, 0.07, 281))
@@ -149,7 +150,7 @@ def arc_row(depth_m: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.045])
 def test_along_the_flippers_arc_penetration_is_of_edge_sides_and_adhesion(depth_m: float) -> None:
-    """To 2 %: mud yields after a millimetre. At no depth is the load of the face in it."""
+    """They agree to 2 %, because mud yields only after a millimetre. The face adds no load at any depth."""
     reported = truth(stride(insertion=leaning(depth_m))).leaning.k_p
     moments_m4, moments_nm = np.array([arc_row(z) for z in np.linspace(0.0005, depth_m, 60)]).T
     assert reported == pytest.approx(moments_m4 @ moments_nm / (moments_m4 @ moments_m4), rel=0.02)
@@ -158,14 +159,14 @@ def test_along_the_flippers_arc_penetration_is_of_edge_sides_and_adhesion(depth_
 @pytest.mark.parametrize("clay", [clay_of_water(47.6), clay_of_water(53.1)])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04, 0.05])
 def test_flipper_arc_and_upright_plate_agree_at_any_depth(depth_m: float, clay: Clay) -> None:
-    """Straight down in the mean attitude the leaning plate's face bears a part: at 5 cm k_p was a third more."""
+    """The face of a leaning plate that went straight down would carry load too: k_p was a third higher at 5 cm."""
     reported = truth(stride(clay, insertion=leaning(depth_m), extraction=leaning(depth_m)))
     assert 1.0 < reported.leaning.k_p / reported.upright.k_p < 1.07
     assert 0.95 < reported.leaning.k_e / reported.upright.k_e < 1.0
 
 
 def test_the_surface_may_lie_below_its_nominal_height() -> None:
-    """The plate leans more there, and nothing else."""
+    """Only the lean of the plate is larger there."""
     reported = [truth(stride(insertion=leaning(), surface_m=surface_m)).leaning.k_p for surface_m in (0.0, 0.003)]
     assert reported[1] == pytest.approx(reported[0], rel=0.02)
     assert reported[1] != reported[0]
@@ -182,8 +183,8 @@ def test_k_p_of_a_walk_covers_the_truth_at_any_depth(depth_m: float) -> None:
         assert abs(each.k_p.value - truths[each.flipper, each.index]) < 1.96 * each.k_p.std_error
 
 
-def test_in_stance_the_plate_is_square_to_its_way() -> None:
-    """The sweep angle turns through zero: only the lean of the adduction is the flipper's."""
+def test_in_stance_the_plate_is_square_to_its_path() -> None:
+    """The sweep angle passes through zero in stance, so only the adduction makes the flipper lean."""
     turned = stroke(sweep_rad=0.3, adduction_rad=-0.3)
     assert truth(stride(stance=turned)).leaning.k_s == truth(stride(stance=turned._replace(sweep_rad=0.0))).leaning.k_s
     assert truth(stride(stance=turned)).leaning.k_s != truth(stride(stance=turned)).upright.k_s
@@ -206,6 +207,6 @@ def test_a_plate_that_never_slipped_is_dragged_at_the_papers_speed() -> None:
 
 
 def test_relaxation_in_a_hold_is_over_on_the_way_up() -> None:
-    """It takes the load that holds the plate up at rest; mud that holds it down has to be sheared anew anyway."""
+    """Relaxation reduces the load that carries the resting plate; the upward motion shears the mud again anyway."""
     at_once, held = truth(stride(), 0.13, 0.0).leaning.k_e, truth(stride(), 0.13, 3.0).leaning.k_e
-    assert held == pytest.approx(at_once, rel=1e-3)  # 7 mm of the way up: seven times what makes it forget
+    assert held == pytest.approx(at_once, rel=1e-3)  # k_e begins after 7 mm, seven times the memory

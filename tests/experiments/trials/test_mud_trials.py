@@ -1,4 +1,4 @@
-"""Trials one after another: nothing is lost, nothing counts twice, and the person decides what is doubtful."""
+"""Trials run one after another: none is lost, none counts twice, and the operator decides about doubtful ones."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PLAN = {"experiment": "synthetic"}
 
 
 class AskedRobot(StillRobot):
-    """A BenchRobot that does nothing but remember what it was asked for."""
+    """A BenchRobot that only records the methods that were called."""
 
     def __init__(self) -> None:
         super().__init__("idle")
@@ -63,7 +63,7 @@ class ScriptedBed:
 
 
 class Session:
-    """A bench of these, and measurements that come as they are told."""
+    """Owns a bench of scripted parts; its measurements give the listed outcomes."""
 
     def __init__(self, folder: Path, operator: ScriptedOperator | None = None, bed: ScriptedBed | None = None) -> None:
         self.robot, self.operator, self.bed = AskedRobot(), operator or ScriptedOperator(), bed or ScriptedBed()

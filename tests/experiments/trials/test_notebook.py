@@ -1,4 +1,4 @@
-"""What was measured is on the disk, and is there when the same experiment begins again."""
+"""Every measurement is written to the disk and is read again when the same experiment continues."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_a_line_that_was_cut_off_costs_itself_alone(tmp_path: Path, cut: int) ->
     contents = notebook.path.read_bytes()
     notebook.path.write_bytes(contents[:-cut])
     again = Notebook(tmp_path, PLAN)
-    assert set(again.entries) == ({"10 g", "20 g"} if cut == 1 else {"10 g"})  # only the line's end is missing
+    assert set(again.entries) == ({"10 g", "20 g"} if cut == 1 else {"10 g"})  # only the newline is missing
     again.write("50 g", {"torque_nm": 0.5})
     assert set(Notebook(tmp_path, PLAN).entries) == set(again.entries) >= {"10 g", "50 g"}
 

@@ -1,4 +1,4 @@
-"""One stride out of a log: that stride, that flipper, and little enough of it."""
+"""The profile of a stride contains that stride and flipper of a log, with a limited number of rows."""
 
 import json
 from math import nan
@@ -22,7 +22,7 @@ from tests.experiments.synthetic_strides import make_log, make_profile, make_tic
 STROKE = [Phase.INSERTION] * 30 + [Phase.PAUSE] * 100 + [Phase.STANCE] * 30
 
 
-def test_a_course_is_that_of_the_stride_under_way() -> None:
+def test_a_profile_is_that_of_the_stride_under_way() -> None:
     log = make_log(make_ticks(STROKE, 0, 0.0), make_ticks(STROKE, 1, 2.0), make_ticks(STROKE, 2, 4.0))
     profile = profile_of(log, "right", 2.5)
     assert len(profile.time_s) == len(STROKE)
@@ -30,7 +30,7 @@ def test_a_course_is_that_of_the_stride_under_way() -> None:
     assert profile.phase.tolist() == [int(phase) for phase in STROKE]
 
 
-def test_a_course_is_that_of_the_flipper_asked_for() -> None:
+def test_a_profile_is_that_of_the_flipper_asked_for() -> None:
     ticks = make_ticks([Phase.INSERTION])
     ticks["force_z_n"] = [[1.0, 2.0]]
     ticks["angle_rad"] = [[0.1, 0.2, 0.3, 0.4]]
@@ -39,19 +39,19 @@ def test_a_course_is_that_of_the_flipper_asked_for() -> None:
     assert (right.force_z_n[0], right.sweep_rad[0], right.adduction_rad[0]) == (2.0, 0.3, 0.4)
 
 
-def test_rows_outside_of_a_stride_are_none_of_its_course() -> None:
+def test_rows_outside_of_a_stride_are_not_in_its_profile() -> None:
     raised, held = make_ticks([Phase.REST] * 3, -1), make_ticks([Phase.REST] * 3, 0, 0.5)
     held["mode"] = Mode.HOLD
     profile = profile_of(make_log(raised, make_ticks(STROKE, 0, 0.1), held), "left", 0.1)
     assert len(profile.time_s) == len(STROKE)
 
 
-def test_after_the_last_stride_there_is_no_course() -> None:
+def test_after_the_last_stride_there_is_no_profile() -> None:
     assert len(profile_of(make_log(make_ticks(STROKE)), "left", 99.0).time_s) == 0
 
 
 def test_slip_is_the_plates_travel_backwards_in_the_world_not_on_the_robot() -> None:
-    """It sweeps back by 6 cm of 12 while the body comes on by 2, then rests on a body that goes on."""
+    """The plate sweeps back by 6 cm while the body advances by 2 cm; then it moves forward with the body."""
     swept = make_profile(Phase.STANCE, [30.0, 0.0, 0.0], [0.03] * 3, body_m=[1.0, 1.02, 1.05])
     assert slip_m(swept, 0.12) == pytest.approx(0.04)
     assert slip_m(swept._replace(body_m=np.array([nan, 1.0, 1.02])), 0.12) == 0.0
@@ -68,7 +68,7 @@ def test_pauses_are_thinned_more_than_strokes_and_no_phase_is_lost() -> None:
         assert thin.time_s[thin.during(phase)][0] == profile.time_s[profile.during(phase)][0]
 
 
-def test_a_course_is_the_same_out_of_the_notebook() -> None:
+def test_a_profile_is_the_same_when_read_from_the_notebook() -> None:
     ticks = make_ticks(STROKE)
     ticks["force_x_n"] = np.nan
     profile = profile_of(make_log(ticks), "left", 0.0)

@@ -1,4 +1,4 @@
-"""Simulated trials: what an estimator meets in them, and that they can be met again. One stride of each, for time."""
+"""Simulated trials give an estimator realistic samples and can be repeated. Each has one stride, to save time."""
 
 from dataclasses import replace
 from functools import cache
@@ -36,12 +36,12 @@ def trial(setup: Setup = WALKING, seed: int = 1, torque_error: float = 0.032) ->
 
 
 def trial_of_new_rows() -> Trial:
-    """Its motor constants are known exactly."""
+    """Return a trial in which every row is new and the motor constants are known exactly."""
     return trial(EVERY_ROW_NEW, torque_error=0.0)
 
 
 def readings(sample: Sample) -> tuple[object, ...]:
-    """All but time and phase."""
+    """Return all fields but time and phase."""
     return sample[2:]
 
 
@@ -56,14 +56,14 @@ def test_a_trial_can_be_repeated() -> None:
 
 
 def test_rows_repeat_as_asked() -> None:
-    """Each lasts its period, in whole ticks: two of 2.6 ms where 5 ms are asked for, one where every row is new."""
+    """A row lasts its period in whole ticks of 2.6 ms: two for 5 ms, eight for 20 ms, one if every row is new."""
     for repeated, ticks in ((trial_of_new_rows(), 1), (trial(), 2), (trial(replace(WALKING, row_period_s=0.02)), 8)):
         runs = [len(list(run)) for _, run in groupby(repeated.samples, key=readings)]
         assert set(runs[1:-1]) == {ticks}
 
 
-def test_repeating_rows_is_behind_the_loop() -> None:
-    """The robot does the same, and a row that is new is the same row."""
+def test_repeating_rows_does_not_affect_the_loop() -> None:
+    """The robot does the same, and each new row equals the row of that tick without repetition."""
     often, seldom = trial_of_new_rows().samples, trial(replace(WALKING, row_period_s=0.02)).samples
     assert trial_of_new_rows().truths == trial(replace(WALKING, row_period_s=0.02)).truths
     new = [i for i, (a, b) in enumerate(zip(seldom, seldom[1:], strict=False), 1) if readings(a) != readings(b)]
@@ -79,7 +79,7 @@ def test_each_row_has_the_phase_of_its_own_tick() -> None:
 
 
 def test_messages_are_at_most_two_milliseconds_old() -> None:
-    """The drives send every 2 ms, and are read at the tick; a robot's step is 1 ms."""
+    """The drives send every 2 ms and are read at the tick; the simulated robot's step is 1 ms."""
     for sample in trial_of_new_rows().samples:
         for state in sample.states:
             assert 0.0 <= sample.now_s - state.angle_stamp_s < 0.0031
@@ -94,7 +94,7 @@ def test_there_is_a_truth_of_each_flippers_every_stride() -> None:
 
 
 def test_a_fixed_base_stays_where_it_is_and_a_free_one_does_not() -> None:
-    """But for the pose's noise of 0.1 mm."""
+    """The fixed base only shows the pose's noise of 0.1 mm."""
     setups = replace(WALKING, fixed_base=True), WALKING
     fixed, free = ([sample.body.x_m for sample in trial(setup).samples] for setup in setups)
     assert max(map(abs, fixed)) < 0.6e-3
@@ -127,7 +127,7 @@ def test_torque_constants_are_known_as_wrongly_as_asked() -> None:
         )
 
 
-# what an estimator says about it
+# estimates of a trial
 
 
 def test_estimators_see_the_pose_only_if_they_may() -> None:
@@ -147,8 +147,9 @@ def test_mud_estimates_are_those_after_each_stride() -> None:
 
 
 def test_in_a_walk_both_flippers_read_the_same_of_the_same_mud() -> None:
-    """Within 10 %. Their drives tell at other moments; currents along a line would make 10 to 34 % of that in k_e,
-    which comes from a quick extraction.
+    """They agree to 10 %, although their drives report at different times.
+
+    With currents interpolated along a line, k_e of the quick extraction would differ by 10 to 34 %.
     """
     soft = Track([(100.0, clay_of_water(51.2))])
     walked = run_trial(EVERY_ROW_NEW, soft, NONE, 2, 1)

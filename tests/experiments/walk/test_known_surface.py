@@ -1,4 +1,4 @@
-"""The paper's law below a known surface: values, and bodies that advance."""
+"""The paper's law below a known surface gives the right coefficient, also while the body advances."""
 
 from __future__ import annotations
 

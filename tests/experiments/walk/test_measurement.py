@@ -68,7 +68,7 @@ def test_a_plate_belongs_to_the_mud_in_which_it_went_down_unless_it_is_near_a_bo
 
 @pytest.mark.parametrize(("slip_m", "mud"), [(0.0, "49.5"), (0.01, "49.5"), (0.03, ""), (0.07, ""), (0.6, "")])
 def test_a_plate_that_slips_back_to_a_border_belongs_to_no_mud(slip_m: float, mud: str) -> None:
-    """It went down 5 cm behind the border at 61 cm."""
+    """It went down 5 cm past the border at 61 cm."""
     assert Plan().mud_at(0.66, slip_m) == mud
 
 
@@ -102,7 +102,7 @@ def test_the_robot_stops_past_the_last_mud() -> None:
 
 
 def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None:
-    """A stance is 12 cm long. In the strides that belong to a mud the plate was there with all of its slip."""
+    """A stance is 12 cm long. A stride belongs to a mud only if its plate stayed in that mud despite its slip."""
     located = [each for each in located_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
     for each in located:
         slip_m = each.stride["slip_m"]
@@ -112,7 +112,7 @@ def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None
 
 
 def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> None:
-    """With dry friction in the joints k_p of the soft mud reads 8 % high, the median of 32 strides of two walks."""
+    """With dry friction in the joints k_p of the soft mud is 8 % high (median of 32 strides of two walks)."""
     strong, soft = report().muds
     assert strong.truth and soft.truth
     for mud in (strong, soft):
@@ -122,7 +122,7 @@ def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> Non
 
 
 def test_without_compensation_firm_mud_seems_softer_and_less_so_with_it() -> None:
-    """As the paper found."""
+    """The paper reports the same."""
     rows = [row for row in report().errors if (row.mud, row.coefficient) == ("47.6", "k_s")]
     biases = {row.method: row.bias or 0.0 for row in rows}
     assert biases[KNOWN] < biases[KNOWN_COMPENSATED] < 0.0
@@ -192,7 +192,7 @@ def blind(folder: Path, from_s: float) -> Bench:
 
 
 def test_without_a_pose_the_robot_makes_only_as_many_strides_as_lead_to_the_end(tmp_path: Path) -> None:
-    """20 cm with steps of 12 cm at most; the strides are assigned to the muds by their order."""
+    """The muds are 20 cm long and steps at most 12 cm; strides are assigned to muds by their order."""
     bench = blind(tmp_path, 0.0)
     bench.bed.prepare(TINY.planned[0])
     entry = measure(bench, TINY, TINY.planned[0])
@@ -237,7 +237,7 @@ def test_a_pose_that_is_lost_during_a_walk_makes_it_invalid(tmp_path: Path) -> N
         measure(bench, replace(TINY, muds=MUDS), TINY.planned[0])
 
 
-# how far a walk has come
+# the advance of a walk
 
 
 def evaluate_walk(*statuses: tuple[float, float | None, str]) -> list[str | None]:
@@ -246,7 +246,7 @@ def evaluate_walk(*statuses: tuple[float, float | None, str]) -> list[str | None
     return [advance.evaluate({"now_s": now_s, "body_x_m": body_m, "phase": phase}) for now_s, body_m, phase in statuses]
 
 
-def test_a_walk_ends_with_the_insertion_behind_the_last_mud() -> None:
+def test_a_walk_ends_with_the_insertion_past_the_last_mud() -> None:
     reported = evaluate_walk((1.0, 1.4, "insertion"), (2.0, 1.51, "stance"), (3.0, 1.51, "insertion"))
     assert reported == [None, None, ""]
 
