@@ -9,7 +9,7 @@ inward lies above it and counts -1, and an upright one adds nothing. So the inte
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from math import cos, inf, radians, sin
+from math import cos, fsum, inf, radians, sin
 from typing import NamedTuple
 
 Corner = tuple[float, float]  # outward, upward in m
@@ -95,7 +95,7 @@ def _lower_corners(corners: Sequence[Corner]) -> list[Corner]:
 def signed_area_m2(corners: Sequence[Corner]) -> float:
     """Return the area, positive where the corners go counter-clockwise."""
     pairs = zip(corners, [*corners[1:], *corners[:1]], strict=True)
-    return sum(a[0] * b[1] - b[0] * a[1] for a, b in pairs) / 2.0
+    return fsum(a[0] * b[1] - b[0] * a[1] for a, b in pairs) / 2.0
 
 
 def _turn(a: Corner, b: Corner, c: Corner) -> float:
