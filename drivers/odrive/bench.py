@@ -1,8 +1,8 @@
 """Finds ODrives: by their heartbeats, and by remote frames that ask every id for its version and serial number.
 
 A remote frame carries no data, so no drive takes it for a command. Firmware 0.5 has no version message and ignores the
-request; it would take the request for a serial number for a new id, so only drives that reported firmware 0.6 get that
-one. Id 63 is that of a board without an id yet (firmware 0.6.9). Source: ODrive's CANSimple documentation, and
+request; it would take the request for a serial number for a new id, so only drives that report firmware 0.6.9 or newer
+get that one. Id 63 is that of a board without an id yet (firmware 0.6.9). Source: ODrive's CANSimple documentation, and
 examples/can_enumerate.py of odriverobotics/ODriveResources.
 """
 
@@ -40,7 +40,9 @@ class OdriveBench:
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
         answers = port.ask_all(_request(node_id, codec.GET_VERSION) for node_id in IDS)
         versions = {each.arbitration_id >> 5: each.data for each in answers if _has_version(each)}
-        numbers = self._serial_numbers(port, [each for each in versions if _version(versions[each])[4:6] == SUPPORTED])
+        numbers = self._serial_numbers(
+            port, [each for each in versions if _version(versions[each])[4:7] >= codec.FIRST_WITH_ADDRESS]
+        )
         return [
             _found(node_id, versions.get(node_id), number)
             for node_id in sorted(versions.keys() | heard)

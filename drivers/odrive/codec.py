@@ -60,6 +60,7 @@ class AxisState(IntEnum):
 
 
 LAST_COMMAND = 0x1F
+FIRST_WITH_ADDRESS = (0, 6, 9)  # older firmware may take a request for the Address message for a new node id
 SERIAL_NUMBER_LOW_BITS = 32
 # Everything that a drive obeys: besides the above, positions and velocities, their limits and gains, reboot, a new
 # angle, and a new firmware. RX_SDO also reads.

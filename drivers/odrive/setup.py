@@ -119,14 +119,10 @@ class OdriveSetup:
         found = FoundDrive("odrive", self._parameters.node_id, hardware, firmware)
         if version[4:6] != SUPPORTED:
             return found._replace(problem=f"firmware {firmware} is not supported: needs 0.6")
-        return found._replace(serial_number=self._serial_number())
-
-    def _serial_number(self) -> str:
-        """Returns an empty text for firmware before 0.6.9, which has no such message."""
-        try:
-            return codec.decode_serial_number(self._request(codec.ADDRESS, "its serial number", 7))
-        except NoAnswerError:
-            return ""
+        if version[4:7] < codec.FIRST_WITH_ADDRESS:
+            return found
+        number = codec.decode_serial_number(self._request(codec.ADDRESS, "its serial number", 7))
+        return found._replace(serial_number=number)
 
     def activity(self) -> str:
         _, state, _, _ = codec.HEARTBEAT.decode(self._request(codec.HEARTBEAT, "its heartbeat", 8))

@@ -74,6 +74,18 @@ def test_firmware_0_5_is_found_by_its_heartbeat() -> None:
     assert (drive.type, drive.node_id, drive.firmware) == ("odrive", 7, "") and "0.5" in drive.problem
 
 
+@pytest.mark.parametrize(("revision", "asked"), [(8, False), (9, True)])
+def test_firmware_without_serial_numbers_is_not_asked_for_one(
+    monkeypatch: pytest.MonkeyPatch, revision: int, asked: bool
+) -> None:
+    """Before 0.6.9 the message was another one, which sets the node id."""
+    monkeypatch.setattr("simulation.devices.odrive.VERSION_FIELDS", (2, 0, 0, 0, 0, 6, revision, 0))
+    bus = SimulatedBus(simulated("odrive", 3, "385f324d3037"))
+    (drive,) = search(bus.bench_port(), DRIVE_BENCHES, False).found
+    address = odrive.arbitration_id(3, odrive.ADDRESS)
+    assert (address in {frame.arbitration_id for frame in bus.sent}) == asked == bool(drive.serial_number)
+
+
 @pytest.mark.parametrize(
     ("name", "serials"),
     [
