@@ -17,7 +17,7 @@ from drivers.mit.bench import MitBench
 from drivers.mit.drive_type import Mit
 from drivers.moteus.bench import MoteusBench
 from drivers.moteus.drive_type import Moteus
-from drivers.odrive.bench import OdriveBench
+from drivers.odrive.bench import Odrive05Bench, OdriveBench
 from drivers.odrive.drive_type import Odrive, Odrive05
 from drivers.transmit_gate import TransmitGate
 
@@ -29,7 +29,12 @@ DRIVE_TYPES: Mapping[str, DriveType] = {
     "odrive05": Odrive05(),
 }
 # In the order in which a bus is searched: the questions of the first disturb no other drive.
-DRIVE_BENCHES: Mapping[str, DriveBench] = {"odrive": OdriveBench(), "mit": MitBench(), "moteus": MoteusBench()}
+DRIVE_BENCHES: Mapping[str, DriveBench] = {
+    "odrive": OdriveBench(),
+    "odrive05": Odrive05Bench(),
+    "mit": MitBench(),
+    "moteus": MoteusBench(),
+}
 
 
 def type_of(parameters: DriveParameters) -> DriveType:

@@ -110,7 +110,9 @@ def _summary(setups: Sequence[JointSetup], written: bool) -> int:
         hint = "" if written else "; 'mudskipper drives setup --write' writes those that may be written"
         print(f"{differing} settings differ, {unread} were not read{hint if differing else ''}")
         return exit_codes.UNHEALTHY
-    print(coloured("ok", GREEN) + "   every setting that can be read is as wanted")
+    cannot = sum(bool(each.drive.cannot) for each in setups)
+    rest = f"; {cannot} of {len(setups)} drives have none that can be read over CAN" if cannot else ""
+    print(coloured("ok", GREEN) + f"   every setting that can be read is as wanted{rest}")
     return exit_codes.OK
 
 

@@ -1,9 +1,12 @@
-"""Finds ODrives: by their heartbeats, and by remote frames that ask every id for its version and serial number.
+"""Finds ODrives: by remote frames that ask every id for its version and serial number, and by their heartbeats.
 
 A remote frame carries no data, so no drive takes it for a command. Firmware 0.5 has no version message and ignores the
 request; it would take the request for a serial number for a new id, so only drives that report firmware 0.6.9 or newer
 get that one. Id 63 is that of a board without an id yet (firmware 0.6.9). Source: ODrive's CANSimple documentation, and
 examples/can_enumerate.py of odriverobotics/ODriveResources.
+
+Firmware 0.5 alone reports counts of its encoder. Only ids with a heartbeat are asked for them: with node id 0 that
+request has the id of a drive in MIT mode.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,15 +14,18 @@ from typing import cast
 
 from drivers.bench.bench_port import BenchPort
 from drivers.bench.drive_bench import SetupFacts
+from drivers.bench.drive_setup import NoSetup
 from drivers.bench.found_drive import FoundDrive
-from drivers.can.frames import Frame, MalformedMessageError
+from drivers.can.frames import DATA_MAX_BYTES, Frame, MalformedMessageError
 from drivers.odrive import codec
 from drivers.odrive.codec import Message, arbitration_id
+from drivers.odrive.codec05 import GET_ENCODER_COUNT
 from drivers.odrive.drive_settings import SUPPORTED
 from drivers.odrive.parameters import OdriveParameters
 from drivers.odrive.setup import OdriveSetup, build_of_file, build_of_watchdog
 
-NAME = "odrive"
+NAME, NAME_05 = "odrive", "odrive05"
+NO_SETTINGS = "firmware 0.5 has no messages for its settings: use odrivetool over USB, and see docs/how-to/odrive.md"
 IDS = range(64)
 NO_ID = 63
 
@@ -31,11 +37,7 @@ class OdriveBench:
     disturbs = ""
 
     def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
-        return {
-            frame.arbitration_id >> 5
-            for frame in _of_odrives(frames)
-            if _is_message(frame, codec.HEARTBEAT) and len(frame.data) == 8
-        }
+        return _ids_with_heartbeat(frames)
 
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
         answers = port.ask_all(_request(node_id, codec.GET_VERSION) for node_id in IDS)
@@ -44,8 +46,8 @@ class OdriveBench:
             port, [each for each in versions if _version(versions[each])[4:7] >= codec.FIRST_WITH_ADDRESS]
         )
         return [
-            _found(node_id, versions.get(node_id), number)
-            for node_id in sorted(versions.keys() | heard)
+            _found(node_id, versions[node_id], number)
+            for node_id in sorted(versions)
             for number in sorted(numbers.get(node_id, {""}))
         ]
 
@@ -61,10 +63,39 @@ class OdriveBench:
         return numbers
 
 
-def _found(node_id: int, version: bytes | None, number: str) -> FoundDrive:
-    if version is None:
-        reason = "it sends a heartbeat and answers no request for its version: firmware 0.5 or older"
-        return FoundDrive(NAME, node_id, problem=reason)
+class Odrive05Bench:
+    """Implements DriveBench for firmware 0.5."""
+
+    is_fd = False
+    disturbs = ""
+
+    def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
+        return _ids_with_heartbeat(frames)
+
+    def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
+        versions = port.ask_all(_request(node_id, codec.GET_VERSION) for node_id in sorted(heard))
+        old = heard - {each.arbitration_id >> 5 for each in versions if _has_version(each)}
+        answers = port.ask_all(_request(node_id, GET_ENCODER_COUNT) for node_id in sorted(old)) if old else []
+        known = {each.arbitration_id >> 5 for each in answers if _is_message(each, GET_ENCODER_COUNT)}
+        unknown = "it sends a heartbeat, and reports neither a version nor the counts of its encoder"
+        return [
+            FoundDrive(NAME_05, node_id, firmware="0.5", problem="" if node_id in known else unknown)
+            for node_id in sorted(old)
+        ]
+
+    def open_setup(self, port: BenchPort, facts: SetupFacts) -> NoSetup:
+        return NoSetup(FoundDrive(NAME_05, facts.parameters.node_id, firmware="0.5"), NO_SETTINGS)
+
+
+def _ids_with_heartbeat(frames: Iterable[Frame]) -> set[int]:
+    return {
+        frame.arbitration_id >> 5
+        for frame in frames
+        if _is_message(frame, codec.HEARTBEAT) and len(frame.data) == DATA_MAX_BYTES
+    }
+
+
+def _found(node_id: int, version: bytes, number: str) -> FoundDrive:
     fields = _version(version)
     firmware, hardware = (".".join(map(str, fields[part])) for part in (slice(4, 7), slice(1, 4)))
     problem = "" if fields[4:6] == SUPPORTED else f"firmware {firmware} is not supported: needs 0.6"
@@ -76,12 +107,9 @@ def _request(node_id: int, message: Message) -> Frame:
     return Frame(arbitration_id(node_id, message), is_remote=True)
 
 
-def _of_odrives(frames: Iterable[Frame]) -> Iterable[Frame]:
-    return (frame for frame in frames if not (frame.is_extended or frame.is_fd or frame.is_error or frame.is_remote))
-
-
 def _is_message(frame: Frame, message: Message) -> bool:
-    return any(_of_odrives([frame])) and frame.arbitration_id & codec.LAST_COMMAND == message.command
+    usual = not (frame.is_extended or frame.is_fd or frame.is_error or frame.is_remote)
+    return usual and frame.arbitration_id & codec.LAST_COMMAND == message.command
 
 
 def _has_version(frame: Frame) -> bool:

@@ -10,7 +10,6 @@ import pytest
 
 from command_line import exit_codes
 from drivers.can.bus_lock import BusRole
-from drivers.drive_types import DRIVE_BENCHES
 from firmware_host.buses import lock_buses
 from firmware_host.configuration.loading import load_configuration
 from tests.command_line.command_lines import run
@@ -30,7 +29,7 @@ def make_bench(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> Benc
     return Bench(folder, name, monkeypatch, watchdog_s=0.0)
 
 
-@pytest.mark.parametrize("name", DRIVE_BENCHES)
+@pytest.mark.parametrize("name", WATCHDOG)
 def test_what_differs_is_written_backed_up_and_restored(
     folder: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
@@ -50,7 +49,7 @@ def test_what_differs_is_written_backed_up_and_restored(
     assert "left_sweep has the old settings" in run("drives", "setup", *config, "--backup", "old.toml").stdout
 
 
-@pytest.mark.parametrize("name", DRIVE_BENCHES)
+@pytest.mark.parametrize("name", WATCHDOG)
 def test_one_joint_alone_is_changed(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     bench = make_bench(folder, monkeypatch, name)
     ended = run("drives", "setup", "left_sweep", "--config", str(bench.config), "--write", "--backup", "old.toml")
@@ -68,7 +67,7 @@ def test_a_backup_is_never_replaced(folder: Path, monkeypatch: pytest.MonkeyPatc
     assert not any(bus.sent for bus in bench.buses.values())
 
 
-@pytest.mark.parametrize("name", DRIVE_BENCHES)
+@pytest.mark.parametrize("name", WATCHDOG)
 def test_ctrl_c_leaves_the_old_settings_and_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     bench = make_bench(folder, monkeypatch, name)
     config = ("--config", str(bench.config))
@@ -157,6 +156,12 @@ def test_a_bus_that_the_daemon_commands_is_refused(folder: Path, monkeypatch: py
         ended = run("drives", "setup", "--config", str(bench.config), "--write")
     assert ended.returncode == exit_codes.UNHEALTHY and "systemctl stop mudskipper" in ended.stderr
     assert not any(bus.sent for bus in bench.buses.values())
+
+
+def test_firmware_0_5_is_found_and_named_as_not_settable(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make_bench(folder, monkeypatch, "odrive05")
+    ended = run("drives", "setup", "--config", str(bench.config), "--write")
+    assert ended.stdout.count("odrivetool") == 4 and not list(folder.glob("drives-*.toml"))
 
 
 def test_a_cubemars_can_neither_be_read_nor_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from drivers.transmit_gate import TransmitGate
 from simulation.devices.drive import Forgery
 from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
 
-ANY_ID = {"odrive": 5, "moteus": 5, "mit": 5}
+ANY_ID = 5
 
 
 def found(bus: SimulatedBus, fd: bool = True, chosen: tuple[str, ...] = ()) -> list[tuple[object, ...]]:
@@ -54,7 +54,14 @@ def test_ranges_of_no_model_are_a_problem() -> None:
     assert drive.hardware == "" and "TMAX" in drive.problem
 
 
-def test_firmware_0_5_is_found_by_its_heartbeat() -> None:
+def test_firmware_0_5_is_found_by_its_heartbeat_and_the_counts_of_its_encoder() -> None:
+    bus = SimulatedBus(simulated("odrive05", 7), simulated("odrive", 3, "385f324d3037"))
+    assert found(bus) == [("odrive", 3, "0.0.0", "0.6.11", "385f324d3037"), ("odrive05", 7, "", "0.5", "")]
+    asked = {frame.arbitration_id for frame in bus.sent if frame.arbitration_id & 0x1F == 0x0A}
+    assert asked == {7 << 5 | 0x0A}
+
+
+def test_an_unknown_sender_of_heartbeats_is_a_problem() -> None:
     class Old:
         """Sends heartbeats and answers nothing."""
 
@@ -71,7 +78,7 @@ def test_firmware_0_5_is_found_by_its_heartbeat() -> None:
             return [Frame(odrive.arbitration_id(7, odrive.HEARTBEAT), odrive.HEARTBEAT.encode(0, 1, 0, 0))]
 
     (drive,) = search(SimulatedBus(Old()).bench_port(), DRIVE_BENCHES, False).found  # type: ignore[arg-type]
-    assert (drive.type, drive.node_id, drive.firmware) == ("odrive", 7, "") and "0.5" in drive.problem
+    assert (drive.type, drive.node_id) == ("odrive05", 7) and "heartbeat" in drive.problem
 
 
 @pytest.mark.parametrize(("revision", "asked"), [(8, False), (9, True)])
@@ -79,7 +86,7 @@ def test_firmware_without_serial_numbers_is_not_asked_for_one(
     monkeypatch: pytest.MonkeyPatch, revision: int, asked: bool
 ) -> None:
     """Before 0.6.9 the message was another one, which sets the node id."""
-    monkeypatch.setattr("simulation.devices.odrive.VERSION_FIELDS", (2, 0, 0, 0, 0, 6, revision, 0))
+    monkeypatch.setattr("simulation.devices.odrive.device.VERSION_FIELDS", (2, 0, 0, 0, 0, 6, revision, 0))
     bus = SimulatedBus(simulated("odrive", 3, "385f324d3037"))
     (drive,) = search(bus.bench_port(), DRIVE_BENCHES, False).found
     address = odrive.arbitration_id(3, odrive.ADDRESS)
@@ -144,7 +151,7 @@ def test_no_fd_frame_is_sent_on_a_bus_without_fd() -> None:
 @pytest.mark.parametrize("name", DRIVE_BENCHES)
 def test_no_question_is_a_command_of_torque(name: str) -> None:
     """The daemon's own gate, closed, lets every question of a search pass, and no drive follows torque after it."""
-    node_id = ANY_ID[name]
+    node_id = ANY_ID
     bus = SimulatedBus(simulated(name, node_id))
     search(bus.bench_port(), DRIVE_BENCHES, True, (name,))
     parameters = DRIVE_TYPES[name].parameters(bus="can", node_id=node_id, type=name, serial_number="1")

@@ -177,6 +177,12 @@ def test_an_odrive_without_the_numbers_of_its_build_says_which_file_is_missing()
         drive.read("axis0.config.watchdog_timeout")
 
 
+def test_firmware_0_5_says_that_it_cannot() -> None:
+    parameters = DRIVE_TYPES["odrive05"].parameters(bus="can", node_id=ID, type="odrive05")
+    drive = DRIVE_BENCHES["odrive05"].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
+    assert "odrivetool" in drive.cannot and not drive.settings()
+
+
 def test_a_cubemars_says_that_it_cannot() -> None:
     parameters = DRIVE_TYPES["mit"].parameters(bus="can", node_id=ID, type="mit", model="AK80-9")  # type: ignore[call-arg]
     drive = DRIVE_BENCHES["mit"].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
