@@ -1,4 +1,4 @@
-"""Fixtures of the daemon's tests."""
+"""Fixtures for the tests of the daemon."""
 
 from __future__ import annotations
 

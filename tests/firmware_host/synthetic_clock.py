@@ -1,4 +1,4 @@
-"""A clock for tests in which nothing waits."""
+"""A clock for tests that must not wait."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class SyntheticClock:
-    """Time passes by sleeping, and by `work_s`."""
+    """A clock whose time advances only by `sleep`, or by a test that changes `now_s`."""
 
     now_s: float = 100.0
     oversleep_s: float = 0.0

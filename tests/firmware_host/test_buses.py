@@ -1,4 +1,4 @@
-"""Buses that do not open, vanish, or appear later: the messages, and that the robot stays disarmed."""
+"""Buses that do not open, vanish, or appear later are reported, and the robot stays disarmed."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_the_error_of_a_bus_that_does_not_open_names_bus_and_cause(
     assert "\n" not in str(caught.value)
 
 
-def test_the_operating_system_s_error_is_found_behind_a_library_s(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_operating_system_s_error_is_found_in_that_of_a_library(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object, **options: object) -> None:
         try:
             raise FileNotFoundError(errno.ENOENT, "No such file or directory")
@@ -172,7 +172,7 @@ def test_an_unplugged_bus_is_a_fault_and_the_robot_stays_disarmed_after_it_retur
     plug.plug_in()
     plug.run(robot, 2.0 * RETRY_S)
     assert plug.port.state is BusState.ACTIVE
-    assert mode_of(robot) is Mode.FAULT  # until a person clears it
+    assert mode_of(robot) is Mode.FAULT  # until an operator clears it
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     plug.run(robot, 2.0)
     assert mode_of(robot) is Mode.IDLE
@@ -247,7 +247,7 @@ def test_a_second_program_on_a_bus_is_refused_before_it_sends_a_frame(
 
 
 def test_an_absent_bus_costs_no_memory_in_ten_hours() -> None:
-    """As in the daemon, no garbage is collected meanwhile. What other tests left behind is not counted."""
+    """As in the daemon, garbage collection is off. Objects of earlier tests do not count."""
     ports = reopening_ports({"left": BusParameters("socketcan", "nocan9")}, wait=True)
 
     def live(begin_s: int, end_s: int) -> int:

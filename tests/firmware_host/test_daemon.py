@@ -1,4 +1,4 @@
-"""The daemon ends on request or by a bug; the drives are idle in both cases."""
+"""The daemon ends on request or because of a bug; the drives are idle in both cases."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lo
     shutdown.request(15, None)
     assert run_shutdown(robot, shutdown)
     assert energised(robot) == [False] * 4
-    assert robot.loop.events.notice == ""  # it would say if they had stayed in the mud
+    assert robot.loop.events.notice == ""  # a notice would report flippers in the mud
 
 
 def test_without_a_request_the_shutdown_does_nothing(robot: Lockstep) -> None:
@@ -127,7 +127,7 @@ class DeliberateBugError(Exception):
 
 
 def caught(problem: Exception) -> Exception:
-    """Return the exception with a traceback."""
+    """Raise and catch the exception, so that it has a traceback."""
     try:
         raise problem
     except DeliberateBugError:
@@ -165,7 +165,7 @@ def test_the_time_in_which_clients_are_served_counts_as_a_part_of_the_tick(
 
 
 def test_a_daemon_in_the_foreground_prints_when_and_where_it_can_be_operated(short_folder: Path) -> None:
-    """No drive has to be heard for that."""
+    """It does so even if no drive sends anything."""
     setup = write_local_setup(short_folder, short_folder / "logs")
     command = [sys.executable, "-m", "firmware_host.daemon", "--config", str(setup)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as daemon:

@@ -1,4 +1,4 @@
-"""The fault monitor beyond single joints: buses, gate, arming, drive health, pose, and trust in encoders."""
+"""The fault monitor checks more than single joints: buses, gate, arming, drive health, pose, and trust in encoders."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ COMMANDS: list[tuple[Message, bytes, bool]] = [
     (Message(0x16, "<B"), b"\0", True),  # a reboot
     (RX_SDO, RX_SDO.encode(1, 100, 0) + bytes(4), True),
     (RX_SDO, RX_SDO.encode(SDO_READ, 100, 0), False),
-    (ESTOP, b"", False),  # everybody may stop a drive
+    (ESTOP, b"", False),  # any program may stop a drive
 ]
 
 
@@ -120,7 +120,7 @@ def test_every_command_counts_but_a_stop_and_a_reading(
     assert ("foreign_commands" in present(robot)) == counts
 
 
-def test_a_command_to_a_drive_of_nobody_is_no_matter(armed: Lockstep) -> None:
+def test_a_command_to_an_unknown_node_id_is_ignored(armed: Lockstep) -> None:
     robot = copy_of(armed)
     robot.buses["left"].open().send(Frame(arbitration_id(9, SET_INPUT_TORQUE), bytes(4)))
     robot.step()

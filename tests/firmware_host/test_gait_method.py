@@ -1,4 +1,4 @@
-"""The method "gait", from the validation of its configuration to the robot's walk."""
+"""The adaptation method "gait", from the validation of its configuration to the robot's walk."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def speed_m_s(lockstep: Lockstep) -> float:
 
 
 def test_firm_mud_is_walked_faster_than_by_choosing_depth_alone(configuration: Configuration) -> None:
-    """Measured 12.9 cm/s against 7.5 (3 kPa); both times include the start."""
+    """Measured: 12.9 cm/s against 7.5 cm/s in 3 kPa, both including the start of the walk."""
     swift, steady = walked(configuration, 3000.0, "gait"), walked(configuration, 3000.0, "default")
     assert speed_m_s(swift) > 1.25 * speed_m_s(steady)
     assert all(stride.estimate.released for stride in swift.loop.learning.strides)
@@ -110,7 +110,7 @@ def test_strides_with_changing_sweep_still_measure_every_coefficient(configurati
     estimates = [stride.estimate for stride in lockstep.loop.learning.strides]
     assert all(each.k_p.valid and each.k_e.valid and each.k_s.valid for each in estimates)
     reported = [each.k_p.value for each in estimates]
-    assert max(reported) < 1.5 * min(reported)  # a fifth by depth (the k-law is not the clay's), and noise
+    assert max(reported) < 1.5 * min(reported)  # a fifth by depth, since clay does not follow the k-law, and noise
 
 
 def test_a_walk_of_fixed_depth_does_not_depend_on_the_method(configuration: Configuration) -> None:

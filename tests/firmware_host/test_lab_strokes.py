@@ -1,9 +1,8 @@
 """The default method on the authors' own measurements: equal trials agree, and stronger mud gets larger coefficients.
 
-The strength labels are the lab's. The stiffest log differs from the others: its flipper was sent 3 cm into the mud,
-theirs 1.7 cm (by their angles, and by where the force begins), and its sweep motor gave all it had. A bound on k_s in
-N/m³ at twice the depth cannot be above the values of the others, so the comparison with it is made where it can be:
-in force at equal depth.
+The lab provides the strength labels. The stiffest log differs from the others: its flipper went 3 cm into the mud,
+theirs 1.7 cm (by their angles and the begin of the force), and its sweep motor was saturated. A bound on k_s in N/m³ at
+twice the depth cannot exceed the values of the others, so this log is compared by its forces.
 """
 
 from functools import cache
@@ -47,7 +46,7 @@ def test_shear_strength_of_equal_trials_agrees(label: str) -> None:
 
 
 def test_penetration_resistance_of_equal_trials_agrees() -> None:
-    strides = first_strokes("12.5N")  # the other insertions took 0.1 s and left four samples in the mud
+    strides = first_strokes("12.5N")  # the other insertions took 0.1 s and have only four samples in the mud
     assert all(stride.k_p.valid for stride in strides)
     assert variation([stride.k_p.value for stride in strides]) <= 0.12
 

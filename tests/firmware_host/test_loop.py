@@ -43,13 +43,13 @@ def armed(configuration: Configuration) -> Lockstep:
 
 @pytest.fixture
 def robot(armed: Lockstep) -> Lockstep:
-    """A robot that holds its pose."""
+    """Return a robot that holds its pose."""
     return copy_of(armed)
 
 
 @pytest.fixture(scope="module")
 def walked(armed: Lockstep) -> dict[float, Lockstep]:
-    """Copies of one robot in every phase, by the time since its walk was requested."""
+    """Return copies of one robot in every phase, by the time since the request to walk."""
     robot, found = copy_of(armed), {}
     robot.walk(WalkOrder(0.03))
     for before_s, after_s in pairwise((0.0, *WALKED_S)):
@@ -122,7 +122,7 @@ def test_disarm_ends_torque_at_once_in_every_phase(walked: dict[float, Lockstep]
 
 
 def test_disarm_idles_drives_even_before_all_are_heard(configuration: Configuration) -> None:
-    """The daemon restarts while one motor runs and another is dead."""
+    """This happens if the daemon restarts while one motor runs and another drive is dead."""
     robot = Lockstep(configuration, FIRM)
     running = robot.robot.drives[0]
     running.energised = True
@@ -199,7 +199,7 @@ def test_flippers_that_stay_in_the_mud_are_reported(configuration: Configuration
     robot.arm()
     robot.walk(WalkOrder(0.05, False))
     robot.run_until(lambda: robot.loop.target.phase is Phase.STANCE, 5.0)
-    for fraction in range(1, 101):  # deeper than the torque could have pushed them, without a jump
+    for fraction in range(1, 101):  # moved gradually to a depth that the torque cannot reach
         for arm in robot.robot.plant.arms:
             deep_rad = configuration.geometry.adduction_rad(arm.sweep_rad, 0.05)
             arm.adduction_rad += (deep_rad - arm.adduction_rad) * fraction / 100.0
@@ -223,7 +223,7 @@ def test_requests_that_do_not_fit_the_mode_are_refused_with_advice(configuration
 def test_clearing_does_not_help_while_the_cause_lasts(configuration: Configuration) -> None:
     robot = Lockstep(configuration, FIRM)
     robot.arm()
-    robot.robot.drives = same_for_all(robot.robot.drives[0])  # three boards are gone
+    robot.robot.drives = same_for_all(robot.robot.drives[0])  # three drives are gone
     assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
     robot.loop.request(Request.CLEAR, robot.now_s)
     robot.run_for(1.0)
@@ -258,12 +258,12 @@ def test_garbage_on_the_bus_is_counted_and_changes_nothing(configuration: Config
     for number in range(750):
         quiet.step()
         garbage.send(Frame(0x700 | number % 256, bytes(number % 9)))
-        garbage.send(Frame(0x009, b"\x00\x00\xc0\x7f\x00\x00\x00\x00"))  # a drive of ours that says NaN
+        garbage.send(Frame(0x009, b"\x00\x00\xc0\x7f\x00\x00\x00\x00"))  # a known drive that reports NaN
         garbage.send(Frame(0x029, b"\x01"))
         noisy.step()
     assert noisy.loop.drives.unknown_frames >= 750 and noisy.loop.drives.malformed_frames >= 1500
     assert len(quiet.loop.learning.strides) >= 2
-    assert repr(noisy.loop.learning.strides) == repr(quiet.loop.learning.strides)  # NaN is not equal to itself
+    assert repr(noisy.loop.learning.strides) == repr(quiet.loop.learning.strides)  # NaN is not equal to NaN
 
 
 def test_the_gait_advances_by_the_missed_ticks(robot: Lockstep) -> None:

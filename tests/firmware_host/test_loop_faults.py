@@ -1,4 +1,4 @@
-"""The whole loop under faults: reaction time, joint motion, and that it stays disarmed.
+"""The whole loop reacts to faults in time, limits the joint motion, and stays disarmed.
 
 One robot walks through all phases and is copied in each, so that every failure begins in the same state.
 """
@@ -88,7 +88,7 @@ def at(stages: dict[str, Lockstep]) -> Copied:
 
 
 def mute(robot: Lockstep, index: int, *messages: Message) -> None:
-    """A drive sends everything but these; without any it sends nothing."""
+    """Suppress these messages of a drive, or all of them if none is given."""
     drive = robot.robot.drives[index]
     everything, silent = drive.cyclic_frames, {message.command for message in messages}
     drive.cyclic_frames = lambda now_s: (  # type: ignore[method-assign]
@@ -105,7 +105,7 @@ def muted(*messages: Message) -> Cause:
 
 
 def altered(index: int = 1, /, **changes: float) -> Cause:
-    """Change what a drive measures."""
+    """Return a cause that changes parameters of a drive, such as its measured voltage."""
 
     def alter(robot: Lockstep) -> None:
         drive = robot.robot.drives[index]
@@ -191,7 +191,7 @@ def test_a_drive_that_restarts_is_a_fault_until_it_is_cleared(at: Copied) -> Non
     assert by_hand == {"drive_silent", "drive_restarted"}
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
-    robot.run_for(1.5)  # version and watchdog are read again meanwhile
+    robot.run_for(1.5)  # version and watchdog are read again in this time
     assert robot.loop.request(Request.ARM, robot.now_s) is None
 
 
@@ -245,7 +245,7 @@ def test_a_drive_that_falls_silent_while_arming_ends_it_without_torque(at: Copie
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_damping_never_speeds_a_joint_up(at: Copied, stage: str) -> None:
-    """This begins with the third tick: the slew limit needs two to end the previous torque."""
+    """This holds from the third tick on, because the slew limit needs two to end the previous torque."""
     robot = at(stage)
     mute(robot, 1, codec.GET_ENCODER_ESTIMATES)
     ticks = 0
@@ -253,7 +253,7 @@ def test_damping_never_speeds_a_joint_up(at: Copied, stage: str) -> None:
         robot.step()
         ticks += mode_of(robot) is Mode.DAMPING
         if mode_of(robot) is Mode.DAMPING and ticks == 3:
-            unmute(robot, 1)  # as a plug that slips in again
+            unmute(robot, 1)  # like a plug that makes contact again
         if mode_of(robot) is Mode.DAMPING and ticks > 3:
             for torque_nm, state in zip(robot.loop.sent.torques_nm, robot.loop.states, strict=True):
                 assert torque_nm * state.velocity_rad_s <= 0.0
@@ -378,7 +378,7 @@ def test_a_bug_stays_a_fault_until_a_restart(at: Copied) -> None:
 
 @pytest.fixture
 def unread(configuration: Configuration) -> Lockstep:
-    """A robot with a drive whose watchdog settings cannot be read."""
+    """Return a robot with a drive whose watchdog settings cannot be read."""
     robot = make_robot(configuration)
     drive = robot.robot.drives[2]
     assert isinstance(drive, SimulatedOdrive)

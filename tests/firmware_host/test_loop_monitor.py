@@ -80,7 +80,7 @@ def test_a_mean_rate_that_is_too_low_is_a_lag(fraction: float, expected: bool) -
         monitor.update(Tick(START_S + tick * PERIOD_S * (1.0 + fraction), 0.0, tick, 0), OFFSET_S)
         for tick in range(300)
     ]
-    assert not any(reported[:MEAN_TICKS])  # a mean of fewer says nothing
+    assert not any(reported[:MEAN_TICKS])  # there is no mean of fewer ticks
     assert [names(each) for each in reported[MEAN_TICKS:]] == [["loop_lagging"] * expected] * (300 - MEAN_TICKS)
 
 
@@ -112,7 +112,7 @@ def test_a_small_step_of_the_wall_clock_is_no_fault(step_s: float) -> None:
 
 
 def test_a_drifting_wall_clock_is_no_fault() -> None:
-    """500 ppm, the most that ntpd lets a clock slew by."""
+    """ntpd slews a clock by at most 500 ppm."""
     monitor = LoopMonitor(FaultBounds())
     for tick in range(20000):
         now_s = START_S + tick * PERIOD_S
@@ -130,10 +130,10 @@ def test_every_missed_tick_is_reported(busy_s: list[float]) -> None:
         assert reported or not tick.missed
 
 
-def crawled(period_ticks: float, beats: int = 40) -> list[str]:
+def crawled(period_ticks: float, ticks: int = 40) -> list[str]:
     """Return the names of all faults of a loop with this period."""
     monitor, found = LoopMonitor(FaultBounds()), []
-    for number in range(beats):
+    for number in range(ticks):
         now_s = START_S + number * period_ticks * PERIOD_S
         found += names(monitor.update(Tick(now_s, 0.0, number, 0), OFFSET_S))
     return found
@@ -184,7 +184,7 @@ def test_each_bound_has_two_sides(well: dict[str, object], ill: dict[str, object
     assert log_faults(HEALTHY._replace(**ill)) == [name]  # type: ignore[arg-type]
 
 
-def test_rows_are_told_lost_when_they_are_lost_and_not_for_ever() -> None:
+def test_lost_rows_are_reported_once() -> None:
     watch = LogMonitor(BOUNDS)
     lost = HEALTHY._replace(dropped=7)
     assert watch.update(lost) == [FaultKind.ROWS_LOST.fault(rows=7)]

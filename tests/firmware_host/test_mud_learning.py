@@ -1,4 +1,4 @@
-"""Learning from synthetic strides: their numbers, the chosen depths, and wild coefficients."""
+"""Learning from synthetic strides: their numbering, the chosen depths, and coefficients out of bounds."""
 
 from __future__ import annotations
 
@@ -164,8 +164,8 @@ def test_a_std_error_that_is_not_finite_is_a_fault(learning: MudLearning, std_er
     [
         GOOD,
         Estimate(0.99 * LARGEST_N_M3, 1e5, 100, True),
-        Estimate(nan, nan, 0, False, "no samples"),  # it says itself that it is not valid
-        Estimate(-1e4, 1e5, 100, True),  # within its doubt of none
+        Estimate(nan, nan, 0, False, "no samples"),  # is marked as not valid
+        Estimate(-1e4, 1e5, 100, True),  # within its uncertainty of zero
     ],
 )
 def test_coefficients_within_bounds_or_invalid_are_no_fault(learning: MudLearning, estimate: Estimate) -> None:

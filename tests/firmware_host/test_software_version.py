@@ -1,4 +1,4 @@
-"""Every log says which version and which commit wrote it."""
+"""Every log contains the version and the commit that wrote it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ticker keeps its absolute deadlines, shown on a synthetic clock."""
+"""On a synthetic clock, the ticker keeps its absolute deadlines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A wall clock that is stepped ends nothing: frames are stamped with it, as the kernel does."""
+"""A step of the wall clock does not interrupt a walk, although the kernel stamps frames with this clock."""
 
 from collections.abc import Callable, Iterable
 
@@ -22,7 +22,7 @@ STEPS_S = (-2.0, -1.0, -0.3, -0.05, -0.012, -0.01, -0.005, 0.005, 0.01, 0.012, 0
 
 
 class WallClock:
-    """The robot's wall clock. It is stepped at a time of the monotonic clock."""
+    """The robot's wall clock, with a step at a time of the monotonic clock."""
 
     def __init__(self, robot: Lockstep) -> None:
         self.robot = robot

@@ -1,7 +1,7 @@
-"""Motors that do not obey: what energy they put into a joint before the drives go idle, in the whole program.
+"""Motors that do not obey put only little energy into a joint before the drives go idle, in the whole program.
 
-Without the monitors of the motion an inverted motor received 20 J and reached 97 rad/s, commands that came late let a
-joint oscillate at its full torque for as long as they were late (26 J in 8 s), and a frozen encoder walked on.
+Without the monitors of the motion an inverted motor received 20 J and reached 97 rad/s, late commands let a joint
+oscillate at its full torque as long as they were late (26 J in 8 s), and a robot with a frozen encoder walked on.
 """
 
 from collections.abc import Iterator
@@ -67,7 +67,7 @@ def test_a_motor_that_does_not_obey_puts_little_energy_into_its_joint(
 def test_damping_with_an_inverted_motor_ends_before_the_joint_is_fast() -> None:
     bench = made("swing")
     with measured(bench, INVERTED, "left_adduction") as energy:
-        bench.fail("left_sweep.position", "off", 0.01)  # damping by another fault
+        bench.fail("left_sweep.position", "off", 0.01)  # another fault causes damping
         assert bench.run_until(lambda: bench.loop.mode is Mode.FAULT, 1.0)
     assert energy.peak_speed_rad_s < 30.0 and energy.energy_j < 0.3
 
@@ -92,7 +92,7 @@ def test_a_pose_held_too_stiffly_is_let_go(stiffness_nm_rad: float) -> None:
 
 
 def test_a_gentle_push_and_a_stop_raise_nothing() -> None:
-    """A push of 0.3 N·m for a quarter of a second, first one way and then the other."""
+    """The push is 0.3 N·m for a quarter of a second in each direction."""
     bench = made("hold")
     arm = bench.robot.plant.arms[0]
     step_rad_s = 0.3 / arm.parameters.arm_mass.sweep_inertia_kg_m2 * PERIOD_S

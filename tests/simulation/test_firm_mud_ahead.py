@@ -1,4 +1,4 @@
-"""A robot that comes from soft mud, five centimetres deep, into mud that would hold it there."""
+"""A robot walks with 5 cm deep strides from soft mud into firm mud that could hold its flippers."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def walk_in_soft_mud(configuration: Configuration, adaptive: bool = True) -> Loc
 
 @pytest.fixture(scope="module")
 def in_soft_mud(configuration: Configuration) -> Lockstep:
-    """An adaptive walk that has not met the firm mud yet."""
+    """Return an adaptive walk that has not met the firm mud yet."""
     return walk_in_soft_mud(configuration)
 
 
 def walk_into(robot: Lockstep, pascal: float) -> tuple[set[Phase], EventRecorder]:
-    """Walks a copy until it is well in firm mud of this strength, or held there, or stops."""
+    """Walk a copy until it is well inside firm mud of this strength, held there, or out of time."""
     robot, seen = copy_of(robot), {Phase.REST}
     segments = robot.robot.plant.track.segments
     segments[1] = segments[1]._replace(clay=Clay("firm", pascal))

@@ -1,4 +1,4 @@
-"""Uneven ground under the robot's flippers: what stones, ridges, layers and random strength do to arms and body."""
+"""Stones, ridges, layers and random strength of the ground act on the robot's arms and body."""
 
 from math import cos, pi, radians, sin
 from random import Random
@@ -21,14 +21,14 @@ from tests.control.synthetic_states import NO_TORQUE
 
 
 def press(plant: Plant, lift_nm: float) -> Plant:
-    """With the same torque for a second."""
+    """Apply the same adduction torque to both arms for a second."""
     for _ in range(1000):
         plant.step(STEP_S, Joints(0.0, lift_nm, 0.0, lift_nm))
     return plant
 
 
 def pressed_arm(track: Track, lift_nm: float) -> Arm:
-    """From the mud's surface on, where the track begins, on a body that stays."""
+    """Return an arm of a fixed body after it was pressed down for a second at the start of the track."""
     return press(Plant(PlantParameters(fixed_base=True), track), lift_nm).arms[0]
 
 
@@ -42,17 +42,17 @@ def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) 
 
 @pytest.mark.parametrize("lift_nm", [-0.2, -0.75, -1.66])
 def test_a_flipper_that_comes_down_on_a_stone_stops_there(lift_nm: float) -> None:
-    """Up to the torque of 20 A, which sinks it far deeper next to the stone; a millimetre is 20 N on its spring."""
+    """The torque is up to that of 20 A, which sinks it deeper next to the stone; 1 mm of the stone's spring is 20 N."""
     soft = [(9.0, MUDS["53.1"])]
-    beside, arm = (pressed_arm(Track(soft, [Stone(start_m, 9.0, 0.02)]), lift_nm) for start_m in (0.01, -0.01))
-    assert depth_m(beside) > 0.025
+    other, arm = (pressed_arm(Track(soft, [Stone(start_m, 9.0, 0.02)]), lift_nm) for start_m in (0.01, -0.01))
+    assert depth_m(other) > 0.025
     assert 0.0 < depth_m(arm) - 0.02 < 0.001
     assert arm.adduction_velocity_rad_s == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("sweep_nm", [-0.2, -0.75])
 def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot(sweep_nm: float) -> None:
-    """In mud too soft to hold the flipper alone: 0.75 N·m are 6 N at the plate."""
+    """The mud is too soft to hold the flipper; 0.75 N·m are 6 N at the plate."""
     stone = Stone(-0.2, -0.02, 0.01)
     plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, Clay("soup", 100.0))], [stone]))
     arm, geometry = plant.arms[0], plant.parameters.geometry
@@ -60,9 +60,9 @@ def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot(swee
     for _ in range(2000):
         hold_nm = 20.0 * (geometry.adduction_rad(arm.sweep_rad, 0.03) - arm.adduction_rad)
         plant.step(STEP_S, Joints(sweep_nm, hold_nm - 0.2 * arm.adduction_velocity_rad_s, 0.0, 0.0))
-    behind_m = stone.end_m - geometry.flipper_length_m * sin(arm.sweep_rad)
-    assert 0.0 < behind_m < 0.001
-    # F l cos α but for what the soup holds and for the arm's weight, which is 0.01 N·m on the sweep joint.
+    pressed_m = stone.end_m - geometry.flipper_length_m * sin(arm.sweep_rad)
+    assert 0.0 < pressed_m < 0.001
+    # F l cos α, except for the load of the mud and the arm's weight, which is 0.01 N·m on the sweep joint.
     thrust_n = -sweep_nm / (geometry.flipper_length_m * cos(arm.sweep_rad))
     assert arm.force.thrust_n == pytest.approx(thrust_n, abs=0.1)
 
@@ -81,7 +81,7 @@ def test_an_arm_that_falls_on_a_stone_comes_to_rest_and_never_rises_as_high_agai
 
 
 def test_a_stone_acts_in_addition_to_the_mud_and_only_at_its_position() -> None:
-    """On an arm half a millimetre under its top, in mud and in a trough so deep that there is none."""
+    """The arm is half a millimetre below the stone's top, in mud, or in a trough so deep that there is no mud."""
     geometry, sunk_rad = PlantParameters().geometry, -0.4
     stone = Stone(0.5, 0.6, lowest_m(geometry, 0.0, sunk_rad) - 0.0005)
 
@@ -91,15 +91,15 @@ def test_a_stone_acts_in_addition_to_the_mud_and_only_at_its_position() -> None:
         arm.step(STEP_S, body_m, 0.0, 0.0, 0.0)
         return arm.force
 
-    without, beside = force([], 0.55, 0.0), force([stone], 0.4, 0.0)
-    assert beside == without
+    without, elsewhere = force([], 0.55, 0.0), force([stone], 0.4, 0.0)
+    assert elsewhere == without
     of_stone = force([stone], 0.55, 0.1)
     assert of_stone.adduction_nm > 0.5
     assert force([stone], 0.55, 0.0) == pytest.approx([a + b for a, b in zip(without, of_stone, strict=True)])
 
 
 def test_a_reset_arm_has_met_no_stone() -> None:
-    """Else it would be pushed back through the flank that it had come to before."""
+    """Otherwise the flank that it met before the reset would push it."""
     plant = Plant(PlantParameters(), Track([(9.0, MUDS["48.5"])], [Stone(-0.005, 9.0, 0.0)]))
     arm = plant.arms[0]
     arm.sweep_rad, arm.adduction_rad = -0.04, -0.4
@@ -138,10 +138,10 @@ def test_ridges_come_on_top_of_the_unevenness_from_stride_to_stride() -> None:
 
 
 def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> None:
-    """On firm mud 1 cm below both, where half an edge withstands 3 N and the flipper presses with 2.5 N.
+    """Firm mud lies 1 cm below both; half an edge carries 3 N there, and the flipper presses with 2.5 N.
 
-    Within 1 mm, in which mud under an edge yields; the joints are so stiff that the arm comes down slowly. The lower
-    corner, by which depth is told, is up to 2 mm deeper than the point at which its half of the edge is carried.
+    The depths agree to 1 mm, in which mud under an edge yields; strong friction makes the arm come down slowly. Depth
+    is that of the lower corner, up to 2 mm deeper than the point at which its half of the edge is carried.
     """
     firm_below = Track([(9.0, Clay("firm below", 700.0, (Layer(0.01, 0.1, 20.0),)))], ridges=Ridges(0.005, 0.2))
     depths_m = []
@@ -162,7 +162,7 @@ def test_random_strength_is_that_at_the_flipper_s_own_position() -> None:
 
 
 def test_a_crust_carries_an_arm_that_sinks_without_it() -> None:
-    """Its own weight at the plate, 0.4 N, against a tenth of a newton of bearing in this mud."""
+    """The arm weighs 0.4 N at the plate; this mud without a crust carries 0.1 N."""
     soup = Clay("soup", 200.0)
     sunk = pressed_arm(Track([(9.0, soup)]), 0.0)
     crusted = pressed_arm(Track([(9.0, soup._replace(layers=(Layer(0.0, 0.005, 10.0),)))]), 0.0)
@@ -170,9 +170,9 @@ def test_a_crust_carries_an_arm_that_sinks_without_it() -> None:
 
 
 def test_a_robot_walks_faster_where_buried_stones_hold_its_flippers(configuration: Configuration) -> None:
-    """In mud in which it slips: bars across the track every 5 cm, 1 cm under the surface."""
+    """The robot slips in this mud; bars lie across the track every 5 cm, 1 cm below the surface."""
     soft = [(9.0, Clay("soft", 500.0))]
-    bars = [Stone(0.05 * place, 0.05 * place + 0.01, 0.01) for place in range(1, 40)]
+    bars = [Stone(0.05 * number, 0.05 * number + 0.01, 0.01) for number in range(1, 40)]
     distances_m = []
     for stones in ([], bars):
         lockstep = Lockstep(configuration, Track(soft, stones))

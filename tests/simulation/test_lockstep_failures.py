@@ -1,4 +1,4 @@
-"""Failures on purpose in lockstep: what the loop makes of them, without an exception and the same every time."""
+"""In lockstep the loop handles injected failures without an exception, and in the same way every time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TRACK = Track([(2.0, MUDS["48.5"])])
 
 @pytest.fixture(scope="module")
 def sound(configuration: Configuration) -> Lockstep:
-    """A robot that walks and to which nothing has happened yet."""
+    """Return a robot that walks without a failure."""
     lockstep = Lockstep(configuration, TRACK, failures=Failures(configuration.bus))
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03))
@@ -41,7 +41,7 @@ def lockstep(sound: Lockstep) -> Lockstep:
         ("left_sweep", "off", "drive_silent"),
         ("right_adduction.error", "off", "drive_disarmed"),
         ("right_adduction.error", "stuck", "drive_error"),
-        ("left_sweep.command", "off", "drive_error"),  # its watchdog
+        ("left_sweep.command", "off", "drive_error"),  # its watchdog trips
         ("bus.right", "stuck", "bus_refuses"),
         ("loop", "stuck", "loop_stalled"),
     ],
@@ -100,7 +100,7 @@ def test_a_stalled_loop_misses_ticks_while_the_robot_continues(lockstep: Lockste
 
 
 def test_joints_at_their_stops_are_moved_back_by_hand_and_the_robot_arms_again(lockstep: Lockstep) -> None:
-    """The bus goes in an extraction: until its watchdog trips a drive keeps the last torque."""
+    """The bus fails in an extraction; each drive keeps its last torque until its watchdog trips."""
     lockstep.run_until(lambda: lockstep.loop.target.phase is Phase.EXTRACTION, 5.0)
     lockstep.run_for(0.02)
     lockstep.fail("bus.left", "bus-off", 0.5)

@@ -1,8 +1,7 @@
-"""The authors' walks through the whole path of a pose: captured positions as NatNet frames over UDP, read tick by tick
-beside the joints, against what their log says directly.
+"""Poses of the authors' walks pass the whole path: NatNet frames over UDP, read tick by tick with the joints.
 
-The motion in the capture is computed here, from the log's own columns. That a reader finds it at any heading of the
-capture is tested with a known truth in tests/firmware_host/log_reading/lab/test_body_track.py.
+The steps must equal those in the log. The motion in the capture is computed here from the log's own columns; that a
+reader finds it at any heading is tested with a known truth in tests/firmware_host/log_reading/lab/test_body_track.py.
 """
 
 from __future__ import annotations
@@ -46,18 +45,18 @@ each_latency = pytest.mark.parametrize("latency_s", LATENCIES_S)
 
 @dataclass(frozen=True)
 class Capture:
-    """What the log says of the body."""
+    """The body's motion according to the log."""
 
     time_s: Floats
     state: Floats
     position_m: Floats  # (n, 3)
     first: NDArray[np.int64]  # rows in which a pose is new
-    lost: NDArray[np.bool_]  # rows of a pose that was held until it leapt
+    lost: NDArray[np.bool_]  # rows of a pose that was held until it jumped
     direction: Floats
 
     @property
     def x_m(self) -> Floats:
-        """Along the horizontal direction in which the stances moved the body; NaN where the capture was lost."""
+        """Return the position along the stances' horizontal motion; NaN where the capture was lost."""
         x_m: Floats = np.where(self.lost, np.nan, self.position_m @ self.direction)
         return x_m
 
@@ -85,7 +84,7 @@ def capture_of(path: Path) -> Capture:
 
 @dataclass(frozen=True)
 class Walked:
-    """What the robot would have known."""
+    """The estimates that the robot would have had."""
 
     x_m: Floats  # of each row
     ends: NDArray[np.int64]  # rows in which a stride of the left flipper closed
@@ -94,7 +93,7 @@ class Walked:
 
 @cache
 def walked(path: Path, latency_s: float) -> Walked:
-    """Row by row, with the log's time."""
+    """Run the log row by row, with its own time, through NatNet and the estimator."""
     capture, lab = capture_of(path), read_lab_csv(path)
     poses = [RecordedPose(float(capture.time_s[row]), tuple(capture.position_m[row].tolist())) for row in capture.first]
     server = NatNetServer(poses, latency_s=latency_s, crowded=True)
@@ -116,7 +115,7 @@ def walked(path: Path, latency_s: float) -> Walked:
 
 
 def connect(server: NatNetServer, port: NatNetPort) -> None:
-    """Before the log begins."""
+    """Connect the port to the server before the log begins."""
     for now_s in (-2.0, -1.0):
         port.read(now_s)
         server.step(now_s)
@@ -131,7 +130,7 @@ def rows_of(lab: LabLog) -> Iterator[tuple[float, Phase, JointAngles, list[float
 @each_latency
 @each_walk
 def test_steps_from_insertion_to_insertion_are_those_of_the_capture(path: Path, latency_s: float) -> None:
-    """None is missing where the capture has both ends, and none is invented where it lacks one."""
+    """No step is missing if the capture has both ends, and none is invented if it lacks one."""
     capture, starts = capture_of(path), capture_of(path).insertions
     true_m, reported_m = np.diff(capture.x_m[starts]), np.diff(walked(path, latency_s).x_m[starts])
     assert len(true_m) >= 2
@@ -145,7 +144,7 @@ def test_steps_from_insertion_to_insertion_are_those_of_the_capture(path: Path, 
 @each_latency
 @each_walk
 def test_the_estimator_s_steps_are_those_of_the_capture(path: Path, latency_s: float) -> None:
-    """Between the moments at which its strides close, as swing begins."""
+    """The steps are those between the ticks in which its strides close, when swing begins."""
     capture, known = capture_of(path), walked(path, latency_s)
     assert len(known.ends) >= 2
     true_m = np.diff(capture.x_m[known.ends])

@@ -45,7 +45,7 @@ def configured(flipper: str = "right", sections: str = FIXED) -> Configuration:
 
 @cache
 def walked(flipper: str) -> tuple[Log, tuple[StrideEstimate, ...], dict[str, object]]:
-    """The log of a walk on a fixed base, the strides that the loop closed in it, and its last status."""
+    """Return the log of a walk on a fixed base, the strides that the loop closed in it, and the last status."""
     configuration = configured(flipper)
     with TemporaryDirectory() as name:
         path = Path(name) / "walk.mcap"
@@ -101,7 +101,7 @@ def test_the_definition_of_the_rows_names_the_flippers() -> None:
 
 def test_one_flipper_moves_a_body_on_a_rail() -> None:
     configuration = configured(sections="")
-    plant = plant_of(configuration, rail_drag_n=1.0, pad_width_m=0.0)  # the paper's needs two flippers
+    plant = plant_of(configuration, rail_drag_n=1.0, pad_width_m=0.0)  # the paper's drag needs two flippers
     lockstep = Lockstep(configuration, Track([(9.0, MUDS["48.5"])]), plant=plant)
     lockstep.arm()
     lockstep.walk(WalkOrder(0.04, strides=4))

@@ -1,4 +1,4 @@
-"""Every number that describes the simulated robot states its bounds, and its default lies within them."""
+"""Every numeric parameter of the simulated robot states its bounds, and its default lies within them."""
 
 from dataclasses import MISSING, fields
 from typing import Annotated, get_args, get_origin, get_type_hints

@@ -1,4 +1,4 @@
-"""The loop's drives and the simulated ones, end to end: the watchdog read back, a restart noticed."""
+"""The loop's drives and the simulated ones, end to end: the watchdog is read back, and a restart is detected."""
 
 from math import isnan
 

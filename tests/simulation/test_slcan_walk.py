@@ -1,5 +1,6 @@
-"""The simulated robot walks on two serial adapters: through LAWICEL's lines, two pseudo-terminals, pyserial and
-python-can, with the daemon's own loop at the other end, in step.
+"""The simulated robot walks in lockstep with the daemon's loop over two serial CAN adapters.
+
+Frames pass as LAWICEL's lines through two pseudo-terminals, pyserial and python-can.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ OPENING_LINES = 5  # of python-can: C, S8, an empty one, O, O
 
 
 class Line:
-    """One bus over a serial line, and how far both ends are: a pseudo-terminal delivers a moment later."""
+    """One bus over a serial line; it counts lines and bytes, because a pseudo-terminal delivers with a delay."""
 
     def __init__(self, end: CanPort) -> None:
         assert isinstance(end, MockPort)
@@ -46,7 +47,7 @@ class Line:
         self._lines += self.port.failed_sends == failed
 
     def obey(self) -> None:
-        """What the loop has sent."""
+        """Deliver the frames of the loop to the robot."""
         while self.plugged:
             self.adapter.step()
             if self.adapter.heard_lines >= self._lines:
@@ -54,7 +55,7 @@ class Line:
             time.sleep(0.0)
 
     def deliver(self) -> None:
-        """What the robot has sent since."""
+        """Deliver the frames of the robot to the loop."""
         if self.plugged:
             self.adapter.step()
             wait_until(lambda: self.adapter.unread_bytes == self.adapter.written_bytes - self._read_bytes)

@@ -1,4 +1,4 @@
-"""The whole program in muds that hold the flippers: when it recovers by itself, and how it stops when it cannot."""
+"""In muds that hold the flippers the whole program recovers by itself, or stops safely if it cannot."""
 
 from __future__ import annotations
 
@@ -65,14 +65,14 @@ def until_swing(robot: Lockstep) -> bool:
 
 @pytest.fixture(scope="module")
 def in_stance(configuration: Configuration) -> Lockstep:
-    """A robot with little patience that has inserted its flippers in mud that lets them go."""
+    """Return a robot with short recoveries and with its flippers inserted in mud that releases them."""
     robot, _ = walking(replace(configuration, recovery=HASTY), mud(2.6), 0.04)
     assert until_phase(robot, Phase.STANCE)
     return robot
 
 
 def hardened(in_stance: Lockstep, kilopascal: float) -> Lockstep:
-    """The same robot in a recovery, after the mud has hardened round its flippers."""
+    """Return the same robot in a recovery, after the mud has hardened around its flippers."""
     robot = copy_of(in_stance)
     for arm in robot.robot.plant.arms:
         arm.track = mud(kilopascal)
@@ -87,13 +87,13 @@ def held(in_stance: Lockstep) -> Lockstep:
 
 @pytest.fixture
 def recovering(held: Lockstep) -> Lockstep:
-    """A robot in a recovery, in mud that lets nothing go."""
+    """Return a robot in a recovery, in mud that never releases its flippers."""
     return copy_of(held)
 
 
 @pytest.fixture(scope="module")
 def two_strides(configuration: Configuration) -> Callable[[float, float], tuple[Lockstep, EventRecorder]]:
-    """Walks two strides in mud of a strength and at a depth; each walk is walked once."""
+    """Return a function that walks two strides in mud of a strength and at a depth; results are cached."""
 
     @cache
     def walk(kilopascal: float, depth_m: float) -> tuple[Lockstep, EventRecorder]:
@@ -128,7 +128,7 @@ def test_where_flippers_come_out_in_time_no_tick_is_waited(
 
 
 def test_without_attempts_swing_begins_with_the_flippers_in_the_mud(configuration: Configuration) -> None:
-    """The paper's extraction failure: nothing waits."""
+    """Without a recovery the gait does not wait, which is the paper's extraction failure."""
     robot, recorder = walking(replace(configuration, recovery=NEVER), mud(7.5), 0.05)
     start_s = robot.now_s
     assert robot.run_until(lambda: robot.loop.target.stride == 1, 5.0)
@@ -139,7 +139,7 @@ def test_without_attempts_swing_begins_with_the_flippers_in_the_mud(configuratio
 
 
 def free_itself(configuration: Configuration, kilopascal: float, log: Recorder | None = None) -> Lockstep:
-    """Up to the next insertion; the body goes forward meanwhile, by at least half of a stride's 12 cm."""
+    """Walk until the robot frees itself and inserts again; its body advances by at least half of a stride's 12 cm."""
     robot, recorder = walking(configuration, mud(kilopascal), 0.05, log)
     assert until_phase(robot, Phase.RECOVERY)
     stuck_s, stuck_m = robot.now_s, robot.robot.plant.body_m
@@ -167,7 +167,7 @@ def test_in_the_stiffest_mud_it_frees_itself_with_its_last_attempt_without_a_fau
 def test_in_stiff_mud_it_frees_itself_and_a_replay_gives_the_same_strides_to_the_last_digit(
     tmp_path: Path, configuration: Configuration
 ) -> None:
-    """It walks further than one that does not wait."""
+    """It walks further than a robot without recoveries."""
     path = tmp_path / "walk.mcap"
     recorder = Recorder(path, configuration.text, {"robot": "test"})
     robot = free_itself(configuration, 5.0, recorder)

@@ -1,6 +1,6 @@
-"""The muds of the paper under the whole program: where it walks, slips and sticks.
+"""The whole program walks, slips and sticks in the muds of the paper.
 
-Speeds are compared with one another only. The strengths were fitted to a simpler model, so this plant does not meet
+Speeds are only compared with each other. The strengths were fitted to a simpler model, so this plant does not reproduce
 every cell of Table I: see the module of the clay.
 """
 
@@ -26,9 +26,9 @@ StepCm = Callable[[Clay, float], float]
 
 @pytest.fixture(scope="module")
 def step_cm(configuration: Configuration) -> StepCm:
-    """Returns the step length of the second stride, at a fixed depth; each walk is walked once.
+    """Return a function that gives the step length of the second stride at a fixed depth; results are cached.
 
-    As on the paper's robot, the gait does not wait for flippers that are stuck.
+    Like that of the paper's robot, the gait does not wait for flippers that are stuck.
     """
     configuration = replace(configuration, recovery=RecoveryParameters(attempts=0))
 
@@ -52,7 +52,7 @@ def test_five_centimetres_stick_in_the_stiff_mud(step_cm: StepCm) -> None:
 
 @pytest.mark.parametrize("water", MUDS)
 def test_it_moves_forward_in_every_mud(step_cm: StepCm, water: str) -> None:
-    assert 1.0 < step_cm(MUDS[water], 0.03) < 20.0  # a sweep of 12 cm, and some coasting
+    assert 1.0 < step_cm(MUDS[water], 0.03) < 20.0  # a sweep of 12 cm plus coasting
 
 
 def test_three_centimetres_slip_in_the_soft_mud(step_cm: StepCm) -> None:
@@ -69,7 +69,7 @@ def test_a_mud_stronger_than_the_motors_holds_the_flippers(step_cm: StepCm) -> N
 
 @pytest.fixture(scope="module")
 def adaptive_walk(configuration: Configuration) -> Lockstep:
-    """An adaptive walk over the paper's three muds, up to their end or for 40 s."""
+    """Walk adaptively over the paper's three muds, to their end or for 40 s."""
     track = Track([(COMPARTMENT_M, clay) for clay in MUDS.values()])
     lockstep = Lockstep(configuration, track)
     lockstep.arm()
@@ -79,7 +79,7 @@ def adaptive_walk(configuration: Configuration) -> Lockstep:
 
 
 def chosen_depths_m(adaptive_walk: Lockstep, compartment: int) -> list[float]:
-    """Of the last strides in a compartment: the first ones there still learn."""
+    """Return the depths of the last strides in a compartment; the robot still learns in the first ones."""
     start_m, chosen, position_m = compartment * COMPARTMENT_M, [], 0.0
     for stride in adaptive_walk.loop.learning.strides:
         if stride.estimate.flipper != "left":

@@ -44,7 +44,7 @@ def updated(folder: Path) -> dict[str, LogEntry]:
 
 @pytest.fixture
 def readings(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The files that were read, in order."""
+    """Return the list of files that the catalogue reads, in order."""
     read: list[str] = []
     plain: Callable[..., LogEntry] = catalogue_module._read_entry
 

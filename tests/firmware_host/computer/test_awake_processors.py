@@ -1,4 +1,4 @@
-"""The processors are kept awake exactly while torque is on, and a computer that does not permit it still walks."""
+"""The processors stay awake exactly while torque is on; where this is not permitted the robot still walks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_sleep_is_forbidden_with_torque_and_permitted_without_and_each_is_writte
         processors.update(energised)
     assert os.read(kernel, 64) == NO_LATENCY + KERNEL_DEFAULT + NO_LATENCY
     processors.close()
-    assert os.read(kernel, 64) == b""  # closed: the kernel ends the request
+    assert os.read(kernel, 64) == b""  # closing the device ends the request
     os.close(kernel)
 
 

@@ -1,4 +1,4 @@
-"""CAN interfaces as iproute2 prints them: samples in the layouts of its releases, and what is said of each."""
+"""CAN interfaces are read from the output of several releases of iproute2 and evaluated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from firmware_host.computer.can_links import CanLink, examine_bus, parse_links, 
 from firmware_host.computer.findings import Level
 from firmware_host.configuration.configuration import BusParameters
 
-# iproute2 6.1 of Debian 12, an mcp251xfd as systemd/80-can.network and .link set it up.
+# iproute2 6.1 of Debian 12, with an mcp251xfd that is set up by systemd/80-can.network and .link.
 DEBIAN_12 = """[{"ifindex":3,"ifname":"can0","flags":["NOARP","UP","LOWER_UP","ECHO"],"mtu":16,"qdisc":"pfifo_fast",
 "operstate":"UP","linkmode":"DEFAULT","group":"default","txqlen":32,"link_type":"can","promiscuity":0,"allmulti":0,
 "min_mtu":0,"max_mtu":0,"linkinfo":{"info_kind":"can","info_data":{"state":"ERROR-ACTIVE",
@@ -24,7 +24,7 @@ DEBIAN_12 = """[{"ifindex":3,"ifname":"can0","flags":["NOARP","UP","LOWER_UP","E
 "prop_seg":14,"phase_seg1":15,"phase_seg2":10,"sjw":1,"brp":1},"bittiming_const":{"name":"mcp251xfd",
 "tseg1":{"min":2,"max":256},"tseg2":{"min":1,"max":128},"sjw":{"min":1,"max":128},"brp":{"min":1,"max":256},
 "brp_inc":1},"clock":40000000}},"num_tx_queues":1,"num_rx_queues":1}]"""
-# As an adapter comes up that nobody configured: down, stopped, ten frames, no timing.
+# An adapter without configuration: down, stopped, a queue of ten frames, no timing.
 UNTOUCHED = """[{},{"ifindex":4,"ifname":"can1","flags":["NOARP","ECHO"],"mtu":16,"qdisc":"noop","operstate":"DOWN",
 "linkmode":"DEFAULT","group":"default","txqlen":10,"link_type":"can","linkinfo":{"info_kind":"can","info_data":
 {"state":"STOPPED","restart_ms":0,"clock":48000000}}}]"""
@@ -35,12 +35,12 @@ CAN0 = BusParameters("socketcan", "can0")
 
 
 def changed(**details: Any) -> dict[str, CanLink]:
-    """DEBIAN_12 with other details."""
+    """Return the links of DEBIAN_12 with other details."""
     links = json.loads(DEBIAN_12)
     info = links[0]["linkinfo"]["info_data"]
     for key, value in details.items():
-        place = links[0] if key in links[0] else info["bittiming"] if key in info["bittiming"] else info
-        place[key] = value
+        table = links[0] if key in links[0] else info["bittiming"] if key in info["bittiming"] else info
+        table[key] = value
     return parse_links(json.dumps(links))
 
 
@@ -60,7 +60,7 @@ def test_a_newer_iproute2_s_numbers_are_read_like_an_older_one_s_strings() -> No
     assert changed(sample_point=0.75) == parse_links(DEBIAN_12)
 
 
-def test_what_is_not_told_is_not_made_up() -> None:
+def test_missing_details_are_not_invented() -> None:
     link = parse_links(UNTOUCHED)["can1"]
     assert (link.up, link.state, link.bit_rate_bit_s, link.restart_ms, link.queue_frames) == (
         False,

@@ -1,4 +1,4 @@
-"""What is read of a made-up computer's /proc and /sys, and what is said of it."""
+"""The /proc and /sys of a synthetic computer are read and evaluated."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ def test_a_running_loop_that_did_not_get_its_priority_fails() -> None:
     assert [examine_priority(45, has).level for has in (45, 0)] == [Level.OK, Level.FAIL]
 
 
-def test_the_priority_of_a_thread_is_read_behind_whatever_it_is_called(computer: Computer) -> None:
+def test_the_priority_of_a_thread_is_read_after_any_thread_name(computer: Computer) -> None:
     computer.thread(90, "odd) S 1 (", 37)
     assert thread_priority(computer.root, 90) == 37
     assert thread_priority(computer.root, 91) == 0
@@ -218,7 +218,7 @@ def test_threads_that_carry_frames_are_found_among_the_others(computer: Computer
     ]
 
 
-def test_a_loop_above_its_interrupts_is_warned_of_and_told_the_bound() -> None:
+def test_a_loop_above_its_interrupts_is_warned_of_with_the_bound() -> None:
     threads = [Thread("irq/55-can0", 50), Thread("irq/56-can1", 45)]
     assert [examine_interrupts(priority, threads).level for priority in (44, 45, 60)] == [
         Level.OK,
@@ -268,7 +268,7 @@ def storage(computer: Computer, folder: str, daemon_runs: bool = False) -> dict[
     return {finding.id: finding for finding in found}
 
 
-def test_logs_that_were_cut_off_are_told_where_no_daemon_is_writing_them(computer: Computer) -> None:
+def test_logs_that_were_cut_off_are_reported_if_no_daemon_is_writing_them(computer: Computer) -> None:
     computer.write(f"logs/{ACTIVE}/20260101T000000.000000Z-robot-0000.mcap", "")
     assert storage(computer, "/logs")["unfinished_logs"].level is Level.WARN
     assert "unfinished_logs" not in storage(computer, "/logs", daemon_runs=True)
@@ -288,7 +288,9 @@ def test_logs_that_were_cut_off_are_told_where_no_daemon_is_writing_them(compute
         (FreeSpace(0.99, round(WALK_BYTES_PER_MIN * ENOUGH_MIN)), Level.OK, "60 min"),
     ],
 )
-def test_a_disk_is_judged_by_the_walking_time_that_it_has_room_for(space: FreeSpace, level: Level, text: str) -> None:
+def test_a_disk_is_evaluated_by_the_walking_time_that_it_has_room_for(
+    space: FreeSpace, level: Level, text: str
+) -> None:
     found = examine_space(space, 0.1)
     assert found.level is level and text in found.text
 
@@ -310,10 +312,10 @@ def test_who_may_write_is_what_the_kernel_would_say(mode: int, uid: int, group: 
 
 def test_a_folder_that_the_daemon_s_user_cannot_write_fails_with_who_should_own_it(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
-    stranger = Account("mudskipper", os.geteuid() + 4242, frozenset())
-    found = examine_folder(tmp_path / "logs" / "deeper", stranger)
+    other_user = Account("mudskipper", os.geteuid() + 4242, frozenset())
+    found = examine_folder(tmp_path / "logs" / "deeper", other_user)
     assert found.level is Level.FAIL
-    assert found.fix.startswith(f"'install -d -o {stranger.uid} {tmp_path / 'logs' / 'deeper'}'")
+    assert found.fix.startswith(f"'install -d -o {other_user.uid} {tmp_path / 'logs' / 'deeper'}'")
 
 
 def test_the_service_s_own_folder_is_made_at_its_start_and_no_other(tmp_path: Path) -> None:
@@ -327,7 +329,7 @@ def test_the_service_s_own_folder_is_made_at_its_start_and_no_other(tmp_path: Pa
     assert examine_folder(logs, service).level is Level.FAIL
 
 
-def test_a_clock_that_was_never_set_fails_and_one_that_nobody_corrects_warns() -> None:
+def test_a_clock_that_was_never_set_fails_and_one_that_is_not_synchronised_warns() -> None:
     today, never = datetime(2026, 5, 1, tzinfo=UTC), datetime(1970, 1, 2, tzinfo=UTC)
     assert examine_clock(today, True, True).level is Level.OK
     assert examine_clock(today, False, True).level is Level.WARN

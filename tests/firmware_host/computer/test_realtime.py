@@ -1,6 +1,6 @@
-"""The loop gets from the operating system what is permitted, and a sentence for what is not.
+"""The loop gets the permitted real-time settings of the operating system, and a sentence for each refused one.
 
-All of it changes the process for good, so every test asks a child of its own.
+These settings change a process permanently, so every test uses a child process.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tests.waiting import LONGEST_S
 IMPORTS = (
     "import ctypes, gc, json, os, resource, subprocess, sys; from firmware_host.computer.realtime import prepare_loop\n"
 )
-# Whoever runs the tests, this child may neither raise its priority nor lock memory.
+# The child may neither raise its priority nor lock memory, even if root runs the tests.
 DROP_RIGHTS = """
 for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_MEMLOCK):
     resource.setrlimit(limit, (0, 0))
@@ -31,7 +31,7 @@ if os.geteuid() == 0:
 
 
 def in_child(code: str) -> Any:
-    """What `code` leaves in `answer`."""
+    """Run `code` in a child process and return the variable `answer`."""
     program = f"{IMPORTS}{code}\nprint(json.dumps(answer))"
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=LONGEST_S)
     assert done.returncode == 0, done.stderr

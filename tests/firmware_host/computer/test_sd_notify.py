@@ -1,4 +1,4 @@
-"""systemd hears what the daemon says, and the loop never notices when it does not."""
+"""systemd receives the daemon's notifications, and a systemd that does not listen never disturbs the loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Listen = Callable[[str], socket.socket]
 
 @pytest.fixture
 def listen() -> Iterator[Listen]:
-    """systemd's end of an address."""
+    """Yield a function that listens on an address like systemd."""
     with ExitStack() as stack:
 
         def listen_on(address: str) -> socket.socket:
@@ -31,7 +31,7 @@ def listen() -> Iterator[Listen]:
 
 @pytest.fixture
 def notifier(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], SystemdNotifier]]:
-    """A notifier of a process that was started with this NOTIFY_SOCKET."""
+    """Yield a function that makes the notifier of a process with this NOTIFY_SOCKET."""
     with ExitStack() as stack:
 
         def start(address: str) -> SystemdNotifier:
@@ -75,7 +75,7 @@ def test_nothing_happens_without_a_notify_socket(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("address", ["/nonexistent/notify", "@mudskipper-nobody-is-here", "x" * 500])
-def test_an_address_where_nobody_listens_never_raises(notifier: Start, address: str) -> None:
+def test_an_address_without_a_listener_never_raises(notifier: Start, address: str) -> None:
     notifier(address).send("WATCHDOG=1")
 
 
@@ -89,8 +89,8 @@ def test_a_socket_that_vanishes_and_comes_back_is_found_again(
     first.close()
     sender.send("WATCHDOG=1")  # refused
     path.unlink()
-    sender.send("WATCHDOG=1")  # not there
-    second = listen(str(path))  # as when systemd re-executes itself
+    sender.send("WATCHDOG=1")  # no such file
+    second = listen(str(path))  # like a systemd that re-executes itself
     sender.send("WATCHDOG=1")
     assert second.recv(4096) == b"WATCHDOG=1"
 
@@ -102,7 +102,7 @@ def test_a_full_queue_loses_the_notice_instead_of_the_deadline(
     systemd = listen(address)
     sender = notifier(address)
     for _ in range(5000):
-        sender.send("WATCHDOG=1")  # would wait for ever
+        sender.send("WATCHDOG=1")  # a blocking socket would wait for ever
     arrived = 0
     while True:
         try:

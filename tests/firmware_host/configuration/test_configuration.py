@@ -1,4 +1,4 @@
-"""A configuration is accepted whole or refused by name, before anything is opened."""
+"""A configuration is accepted as a whole, or refused with the names of the wrong keys before anything is opened."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def problems_of(text: str) -> list[str]:
 
 
 def changed(text: str, key: str, value: str) -> str:
-    """`key = …` set to another value where it stands first."""
+    """Return the text with another value in the first line `key = …`."""
     assert re.search(rf"^{key} = ", text, re.MULTILINE), key
     return re.sub(rf"^{key} = \S+", f"{key} = {value}", text, count=1, flags=re.MULTILINE)
 
@@ -39,7 +39,7 @@ def test_the_example_is_valid_and_names_all_joints(configuration: Configuration,
 
 
 def test_the_example_states_the_defaults(configuration: Configuration) -> None:
-    """What the file shows to a newcomer is what he would get without it."""
+    """A robot without these sections in its file behaves like the example."""
     minimal = parse_configuration(minimal_text())
     for section in ("geometry", "arm", "gait", "limits", "adaptation", "gains", "motion", "loop"):
         assert getattr(configuration, section) == getattr(minimal, section), section
@@ -149,7 +149,7 @@ def test_the_bounds_of_faults_are_ordered(lower: str, upper: str, bound: float, 
     parse_configuration(f"{text}{bound}")
 
 
-def test_all_problems_are_told_at_once(example_text: str) -> None:
+def test_all_problems_are_reported_at_once(example_text: str) -> None:
     text = changed(changed(example_text, "torque_nm", "9.5"), "plate_width_m", "7")
     assert len(problems_of(text)) == 2
 
@@ -281,7 +281,7 @@ KEYS = st.sampled_from(
 
 @given(KEYS, TOML_VALUES)
 def test_any_value_anywhere_is_accepted_or_refused_by_name(key: str, value: str) -> None:
-    """Never another exception than ConfigurationError."""
+    """No other exception than ConfigurationError occurs."""
     try:
         parse_configuration(f"{key} = {value}\n{minimal_text()}")
     except ConfigurationError as problem:

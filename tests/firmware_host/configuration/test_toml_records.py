@@ -1,4 +1,4 @@
-"""Records from TOML: nested in tables, arrays and changes, with every problem told by its place."""
+"""Records are read from nested TOML tables, arrays and changes, and every problem is reported with its key."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_tables_arrays_and_arrays_in_arrays_become_their_records() -> None:
     ("text", "changes"),
     [
         ("", {}),
-        ("[deck]\npainted = false\n", {"painted": False}),  # said, though it is the default
+        ("[deck]\npainted = false\n", {"painted": False}),  # listed, although it is the default
         ("[deck.plank]\nlength_m = 2.0\n", {"plank": Plank(2.0)}),
     ],
 )
@@ -88,7 +88,7 @@ def test_changes_are_what_the_file_sets_and_nothing_else(text: str, changes: dic
         ("rail = []\nnote = 'x'", "note: there is no such key"),
     ],
 )
-def test_each_problem_is_told_with_key_value_and_bound(text: str, reported: str) -> None:
+def test_each_problem_is_reported_with_key_value_and_bound(text: str, reported: str) -> None:
     document = parse_document(text)
     assert READER.problems(document) == [reported]
     with pytest.raises(ConfigurationError) as caught:
@@ -101,7 +101,7 @@ def test_a_right_document_has_no_problems() -> None:
 
 
 def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
-    """Python reads it in hexadecimal, but does not print it."""
+    """Python reads such a number in hexadecimal, but refuses to print it in decimal."""
     document = parse_document(f"rail = []\n[beam.left]\nlength_m = 1.0\nnails = 0x{'f' * 6000}\n")
     (reported,) = READER.problems(document)
     assert reported.startswith("beam.left.nails = beyond all size: ")

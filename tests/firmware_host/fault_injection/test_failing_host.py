@@ -1,4 +1,4 @@
-"""Parts of the daemon that fail on purpose: a ticker that stalls, a wall clock that steps, a log that loses rows."""
+"""The daemon's parts fail on purpose: the ticker stalls, the wall clock steps, the log loses rows."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_a_clock_steps_by_an_hour_and_back() -> None:
 
 
 class KeepingRecorder(EventRecorder):
-    """Has lost two rows by itself."""
+    """A recorder that has already lost two rows by itself."""
 
     dropped = 2
     closed_in_s = 0.0

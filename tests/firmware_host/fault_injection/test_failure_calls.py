@@ -1,4 +1,4 @@
-"""The methods that inject failures, and their traces in log and status."""
+"""The methods that inject failures appear in log and status."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MIA = Caller(1, Peer(7, 1000, frozenset()), Level.DRIVE)
 class Bench:
     def __init__(self, failures: Failures | None) -> None:
         self.now_s = 10.0
-        self.reported: list[tuple[float, str, bool]] = []  # when, what, and whether anything failed then
+        self.reported: list[tuple[float, str, bool]] = []  # time, text, and whether a failure was active
         self.failures = failures
         self.failing_at_disarm: list[str] = []
         self.methods = with_failures(self._plain(), failures, self._report, lambda: self.now_s)

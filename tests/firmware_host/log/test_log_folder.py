@@ -1,4 +1,4 @@
-"""Which log is freed, which never, and how logs are named."""
+"""The quota deletes the oldest logs and never certain others; logs are named by their run."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_what_a_person_preserved_does_not_use_up_the_quota(tmp_path: Path) -> No
     assert [freed.name for freed in delete_by_quota(tmp_path, 150, 0.0)] == ["3.mcap"]
 
 
-def test_whatever_lies_in_active_counts_as_logs(tmp_path: Path) -> None:
+def test_every_file_in_active_counts_as_a_log(tmp_path: Path) -> None:
     make_files(tmp_path, DONE, "1", "2")
     make_files(tmp_path, ACTIVE, "3")
     for name in ("0.mcap.broken", "0.mcap.part", "notes.txt"):
@@ -133,7 +133,7 @@ def test_logs_of_the_older_layout_are_seen(tmp_path: Path) -> None:
     (done,) = make_files(tmp_path, DONE, "3")
     assert stored_files(tmp_path) == [whole, cut, done]
     assert unfinished_files(tmp_path) == [cut]
-    assert [freed.name for freed in delete_by_quota(tmp_path, 1, 0.0)] == ["1.mcap"]  # what is cut off is not freed
+    assert [freed.name for freed in delete_by_quota(tmp_path, 1, 0.0)] == ["1.mcap"]  # a cut log is not deleted
 
 
 def test_a_log_of_the_older_layout_can_be_preserved(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The recorder with its real writer: what is put in comes out bit for bit, and a loss is told.
+"""The recorder with its real writer: rows come back bit for bit, and lost rows are reported.
 
 Two readers that share no code with the project, rosbags and mcap-ros2-support, must see the same values.
 """
@@ -59,7 +59,7 @@ class Row(NamedTuple):
 
 
 def make_row(kind: RowKind, stamp_s: float) -> Row:
-    """A value of its own in every place, one of them NaN."""
+    """Return a row with a different value in every field, one of them NaN."""
     kinds = [field.kind for field in kind.fields for _ in range(field.length or 1)]
     values = [stamp_s, *(MAKE[name](place) for place, name in enumerate(kinds) if place > 0)]
     if len(values) > 2:
@@ -86,7 +86,7 @@ def recorder(tmp_path: Path) -> Recorder:
 
 @pytest.fixture
 def golden(recorder: Recorder) -> list[Row]:
-    """Three rows of every kind, in a finished log."""
+    """Write three rows of every kind into a finished log, and return them."""
     rows = [make_row(kind, 100.0 + number) for number in range(3) for kind in ROW_KINDS]
     for row in rows:
         assert recorder.put(ROW_KINDS.index(row.kind), row.payload)
@@ -95,12 +95,12 @@ def golden(recorder: Recorder) -> list[Row]:
 
 
 def comparable(values: list[Any]) -> list[str]:
-    """Bit for bit, NaN equal to NaN and a truth to its number."""
+    """Return the values as text, so that they compare bit for bit; NaN equals NaN, and True equals 1.0."""
     return [value if isinstance(value, str) else float(value).hex() for value in values]
 
 
 def values_of(message: Any, kind: RowKind) -> list[Any]:
-    """Of a message that another reader decoded, in the order of the row's table."""
+    """Return the values of a message that another reader decoded, in the order of the row's fields."""
     values: list[Any] = []
     for field in kind.fields:
         value = getattr(message, field.name)
@@ -148,7 +148,7 @@ def test_a_full_pipe_drops_at_once_and_the_log_says_how_many(recorder: Recorder)
     os.kill(recorder.writer_pid, signal.SIGSTOP)
     accepted = fill_pipe(recorder)
     for stamp_s in range(9):
-        assert not recorder.put(TICK_KIND, make_tick(float(stamp_s)))  # would wait for ever
+        assert not recorder.put(TICK_KIND, make_tick(float(stamp_s)))  # a blocking pipe would wait for ever
     assert (recorder.dropped, recorder.writer_alive) == (10, True)
     os.kill(recorder.writer_pid, signal.SIGCONT)
     wait_until(lambda: recorder.put(TICK_KIND, make_tick(1e3)))
@@ -174,7 +174,7 @@ def test_close_ends_though_the_writer_hangs(recorder: Recorder) -> None:
     wait_until(recorder.path.exists)
     os.kill(recorder.writer_pid, signal.SIGSTOP)
     fill_pipe(recorder)
-    assert not recorder.close(0.1)  # would wait for ever
+    assert not recorder.close(0.1)  # the writer would never end
     os.kill(recorder.writer_pid, signal.SIGCONT)
     assert recorder.close(LONGEST_S)
 
@@ -235,7 +235,9 @@ def test_the_writer_is_last_in_line_for_the_cpu(recorder: Recorder) -> None:
     assert recorder.close(LONGEST_S)
 
 
-def test_a_path_that_cannot_be_made_is_told_in_a_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_path_that_cannot_be_made_is_reported_in_a_sentence(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "file").touch()
     recorder = Recorder(tmp_path / "file" / "run.mcap", "", {})
     assert not recorder.close(LONGEST_S)
@@ -252,7 +254,7 @@ def test_a_log_is_never_written_over(tmp_path: Path, capfd: pytest.CaptureFixtur
 
 
 def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """The kernel lets no file grow beyond a size; then it does again."""
+    """The kernel limits the size of files for a while."""
     recorder = Recorder(tmp_path / "run.mcap", "", {})
     wait_until(recorder.path.exists)
     resource.prlimit(recorder.writer_pid, resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
@@ -278,7 +280,7 @@ def test_a_disk_that_refuses_costs_rows_that_the_log_counts(tmp_path: Path, capf
 
 
 def count_rows(path: Path) -> int:
-    """In the chunks that are whole so far."""
+    """Return the number of ticks in the chunks that are complete so far."""
     return len(read_log(path).ticks) if path.exists() and path.stat().st_size else 0
 
 
@@ -302,7 +304,7 @@ def test_what_a_killed_writer_left_is_recovered_at_the_next_start(tmp_path: Path
 
 
 def look(recorder: Recorder) -> LogReport:
-    """Into the pipe of reports, now."""
+    """Read the pipe of reports now, and not only after some calls."""
     recorder._calls = 0
     return recorder.report()
 

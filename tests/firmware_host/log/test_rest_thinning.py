@@ -1,4 +1,4 @@
-"""At rest few ticks are written; around torque and every change of mode, all of them."""
+"""At rest only some ticks are written; around torque and around every change of mode all are."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from firmware_host.log.rest_thinning import RestThinning
 from firmware_host.log.rows import TICK
 from tests.firmware_host.synthetic_rows import make_event, make_ticks
 
-REST_HZ, FULL_S = 10.0, 1.0  # every 38th tick; 380 in full
+REST_HZ, FULL_S = 10.0, 1.0  # every 38th tick; the first 380 in full
 
 
 def numbers(rows: list[tuple[int, bytes]]) -> list[int]:

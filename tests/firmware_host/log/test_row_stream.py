@@ -1,4 +1,4 @@
-"""Rows reach every subscriber; a slow one loses its own rows alone and learns how many."""
+"""Rows reach every subscriber; a slow subscriber loses only its own rows and is informed of their number."""
 
 import os
 import time

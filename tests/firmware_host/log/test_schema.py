@@ -1,4 +1,4 @@
-"""Layouts of rows that other versions wrote."""
+"""Rows of other versions are read with the layouts in their logs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The files of one run: what each carries, that no row is lost or doubled between them, and a disk that refuses."""
+"""The files of one run: each is complete, no row is lost or doubled between them, and a full disk is handled."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def make_old_logs(folder: Path, count: int = 2) -> list[Path]:
 
 
 def full(descriptor: int, piece: bytes) -> int:
-    """In place of os.write."""
+    """Replaces os.write by that of a full disk."""
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
@@ -106,7 +106,7 @@ def test_a_full_disk_frees_nothing_where_nothing_may_be_freed(tmp_path: Path, mo
 
 
 def test_freeing_that_does_not_help_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Somebody else takes what becomes free, or another name keeps the file."""
+    """Another program uses the freed space, or a second link keeps the deleted file."""
     old = make_old_logs(tmp_path, 5)
     log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=10**9))
     monkeypatch.setattr(log_segments, "free_space", lambda folder: log_folder.FreeSpace(0.0, 0))
@@ -139,7 +139,7 @@ def test_a_log_removed_under_the_writer_is_noticed(
     assert read.events[0]["text"].startswith("rows missing here: 200, ")
 
 
-def test_a_log_moved_away_keeps_its_rows_and_its_place_is_left_alone(
+def test_a_log_moved_away_keeps_its_rows_and_a_file_at_its_path_is_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
@@ -203,7 +203,7 @@ def test_a_full_disk_frees_the_oldest_log_and_counts_what_it_cost(
         "rows missing here: 190, the log could not be written: No space left on device",
     ]
     left = read_log(log_folder.present_path(tmp_path / ACTIVE / "run-0000.mcap"))
-    assert left.ticks["tick"].tolist() == list(range(10))  # to the row, not to the chunk
+    assert left.ticks["tick"].tolist() == list(range(10))  # complete to the last row, not only to the last chunk
 
 
 def test_the_quota_frees_the_oldest_and_says_so(tmp_path: Path) -> None:

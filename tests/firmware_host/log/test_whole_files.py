@@ -1,4 +1,4 @@
-"""A file is whole or as it was before; a device or a pipe is written as it is, and never replaced."""
+"""A file is either written completely or unchanged; a device or a pipe is written to and never replaced."""
 
 from __future__ import annotations
 

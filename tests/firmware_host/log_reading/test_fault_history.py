@@ -1,4 +1,4 @@
-"""A log's faults are read back as the causes that the daemon showed."""
+"""The faults of a log are read back as the causes that the daemon reported."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The authors' measurements in our conventions, our logs in theirs, and every malformed line named.
+"""The authors' logs are read in this project's conventions, its own logs are exported in theirs, and errors are named.
 
-The measurements are no part of this project; they are looked for beside it or in MUDSKIPPER_SHARED_DATA.
+The measurements are no part of this project; they are searched next to it or in MUDSKIPPER_SHARED_DATA.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Numbers = NDArray[Any]
 
 
 def inside(log: LabLog, phase: Phase) -> Numbers:
-    """Steps from row to row within a phase."""
+    """Return which steps from row to row lie within a phase."""
     steps: Numbers = (log.phase[1:] == phase) & (log.phase[:-1] == phase)
     return steps
 
@@ -52,7 +52,7 @@ def travel(log: LabLog, joint: int, phase: Phase) -> float:
 
 
 def work(log: LabLog, joint: int, phase: Phase) -> float:
-    """In A·rad, positive where the motor drives the joint."""
+    """Return the work in A·rad, positive if the motor drives the joint."""
     steps = np.diff(log.angle_rad[:, joint]) * log.current_a[1:, joint]
     return float(np.sum(steps[inside(log, phase)]))
 
@@ -67,7 +67,7 @@ def write(path: Path, *lines: str) -> Path:
 
 
 def make_walk(strides: int = 3, rate_hz: float = 100.0) -> Log:
-    """A log of ours in which both flippers walk in mud: they go down, back, up and forward, and push."""
+    """Return a log of this project in which both flippers walk in mud: down, back, up and forward, against a load."""
     pose = {  # sweep and adduction in rad at the end of each phase of one second
         Phase.REST: (0.0, 0.1),
         Phase.PAUSE: (0.5, 0.1),
@@ -106,7 +106,7 @@ def test_all_twelve_measurements_are_there() -> None:
 
 @measured
 def test_measured_motion_has_the_signs_of_a_walk(path: Path) -> None:
-    """Extraction was not used to find the signs, so its work shows that they are right."""
+    """The signs are found without the extraction, so its work confirms them."""
     log = read_lab_csv(path)
     single = path.name.startswith("single")
     present = ("right",) if single else ("left", "right")
@@ -124,7 +124,7 @@ def test_measured_motion_has_the_signs_of_a_walk(path: Path) -> None:
 
 @needs_measurements
 def test_most_measured_walks_of_january_sink_further_than_they_advance() -> None:
-    """The capture's y is its vertical; the largest motion of these bodies is no advance."""
+    """The capture's y is vertical, so the largest motion of these bodies is not their advance."""
     logs = [read_lab_csv(path) for path in MEASURED if path.name.startswith("walk")]
     sinking_m = [float(np.nanmax(log.body_height_m) - np.nanmin(log.body_height_m)) for log in logs]
     advance_m = [float(np.nansum(np.diff(log.body_x_m)[inside(log, Phase.STANCE)])) for log in logs]
@@ -190,7 +190,7 @@ def test_states_become_phases(tmp_path: Path) -> None:
 
 
 def test_lost_poses_are_not_positions(tmp_path: Path) -> None:
-    """An old pose held until the true one is found, and zeros, are no motion of the body."""
+    """An old pose that is held until tracking returns, and zeros, do not count as positions."""
     body_m = [0.8] * 10 + [0.1, 0.11, 0.12, 0.0, 0.13, 0.14]
     rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,{x_m},0,0" for number, x_m in enumerate(body_m)]
     head = HEAD + ",OptitrackPosition_x,OptitrackPosition_y,OptitrackPosition_z"
@@ -266,7 +266,7 @@ def test_a_broken_off_archive_names_the_last_good_line(tmp_path: Path) -> None:
     assert 2000 < int(str(refusal.value).split()[-1]) < 3000
 
 
-def test_a_file_that_is_not_there_is_told_in_a_sentence(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported_in_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"none\.csv: No such file or directory"):
         read_lab_csv(tmp_path / "none.csv")
 

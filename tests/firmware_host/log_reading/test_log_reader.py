@@ -1,4 +1,4 @@
-"""Reading logs that are whole, cut off or damaged: all that is there, or one sentence of refusal."""
+"""Whole, cut and damaged logs are read as far as possible, or refused with one sentence."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def make_tick(number: int) -> bytes:
 
 
 def make_log(path: Path, ticks: int = TICKS) -> Path:
-    """A finished log: ticks, and among them two strides and three events."""
+    """Write a finished log with ticks, two strides and three events."""
     rows = [(TICK_KIND, make_tick(number)) for number in range(ticks)]
     strides = [encode_row(STRIDE, stamp_s=1.0, index=index, flipper=index) for index in range(2)]
     events = [encode_row(EVENT, stamp_s=1.0, text=text) for text in ("walk", "mud", "stop")]
@@ -125,7 +125,7 @@ def test_a_log_without_rows_is_a_log(tmp_path: Path) -> None:
 
 
 def test_a_long_log_costs_about_as_much_as_its_bare_messages(tmp_path: Path) -> None:
-    """0.5 to 0.8 of it, measured; where each row would be unpacked by itself, many times as much."""
+    """Measured: 0.5 to 0.8 of it. A reader that unpacked each row by itself would take many times as much."""
     path = make_log(tmp_path / "long.mcap", 20 * 380)
     assert len(read_log(path).ticks) == 20 * 380
     assert least_cost_s(lambda: read_log(path)) < 2.0 * least_cost_s(lambda: bare_messages(path))
@@ -137,7 +137,7 @@ def bare_messages(path: Path) -> int:
 
 
 def least_cost_s(do: Callable[[], object]) -> float:
-    """Processor time, of three."""
+    """Return the least processor time of three calls."""
     costs_s = []
     for _ in range(3):
         begun_s = time.process_time()
@@ -181,7 +181,7 @@ def test_a_chunk_that_no_longer_looks_like_one_is_missed(path: Path, tmp_path: P
 
 
 def test_damage_is_refused_or_does_not_touch_the_rows(path: Path, whole: Log, tmp_path: Path) -> None:
-    """Flip one bit anywhere: the rows are all right or the file is refused, whichever byte it was."""
+    """After one flipped bit in any byte, all rows are right or the file is refused."""
     chance = random.Random(2)
     contents = path.read_bytes()
     refused = 0
@@ -225,7 +225,7 @@ def write_foreign(
     ros_text: str = "",
     compression: CompressionType = CompressionType.LZ4,
 ) -> Path:
-    """A log of one channel, sound as a file, that this program need not have written."""
+    """Write a valid MCAP file with one channel, as another program might."""
     with path.open("wb") as file:
         writer = Writer(file, compression=compression)
         writer.start(profile="ros2", library="another")
@@ -256,7 +256,7 @@ def test_a_layout_that_this_version_cannot_decode_is_refused(tmp_path: Path, ros
     path = write_foreign(tmp_path / "new.mcap", [make_tick(0)], ros_text=ros_text)
     with pytest.raises(LogError, match="the version of mudskipper that wrote it") as refusal:
         read_log(path)
-    assert "recover" not in str(refusal.value)  # which cannot help
+    assert "recover" not in str(refusal.value)  # it would not help
 
 
 def test_other_comments_are_no_other_layout(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Logs of other versions: all that they hold is read, and what they lack is marked as missing."""
+"""All contents of logs of other versions are read, and missing fields are marked as missing."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_the_replay_of_a_log_of_version_0_1_gives_the_same_numbers(capsys: pytes
     replayed = json.loads(capsys.readouterr().out)
     expected = json.loads(OLD_LOG.with_name("walk_0_1_replay.json").read_text(encoding="utf-8"))
     strides = replayed["strides"]
-    assert all(stride.pop("chosen_depth_m") is not None for stride in strides)  # keys that are new
+    assert all(stride.pop("chosen_depth_m") is not None for stride in strides)  # new keys
     assert all(stride.pop("other_surface_m") is None for stride in strides)
     assert {name: replayed[name] for name in expected} == expected
 
@@ -53,7 +53,7 @@ def in_reverse(lines: list[str]) -> list[str]:
 
 
 def write_version(path: Path, change: Change, finish: bool = True) -> LogFile:
-    """Writes 300 ticks and a stride, their fields changed as by another version."""
+    """Write 300 ticks, a stride and an event with the changed fields of another version."""
     kinds = [
         RowKind(kind.topic, kind.schema_name, changed.fields, changed.definition)
         for kind in ROW_KINDS
@@ -107,7 +107,7 @@ def test_a_log_of_another_version_is_recovered_in_its_own_layout(tmp_path: Path,
     before = read_log(path)
     if damaged:
         contents = bytearray(path.read_bytes())
-        contents[contents.rfind(b"/tick") - 17] += 1  # a record of the summary that becomes a message
+        contents[contents.rfind(b"/tick") - 17] += 1  # makes a message of a record in the summary
         path.write_bytes(contents)
     recovered = recover_log(path)
     log = read_log(recovered.path)

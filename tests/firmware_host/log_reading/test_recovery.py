@@ -1,4 +1,4 @@
-"""A log whose writer was cut off comes back with every row that is still there, and opens everywhere."""
+"""A log whose writer was killed is recovered with every row on the disk, and other programs can open it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CHUNK = 100  # ticks
 
 
 def make_file(path: Path, chunks: int = 5) -> LogFile:
-    """Every chunk flushed, then three ticks that are not."""
+    """Write chunks of ticks, each of them flushed, and leave the log open."""
     log = LogFile(path, OPENING)
     for chunk in range(chunks):
         log.write(make_ticks(chunk * CHUNK, (chunk + 1) * CHUNK))
@@ -36,7 +36,7 @@ def make_file(path: Path, chunks: int = 5) -> LogFile:
 
 
 def make_cut_log(folder: Path, name: str = "run-0000.mcap") -> Path:
-    """As SIGKILL leaves it: no index, no lock."""
+    """Write a log as SIGKILL leaves it, without index and lock."""
     log = make_file(folder / ACTIVE / name)
     log._file.close()
     return log.path
@@ -164,7 +164,7 @@ def test_a_log_of_the_older_layout_is_recovered_where_it_lies(tmp_path: Path) ->
 
 
 def recompress(path: Path, cut_bytes: int = 0, ros_text: str = "", topics: tuple[str, ...] = ("/tick",)) -> Path:
-    """As another program writes it, or with another layout of its rows."""
+    """Write a log with another program's compression, or with other topics or another layout of its rows."""
     ticks = [payload for _, payload in make_ticks(0, 300)]
     with path.open("wb") as file:
         compression = CompressionType.LZ4 if ros_text or len(topics) > 1 else CompressionType.ZSTD
@@ -229,7 +229,7 @@ def test_a_finished_log_of_the_same_name_with_fewer_rows_takes_nothing_away(tmp_
 def test_a_summary_that_looks_like_a_row_is_none(tmp_path: Path) -> None:
     path = make_file(tmp_path / "run.mcap").finish()
     contents = bytearray(path.read_bytes())
-    contents[contents.rfind(b"/tick") - 17] += 1  # a channel's opcode, in the summary: it makes a message of it
+    contents[contents.rfind(b"/tick") - 17] += 1  # makes a message of a channel in the summary
     path.write_bytes(contents)
     with pytest.raises(LogError, match="damaged"):
         read_log(path)
@@ -261,8 +261,8 @@ def test_corrupted_logs_cost_no_row_that_is_still_there(tmp_path: Path, finished
 def test_a_length_of_2_to_the_60_costs_no_memory(tmp_path: Path) -> None:
     path = make_cut_log(tmp_path)
     contents = bytearray(path.read_bytes())
-    place = contents.find(b"\x03\x00\x00\x00lz4") - 12  # the first chunk's size when opened
-    contents[place : place + 8] = (1 << 60).to_bytes(8, "little")
+    start = contents.find(b"\x03\x00\x00\x00lz4") - 12  # the uncompressed size of the first chunk
+    contents[start : start + 8] = (1 << 60).to_bytes(8, "little")
     path.write_bytes(contents)
     with pytest.raises(LogError, match="cannot hold 1152921504606846976"):
         read_log(path)

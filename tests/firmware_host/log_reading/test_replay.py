@@ -1,4 +1,4 @@
-"""A replayed log says what the robot knew while it walked; the authors' logs are read as they are."""
+"""A replayed log gives the estimates that the robot had while it walked; the authors' logs are read unchanged."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LAB_LOGS = sorted((SHARED / "flipper_in_mud").glob("*.csv.gz"))
 
 
 def same(live: StrideEstimate, replayed: StrideEstimate) -> bool:
-    """To the last digit; NaN is the same as NaN."""
+    """Return whether both agree to the last digit; NaN equals NaN."""
     return repr(dataclasses.astuple(live)) == repr(dataclasses.astuple(replayed))
 
 
@@ -43,7 +43,7 @@ def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path
 def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
     tmp_path: Path, configuration: Configuration
 ) -> None:
-    """A long rest first, of which few ticks are written, and a border every second and a half of the walk."""
+    """The log begins with a long rest, of which few ticks are written, and has a new segment every 1.5 s."""
     parameters = LogParameters(directory=str(tmp_path), segment_s=1.5)
     first = first_path(tmp_path, "run")
     recorder = Recorder(first, configuration.text, {"robot": "test", "run_id": "run"}, parameters)

@@ -1,4 +1,4 @@
-"""A subscription survives the absence and the restart of its daemon, and waits only where its caller wants to."""
+"""A subscription survives the absence and the restart of its daemon, and waits only if its caller wants it to."""
 
 from __future__ import annotations
 

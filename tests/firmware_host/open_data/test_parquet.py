@@ -1,4 +1,4 @@
-"""A log as Parquet: every value of the rows, one number or word per cell, with units."""
+"""A Parquet export has every value of a log's rows, one number or word per cell, with units."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def log() -> Log:
 
 @contextmanager
 def files_of_at_most(size: int) -> Iterator[None]:
-    """A disk that refuses to grow a file, as a full one does."""
+    """Limit the size of files, so that a write fails as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

@@ -40,7 +40,7 @@ def path(log: Log, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def by_rosbags(path: Path) -> dict[str, list[tuple[int, Any]]]:
-    """All messages of an independent reader by topic, each with its time in ns."""
+    """Return all messages by topic, decoded by an independent reader, each with its time in ns."""
     found: dict[str, list[tuple[int, Any]]] = {}
     with AnyReader([path], default_typestore=get_typestore(Stores.EMPTY)) as reader:
         for connection, time_ns, data in reader.messages():
@@ -90,7 +90,7 @@ def test_messages_come_at_50_to_100_hz_in_the_order_of_time(by_rosbags: dict[str
 def test_own_rows_are_preserved(log: Log, path: Path) -> None:
     copied = read_log(path)
     assert copied.complete and copied.events == log.events
-    assert repr(copied.strides) == repr(log.strides)  # in which NaN equals NaN
+    assert repr(copied.strides) == repr(log.strides)  # as text, because NaN is not equal to NaN
     for name in log.ticks.dtype.names or ():
         assert np.array_equal(copied.ticks[name], log.ticks[name], equal_nan=True), name
 
@@ -102,7 +102,7 @@ def test_forces_and_frames_are_those_of_the_geometry(log: Log, by_rosbags: dict[
         assert np.array_equal([force.z for force in forces], chosen["force_z_n"][:, number], equal_nan=True)
         poses = [message.pose.position for _, message in by_rosbags[f"/{flipper}/pose"]]
         depths_m = np.array([-(position.z + GEOMETRY.axis_height_m) for position in poses])
-        differences_m = np.abs(depths_m - chosen["depth_m"][:, number])  # the loop's depth is of the current's time
+        differences_m = np.abs(depths_m - chosen["depth_m"][:, number])  # the loop takes it at the current's stamp
         assert np.median(differences_m) < 1e-4 and differences_m.max() < 0.005
     _, frames = by_rosbags["/tf"][-1]
     parents = {each.child_frame_id: each.header.frame_id for each in frames.transforms}

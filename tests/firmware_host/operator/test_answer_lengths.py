@@ -1,4 +1,4 @@
-"""No answer of the socket is long, whatever the robot has to report: it is made between two ticks."""
+"""No answer of the socket is long, even with every fault present, because it is computed between two ticks."""
 
 from __future__ import annotations
 

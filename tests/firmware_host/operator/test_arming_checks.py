@@ -21,7 +21,7 @@ SUBJECTS = {"drive": "left_sweep", "watchdog": "left_sweep", "joint": "left_swee
 
 @pytest.fixture(scope="module")
 def ready(configuration: Configuration) -> Lockstep:
-    """A robot that may be armed; tests add faults and remove them."""
+    """Return a robot that may be armed; tests add and remove faults."""
     robot = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]))
     robot.run_until(lambda: robot.loop.mode is Mode.IDLE and not robot.loop.faults.present, 3.0)
     return robot

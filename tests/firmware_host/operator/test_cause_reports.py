@@ -1,4 +1,4 @@
-"""A cause of faults is reported in one sentence."""
+"""A cause of several faults is reported in one sentence."""
 
 from __future__ import annotations
 

@@ -63,11 +63,11 @@ def test_a_second_program_is_refused_with_the_holder_s_name() -> None:
         "anna operates the robot: wait until that program has ended, or has been silent for 0.4 s, "
     )
     assert lease.release("ben") == "anna holds the lease"
-    assert lease.lost(10.51)  # which was not renewed by that
+    assert lease.lost(10.51)  # the refused calls did not renew it
 
 
-def test_a_lost_lease_is_freed_by_its_holder_and_by_nobody_else() -> None:
-    """Or a robot whose program has just vanished would move on. A program's own release may be read after its end."""
+def test_a_lost_lease_is_freed_only_by_its_holder() -> None:
+    """Otherwise a robot would move on after its program has died. The holder's release may be read after its end."""
     lease = Lease()
     lease.renew("anna", 10.0, HALF_S)
     lease.hang_up("anna")
@@ -109,7 +109,7 @@ def test_an_ousted_program_is_refused_until_it_connects_again() -> None:
     assert lease.refusal("ben", 10.1, take_over=True) is None
     lease.oust("ben")
     assert not lease.held and not lease.lost(99.0)
-    lease.reset()  # the torque went off meanwhile
+    lease.reset()  # called when the torque goes off
     for refused in (
         lease.refusal("anna", 10.2),
         lease.refusal("anna", 10.2, take_over=True),

@@ -1,4 +1,4 @@
-"""Accounts that flood the socket for every user delay no stop for long, and no operator at all."""
+"""Accounts that flood the public socket delay a stop only briefly, and operators not at all."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from tests.firmware_host.served_socket import METHODS, OPERATOR, OTHER_USER, Ser
 
 CONNECTORS = 3000
 STOP = msgpack.packb([0, 2, "stop", {}])
-HONEST = Peer(9, 1009, frozenset())  # another account that may only stop
+BYSTANDER = Peer(9, 1009, frozenset())  # another account that may only stop
 
 
 @pytest.fixture
 def crowd(served: Served) -> Iterator[list[socket.socket]]:
-    """3,000 connections of one account that wait to be accepted."""
+    """Open 3,000 connections of one account, which wait to be accepted."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if hard < CONNECTORS + 200 or int(Path("/proc/sys/net/core/somaxconn").read_text()) < CONNECTORS + 200:
         pytest.skip("this computer permits fewer connections")
@@ -63,9 +63,9 @@ def connect_as_operator(served: Served) -> socket.socket:
 
 def test_a_stop_of_any_account_passes_3000_waiting_connections(served: Served, crowd: list[socket.socket]) -> None:
     stopped = stops_of(served)
-    ticks = ticks_until_stopped(served, connect(served, HONEST), stopped)
+    ticks = ticks_until_stopped(served, connect(served, BYSTANDER), stopped)
     assert ticks * PERIOD_S < 0.5
-    assert stopped[0].peer == HONEST
+    assert stopped[0].peer == BYSTANDER
 
 
 def test_an_operator_stops_at_once_next_to_3000_waiting_connections(served: Served, crowd: list[socket.socket]) -> None:
@@ -94,7 +94,7 @@ def test_accepting_ends_when_its_time_in_a_tick_is_over(served: Served) -> None:
 
 
 def test_users_with_one_connection_each_are_not_dropped_faster_than_they_are_answered(served: Served) -> None:
-    """Else many accounts that connect at once exclude each other."""
+    """Otherwise many accounts that connect at the same time would exclude each other."""
     stopped = stops_of(served)
     clients = [connect(served, Peer(9, 2000 + index, frozenset())) for index in range(10 * MOST_CLIENTS)]
     for client in clients:

@@ -57,7 +57,7 @@ def test_the_log_names_the_sender_of_each_request(armed: Robot) -> None:
     armed.ask("stop", BEN)
     armed.ask("disarm", BEN)
     assert [text for text in armed.events.texts if text.startswith("request")] == [
-        "request arm",  # by the test
+        "request arm",  # by the fixture
         "request walk by uid 1000 (process 77)",
         "request stop by uid 1001 (process 78)",
         "request disarm by uid 1001 (process 78)",
@@ -71,7 +71,7 @@ def test_a_stop_that_changes_nothing_does_not_fill_the_log_but_is_counted(armed:
     for _ in range(50):
         assert armed.ask("stop", BEN) == armed.ask("disarm", BEN) == "accepted"
         armed.steps.step()
-    assert not armed.events.about("request")[2:] and len(armed.events.texts) - reported <= 2  # the mode, a lease
+    assert not armed.events.about("request")[2:] and len(armed.events.texts) - reported <= 2  # mode and lease
     assert armed.ask("status")["unlogged_requests"] == 100
     armed.ask("arm")
     assert armed.events.texts[-1].startswith("request arm by uid 1000 (process 77); 100 before it")
@@ -183,7 +183,7 @@ def test_a_take_over_ends_the_lease_of_the_previous_holder(armed: Robot, method:
             armed.ask(again, ANNA, **({"for_s": 0.5} if again == "lease" else {}))
     armed.lease.hang_up(ANNA)
     armed.steps.run_for(0.3)
-    assert armed.ask("status")["notice"] == ""  # nothing was lost
+    assert armed.ask("status")["notice"] == ""  # no lease was lost
     assert armed.ask("status")["mode"] in ("hold", "walking")
 
 
@@ -209,7 +209,7 @@ def test_a_walk_can_take_the_lease(armed: Robot) -> None:
     with pytest.raises(RefusedError, match="operates the robot"):
         armed.ask("walk", BEN)
     assert armed.ask("status")["mode"] == "walking"
-    armed.steps.run_for(0.2)  # in which it was to be renewed
+    armed.steps.run_for(0.2)  # the lease expires
     assert armed.ask("status")["mode"] == "stopping"
 
 

@@ -31,7 +31,7 @@ def listener(short_folder: Path) -> Iterator[socket.socket]:
 
 
 def peer_in_groups(listener: socket.socket, groups: list[int]) -> tuple[int, Peer]:
-    """A process of another user connects."""
+    """Connect from a process of another user in these groups; return its id and the credentials that were read."""
     child = os.fork()
     if child == 0:
         try:

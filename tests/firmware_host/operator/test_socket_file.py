@@ -12,7 +12,7 @@ import pytest
 from firmware_host.operator.socket_file import AlreadyServedError, SocketFile
 
 
-def leave_behind(path: Path) -> None:
+def leave_stale_socket(path: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as dead:
         dead.bind(str(path))
 
@@ -54,7 +54,7 @@ def test_a_hanging_daemon_with_a_full_queue_is_not_replaced(short_folder: Path) 
 
 
 def test_a_dead_daemon_s_socket_is_replaced(short_folder: Path) -> None:
-    leave_behind(short_folder / "s")
+    leave_stale_socket(short_folder / "s")
     SocketFile(short_folder / "s", 4).close()
     assert not (short_folder / "s").exists()
 
@@ -69,7 +69,7 @@ def test_a_file_that_is_no_socket_is_left_alone(short_folder: Path) -> None:
 
 @pytest.mark.parametrize("target", ["dead", "file", "nothing"])
 def test_a_symbolic_link_is_not_followed(short_folder: Path, target: str) -> None:
-    leave_behind(short_folder / "dead")
+    leave_stale_socket(short_folder / "dead")
     (short_folder / "file").write_text("mine", encoding="utf-8")
     link = short_folder / "s"
     link.symlink_to(short_folder / target)

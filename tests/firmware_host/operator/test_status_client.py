@@ -25,7 +25,7 @@ Ends = tuple[StatusClient, socket.socket]
 
 @pytest.fixture
 def ends(short_folder: Path) -> Iterator[Ends]:
-    """A client and the other end of its connection."""
+    """Yield a client and the other end of its connection."""
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(short_folder / "s"))
         listener.listen()
@@ -44,7 +44,7 @@ def answer(ends: Ends, *messages: Any) -> Any:
 
 
 def test_an_answer_to_an_earlier_request_is_skipped(ends: Ends) -> None:
-    """A Ctrl-C may have kept it from being read."""
+    """An answer stays unread if Ctrl-C interrupts its request."""
     assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"
 
 
@@ -93,7 +93,7 @@ def test_a_message_before_the_connection_closes_is_read(ends: Ends) -> None:
 
 
 def test_a_full_queue_is_waited_for(short_folder: Path) -> None:
-    """The queue may be full for a moment only."""
+    """The queue may be full only for a moment."""
     with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as before:
         listener.bind(str(short_folder / "s"))
         listener.listen(0)

@@ -75,7 +75,7 @@ def test_a_stop_among_flooding_clients_is_served_within_one_turn(
         stopped.clear()
         operator.close()
         serve(served, 3)
-    assert longest <= 1 + MOST_CLIENTS  # a tick to be let in, then its turn
+    assert longest <= 1 + MOST_CLIENTS  # a tick until it is accepted, then one turn
 
 
 def test_requests_beyond_the_rate_wait_and_none_is_lost(served: Served) -> None:
@@ -90,7 +90,7 @@ def test_requests_beyond_the_rate_wait_and_none_is_lost(served: Served) -> None:
         with contextlib.suppress(BlockingIOError):
             answers.feed(fast.recv(65536))
         times_s += [served.now_s - begin_s for _ in answers]
-    assert len(times_s) == 400  # none is lost
+    assert len(times_s) == 400
     assert all(number < BURST + REQUESTS_PER_S * t_s + 1.0 for number, t_s in enumerate(times_s))
     assert ask(served, other, msgpack.packb([0, 1, "status", {}]))
 
@@ -112,7 +112,7 @@ def test_a_client_that_does_not_complete_a_request_is_dropped(served: Served) ->
     slow.sendall(ECHO + ECHO[:4])
     serve(served, 6)
     served.now_s += 0.9 * LONGEST_SENDING_S
-    slow.sendall(ECHO[4:5])  # a trickle is no more patience
+    slow.sendall(ECHO[4:5])  # a further byte does not extend the time
     serve(served, 6)
     assert served.counters["dropped_slow_clients"] == 0
     served.now_s += 0.2 * LONGEST_SENDING_S
@@ -121,12 +121,12 @@ def test_a_client_that_does_not_complete_a_request_is_dropped(served: Served) ->
     assert len(list(unpacked(slow.recv(4096)))) == 1 and slow.recv(1) == b""
     served.now_s += 1e6
     serve(served, 2)
-    assert ask(served, idle, ECHO)  # who asks nothing may stay
+    assert ask(served, idle, ECHO)  # a client without a request may stay
 
 
 def test_a_request_in_two_parts_is_answered_if_the_second_is_in_time(served: Served) -> None:
     client = connect(served)
-    for _ in range(3):  # each has its own time
+    for _ in range(3):  # each request has its own time
         assert ask(served, client, ECHO[:4]) == []
         served.now_s += 0.8 * LONGEST_SENDING_S
         assert ask(served, client, ECHO[4:]) == [[1, 1, None, {}]]
@@ -168,7 +168,7 @@ def test_one_user_s_connections_do_not_exclude_other_users(served: Served, monke
     for _ in range(4 * MOST_CLIENTS):
         others.append(connect(served, OTHER_USER))
         served.tick()
-    assert is_open(operator) and is_open(reader)  # although they were silent for longest
+    assert is_open(operator) and is_open(reader)  # although they were silent the longest
     late = connect(served, Peer(9, 1009, frozenset()))
     late.sendall(STOP)
     serve(served, 6)
@@ -179,13 +179,13 @@ def test_one_user_s_connections_do_not_exclude_other_users(served: Served, monke
 def test_among_users_with_equal_connections_the_newcomer_s_user_loses_one(served: Served) -> None:
     gone: list[Caller] = []
     served.on_hang_up = gone.append
-    others = [connect(served, READER) for _ in range(MOST_CLIENTS // 2)]  # still for longest
+    others = [connect(served, READER) for _ in range(MOST_CLIENTS // 2)]  # silent the longest
     own = [connect(served, OPERATOR) for _ in range(MOST_CLIENTS // 2)]
     serve(served, MOST_CLIENTS)
     late = connect(served, OPERATOR)
     serve(served, 2)
     assert all(map(is_open, others)) and [is_open(client) for client in own] == [False] + [True] * (len(own) - 1)
-    assert is_open(late) and [caller.connection for caller in gone] == [1 + len(others)]  # reported like any other end
+    assert is_open(late) and [caller.connection for caller in gone] == [1 + len(others)]  # the end is reported
 
 
 def test_among_single_connections_the_least_privileged_is_dropped(served: Served) -> None:
@@ -212,7 +212,7 @@ def test_a_user_without_rights_is_refused_with_a_message(short_folder: Path) -> 
 
 def test_the_holder_of_the_lease_is_never_dropped_for_a_newcomer(served: Served) -> None:
     served.is_protected = lambda caller: caller.connection == 1
-    clients = [connect(served, OPERATOR) for _ in range(MOST_CLIENTS)]  # the first one is still for longest
+    clients = [connect(served, OPERATOR) for _ in range(MOST_CLIENTS)]  # the first one is silent the longest
     serve(served, MOST_CLIENTS)
     connect(served, OPERATOR)
     serve(served, 2)
@@ -227,7 +227,7 @@ def test_a_disconnection_is_reported_with_its_caller(served: Served) -> None:
     assert ask(served, first, msgpack.packb([0, 1, "whoami", {}])) == [[1, 1, None, "uid 1000 (process 500)"]]
     first.close()
     serve(served, 3)
-    third = connect(served)  # has the descriptor of the first
+    third = connect(served)  # gets the file descriptor of the first
     serve(served, 3)
     assert {caller.connection for caller in gone} == {1}
     third.close()

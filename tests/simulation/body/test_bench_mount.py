@@ -1,4 +1,4 @@
-"""A flipper on a bench: the torques of arm and weight are the slope of their height, and no energy is made."""
+"""On a bench the torques of arm and weight equal the slope of their potential energy, and no energy is created."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The free body, compared with rotation matrices and differences, and with the laws of mechanics."""
+"""The free body agrees with rotation matrices, with finite differences, and with the laws of mechanics."""
 
 from dataclasses import replace
 from math import cos, hypot, pi, sin
@@ -36,12 +36,12 @@ from tests.control.synthetic_states import NO_TORQUE
 from tests.copied_robots import copy_of
 
 GEOMETRY, SHAPE, MASS_KG = FlipperGeometry(), BodyShape(), 1.02
-AHEAD_M = 0.02  # of the joints, where geometry is tested
+AHEAD_M = 0.02  # the joints are ahead of the centre of mass, where geometry is tested
 AREA_M2 = SHAPE.length_m * SHAPE.width_m
 WEIGHT_N = MASS_KG * 9.81
 NO_PAD = DragPad(0.0, 0.0)
 FREE = PlantParameters(free_body=True)
-POSITIONS_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners, and the middles between them
+POSITIONS_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners and midpoints
 TURNS = st.floats(-0.6, 0.6)
 RATES = st.floats(-3.0, 3.0)
 SIDES = st.sampled_from([1.0, -1.0])
@@ -66,7 +66,7 @@ def live(body: FreeBody, seconds: float, left: Still | None = None, right: Still
 
 
 def turned(roll_rad: float, pitch_rad: float) -> np.ndarray:
-    """From the body's axes to the world's, as the books have it."""
+    """Return the textbook rotation from the body's axes to the world's."""
     sr, cr, sp, cp = np.sin(roll_rad), np.cos(roll_rad), np.sin(pitch_rad), np.cos(pitch_rad)
     about_y = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
@@ -75,7 +75,7 @@ def turned(roll_rad: float, pitch_rad: float) -> np.ndarray:
 
 
 def plate_in_body(sweep_rad: float, adduction_rad: float, side: float) -> np.ndarray:
-    """Columns: the plate's n, r, s, and the intersection of the joints' axes, y to the left for either flipper."""
+    """Return as columns the plate's axes n, r and s and the intersection of the joints' axes; y is to the left."""
     ca, sa = np.cos(sweep_rad), np.sin(sweep_rad)
     tilted = turned(adduction_rad, 0.0) @ np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
     cross_coupling = np.array([[AHEAD_M], [SHAPE.width_m / 2.0], [0.0]])
@@ -84,11 +84,11 @@ def plate_in_body(sweep_rad: float, adduction_rad: float, side: float) -> np.nda
 
 
 def point_in_world(state: np.ndarray, side: float, u: float, s: float) -> np.ndarray:
-    """Of the plate; state: forward, height, roll, pitch, sweep, adduction."""
+    """Return the point (u, s) of the plate; `state` is forward, height, roll, pitch, sweep, adduction."""
     forward_m, height_m, roll_rad, pitch_rad, sweep_rad, adduction_rad = state
     plate = plate_in_body(sweep_rad, adduction_rad, side)
-    way = np.array([0.0, GEOMETRY.flipper_length_m + u, s - GEOMETRY.drop_m, 1.0])
-    position_m: np.ndarray = np.array([forward_m, 0.0, height_m]) + turned(roll_rad, pitch_rad) @ plate @ way
+    along = np.array([0.0, GEOMETRY.flipper_length_m + u, s - GEOMETRY.drop_m, 1.0])
+    position_m: np.ndarray = np.array([forward_m, 0.0, height_m]) + turned(roll_rad, pitch_rad) @ plate @ along
     return position_m
 
 
@@ -107,7 +107,7 @@ SPEEDS = st.tuples(*[RATES] * 6).map(np.array)
 def test_a_carried_plate_has_the_depth_of_rotation_matrices(state: np.ndarray, side: float) -> None:
     carriage = body_in(state, np.zeros(6)).carriages[side < 0.0]
     attitude = carried_attitude(GEOMETRY, carriage, state[4], state[5], 0.004)
-    if attitude.per_upward == LEAST_UPRIGHT:  # lies flat, which no plate in this model does
+    if attitude.per_upward == LEAST_UPRIGHT:  # a plate that lies flat is limited by the model
         return
     for u, s in POSITIONS_M:
         reported_m = attitude.depth_m + attitude.per_outward * u - attitude.per_upward * s
@@ -200,7 +200,7 @@ def test_it_falls_freely_until_it_meets_the_mud() -> None:
 
 @pytest.mark.parametrize("water", MUDS)
 def test_at_rest_it_lies_where_the_mud_s_bearing_carries_its_weight(water: str) -> None:
-    """Elastic down to YIELD_M, at which the reference bearing N_c s_u A acts, and floating from the surface on."""
+    """The mud is elastic down to YIELD_M, where the bearing N_c s_u A is reached; buoyancy acts from the surface on."""
     body = make_body(MUDS[water])
     live(body, 2.0)
     per_m = 5.14 * MUDS[water].strength_pa * AREA_M2 / YIELD_M + 17.5e3 * AREA_M2
@@ -216,7 +216,7 @@ def test_on_mud_that_cannot_carry_it_the_body_sinks_until_it_floats() -> None:
     least_m = (WEIGHT_N - bearing_n) / (17.5e3 * AREA_M2)
     assert least_m > 0.01  # far beyond its elastic depth
     assert abs(body.upward_m_s) < 0.001
-    # Released on the surface it overshoots, at most to twice the depth, as a weight on an undamped spring.
+    # Released on the surface it overshoots at most to twice the depth, like a weight on an undamped spring.
     assert least_m < SHAPE.axis_above_belly_m - body.height_m < 2.0 * least_m
 
 
@@ -225,7 +225,7 @@ def test_mud_never_returns_more_energy_to_a_falling_sliding_rolling_body_than_it
     random, dt_s = Random(seed), 0.0001
     tracks = (Track([(9.0, MUDS["53.1"])]), Track([(0.06, MUDS["53.1"]), (9.0, MUDS["45.3"])]))
     body = FreeBody(MASS_KG, SHAPE, DragPad(0.015, 0.02), tracks[seed % 2])
-    body.height_m += random.uniform(0.03, 0.06)  # clear of the mud, which keeps nothing yet
+    body.height_m += random.uniform(0.03, 0.06)  # above the mud, which has stored no energy yet
     body.roll_rad, body.pitch_rad = random.uniform(-0.15, 0.15), random.uniform(-0.2, 0.2)
     body.forward_m_s, body.pitch_rad_s = random.uniform(-0.5, 1.0), random.uniform(-2.0, 2.0)
 
@@ -266,7 +266,7 @@ def test_a_quarter_pressed_again_and_again_into_changing_mud_never_has_given_ene
         given_j -= quarter.step(clay, rate_factor(abs(sinking_m_s)), depth_m, sinking_m_s) * sinking_m_s / steps
         assert (
             given_j < 1e-6
-        )  # a step of 40 um of the stiffest mud is worth 25 uJ, and half-way sums leave little of it
+        )  # a step of 40 um in the stiffest mud has 25 uJ, and midpoint sums leave little error of it
     assert given_j < -0.001 * rounds
 
 
@@ -305,7 +305,7 @@ def test_a_print_carries_no_load_until_the_belly_is_back_in_it_or_was_clear_of_t
     assert quarter.step(clay, 1.0, 0.0019, 0.0) > 5.14 * 1000.0 * 0.004 * 0.6
 
 
-def test_both_flippers_pushed_down_in_front_lift_the_nose_and_behind_the_tail() -> None:
+def test_both_flippers_pushed_down_in_front_lift_the_nose_and_at_the_rear_the_tail() -> None:
     pitches_rad = []
     for sweep_rad in (0.5, -0.5):
         plant = Plant(FREE, Track([(9.0, Clay("stiff", 8000.0))]))
@@ -326,7 +326,7 @@ def test_both_flippers_pushed_down_at_the_sides_lift_the_body() -> None:
         plant.step(STEP_S, Joints(0.0, -1.0, 0.0, -1.0))
     assert body.height_m > body.shape.axis_above_belly_m  # clear of the mud
     carried_n = sum(load.upward_n for load in body.flipper_loads(axes_of(0.0, 0.0), *plant.arms))
-    assert carried_n == pytest.approx(body.mass_kg * 9.81, rel=0.05)  # it still rocks by that much on the plates
+    assert carried_n == pytest.approx(body.mass_kg * 9.81, rel=0.05)  # it still rocks on the plates
     assert abs(body.pitch_rad) < 0.01
 
 
@@ -413,7 +413,7 @@ def test_a_walk_of_a_free_body_hardly_depends_on_the_step_of_the_simulation(
 
 
 def test_moments_of_a_flipper_on_a_level_body_are_levers_times_forces() -> None:
-    """An upward force at the plate's edge: over the arm it rolls, over the sweep it pitches."""
+    """An upward force at the plate's edge rolls the body by the arm's length and pitches it by the sweep."""
     sweep_rad, adduction_rad = 0.4, -0.5
     plate = plate_in_body(sweep_rad, adduction_rad, 1.0)
     along = plate[:, :3].T @ np.array([0.0, 0.0, 5.0])

@@ -24,7 +24,7 @@ MOMENT_NM = 0.08 * 9.81 * 0.06
 
 
 class ConstantThrust(FlipperContact):
-    """Mud that always pushes with the same force."""
+    """A contact with mud that always pushes with the same force."""
 
     thrust_n = 0.0
 
@@ -35,7 +35,7 @@ class ConstantThrust(FlipperContact):
 
 
 def make_air_plant(parameters: PlantParameters = WITHOUT_FRICTION) -> Plant:
-    """Arms level, and no mud under them."""
+    """Return a plant with level arms and without mud."""
     plant = Plant(parameters, TRACK)
     for arm in plant.arms:
         arm.adduction_rad = 0.0
@@ -115,7 +115,7 @@ def test_dry_friction_slows_an_arm_down_evenly_until_it_stands() -> None:
     assert arm.adduction_velocity_rad_s == pytest.approx(-2.0 + 0.02 * 0.02 / 0.0006)
     run(plant, 0.1)
     assert plant.velocities_rad_s == (0.0, 0.0, 0.0, 0.0)
-    assert arm.sweep_rad == pytest.approx(2.0**2 / 2.0 * 0.0004 / 0.02, rel=0.03)  # v²/2a, in steps of a fortieth
+    assert arm.sweep_rad == pytest.approx(2.0**2 / 2.0 * 0.0004 / 0.02, rel=0.03)  # v²/2a; a step is 1/40 of the stop
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -160,7 +160,7 @@ def test_one_flipper_alone_moves_and_pushes(side: int) -> None:
     plant.arms[side].contact = pushing
     for _ in range(100):
         plant.step(STEP_S, Joints(0.01, 0.06, 0.0, 0.0) if side == 0 else Joints(0.0, 0.0, 0.01, 0.06))
-    own_rad, other_rad = (plant.angles_rad[2 * place : 2 * place + 2] for place in (side, 1 - side))
+    own_rad, other_rad = (plant.angles_rad[2 * flipper : 2 * flipper + 2] for flipper in (side, 1 - side))
     assert own_rad[0] > 0.0 == other_rad[0]
     assert own_rad[1] > 0.0 > other_rad[1]  # the other one falls
     assert plant.body_m > 0.01
@@ -191,7 +191,7 @@ def test_the_body_comes_to_rest_after_a_push() -> None:
 
 
 def test_a_quarter_of_the_step_gives_the_same_push() -> None:
-    """A stance and an extraction with prescribed torques."""
+    """The torques of a stance and an extraction are prescribed."""
     ends_m = []
     for dt_s in (0.001, 0.00025):
         plant = Plant(PlantParameters(), TRACK)
@@ -204,7 +204,7 @@ def test_a_quarter_of_the_step_gives_the_same_push() -> None:
 
 
 def row(plant: Plant, strides: int = 2) -> list[float]:
-    """Strokes with prescribed torques: down, back, up and forward. The flippers' angles at the end of each."""
+    """Make strokes down, back, up and forward with prescribed torques; return body and angles at the end of each."""
     ends = []
     for _ in range(strides):
         for torques_nm in ((0.0, -0.2), (-0.6, -0.1), (0.0, 0.6), (0.1, 0.05)):
@@ -225,7 +225,7 @@ def test_a_reset_brings_everything_back(disturbances: Disturbances) -> None:
 
 def test_the_body_of_a_fixed_base_never_moves() -> None:
     plant, free = Plant(PlantParameters(fixed_base=True), TRACK), Plant(PlantParameters(), TRACK)
-    # Further than the drag that holds it elastically gives way, twice over for a sudden push: it has slid.
+    # An elastic drag gives way by at most twice its static deflection under a sudden push, so the free body has slid.
     assert max(row(free)[::5]) > 2.0 * static_drag_n() / DRAG_STIFFNESS_N_M
     row(plant)
     assert (plant.body_m, plant.body_m_s) == (0.0, 0.0)

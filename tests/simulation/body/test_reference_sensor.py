@@ -1,4 +1,4 @@
-"""The reference sensor's strokes, with arms that the test moves and in whole walks."""
+"""The reference sensor records the strokes of arms that a test moves, and of whole walks."""
 
 from dataclasses import replace
 from math import isfinite, isnan, radians, sin
@@ -30,7 +30,7 @@ def make_plant(depth_m: float = 0.03) -> Plant:
 
 
 def watch(reference: StrokeReference, plant: Plant, *phases: Phase) -> list[StrideTruth]:
-    """One tick in each phase."""
+    """Run one tick in each phase; return the strides that closed."""
     return [truth for phase in phases for truth in reference.step(DT_S, plant, phase)]
 
 
@@ -149,7 +149,7 @@ def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
 
 
 def test_depths_and_surface_are_those_of_the_ridge_that_the_flipper_met() -> None:
-    """A crest of 4 mm lies under a flipper that stands straight out, with the body a quarter of a ridge ahead."""
+    """The body is a quarter of a ridge ahead, so a crest of 4 mm lies under a flipper that points straight out."""
     reference, plant = StrokeReference(), make_plant()
     plant.track = Track([(1.0, MUDS["48.5"])], ridges=Ridges(0.004, 0.2))
     for arm in plant.arms:
@@ -169,7 +169,7 @@ def test_a_reset_reference_sensor_counts_from_zero() -> None:
 
 
 def observe_walk(lockstep: Lockstep, strides: int) -> list[StrideTruth]:
-    """Of so many strides of each flipper, 3 cm deep."""
+    """Walk at 3 cm depth; return the truths of this number of strides of each flipper."""
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03, adaptive=False))
     reference = StrokeReference()
@@ -203,7 +203,7 @@ def test_in_soft_mud_slip_and_advance_make_up_the_sweep(
     truths = [truth for truth in both if truth.flipper == "left"]
     steps_m = lockstep.robot.plant.body_m / len(truths)
     arc_m = 2.0 * configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
-    assert truths[-1].stance.slip_m + steps_m == pytest.approx(arc_m, abs=0.02)  # the body goes on a bit in extraction
+    assert truths[-1].stance.slip_m + steps_m == pytest.approx(arc_m, abs=0.02)  # the body still coasts in extraction
 
 
 def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configuration: Configuration) -> None:

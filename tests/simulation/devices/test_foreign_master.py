@@ -1,4 +1,4 @@
-"""A foreign master on the bus: the drive follows it until the loop's next command, and the bus carries its frames."""
+"""A drive follows a foreign master until the loop's next command, and the master's frames are on the bus."""
 
 import pytest
 
@@ -33,7 +33,7 @@ def heard_frames(robot: Lockstep, master: ForeignMaster, ticks: int) -> tuple[li
 @pytest.mark.parametrize("joint", [0, 1])
 @pytest.mark.parametrize("every", [1, 2, 4])
 def test_the_drive_follows_it_after_every_nth_command(robot: Lockstep, joint: int, every: int) -> None:
-    robot.loop.drives.close()  # the loop hears nothing, so it does not react
+    robot.loop.drives.close()  # without its ports the loop does not react
     master = ForeignMaster(robot.robot.drives[joint], TORQUE_NM, every)
     loop_port = robot.buses["left"].open()
     robot.robot.advance(robot.robot.now_s + 0.002)  # executes the loop's last commands

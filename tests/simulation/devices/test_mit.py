@@ -67,7 +67,7 @@ def test_it_follows_torque_only_in_the_mode_and_answers_with_the_values_of_befor
     bench.command(0.5)
     assert bench.torque_after(0.001) == 0.0
     assert bench.ask(codec.ENTER).status == codec.DISABLED
-    assert bench.torque_after(0.001) == pytest.approx(0.5, abs=STEP_NM)  # the command that it remembers
+    assert bench.torque_after(0.001) == pytest.approx(0.5, abs=STEP_NM)  # the drive stored the command
     answer = bench.command(0.2)
     assert answer.status == codec.ENABLED and answer.torque_nm == pytest.approx(0.5, abs=1.5 * STEP_NM)
     assert bench.torque_after(0.001) == pytest.approx(0.2, abs=STEP_NM)
@@ -262,7 +262,7 @@ def test_the_watchdog_of_a_cubemars_stays_unknown() -> None:
 
 
 @pytest.mark.parametrize("model", ["DM4310", "AK80-9"])
-def test_an_idle_drive_is_told_to_leave_the_mode_in_every_tick(model: str) -> None:
+def test_an_idle_drive_is_commanded_to_leave_the_mode_in_every_tick(model: str) -> None:
     robot = Robot(model=model)
     robot.tick(count=3)
     robot.devices[0].energised = True
@@ -290,7 +290,7 @@ def test_arming_enters_at_zero_torque_and_disarming_leaves(model: str) -> None:
 
 
 def replace_torque(robot: Robot, torque_nm: float) -> Any:
-    """Returns the remembered command of a drive with another torque."""
+    """Return the stored command of a drive with another torque."""
     return robot.devices[0]._command._replace(torque_nm=torque_nm)
 
 

@@ -1,4 +1,4 @@
-"""The simulated moteus, held against what its makers document: modes, watchdog, limits, answers, console."""
+"""The simulated moteus follows its makers' documentation: modes, watchdog, limits, answers, console."""
 
 from dataclasses import replace
 from math import isnan, nan, pi
@@ -37,7 +37,7 @@ class Bench:
         return self.drive.torque_nm(self.now_s)
 
     def write(self, **values: float) -> None:
-        """Commands position mode with these registers as floats, and all others at their defaults."""
+        """Command position mode with these registers as floats and all others at their defaults."""
         data = bytes.fromhex("01000a")
         for name, value in values.items():
             data += registers.encode_values(registers.WRITE, Resolution.FLOAT, Register[name.upper()], [value])
@@ -129,7 +129,7 @@ def test_a_watchdog_that_is_off_never_trips() -> None:
 
 @pytest.mark.parametrize(("kd_scale", "damps"), [(1.0, True), (0.5, True), (0.0, False)])
 def test_the_timeout_damps_by_default_but_not_after_a_pure_torque(kd_scale: float, damps: bool) -> None:
-    """It uses the scale of kd of the last command: ISR_DoZeroVelocity of the firmware."""
+    """The timeout uses the kd scale of the last command, like ISR_DoZeroVelocity of the firmware."""
     bench = Bench()
     bench.write(command_position=nan, command_torque=0.2, kp_scale=0.0, kd_scale=kd_scale)
     bench.drive.measure(0.0, 3.0)
@@ -176,7 +176,7 @@ def test_a_restart_is_silent_and_ends_stopped(bench: Bench) -> None:
     assert bench.ask().mode == Mode.STOPPED
 
 
-def test_the_console_tells_and_changes_settings(bench: Bench) -> None:
+def test_the_console_reports_and_changes_settings(bench: Bench) -> None:
     def answer(data: bytes) -> bytes:
         (frame,) = bench.send(data)
         return b"".join(each.text for each in registers.decode_frame(frame.data))

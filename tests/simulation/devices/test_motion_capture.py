@@ -1,4 +1,4 @@
-"""Motion capture: rate, latency and accuracy of the body's position."""
+"""Motion capture has the stated rate, latency and accuracy of the body's position."""
 
 from math import isfinite, isnan
 
@@ -35,7 +35,7 @@ def make_plant(x_m: float = 0.0, speed_m_s: float = 0.0) -> Plant:
 def frames_of(
     parameters: MotionCaptureParameters, seconds: float, speed_m_s: float = 0.0, seed: int = 1
 ) -> list[tuple[float, CameraFrame]]:
-    """Of a body that moves evenly: when each arrives, and the frame."""
+    """Return the arrival times and frames of a body that moves at constant speed."""
     capture, arrived = MotionCapture(parameters, seed), []
     for tick in range(round(seconds / PERIOD_S)):
         plant = make_plant(speed_m_s * tick * PERIOD_S, speed_m_s)
@@ -76,7 +76,7 @@ def test_drop_outs_are_bursts_of_the_stated_length_and_frequency() -> None:
     bursts_s = gaps_s[gaps_s > 0.015] - 0.01
     seen_s = 1000.0 - bursts_s.sum()
     assert len(bursts_s) / seen_s == pytest.approx(0.5, rel=0.15)  # standard error of 450 bursts: 5 %
-    assert np.mean(bursts_s) == pytest.approx(0.2 + 0.005, rel=0.15)  # whole frames: half of one more on average
+    assert np.mean(bursts_s) == pytest.approx(0.2 + 0.005, rel=0.15)  # plus half a frame on average
 
 
 def test_noise_is_the_same_for_the_same_seed_and_disabled_noise_draws_nothing() -> None:
@@ -130,4 +130,4 @@ def test_the_loop_gets_120_positions_a_second_from_such_cameras(configuration: C
             lockstep.step()
             positions_m.add(lockstep.loop.body.x_m)
     assert len(seen[AT_EVERY_TICK]) == 380
-    assert len(seen[OF_THE_PAPER]) in (120, 121)  # the second may begin between two frames
+    assert len(seen[OF_THE_PAPER]) in (120, 121)  # its second may begin between two frames

@@ -1,4 +1,4 @@
-"""The simulated drive, held against what ODrive documents: states, watchdog, clamps, periods, answers."""
+"""The simulated drive follows ODrive's documentation: states, watchdog, clamps, periods, answers."""
 
 from collections import Counter
 from dataclasses import replace
@@ -271,7 +271,7 @@ def test_a_motor_with_another_constant_exerts_another_torque_and_reports_the_bel
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_cogging_has_the_stated_amplitude_and_number_per_turn_and_gives_no_energy(sign: int) -> None:
-    drive = make_drive(cogging_nm=0.02, cogging_per_turn=14, sign=sign)  # idle: magnets know no power
+    drive = make_drive(cogging_nm=0.02, cogging_per_turn=14, sign=sign)  # idle: cogging needs no power
     angles_rad = np.arange(1400) * 2.0 * pi / 1400
     torques_nm = []
     for angle_rad in angles_rad:
@@ -280,7 +280,7 @@ def test_cogging_has_the_stated_amplitude_and_number_per_turn_and_gives_no_energ
     spectrum = np.abs(np.fft.rfft(torques_nm)) * 2.0 / 1400
     assert spectrum[14] == pytest.approx(0.02)
     assert spectrum[28] == pytest.approx(0.005)
-    assert sum(spectrum) == pytest.approx(0.025)  # nothing else, and no mean: a turn takes what it gives
+    assert sum(spectrum) == pytest.approx(0.025)  # no other terms and no mean, so a turn does no work
     assert torques_nm[1] < 0.0 < torques_nm[-1]  # a detent holds the joint where it is
 
 
@@ -346,7 +346,7 @@ def test_late_messages_keep_their_order_and_number_and_report_an_earlier_state()
                 late_ms.append(step - turns * 4096.0)
     assert len(late_ms) == pytest.approx(1000, abs=6)  # one each 2 ms; the last 10 ms of them are still in transit
     assert 0.0 <= min(late_ms) < 3.0
-    assert 9.0 < max(late_ms) <= 11.0  # the bound, and the millisecond in which they are looked for
+    assert 9.0 < max(late_ms) <= 11.0  # the bound, plus the test's step of 1 ms
 
 
 def test_the_stated_fraction_of_messages_repeats_the_previous_one_to_the_last_bit() -> None:

@@ -42,7 +42,7 @@ def free_port() -> int:
 
 
 def made_plant(now_s: float) -> Any:
-    """A body that moves at 0.1 m/s."""
+    """Return the part of a plant that the broadcast reads, for a body that moves at 0.1 m/s."""
     return SimpleNamespace(body_m=0.1 * now_s, body_m_s=0.1)
 
 
@@ -74,7 +74,7 @@ def test_counts_arrive_from_the_device_of_the_configuration(short_folder: Path) 
     encoder = RailEncoderParameters(device=str(short_folder / "encoder"), metres_per_count=-1e-5, label="n")
     pose = PoseParameters("rail_encoder", origin_m=-0.2, rail_encoder=encoder)
     with closing(PoseBroadcast(pose, 1)) as broadcast, closing(open_pose(pose)) as port:
-        broadcast.line.send(CameraFrame(0.0, 0.0))  # of which the robot cannot know that it is whole
+        broadcast.line.send(CameraFrame(0.0, 0.0))  # the robot ignores the first line, which may be cut
         for step in range(1, 20):
             broadcast.line.send(CameraFrame(0.01 * step, 0.001 * step))
             deadline_s = time.monotonic() + LONGEST_S
@@ -94,7 +94,7 @@ def test_a_pose_source_that_cannot_be_provided_raises_an_os_error(short_folder: 
 
 
 class StreamedPose:
-    """A PoseSource: the plant's body, captured and sent by NatNet over the loopback."""
+    """A PoseSource that captures the plant's body and sends it by NatNet over the loopback interface."""
 
     def __init__(self, plant: Plant, latency_s: float) -> None:
         self._plant, self._capture = plant, MotionCapture(MotionCaptureParameters(rate_hz=120.0), 1)
@@ -124,8 +124,9 @@ def strides_of(robot: Lockstep) -> list[StrideEstimate]:
 
 
 def test_a_late_camera_that_reports_its_latency_biases_no_bound(configuration: Configuration) -> None:
-    """Firm mud holds the plates and the body moves. Captured 20 ms late without a reported latency, the plates seem to
-    slip, and a lower bound of k_s becomes a value below it.
+    """In firm mud the plates do not slip while the body moves.
+
+    If 20 ms of latency are not reported the plates seem to slip, so a lower bound of k_s becomes a value below it.
     """
     strong = {joint: replace(drive, current_limit_a=20.0) for joint, drive in configuration.drive.items()}
     limits = replace(configuration.limits, torque_nm=1.65)

@@ -1,4 +1,4 @@
-"""The energy that motors put into joints, held against the kinetic energy that the joints then have."""
+"""The energy that motors put into joints equals the kinetic energy of the joints."""
 
 from dataclasses import replace
 

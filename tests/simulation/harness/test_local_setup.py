@@ -25,7 +25,7 @@ def lockstep(tmp_path: Path) -> Lockstep:
 
 
 class LateRobot:
-    """Owns for how many more ticks the simulated robot of a lockstep stands still, and then catches up."""
+    """Stops the simulated robot of a lockstep for `late_ticks`, after which it catches up."""
 
     def __init__(self, lockstep: Lockstep) -> None:
         self.late_ticks = 0

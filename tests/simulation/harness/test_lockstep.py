@@ -1,4 +1,4 @@
-"""Robot and loop in step: repeatable, armed from power-on, and without power where something stops."""
+"""Robot and loop in lockstep: repeatable, armed from power-on, and without power when a part stops."""
 
 from collections.abc import Iterator
 
@@ -64,7 +64,7 @@ def test_on_a_fixed_base_the_flippers_walk_and_the_body_stays(configuration: Con
     lockstep.run_for(2.0)
     assert len(lockstep.loop.learning.strides) >= 2
     assert lockstep.robot.plant.body_m == 0.0
-    assert abs(lockstep.loop.body.x_m) < 0.001  # what motion capture sees of it
+    assert abs(lockstep.loop.body.x_m) < 0.001  # by motion capture
 
 
 def test_a_plant_and_drives_of_one_s_own_are_used_as_they_are(configuration: Configuration) -> None:

@@ -1,4 +1,4 @@
-"""The simulated robot in real time, on a computer that is busy with other things."""
+"""The simulated robot runs in real time, also on a busy computer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def odrive(parameters: DriveParameters) -> OdriveParameters:
 
 
 class Bench:
-    """Owns a robot that is stepped by hand, and the other end of its buses."""
+    """Owns a robot that the test steps, and the other end of its buses."""
 
     def __init__(self, folder: Path) -> None:
         configuration = load_configuration(write_local_setup(folder, folder / "logs"))

@@ -1,4 +1,4 @@
-"""The simulated robot on its buses: each drive hears and answers on its own bus only."""
+"""Each drive of the simulated robot receives and answers only on its own bus."""
 
 from control.records import JOINTS
 from drivers.can.frames import Frame
@@ -12,7 +12,7 @@ from simulation.mud.track import Track
 
 
 def make_robot() -> tuple[SimulatedRobot, dict[str, MockPort]]:
-    """Nodes 0 and 1 on each of two buses, and the far ends of these."""
+    """Return a robot with node ids 0 and 1 on each of two buses, and the other ends of the buses."""
     buses = {name: MockBus() for name in ("left", "right")}
     far = {name: bus.open() for name, bus in buses.items()}
     robot = SimulatedRobot(

@@ -1,4 +1,4 @@
-"""A world is taken as it is written or refused as a whole, with everything that is wrong."""
+"""A world file is accepted as it is written, or refused as a whole with all its problems."""
 
 from dataclasses import fields, replace
 from math import isfinite
@@ -61,7 +61,7 @@ def test_the_example_has_the_values_that_it_documents() -> None:
     assert world.track.stones == (Stone(0.40, 0.46, 0.015),)
     assert world.track.ridges == Ridges(0.002, 0.25)
     assert world.track.clay_at(0.3).strength_pa != clay_of_water(48.5).strength_pa
-    assert world.disturbances == replace(LAB, current_noise_a=0.0, current_limit_a=0.0)  # those of the drives apart
+    assert world.disturbances == replace(LAB, current_noise_a=0.0, current_limit_a=0.0)  # the drives have them
     assert world.robot_changes == {
         "body_mass_kg": 1.0,
         "rail_drag_n": 2.5,
@@ -210,7 +210,7 @@ KEYS = st.sampled_from(
 
 @given(KEYS, VALUES)
 def test_any_value_anywhere_is_taken_or_refused_by_name(key: str, value: str) -> None:
-    """Never another exception than ConfigurationError."""
+    """No other exception than ConfigurationError occurs."""
     try:
         parse_world(f"{key} = {value}\n" + ("" if key == "segment" else SHORTEST))
     except ConfigurationError as problem:
@@ -218,7 +218,7 @@ def test_any_value_anywhere_is_taken_or_refused_by_name(key: str, value: str) ->
 
 
 def test_robot_and_drives_accept_all_fields_of_their_records() -> None:
-    """So that a field which is added there can be set here."""
+    """A field that is added to a record can therefore be set in a world file."""
     settable: dict[str, dict[str, Any]] = {
         section: {item.name: item.default for item in fields(record) if item.name not in fixed}
         for section, record, fixed in (

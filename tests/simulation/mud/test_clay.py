@@ -1,4 +1,4 @@
-"""The clay's stresses, against the stated laws, and muds between the three that were fitted."""
+"""The clay's stresses follow the stated laws, and muds lie between the three that were fitted."""
 
 from itertools import pairwise
 from math import nan, sqrt
@@ -41,7 +41,7 @@ def test_the_sideways_force_in_layers_is_the_sum_of_the_pressure(depth_m: float,
     strengths_pa = 1500.0 * np.where(z < 0.008, 3.0, np.where((z > 0.02) & (z < 0.035), 0.4, 1.0))
     pressures_pa = strengths_pa * np.minimum(3.0 + 17.5e3 * z / strengths_pa + 0.5 * z / width_m, 9.0)
     slices_n = width_m * pressures_pa * np.diff(edges_m)
-    # Three borders, each within half a slice of the dense sum's.
+    # Three borders, each at most half a slice off in the dense sum.
     uncertainty_n = 1.5 * width_m * 9.0 * 4500.0 * depth_m / 4000
     assert CRUSTED.lateral_n(depth_m, width_m) == pytest.approx(slices_n.sum(), abs=uncertainty_n)
 
@@ -50,7 +50,7 @@ def test_the_sideways_force_in_layers_is_the_sum_of_the_pressure(depth_m: float,
 def test_the_mean_strength_of_layers_is_the_mean_of_the_strengths_in_them(from_m: float, span_m: float) -> None:
     z = from_m + span_m * (np.arange(4000) + 0.5) / 4000
     strengths_pa = [CRUSTED.strength_at_pa(depth_m) for depth_m in z]
-    uncertainty_pa = 1.5 * (4500.0 - 600.0) / 4000  # three borders, each within half a piece of the dense sum's
+    uncertainty_pa = 1.5 * (4500.0 - 600.0) / 4000  # three borders, each at most half a piece off in the dense sum
     assert CRUSTED.mean_strength_pa(from_m, from_m + span_m) == pytest.approx(np.mean(strengths_pa), abs=uncertainty_pa)
 
 
@@ -103,7 +103,7 @@ def test_half_way_between_two_muds_lies_their_geometric_mean(dry: str, wet: str)
 
 @pytest.mark.parametrize(("end", "inner", "outer"), [("45.3", 46.5, 44.1), ("53.1", 51.0, 55.2)])
 def test_the_slope_continues_beyond_the_outer_muds(end: str, inner: float, outer: float) -> None:
-    """The outer muds lie in the middle between these."""
+    """Each outer mud lies in the middle between an inner and an extrapolated water content."""
     product = clay_of_water(inner).strength_pa * clay_of_water(outer).strength_pa
     assert product == pytest.approx(MUDS[end].strength_pa ** 2)
 

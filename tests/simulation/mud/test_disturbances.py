@@ -1,4 +1,4 @@
-"""Each disturbance alone: its effect on the mud, the arm or the drives, and none where it is off."""
+"""Each disturbance has its stated effect on the mud, the arm or the drives, and none if it is off."""
 
 from dataclasses import fields, replace
 from itertools import pairwise
@@ -39,7 +39,7 @@ SOFT = Track([(5.0, MUDS["53.1"])])
 
 
 def stroke(history: StrokeHistory, depth_m: float = 0.03, position_m: float = 0.0) -> None:
-    """From the air down to a depth and up again."""
+    """Move the plate from the air down to a depth and up again."""
     for lowest_m in (-0.014, 0.5 * depth_m, depth_m, 0.5 * depth_m, -0.014, -0.014):
         history.step(lowest_m, position_m)
 
@@ -66,7 +66,7 @@ def test_everything_is_off_by_default() -> None:
 
 @given(st.floats(-0.6, 0.6), st.floats(-1.2, 0.5))
 def test_clinging_mud_pulls_at_the_joints_as_a_weight_on_the_plate(sweep_rad: float, adduction_rad: float) -> None:
-    """Against differences of the weight's height: the edge's, and the plate's slant for the 15 mm above it."""
+    """The reference is the difference of the weight's potential energy; the weight is 15 mm above the edge."""
 
     def energy_j(sweep: float, adduction: float) -> float:
         upright = replace(GEOMETRY, drop_m=GEOMETRY.drop_m - CLINGING_ABOVE_EDGE_M)
@@ -104,7 +104,7 @@ def test_the_amounts_spread_evenly_by_forty_percent_around_their_mean() -> None:
 
 
 def pulled_out(shaken_fraction: float, highest_m: float = 0.014) -> tuple[StrokeHistory, float]:
-    """A flipper above the mud after a stroke, and the weight that it took along."""
+    """Return the history of a flipper above the mud after a stroke, and the weight of the mud that clings to it."""
     history = lowered(StrokeHistory(Disturbances(clinging_n=0.7, shaken_fraction=shaken_fraction), 1))
     history.step(-0.001, 0.0)
     weight_n = history.clinging_n
@@ -118,7 +118,7 @@ def test_mud_falls_off_on_the_way_down_in_proportion_to_it() -> None:
         history.step(-height_m, 0.0)
         assert history.clinging_n == pytest.approx(weight_n * (1.0 - 0.3 * part))
     history.step(0.02, 0.0)
-    assert history.clinging_n == pytest.approx(0.7 * weight_n)  # in the mud it stays, until the next extraction
+    assert history.clinging_n == pytest.approx(0.7 * weight_n)  # it stays constant in the mud until the next extraction
 
 
 def test_mud_stays_while_the_flipper_rises_and_swings_and_what_fell_off_does_not_return() -> None:
@@ -129,7 +129,7 @@ def test_mud_stays_while_the_flipper_rises_and_swings_and_what_fell_off_does_not
     for height_m in (0.007, 0.012, 0.014, 0.007):
         history.step(-height_m, 0.0)
         assert history.clinging_n == pytest.approx(0.85 * weight_n)
-    for height_m in (0.028, 0.014):  # half of a longer way is no more than before
+    for height_m in (0.028, 0.014):  # half of a longer path removes no more than before
         history.step(-height_m, 0.0)
     assert history.clinging_n == pytest.approx(0.85 * weight_n)
 
@@ -183,7 +183,7 @@ def test_a_stroke_s_position_is_that_of_its_entry_and_its_mud_stays_the_same() -
     history = StrokeHistory(Disturbances(remoulding=1.0), 1)
     stroke(history)
     history.step(0.02, 0.0)
-    for position_m in (0.0, -0.02, -0.06):  # as a flipper that slips
+    for position_m in (0.0, -0.02, -0.06):  # like a flipper that slips
         history.step(0.02, position_m)
         assert history.firmness == pytest.approx(0.5 + 0.5 * exp(-0.4))
     history.step(-0.014, -0.06)
@@ -239,7 +239,7 @@ def test_the_surface_stays_through_a_stroke_and_never_rises_over_a_plate_outside
         for lowest_m in (0.01, 0.03, 0.02, met_m + 1e-4):
             history.step(lowest_m, 0.0)
             assert history.surface_m == met_m
-        for lowest_m in (met_m - 1e-5, met_m - 1e-5, -0.014):  # it lingers just above the mud
+        for lowest_m in (met_m - 1e-5, met_m - 1e-5, -0.014):  # it stays just above the mud
             history.step(lowest_m, 0.0)
             assert lowest_m <= history.surface_m
 
@@ -262,7 +262,7 @@ def test_layers_do_not_change_each_other_s_draws() -> None:
 def single_flipper(
     configuration: Configuration, disturbances: Disturbances, track: Track = SOFT, pause_s: float = 0.1
 ) -> Lockstep:
-    """Walks faster and with shorter holds than the paper's, for a short test."""
+    """Return a walking single flipper, faster and with shorter holds than the paper's, for a short test."""
     gait = replace(SINGLE_FLIPPER, stance_speed_m_s=0.3, extraction_speed_m_s=0.3, swing_speed_m_s=0.4, pause_s=pause_s)
     lockstep = Lockstep(replace(configuration, gait=gait), track, disturbances=disturbances, fixed_base=True)
     lockstep.arm()
@@ -275,7 +275,7 @@ def until_phase(lockstep: Lockstep, phase: Phase) -> None:
 
 
 def truths_of(lockstep: Lockstep, strides: int) -> list[StrideTruth]:
-    """Of so many strides of each flipper."""
+    """Return the truths of this number of strides of each flipper."""
     reference = StrokeReference()
     truths: list[StrideTruth] = []
     while len(truths) < 2 * strides:
@@ -285,11 +285,11 @@ def truths_of(lockstep: Lockstep, strides: int) -> list[StrideTruth]:
 
 
 def swing_currents_a(lockstep: Lockstep, strides: int) -> list[float]:
-    """Mean adduction current of the left flipper in each swing, and in the air before the first one."""
+    """Return the left flipper's mean adduction current in each swing, after the current in air before the first one."""
     means_a = []
     for stride in range(strides):
         until_phase(lockstep, Phase.INSERTION)
-        if stride == 0:  # as raised as in swing
+        if stride == 0:  # raised as in swing
             means_a.append(lockstep.loop.states[1].current_a)
         until_phase(lockstep, Phase.SWING)
         currents_a = []
@@ -301,11 +301,11 @@ def swing_currents_a(lockstep: Lockstep, strides: int) -> list[float]:
 
 
 def test_clinging_mud_is_felt_in_swing_from_the_first_extraction_on(configuration: Configuration) -> None:
-    firm = Track([(5.0, MUDS["48.5"])])  # in which the arms do not sink under their own weight before the walk
+    firm = Track([(5.0, MUDS["48.5"])])  # the arms do not sink under their own weight before the walk
     clean_a = swing_currents_a(single_flipper(configuration, NONE, firm), 2)
     weighed_a = swing_currents_a(single_flipper(configuration, Disturbances(clinging_n=0.7), firm), 2)
     assert weighed_a[0] == clean_a[0]
-    lever_m = 0.95 * configuration.geometry.flipper_length_m  # its mean over a swing from -30 to 30 degrees
+    lever_m = 0.95 * configuration.geometry.flipper_length_m  # the mean over a swing from -30 to 30 degrees
     mean_a = 0.7 * lever_m / configuration.drive["left_adduction"].torque_constant_nm_a
     for clean, weighed in zip(clean_a[1:], weighed_a[1:], strict=True):
         assert 0.55 * mean_a < weighed - clean < 1.45 * mean_a
@@ -326,7 +326,7 @@ def test_clinging_mud_is_lighter_just_above_the_mud_than_at_the_end_of_the_swing
 
 
 def friction_nm(lockstep: Lockstep, joint: int) -> float:
-    """The work of a motor over the travel of its joint, in the air: two swings of the left flipper."""
+    """Return the work of a motor divided by the travel of its joint, over two swings of the left flipper."""
     constant_nm_a = 0.083
     work_j = travel_rad = 0.0
     for _ in range(2):
@@ -350,7 +350,7 @@ def test_the_sweep_motor_works_against_the_stated_friction(configuration: Config
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize(("field", "joint"), [("sweep_friction_nm", 0), ("adduction_friction_nm", 1)])
 def test_friction_opposes_one_joint_in_each_direction(field: str, joint: int, direction: float) -> None:
-    """It slows a joint as much as the same torque backward does."""
+    """It slows a joint as much as an opposing torque of the same size."""
     rates_rad_s = []
     for disturbances, torque_nm in ((NONE, -0.05 * direction), (Disturbances(**{field: 0.05}), 0.0)):
         plant = Plant(PlantParameters(disturbances=disturbances), SOFT)
@@ -386,7 +386,7 @@ def peak_thrusts_n(lockstep: Lockstep, strides: int) -> list[float]:
 
 
 def test_repeated_stances_lose_strength_and_force_as_the_logs_do(configuration: Configuration) -> None:
-    """15 to 20 % a stroke at first; the pressure from the mud's weight is not remoulded."""
+    """The logs lose 15 to 20 % per stroke at first; the pressure from the mud's weight is not remoulded."""
     lockstep = single_flipper(configuration, Disturbances(remoulding=1.0))
     remoulded_n, fractions = [], []
     for _ in range(4):
@@ -400,7 +400,7 @@ def test_repeated_stances_lose_strength_and_force_as_the_logs_do(configuration: 
 
 
 def held_thrust_n(lockstep: Lockstep) -> tuple[float, float]:
-    """In the pause after the stance: at its beginning and a second later."""
+    """Return the thrust in the pause after the stance, at its beginning and 0.9 s later."""
     arm: Arm = lockstep.robot.plant.arms[0]
     until_phase(lockstep, Phase.STANCE)
     until_phase(lockstep, Phase.PAUSE)
@@ -411,12 +411,12 @@ def held_thrust_n(lockstep: Lockstep) -> tuple[float, float]:
 
 
 def test_a_load_relaxes_in_the_holds(configuration: Configuration) -> None:
-    """In addition to the loss by the mud's rate when a plate stops."""
+    """Relaxation comes in addition to the rate effect, by which mud loses load when a plate stops."""
     plain_early_n, plain_late_n = held_thrust_n(single_flipper(configuration, NONE, pause_s=1.0))
     for relaxation in (0.13, 0.3):
         early_n, late_n = held_thrust_n(single_flipper(configuration, Disturbances(relaxation=relaxation), pause_s=1.0))
         assert early_n == pytest.approx(plain_early_n, rel=0.02)
-        assert late_n == pytest.approx((1.0 - relaxation) * plain_late_n, rel=0.08)  # the servo pushes on
+        assert late_n == pytest.approx((1.0 - relaxation) * plain_late_n, rel=0.08)  # the servo continues to push
 
 
 def test_both_flippers_meet_their_own_surfaces_and_are_as_much_deeper(configuration: Configuration) -> None:
@@ -438,12 +438,12 @@ def test_the_drives_take_over_their_part() -> None:
 
 
 def patient(configuration: Configuration) -> Configuration:
-    """For messages that come so seldom that a robot would take them for lost, and joints that swing."""
+    """Return a configuration that tolerates rare messages, which would otherwise count as lost, and swinging joints."""
     return replace(configuration, faults=FaultBounds(late_s=0.02, quiet_s=0.02, jump_rad=1.0, fast_s=1.0))
 
 
 def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
-    """The disturbances of the authors' logs do not make the loop swing by itself."""
+    """The disturbances of the authors' logs do not make the control loop oscillate."""
     spreads = []
     configuration = patient(configuration)
     for disturbances in (NONE, LAB):
@@ -461,8 +461,8 @@ def test_the_joints_stay_calm_in_the_lab(configuration: Configuration) -> None:
     assert lab < none + 0.5
 
 
-def test_a_loop_over_seldom_messages_swings_by_itself_and_is_stopped(configuration: Configuration) -> None:
-    """At 10 ms the joints swing by 10 rad/s, in air and without any mud."""
+def test_a_loop_over_rare_messages_oscillates_and_is_stopped(configuration: Configuration) -> None:
+    """With a message every 10 ms the joints oscillate with 10 rad/s even in air."""
     seldom = replace(LAB, sample_period_s=0.010)
     lockstep = Lockstep(patient(configuration), Track([(5.0, MUDS["48.5"])]), disturbances=seldom)
     lockstep.arm()
@@ -480,11 +480,11 @@ def test_the_current_is_as_noisy_as_stated(configuration: Configuration) -> None
         lockstep = Lockstep(configuration, SOFT, disturbances=Disturbances(current_noise_a=noise_a))
         lockstep.run_for(0.5)
         currents_a = []
-        for _ in range(500):  # of four idle drives
+        for _ in range(500):  # four idle drives
             lockstep.step()
             currents_a += [state.current_a for state in lockstep.loop.states]
         deviations_a.append(pstdev(currents_a))
-    assert deviations_a == pytest.approx([0.1, 0.4], rel=0.07)  # 0: the drive's own
+    assert deviations_a == pytest.approx([0.1, 0.4], rel=0.07)  # the drive's own noise is 0.1 A
 
 
 def test_seldom_messages_are_read_again_and_again(configuration: Configuration) -> None:

@@ -1,4 +1,4 @@
-"""One flipper in clay: its plate moves as joints and body do, and the mud's forces are handed on by the transpose."""
+"""One flipper in clay: joints and body move its plate, and the transpose of this map gives the loads of the mud."""
 
 from math import cos, hypot, pi, sin
 
@@ -28,17 +28,17 @@ SWEEPS = st.floats(-0.6, 0.6)
 ADDUCTIONS = st.floats(-1.2, 0.3)
 DEPTHS = st.floats(0.005, 0.045)
 SPEEDS = st.floats(-3.0, 3.0)
-POSITIONS_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners, and the middles between them
+POSITIONS_M = [(u, s) for u in (-0.0125, 0.0, 0.0125) for s in (0.0, 0.07)]  # corners and midpoints
 
 
 def in_world(adduction_rad: float, x: float, y: float, z: float) -> np.ndarray:
-    """A vector of the frame that tilts with adduction, in the world's frame: x forward, y outward, z up."""
+    """Return a vector of the frame that tilts with adduction in the world's frame: x forward, y outward, z up."""
     sb, cb = sin(adduction_rad), cos(adduction_rad)
     return np.array([x, cb * y - sb * z, sb * y + cb * z])
 
 
 def position_m(sweep_rad: float, adduction_rad: float, outward_m: float, above_edge_m: float) -> np.ndarray:
-    """Returns a point on the plate, from the intersection of the axes."""
+    """Return a point on the plate, relative to the intersection of the axes."""
     arm_m = GEOMETRY.flipper_length_m + outward_m
     return in_world(adduction_rad, arm_m * sin(sweep_rad), arm_m * cos(sweep_rad), above_edge_m - GEOMETRY.drop_m)
 
@@ -51,7 +51,7 @@ def hold(
     seconds: float,
     surface_m: float = 0.0,
 ) -> ContactForce:
-    """The force after moving at these velocities (sweep, adduction, body); the angles stay, and with them the depth."""
+    """Return the force after a motion at these velocities (sweep, adduction, body) with constant angles and depth."""
     adduction_rad = GEOMETRY.adduction_rad(sweep_rad, depth_m)
     force = NO_CONTACT
     for _ in range(round(seconds / DT_S)):
@@ -86,17 +86,17 @@ def test_the_twist_is_the_motion_of_every_point_of_the_plate(
         in_world(adduction_rad, 0.0, 0.0, 1.0),
     )
     for u, s in POSITIONS_M:
-        ahead_m, behind_m = (
-            position_m(sweep_rad + way * sweep_rad_s * moved_s, adduction_rad + way * adduction_rad_s * moved_s, u, s)
-            for way in (1.0, -1.0)
+        after_m, before_m = (
+            position_m(sweep_rad + sign * sweep_rad_s * moved_s, adduction_rad + sign * adduction_rad_s * moved_s, u, s)
+            for sign in (1.0, -1.0)
         )
-        velocity_m_s = (ahead_m - behind_m) / (2.0 * moved_s) + np.array([body_m_s, 0.0, 0.0])
+        velocity_m_s = (after_m - before_m) / (2.0 * moved_s) + np.array([body_m_s, 0.0, 0.0])
         reported_m_s = (
             twist.normal_m_s + twist.normal_per_outward_s * u + twist.normal_per_upward_s * s,
             twist.outward_m_s + twist.outward_per_upward_s * s,
             twist.upward_m_s + twist.upward_per_outward_s * u,
         )
-        assert reported_m_s == pytest.approx([float(velocity_m_s @ way) for way in directions], abs=1e-8)
+        assert reported_m_s == pytest.approx([float(velocity_m_s @ axis) for axis in directions], abs=1e-8)
 
 
 @given(SWEEPS, SPEEDS, SPEEDS, st.floats(-1.0, 1.0), st.tuples(*[st.floats(-10.0, 10.0)] * 7))
@@ -116,7 +116,7 @@ def test_torques_and_thrust_do_the_work_that_the_mud_does_on_the_plate(
 def test_the_plate_yields_sideways_at_the_limit_of_the_clay(direction: float) -> None:
     sweep_rad_s = direction * 0.1 / GEOMETRY.flipper_length_m
     force = hold(FlipperContact(GEOMETRY), 0.0, 0.03, (sweep_rad_s, 0.0, 0.0), 1.0)
-    # The plate leans with the arm, so more of it is in the mud than of an upright one.
+    # The plate leans with the arm, so more of it is in the mud than of an upright plate.
     limit_n = CLAY.lateral_n(0.03, GEOMETRY.plate_width_m) / cos(GEOMETRY.adduction_rad(0.0, 0.03))
     assert force.normal_n == pytest.approx(-direction * limit_n, rel=0.015)  # the lean makes one end deeper than 3 cm
     assert force.thrust_n == pytest.approx(force.normal_n)  # a flipper that sweeps back pushes the body forward
@@ -131,7 +131,7 @@ def test_mud_pushes_an_inserted_flipper_up_and_an_extracted_one_down(direction: 
 
 
 def test_a_load_across_the_face_turns_the_adduction_joint_by_its_lever_below_the_arm() -> None:
-    """The cross-talk of the authors' stances: -e sin α of the normal force, at a pressure centre e below the arm."""
+    """The authors' stances show this cross-coupling: -e sin α times the normal force, at a depth e below the arm."""
     for sweep_rad in (0.4, -0.4):
         force = hold(FlipperContact(GEOMETRY), sweep_rad, 0.03, (-1.0, 0.0, 0.0), 0.5)
         lever_m = force.adduction_nm / (-sin(sweep_rad) * force.normal_n)

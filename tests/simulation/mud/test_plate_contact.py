@@ -1,4 +1,4 @@
-"""The plate in clay, against the stated stresses summed up densely, and as a body that takes energy and gives none."""
+"""The loads of a plate in clay equal a dense sum of the stated stresses, and the mud never returns more energy."""
 
 from itertools import pairwise, product
 from math import cos, exp, hypot, inf, pi, sin, sqrt
@@ -35,7 +35,7 @@ ATTITUDES = st.builds(attitude_of, st.floats(-0.004, 0.08), SWEEPS, LOWERINGS)
 
 
 def move(plate: PlateContact, twist: Twist, seconds: float, attitude: Attitude = UPRIGHT, clay: Clay = CLAY) -> Wrench:
-    """The wrench after a motion at a constant depth."""
+    """Return the wrench after a motion at a constant depth."""
     wrench = NO_WRENCH
     for _ in range(round(seconds / DT_S)):
         wrench = plate.step(DT_S, clay, attitude, twist)
@@ -43,12 +43,12 @@ def move(plate: PlateContact, twist: Twist, seconds: float, attitude: Attitude =
 
 
 def power_w(wrench: Wrench, twist: Twist) -> float:
-    """Of the mud on the plate: the records' fields belong together pair by pair."""
+    """Return the power of the mud on the plate; the fields of both records correspond in order."""
     return sum(force * speed for force, speed in zip(wrench, twist, strict=True))
 
 
 def yielded_n(attitude: Attitude, clay: Clay, velocity_m_s: tuple[float, float, float], pieces: int) -> Wrench:
-    """From clay that yields everywhere to a straight motion: the laws as their module states them, summed up."""
+    """Return the wrench of clay that yields everywhere to a straight motion, as a dense sum of the stated laws."""
     speed_m_s = sqrt(sum(part * part for part in velocity_m_s))
     normal, outward, upward = velocity_m_s
     along = (-outward / hypot(outward, upward), -upward / hypot(outward, upward))
@@ -61,21 +61,21 @@ def yielded_n(attitude: Attitude, clay: Clay, velocity_m_s: tuple[float, float, 
         return np.asarray(attitude.depth_m + attitude.per_outward * across - attitude.per_upward * up)
 
     def strength_pa(depths_m: np.ndarray) -> np.ndarray:
-        """Times the rate factor."""
+        """Return the strength times the rate factor."""
         fraction = np.ones_like(depths_m)
         for layer in clay.layers:
             fraction = np.where((depths_m >= layer.top_m) & (depths_m < layer.bottom_m), layer.factor, fraction)
         return rate_factor(speed_m_s) * clay.strength_pa * np.where(depths_m > 0.0, fraction, 0.0)
 
     def pressure_pa(depths_m: np.ndarray, width_m: float) -> np.ndarray:
-        """N_p s_u = min(3 s_u + γ ζ + J s_u ζ/b, 9 s_u), which is 0 above the mud."""
+        """Return N_p s_u = min(3 s_u + γ ζ + J s_u ζ/b, 9 s_u), which is 0 above the mud."""
         strengths_pa = strength_pa(depths_m)
         weight_pa = rate_factor(speed_m_s) * 17.5e3 * depths_m
         law_pa = 3.0 * strengths_pa + weight_pa + 0.5 * strengths_pa * depths_m / width_m
         return np.where(depths_m > 0.0, np.minimum(law_pa, 9.0 * strengths_pa), 0.0)
 
     def moments(across: np.ndarray, stick_n: np.ndarray, pressed_n: np.ndarray) -> list[float]:
-        """Of forces that act at `across` and `height`."""
+        """Return the forces at `across` and `height`, and their moments."""
         out_n = along[0] * stick_n + pressed_n
         return [out_n.sum(), along[1] * stick_n.sum(), (out_n * height).sum(), (along[1] * stick_n * across).sum()]
 
@@ -110,8 +110,10 @@ DIRECTIONS = st.sampled_from([-1.0, 1.0])
 def test_strips_give_the_force_of_a_dense_sum(
     attitude: Attitude, clay: Clay, directions: tuple[float, float, float]
 ) -> None:
-    """Within 3 % of the whole force, and of that at half of the plate's height: one where the law bends at 9, two
-    where suction begins to fade. At the first touch 2 mN are the dense sum's own doubt.
+    """They agree to 3 % of the total force, and of its moment at half of the plate's height.
+
+    1 % comes from the bend of the law at 9, 2 % from the begin of the suction's fade. At the first contact the dense
+    sum itself is uncertain by 2 mN.
     """
     velocity_m_s = (0.08 * directions[0], 0.04 * directions[1], 0.06 * directions[2])
     wrench = move(PlateContact(SIZE), Twist(*velocity_m_s), 0.25, attitude, clay)
@@ -133,8 +135,9 @@ def size_of(corners: tuple[tuple[float, float], ...]) -> PlateSize:
 
 
 def dense_n(size: PlateSize, attitude: Attitude, velocity_m_s: tuple[float, float, float], pieces: int) -> list[float]:
-    """The forces on a plate of any outline by the laws as their module states them, summed over pieces of its face, its
-    narrow sides by height and its lower edges by width.
+    """Return the forces on a plate of any outline as a dense sum of the stated laws.
+
+    The sum covers pieces of the face, the narrow sides by height, and the lower edges by width.
     """
     normal, outward, upward = velocity_m_s
     along = (-outward / hypot(outward, upward), -upward / hypot(outward, upward))
@@ -179,8 +182,9 @@ def dense_n(size: PlateSize, attitude: Attitude, velocity_m_s: tuple[float, floa
 def test_panels_give_the_forces_of_a_dense_sum_over_any_outline(
     corners: tuple[tuple[float, float], ...], depth_m: float
 ) -> None:
-    """Within 4 % of the whole force, and 0.12 N: where a leaning plate just touches, its narrow sides, each at one
-    distance outward, are the most of it.
+    """They agree to 4 % of the total force plus 0.12 N.
+
+    When a leaning plate just touches the mud, its narrow sides, each at one distance outward, carry most of the load.
     """
     for across, along, up in product((1.0, -1.0), repeat=3):
         attitude = attitude_of(depth_m, 0.4 * along, 0.3 + 0.3 * up)
@@ -192,7 +196,7 @@ def test_panels_give_the_forces_of_a_dense_sum_over_any_outline(
 
 
 def test_a_rectangle_by_its_corners_meets_the_mud_as_one_by_its_sides() -> None:
-    """But for the springs' number: it has four slices in place of one, and narrow sides of their own."""
+    """Small differences remain, because the corners give four slices instead of one, each with narrow sides."""
     corners = ((-0.0125, 0.0), (0.0125, 0.0), (0.0125, 0.07), (-0.0125, 0.07))
     for attitude in (UPRIGHT, Attitude(0.03, 0.3, 0.9)):
         twist = Twist(0.08, 0.04, -0.06)
@@ -222,7 +226,7 @@ def test_the_panels_have_the_area_of_the_outline(corners: tuple[tuple[float, flo
 
 @st.composite
 def layered(draw: st.DrawFn) -> Clay:
-    """Two layers, crust or weak, anywhere in the upper 6 cm."""
+    """Draw a clay with two crusts or weak layers anywhere in the upper 6 cm."""
     a, b, c, d = sorted(draw(st.lists(st.floats(0.0, 0.06), min_size=4, max_size=4)))
     factors = st.floats(0.2, 4.0)
     return Clay("layered", 1500.0, (Layer(a, b, draw(factors)), Layer(c, d, draw(factors))))
@@ -233,10 +237,11 @@ def layered(draw: st.DrawFn) -> Clay:
 def test_every_strip_has_the_strength_of_the_mud_at_its_own_depth(
     depth_m: float, clay: Clay, directions: tuple[float, float, float]
 ) -> None:
-    """Upright, where strips and layers are parallel. A strip across a border takes the law at its mean strength, which
-    is concave in it: with factors of 0.2 and 4 and the 15 mm that the strongest layer fills at most in the strips of
-    its two borders, that is 5 % of the whole force. A piece of the dense sum is 0.2 mm high, which can lie on either
-    side of four borders of up to 9 times 6 kPa.
+    """On an upright plate strips and layers are parallel. A strip across a border takes the law at its mean strength.
+
+    The law is concave in the strength: with factors of 0.2 and 4, and at most 15 mm of the strongest layer in the
+    strips at its two borders, the error is 5 % of the total force. A piece of the dense sum is 0.2 mm high and can lie
+    on either side of four borders of up to 9 times 6 kPa.
     """
     velocity_m_s = (0.08 * directions[0], 0.04 * directions[1], 0.06 * directions[2])
     attitude = Attitude(depth_m, 0.0, 1.0)
@@ -248,12 +253,12 @@ def test_every_strip_has_the_strength_of_the_mud_at_its_own_depth(
 
 
 def steady_n(depth_m: float, clay: Clay) -> float:
-    """Across, at the reference speed."""
+    """Return the force across an upright plate at the reference speed."""
     return -move(PlateContact(SIZE), Twist(normal_m_s=0.1), 0.3, Attitude(depth_m, 0.0, 1.0), clay).normal_n
 
 
 def test_a_crust_acts_before_the_mud_under_it() -> None:
-    """Bearing under the edge: three times as much in the crust, as without it below."""
+    """The edge bears three times the load in the crust and the normal load below it."""
     crusted = CLAY._replace(layers=(Layer(0.0, 0.01, 3.0),))
     plate, plain = PlateContact(SIZE), PlateContact(SIZE)
     bearing_n = {}
@@ -262,20 +267,20 @@ def test_a_crust_acts_before_the_mud_under_it() -> None:
         down = Twist(upward_m_s=-0.1)
         forces_n = [each.step(DT_S, clay, attitude, down).upward_n for each, clay in ((plate, crusted), (plain, CLAY))]
         bearing_n[step] = forces_n[0] - forces_n[1]
-    stuck_n = 2.0 * adhesion_n(0.01)  # what the crust adds to the sides, which stay in it
+    stuck_n = 2.0 * adhesion_n(0.01)  # added by the crust to the sides, which stay in it
     assert bearing_n[90] == pytest.approx(2.0 * edge_n(5.14) + 0.9 * stuck_n)
     assert bearing_n[190] == pytest.approx(stuck_n)
 
 
 def test_a_weak_layer_reduces_the_force_by_its_own_part() -> None:
-    """The layer from 1 to 2 cm, with a tenth of the strength: 3 to 9 times that are left of what was there."""
+    """The layer from 1 to 2 cm has a tenth of the strength, of which 3 to 9 times remain as pressure."""
     weak = CLAY._replace(layers=(Layer(0.01, 0.02, 0.1),))
     assert steady_n(0.01, weak) == steady_n(0.01, CLAY)
     lost_n = steady_n(0.03, CLAY) - steady_n(0.03, weak)
     third_n = CLAY.lateral_n(0.02, SIZE.width_m) - CLAY.lateral_n(0.01, SIZE.width_m)
     left_n = 0.1 * CLAY.strength_pa * 0.01 * SIZE.width_m
     assert third_n - 9.0 * left_n < lost_n < third_n - 3.0 * left_n
-    assert steady_n(0.03, weak) == pytest.approx(weak.lateral_n(0.03, SIZE.width_m), rel=0.01)  # as without the layer
+    assert steady_n(0.03, weak) == pytest.approx(weak.lateral_n(0.03, SIZE.width_m), rel=0.01)  # the closed law
 
 
 def test_layers_of_factor_one_are_no_layers() -> None:
@@ -297,7 +302,7 @@ def edge_n(factor: float) -> float:
 def test_an_upright_plate_yields_across_at_the_limit_of_the_clay(direction: float) -> None:
     wrench = move(PlateContact(SIZE), Twist(normal_m_s=0.1 * direction), 0.3)
     limit_n = CLAY.lateral_n(0.03, SIZE.width_m)
-    assert wrench.normal_n == pytest.approx(-direction * limit_n, rel=0.01)  # the strip in which the law bends at 9
+    assert wrench.normal_n == pytest.approx(-direction * limit_n, rel=0.01)  # one strip has the bend at 9
     assert wrench.normal_upward_nm < 0.0 if direction > 0.0 else wrench.normal_upward_nm > 0.0
     assert wrench[1:4] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
 
@@ -348,16 +353,16 @@ def test_sticking_does_not_prefer_a_direction_in_the_plate_s_plane() -> None:
 
 @pytest.mark.parametrize("attitude", [UPRIGHT, attitude_of(0.03, 0.5, 0.5), attitude_of(0.001, -0.5, 0.7)])
 def test_before_it_yields_mud_is_a_spring_with_a_symmetric_stiffness(attitude: Attitude) -> None:
-    """The work of one push on another's displacement is mutual: Betti's theorem."""
+    """By Betti's theorem the work of one push on another's displacement is mutual."""
     push = 1e-4
     stiffness = np.array([PlateContact(SIZE).step(1.0, CLAY, attitude, Twist(*row)) for row in push * np.eye(7)])
     assert stiffness == pytest.approx(stiffness.T, abs=1e-9)
-    assert max(np.linalg.eigvalsh(stiffness)) < 1e-12  # against the push, whichever
+    assert max(np.linalg.eigvalsh(stiffness)) < 1e-12  # every push is resisted
     assert min(-np.diag(stiffness)) > 0.0
 
 
 def test_a_plate_that_turns_is_held_by_each_piece_s_own_motion() -> None:
-    """Two columns stand for half of the width each: at 0.29 of the width, where the halves' means are at 0.25."""
+    """Two columns represent half of the width each, at 0.29 of the width from the middle (the halves' means: 0.25)."""
     gauss_m = SIZE.width_m / 12.0**0.5
     limit_n = rate_factor(0.0) * CLAY.lateral_n(0.03, SIZE.width_m)
     turned = move(PlateContact(SIZE), Twist(normal_per_outward_s=20.0), 0.5)
@@ -370,7 +375,7 @@ def test_a_plate_that_turns_is_held_by_each_piece_s_own_motion() -> None:
 
 
 def test_sideways_loads_build_up_as_in_the_logs() -> None:
-    """A fifth of the yield after 3.6 mm in insertion at 0.1 m/s, all of it before 2 cm, where the servo gives too."""
+    """A fifth of the yield load is reached after 3.6 mm, and all of it before 2 cm, where the servo yields as well."""
     plate = PlateContact(SIZE)
     early, late, end = (move(plate, Twist(normal_m_s=0.1), seconds) for seconds in (0.036, 0.164, 0.3))
     assert 0.15 < early.normal_n / end.normal_n < 0.25
@@ -395,7 +400,7 @@ def test_outward_and_inward_are_mirror_images(attitude: Attitude, twists: list[T
 def test_mud_never_returns_more_work_than_it_received(
     motions: list[tuple[Attitude, Twist, Clay, int]], relaxation: float
 ) -> None:
-    """Along any path, also an impossible one, with jumps between depths, muds and speeds."""
+    """This holds along any path, even an impossible one with jumps between depths, muds and speeds."""
     plate, given_j = PlateContact(SIZE, relaxation), 0.0
     for attitude, twist, clay, steps in motions:
         for _ in range(steps):
@@ -423,15 +428,15 @@ def test_a_push_into_deeper_mud_keeps_its_force_and_a_lift_reduces_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("way", "yield_m"),
+    ("axis", "yield_m"),
     [("normal_m_s", SIDEWAYS_YIELD_M), ("outward_m_s", LENGTHWAYS_YIELD_M), ("upward_m_s", LENGTHWAYS_YIELD_M)],
 )
-def test_a_small_push_springs_back(way: str, yield_m: float) -> None:
+def test_a_small_push_springs_back(axis: str, yield_m: float) -> None:
     plate, steps_s = PlateContact(SIZE), 4 * DT_S
     speed_m_s = 0.4 * yield_m / steps_s
-    pushed = move(plate, Twist(**{way: speed_m_s}), steps_s)
+    pushed = move(plate, Twist(**{axis: speed_m_s}), steps_s)
     assert max(abs(force_n) for force_n in pushed[:3]) > 0.3
-    back = move(plate, Twist(**{way: -speed_m_s}), steps_s)
+    back = move(plate, Twist(**{axis: -speed_m_s}), steps_s)
     assert back == pytest.approx(NO_WRENCH, abs=1e-12)
 
 
@@ -456,7 +461,7 @@ def test_a_load_relaxes_at_rest_by_the_stated_fraction_within_half_a_second() ->
     loads_n = [move(plate, STOP, seconds) for seconds in (DT_S, 0.5, 10.0)]
     for part in (0, 2):
         fresh_n, soon_n, late_n = (load[part] for load in loads_n)
-        assert late_n / fresh_n == pytest.approx(0.8, abs=0.001)  # a millisecond has taken that already
+        assert late_n / fresh_n == pytest.approx(0.8, abs=0.001)  # the rate effect has ended within a millisecond
         assert soon_n / fresh_n == pytest.approx(1.0 - 0.2 * (1.0 - exp(-0.5 / 0.2)), abs=0.002)
 
 
@@ -470,7 +475,7 @@ def test_a_relaxed_plate_that_moves_on_is_loaded_again_and_relaxes_again() -> No
     plate = PlateContact(SIZE, relaxation=0.2)
     moving = move(plate, Twist(normal_m_s=0.1), 0.5)
     relaxed = move(plate, STOP, 5.0)
-    assert move(plate, STOP, 5.0).normal_n == pytest.approx(relaxed.normal_n, rel=1e-6)  # once, not over and over
+    assert move(plate, STOP, 5.0).normal_n == pytest.approx(relaxed.normal_n, rel=1e-6)  # it relaxes only once
     assert move(plate, Twist(normal_m_s=0.1), 0.5) == pytest.approx(moving)
     assert move(plate, STOP, 5.0).normal_n == pytest.approx(relaxed.normal_n)
 
@@ -513,13 +518,13 @@ def test_a_plate_without_history_relaxes_as_one_that_moved_for_long() -> None:
     resting, reset = PlateContact(SIZE, relaxation=0.2), PlateContact(SIZE, relaxation=0.2)
     move(reset, STOP, 1.0)
     reset.reset()
-    push = Twist(normal_m_s=1.0)  # of a millimetre: too short to forget a rest
+    push = Twist(normal_m_s=1.0)  # a millimetre, too short to reset the rest
     assert move(reset, push, DT_S) == move(resting, push, DT_S)
     assert move(reset, STOP, 0.1) == move(resting, STOP, 0.1)
 
 
 def test_a_plate_that_comes_in_obliquely_is_loaded_from_its_corner_on_without_a_jump() -> None:
-    """A sixth of the bearing force a step at most, at 0.1 mm a step: the corner's 8 mm are crossed in 80 steps."""
+    """At 0.1 mm a step the corner's 8 mm take 80 steps; a step adds at most 1/40 of the bearing force."""
     plate, slope = PlateContact(SIZE), 0.34
     corner_m = -slope * SIZE.width_m / 2.0
     forces_n = []

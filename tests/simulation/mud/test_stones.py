@@ -1,4 +1,4 @@
-"""A stone's push: away from the face that was met, hard enough, never pulling and never giving energy."""
+"""A stone pushes away from the face that was met, limits the penetration, never pulls and never adds energy."""
 
 from dataclasses import replace
 from math import inf
@@ -18,7 +18,7 @@ STONE = Stone(0.10, 0.16, 0.02)
 
 
 def pushed(*places: tuple[float, float]) -> tuple[float, float]:
-    """Returns the push at the last of some (position, depth), each held until nothing moves."""
+    """Return the push at the last of these (position, depth), each held for two steps so that nothing moves."""
     contact, push = StoneContact([STONE]), NO_PUSH
     for position_m, depth_m in places:
         for _ in range(2):
@@ -31,7 +31,7 @@ def pushed(*places: tuple[float, float]) -> tuple[float, float]:
     [
         ([(0.13, 0.010), (0.13, 0.0205)], 0.0, 1.0),  # from above
         ([(0.09, 0.030), (0.1005, 0.030)], -1.0, 0.0),  # forward, against the flank that faces the start
-        ([(0.17, 0.030), (0.1595, 0.030)], 1.0, 0.0),  # backward, as in a stance
+        ([(0.17, 0.030), (0.1595, 0.030)], 1.0, 0.0),  # backward, like in a stance
     ],
 )
 def test_a_stone_pushes_back_where_the_plate_came_from(
@@ -49,7 +49,7 @@ def test_next_to_and_above_a_stone_there_is_no_push(place: tuple[float, float]) 
 def test_a_plate_at_a_flank_slides_along_it_and_is_held_there_however_deep_it_is() -> None:
     force_n = STIFFNESS_N_M * 0.0005
     assert pushed((0.1595, 0.03), (0.1595, 0.06)) == pytest.approx((force_n, 0.0))
-    assert pushed((0.1595, 0.03), (0.1595, 0.0201)) == pytest.approx((force_n, 0.0))  # nearer to the top by then
+    assert pushed((0.1595, 0.03), (0.1595, 0.0201)) == pytest.approx((force_n, 0.0))  # now it is nearer to the top
 
 
 def test_a_plate_on_top_slides_off_over_the_edge() -> None:
@@ -83,18 +83,18 @@ def test_a_reset_contact_has_met_no_stone() -> None:
 
 @given(st.floats(0.028, 2.0), st.floats(0.01, 3.0), st.floats(0.0, 1.0))
 def test_a_mass_that_falls_on_a_stone_rebounds_slower(mass_kg: float, speed_m_s: float, start_fraction: float) -> None:
-    """From the sweep inertia of an arm at its plate up to a body; wherever within a step it arrives."""
+    """The mass ranges from an arm's sweep inertia at its plate to a body; it arrives at any time within a step."""
     contact, depth_m = StoneContact([STONE]), STONE.top_m - start_fraction * speed_m_s * DT_S
     velocity_m_s, deepest_m = speed_m_s, -inf
     for _ in range(400):
         depth_m += DT_S * velocity_m_s
         velocity_m_s -= DT_S * contact.step(DT_S, 0.13, depth_m).upward_n / mass_kg
         deepest_m = max(deepest_m, depth_m - STONE.top_m)
-        if depth_m < STONE.top_m and velocity_m_s < 0.0:  # a first step may end just above the stone, by rounding
+        if depth_m < STONE.top_m and velocity_m_s < 0.0:  # by rounding, a first step may end just above the stone
             break
     assert depth_m < STONE.top_m
     assert -speed_m_s < velocity_m_s < 0.0
-    # As deep as a spring without a damper would let it, and by one step.
+    # At most the depth on a spring without a damper, plus one step.
     assert deepest_m < speed_m_s * ((mass_kg / STIFFNESS_N_M) ** 0.5 + DT_S)
 
 
@@ -119,8 +119,8 @@ def test_a_push_works_on_the_edge_s_middle_forward_and_on_its_lower_corner_upwar
     forward_n: float,
     upward_n: float,
 ) -> None:
-    """By virtual work: a point outward on the edge is the middle of the edge of a longer arm."""
-    assume(abs(adduction_rad) > 1e-3)  # where no corner is the lower one
+    """The reference is virtual work: a point further outward is the middle of the edge of a longer arm."""
+    assume(abs(adduction_rad) > 1e-3)  # at a level edge neither corner is the lower one
     wrench = push_wrench(GEOMETRY, sweep_rad, adduction_rad, Push(forward_n, upward_n))
     force = contact_force(GEOMETRY, sweep_rad, wrench)
     power_w = force.sweep_nm * sweep_rad_s + force.adduction_nm * adduction_rad_s + force.thrust_n * body_m_s

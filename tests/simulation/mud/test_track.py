@@ -44,15 +44,13 @@ def strengths_pa(parameters: RandomStrength, positions_m: np.ndarray) -> np.ndar
 
 
 def test_random_strength_has_the_requested_mean_and_spread() -> None:
-    """8000 lengths of 5 cm count as about 4000 independent draws, so 1 % is three standard errors of the mean, and
-    0.01 as many of the spread.
-    """
+    """8000 lengths of 5 cm are about 4000 independent draws: 1.5 % and 0.015 are three to five standard errors."""
     strengths = strengths_pa(RandomStrength(0.3, 0.05, 1), np.arange(0.0, 400.0, 0.025))
     assert strengths.mean() == pytest.approx(1000.0, rel=0.015)
     assert strengths.std() / strengths.mean() == pytest.approx(0.3, abs=0.015)
     logarithms = np.log(strengths)
     skewness = np.mean((logarithms - logarithms.mean()) ** 3) / logarithms.std() ** 3
-    assert skewness == pytest.approx(0.0, abs=0.1)  # of the logarithm: the strength itself has 0.9
+    assert skewness == pytest.approx(0.0, abs=0.1)  # the logarithm has none, the strength itself 0.9
 
 
 def test_random_strength_forgets_itself_over_its_correlation_length() -> None:
@@ -75,7 +73,7 @@ def test_random_strength_has_no_outliers_beyond_three_deviations() -> None:
     variance = np.log(1.0 + 0.5**2)
     factors = strengths_pa(RandomStrength(0.5, 0.05, 2), np.arange(0.0, 400.0, 0.005)) / 1000.0
     limits = [exp(way * 3.0 * variance**0.5 - variance / 2.0) for way in (-1.0, 1.0)]
-    assert [factors.min(), factors.max()] == pytest.approx(limits)  # of 80000 cells some reach them
+    assert [factors.min(), factors.max()] == pytest.approx(limits)  # some of the 80000 cells reach them
 
 
 def test_random_strength_is_about_each_segment_s_own_with_its_name_and_layers() -> None:

@@ -1,4 +1,4 @@
-"""The emulated amplifier, heard through its tty with nothing but the operating system."""
+"""The emulated amplifier is read through its tty with only the operating system's calls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plate on its arm in clay; what it reads is held against the clay's numbers in test_load_cell_truth.py."""
+"""A plate on its arm in clay; its readings are compared with the clay's laws in test_load_cell_truth.py."""
 
 from math import cos, degrees, radians, sin
 
@@ -25,7 +25,7 @@ def stiffness(curve: ArcCurve) -> float:
 def test_nothing_is_read_in_free_air() -> None:
     down, up = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.002, 0.03, 0.1)
     for depth_m, moment_m4, moment_nm in [*zip(*down, strict=True), *zip(*up, strict=True)]:
-        if depth_m < -0.005:  # the corner that hangs lowest is out
+        if depth_m < -0.005:  # even the lowest corner is out of the mud
             assert (moment_m4, moment_nm) == (0.0, 0.0)
 
 
@@ -37,7 +37,7 @@ def test_mud_pushes_an_inserted_plate_up_and_an_extracted_one_down() -> None:
 
 
 def test_a_depth_beyond_the_arm_s_reach_ends_at_its_reach() -> None:
-    """Below the surface, which lies 2 mm below its nominal height."""
+    """The depth is below the surface, which lies 2 mm below its nominal height."""
     down, _ = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.002, 0.08, 0.1)
     assert down.depths_m[-1] == pytest.approx(GEOMETRY.deepest_m(degrees(SWEEP_RAD)) - 0.002)
 
@@ -51,7 +51,7 @@ def test_steps_are_fine_enough(depth_m: float, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(("depth_m", "more"), [(0.03, 0.04), (0.04, 0.13), (0.05, 0.31)])
 def test_pushed_straight_down_in_its_mean_attitude_the_same_plate_reads_more(depth_m: float, more: float) -> None:
-    """Its face is pressed through the mud. (In all muds alike, to 1 %.)"""
+    """Its face is pressed through the mud. (The increase is the same in all muds, to 1 %.)"""
     lift_rad = sum(GEOMETRY.adduction_rad(SWEEP_RAD, depth_m * (i + 0.5) / 50.0) for i in range(50)) / 50.0
     curve = measure_insertion(CLAY, GEOMETRY, SWEEP_RAD, lift_rad, depth_m, 0.15).down
     rows = [row for row in zip(*curve, strict=True) if row[0] > 0.0]

@@ -1,4 +1,4 @@
-"""The virtual load cell: closed forms for upright plates, the flipper's own contact for leaning ones."""
+"""The virtual load cell agrees with closed forms for upright plates and with the flipper's contact for leaning ones."""
 
 from itertools import pairwise
 from math import cos, radians, sin
@@ -121,7 +121,7 @@ def test_a_distance_too_short_for_the_mud_to_yield_is_refused() -> None:
 
 
 def test_twice_the_strength_is_a_bit_less_than_twice_the_shear() -> None:
-    """A part of the pressure is the weight of the mud, which does not depend on its strength."""
+    """Part of the pressure comes from the weight of the mud, which does not depend on its strength."""
     weak_n, strong_n = (
         measure_shear(Clay("any", strength_pa), GEOMETRY, 0.0, radians(-20.0), 0.03, 0.1)
         for strength_pa in (2000.0, 4000.0)

@@ -1,4 +1,4 @@
-"""The stage's position against time, in steps of any length."""
+"""The stage's position follows its motion profile in steps of any length."""
 
 from __future__ import annotations
 

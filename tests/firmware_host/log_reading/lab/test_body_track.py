@@ -1,4 +1,4 @@
-"""Advance, sinking and pitch that were put into a capture come out of it at any heading."""
+"""A known advance, sinking and pitch are recovered from a capture at any heading."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEADINGS_DEG = (0.0, 35.0, 90.0, 200.0)
 
 
 def add_pose(columns: Columns, sinking_m: float, pitch_rad: float, heading_deg: float) -> None:
-    """The body advances in stance and sinks and pitches as it does so; y is up, and the capture is turned about it."""
+    """Add poses of a body that advances, sinks and pitches in stance; y is up, and the heading is a turn about y."""
     stance = columns["turtle_state"] == 3
     done = np.cumsum(stance) / max(np.count_nonzero(stance), 1)
     advance_m = 3 * STEP_M * done
@@ -42,7 +42,7 @@ def read(path: Path, sinking_m: float, pitch_rad: float, heading_deg: float) -> 
 @pytest.mark.parametrize("heading_deg", HEADINGS_DEG)
 @pytest.mark.parametrize("sinking_m", [0.0, 0.061, -0.02])
 def test_advance_height_and_pitch_are_those_of_the_body(sinking_m: float, heading_deg: float, tmp_path: Path) -> None:
-    """A step of 62 mm that is 11 mm of advance and 61 mm of sinking is a step of 11 mm."""
+    """A motion of 62 mm that consists of 11 mm of advance and 61 mm of sinking is a step of 11 mm."""
     log = read(tmp_path, sinking_m, 0.3, heading_deg)
     assert log.body_x_m[-1] - log.body_x_m[0] == pytest.approx(3 * STEP_M, abs=1e-6)
     assert log.body_height_m[0] == pytest.approx(HEIGHT_M)
@@ -85,7 +85,7 @@ def test_stances_that_move_the_body_to_all_sides_are_reported(tmp_path: Path) ->
 
 
 def test_a_log_with_one_coordinate_has_the_advance_alone(tmp_path: Path) -> None:
-    """The export of this project knows the position along the track."""
+    """An export of this project contains only the position along the track."""
     columns = lab_columns()
     add_pose(columns, 0.0, 0.0, 0.0)
     kept = {name: values for name, values in columns.items() if name[:9] != "Optitrack" or name.endswith("Position_x")}

@@ -1,4 +1,4 @@
-"""The authors' CSV in every form it has: heads, line ends, compression, torn rows, empty cells."""
+"""The authors' CSV is read in all its forms: heads, line ends, compression, torn rows, empty cells."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_settings_and_rows_are_read_under_every_head(head: tuple[str, ...], tmp_
 
 
 def test_more_names_than_values_leave_every_setting_unknown(tmp_path: Path) -> None:
-    """The lateral angle would otherwise be read under another name."""
+    """Otherwise the value of one setting would be read under the name of another."""
     table = read_table(write(tmp_path / "run.csv", NAMES + ",wiggle_amplitude", VALUES, COLUMNS, *ROWS), WANTED)
     assert table.gait == {}
     assert table.missing_settings == ("lateral_angle_range", "insertion_angle", "wiggle_amplitude")

@@ -27,7 +27,7 @@ def kinds(log: LabLog) -> list[FindingKind]:
 def test_inverted_signals_are_inverted_back(
     joint: int, inverted: tuple[float, float], mud: bool, tmp_path: Path
 ) -> None:
-    """In air the arm's weight does the work of the insertion, so that work says nothing about the sign."""
+    """In air the arm's weight does the work of the insertion, so this work does not show the sign."""
     straight = read_lab_csv(write_lab_log(tmp_path / "straight.csv", lab_columns(mud=mud)))
     columns = lab_columns(mud=mud)
     for signal, sign in zip(("pos", "curr"), inverted, strict=True):

@@ -1,4 +1,4 @@
-"""Nonsense is refused where every number would be wrong, and left out where a part is; both name place and reason."""
+"""Invalid logs are refused, invalid parts are left out, and both are reported with position and reason."""
 
 from __future__ import annotations
 
@@ -107,13 +107,13 @@ def test_a_joint_whose_both_signals_hang_is_left_out(tmp_path: Path) -> None:
 
 
 def saturated(columns: Columns) -> None:
-    """The drives have one limit."""
+    """Clip the currents at the one limit of all drives."""
     for joint in JOINTS:
         columns[f"{joint}_curr"] = np.clip(columns[f"{joint}_curr"], -6.0, 6.0)
 
 
 def repeated(columns: Columns) -> None:
-    """Rows are written five times as often as the drives sample."""
+    """Repeat rows, which are written five times as often as the drives sample."""
     for name in columns:
         if name != "time":
             columns[name] = np.repeat(columns[name][::5], 5)[: len(columns["time"])]
