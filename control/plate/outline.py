@@ -7,7 +7,7 @@ upward without end: counter-clockwise, an edge that runs outward lies below the 
 inward lies above it and counts -1, and an upright one adds nothing. So the integrals (integrals.py) are closed forms.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
 from math import cos, fsum, inf, radians, sin
 from typing import NamedTuple
@@ -63,7 +63,7 @@ def mounted_outline(corners: Sequence[Corner], angle_deg: float = 0.0) -> PlateO
         turned = [_turned(corner, radians(angle_deg)) for corner in around]
         lowest_m = min(upward_m for _, upward_m in turned)
         around = tuple((outward_m, upward_m - lowest_m) for outward_m, upward_m in turned)
-    return PlateOutline(around, tuple(_edges(around)), tuple(_lower_corners(around)))
+    return PlateOutline(around, tuple(_edges(around)), tuple(lower_hull(around)))
 
 
 def _turned(corner: Corner, angle_rad: float) -> Corner:
@@ -80,8 +80,8 @@ def _edges(corners: Sequence[Corner]) -> Iterator[Edge]:
             yield inner[0], outer[0], inner[1], outer[1], slope, 1.0 if here < after else -1.0
 
 
-def _lower_corners(corners: Sequence[Corner]) -> list[Corner]:
-    """Return the lower hull (Andrew's monotone chain)."""
+def lower_hull(corners: Iterable[Corner]) -> list[Corner]:
+    """Return the lower boundary of the convex hull of points, outward (Andrew's monotone chain)."""
     hull: list[Corner] = []
     for corner in sorted(corners):
         if hull and hull[-1][0] == corner[0]:

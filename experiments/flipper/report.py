@@ -65,7 +65,11 @@ def report_of(
         later_strokes=_later_strokes(by_mud, method),
         missing_truth=missing_text(truth, by_mud),
         settings=plan.identity | {"method": method, "truth": "file" if truth else "bed"},
-        plate_m={name: getattr(geometry, f"plate_{name}_m") for name in ("width", "height", "thickness")},
+        plate_m={
+            "width": geometry.plate.width_m,
+            "height": geometry.plate.height_m,
+            "thickness": geometry.plate_thickness_m,
+        },
         left_out=left_out or {},
     )
 

@@ -5,13 +5,12 @@ lower edge is at ((l + u) sin α + w cos α, (l + u) cos α - w sin α, s - h). 
 intersection of the axes (control/geometry.py), which is at height H above the mud.
 """
 
-from cmath import phase
 from collections.abc import Iterable
-from itertools import accumulate
 from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
+from control.plate.outline import lower_hull
 
 Point = tuple[float, float]  # x, z in m
 
@@ -20,7 +19,7 @@ class SideView(NamedTuple):
     shoulder: Point  # intersection of the axes
     wrist: Point  # joint of arm and plate
     edge: Point  # the middle of the plate's lower edge
-    plate: list[Point]  # its outline, counter-clockwise
+    plate: list[Point]  # its outline, counter-clockwise; without the notches of a plate that has any
 
 
 def view_from_side(
@@ -33,16 +32,13 @@ def view_from_side(
         outward_m = (l + u_m) * ca - w_m * sa
         return body_x_m + (l + u_m) * sa + w_m * ca, axis_m + outward_m * sb + (s_m - h) * cb
 
-    edge, height_m = project(0.0, 0.0), geometry.plate_height_m
-    sizes = ((geometry.plate_width_m, 0.0, 0.0), (0.0, height_m, 0.0), (0.0, 0.0, geometry.plate_thickness_m))
-    sides = [complex(*project(*size)) - complex(*edge) for size in sizes]
-    outline = _outline_of_box(complex(*project(0.0, height_m / 2.0)), sides)
-    return SideView((body_x_m, axis_m), project(0.0, h), edge, outline)
+    half_m = geometry.plate_thickness_m / 2.0
+    corners = [project(u_m, s_m, w_m) for u_m, s_m in geometry.plate.corners for w_m in (-half_m, half_m)]
+    return SideView((body_x_m, axis_m), project(0.0, h), project(0.0, 0.0), _convex_hull(corners))
 
 
-def _outline_of_box(middle: complex, sides: Iterable[complex]) -> list[Point]:
-    """Return the outline from its leftmost corner: the sides in the order of their directions, there and back."""
-    rightward = sorted((max(side, -side, key=lambda each: (each.real, each.imag)) for side in sides), key=phase)
-    steps = [*rightward, *(-side for side in rightward[:-1])]
-    corners = accumulate(steps, initial=middle - sum(rightward) / 2.0)
-    return [(corner.real, corner.imag) for corner in corners]
+def _convex_hull(points: Iterable[Point]) -> list[Point]:
+    """Return the hull counter-clockwise: the lower boundary forward, and the upper one back."""
+    known = list(points)
+    upper = [(-x_m, -z_m) for x_m, z_m in lower_hull((-x_m, -z_m) for x_m, z_m in known)]
+    return list(dict.fromkeys([*lower_hull(known), *upper]))

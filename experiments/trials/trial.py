@@ -10,6 +10,7 @@ from random import Random
 
 from control.controller import WalkOrder
 from control.gait.gait import SINGLE_FLIPPER, GaitParameters
+from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.rate import PERIOD_S
 from control.records import BodyPose, StrideEstimate
@@ -31,13 +32,14 @@ TORQUE_ERROR = 0.032  # of a motor's constant: the paper's repeatability
 
 @dataclass(frozen=True)
 class Setup:
-    """A gait and a base for trials."""
+    """A gait, a base and a flipper for trials."""
 
     name: str
     gait: GaitParameters
     fixed_base: bool
     row_period_s: float  # rows between two new samples repeat the last one; 0: every row is new
     depth_m: float = 0.03
+    geometry: FlipperGeometry = FlipperGeometry()
 
 
 # The authors' logs hold 50 to 110 distinct states a second of a single flipper, up to 210 of the walking robot.
@@ -54,9 +56,11 @@ class Trial:
 
 
 def configuration_of(setup: Setup, drive_type: str = DEFAULT) -> Configuration:
-    """Return the simulated robot's configuration with a setup's gait and base, and drives of this type."""
+    """Return the simulated robot's configuration with a setup's flipper, gait and base, and drives of this type."""
     estimation = EstimationParameters(fixed_base=setup.fixed_base)
-    configuration = replace(simulated_configuration(drive_type=drive_type), gait=setup.gait, estimation=estimation)
+    configuration = replace(
+        simulated_configuration(drive_type=drive_type), geometry=setup.geometry, gait=setup.gait, estimation=estimation
+    )
     return _with_bench_drives(configuration) if setup.fixed_base else configuration
 
 

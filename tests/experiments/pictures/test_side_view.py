@@ -97,6 +97,16 @@ def test_the_lowest_corner_is_as_deep_as_the_simulator_has_it(sweep_rad: float, 
     )
 
 
+@given(SWEEPS, ADDUCTIONS)
+def test_a_plate_of_another_shape_shows_its_face_too(sweep_rad: float, adduction_rad: float) -> None:
+    trapezoid = replace(SHEET, plate_corners_m=((-0.0075, 0.0), (0.0075, 0.0), (0.0175, 0.07), (-0.0175, 0.07)))
+    outline, fraction = (
+        view_from_side(trapezoid, sweep_rad, adduction_rad).plate,
+        abs(sin(sweep_rad)) * cos(adduction_rad),
+    )
+    assert area_m2(outline) == pytest.approx(fraction * 0.07 * 0.025, abs=1e-12)
+
+
 def test_a_plate_straight_below_the_shoulder_is_seen_by_its_edge() -> None:
     outline = view_from_side(GEOMETRY, 0.0, 0.0).plate
     width_m = max(x_m for x_m, _ in outline) - min(x_m for x_m, _ in outline)

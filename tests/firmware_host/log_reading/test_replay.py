@@ -8,10 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from command_line.init.plate_file import read_corners
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import StrideEstimate
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.key_reference import toml_value
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.recorder import Recorder
@@ -22,6 +25,7 @@ from simulation.mud.track import paper_track
 from tests.folders import SHARED_DATA
 from tests.recorded_walks import record_walks
 
+PLATES = Path(__file__).resolve().parents[3] / "examples" / "plates"
 SHARED = SHARED_DATA
 LAB_LOGS = sorted((SHARED / "flipper_in_mud").glob("*.csv.gz"))
 
@@ -38,6 +42,21 @@ def test_a_replayed_walk_gives_the_same_strides_to_the_last_digit(tmp_path: Path
     replayed = replay_files([path]).strides
     assert len(live) == len(replayed) == 6
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
+
+
+@pytest.mark.parametrize("plate", ["trapezoid", "paddle"])
+def test_a_log_carries_the_shape_of_the_plate(tmp_path: Path, example_text: str, plate: str) -> None:
+    corners = read_corners(PLATES / f"{plate}.csv")
+    lines = [line for line in example_text.splitlines() if not line.startswith(("plate_width_m", "plate_height_m"))]
+    text = "\n".join(lines).replace("[geometry]", f"[geometry]\nplate_corners_m = {toml_value(corners)}")
+    path = tmp_path / "walk.mcap"
+    robot = record_walks(path, parse_configuration(text), 1)
+    live = [stride.estimate for stride in robot.loop.learning.strides]
+    replayed = replay_files([path]).strides
+    assert len(live) == len(replayed) > 0
+    assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
+    rectangle = replay_files([path], parse_configuration(example_text)).strides
+    assert not any(same(one, other) for one, other in zip(live, rectangle, strict=True))
 
 
 def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
