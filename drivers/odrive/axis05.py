@@ -154,9 +154,13 @@ class Odrive05Axis(CanSimpleAxis):
             self._ask()
 
     def poll(self) -> None:
-        """Asks an idle drive for its counts while it reports no position, or its watchdog is not proven."""
+        """Asks an idle drive for its counts while it reports no position, or its watchdog is not proven.
+
+        A drive with firmware 0.6 has none, and reports its version.
+        """
         if not self.closed_loop and not self._proof.silent and self._heartbeat_stamp_s > NEVER_S:
             self._ask()
+            self.request_settings(self._read_s)
 
     def _ask(self) -> None:
         if self._proof.must_clear:

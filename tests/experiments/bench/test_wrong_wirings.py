@@ -24,8 +24,11 @@ from experiments.bench.rig import SimulatedRig
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_robot import BenchError
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.blocks import on_blocks
+from simulation.harness.drive_presets import with_drive_type
 from tests.bench.staged_bench import STAGES, BenchReport, StagedBench
+from tests.folders import EXAMPLE_CONFIGURATION
 
 MODULES = [import_module(f"tests.bench.test_{number}_{name}") for number, name in enumerate(STAGES, 1)]
 
@@ -127,6 +130,16 @@ class DriveRestart:
             rig.robot.restart_drive(2)
 
 
+def of_firmware05(built: bool = True, configured: bool = True, **changes: Any) -> SimulatedRig:
+    """Return a rig with ODrives of firmware 0.5, or one that is only configured or only built so."""
+    text = EXAMPLE_CONFIGURATION.read_text(encoding="utf-8")
+    usual, other = parse_configuration(text), parse_configuration(with_drive_type(text, "odrive05"))
+    robot = other if built else usual
+    drives = on_blocks(robot).drives(robot)
+    drives["left_sweep"] = replace(drives["left_sweep"], **changes)
+    return SimulatedRig(other if configured else usual, robot, drives)
+
+
 def stuck_encoder(configuration: Configuration) -> SimulatedRig:
     """Return a rig with an encoder that always reports the same angle, and no speed."""
     rig = SimulatedRig(configuration)
@@ -205,6 +218,29 @@ WRONG = (
         "watchdogs",
         "right_adduction: idle among requests of the position",
         "watchdogs",
+    ),
+    Wrong(
+        "firmware 0.5, watchdog off",
+        lambda _: of_firmware05(watchdog_s=0.0),
+        "wiring",
+        "left_sweep: watchdog is 0 s",
+        "wiring",
+    ),
+    Wrong("firmware 0.5 instead of 0.6", lambda _: of_firmware05(configured=False), "wiring", "left_sweep", "wiring"),
+    Wrong("firmware 0.6 instead of 0.5", lambda _: of_firmware05(built=False), "wiring", "it is 0.6.11", "wiring"),
+    Wrong(
+        "firmware 0.5, other direction",
+        lambda _: of_firmware05(encoder_direction=-1),
+        "signs",
+        "left_sweep follows other torques",
+        "signs",
+    ),
+    Wrong(
+        "firmware 0.5, other counts",
+        lambda _: of_firmware05(encoder_counts=4000),
+        "currents",
+        "encoder_counts = 8192",
+        "wiring",
     ),
     Wrong(
         "soft gains",
