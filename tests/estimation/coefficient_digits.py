@@ -1,4 +1,4 @@
-"""Prints the coefficients of four synthetic strides, digit by digit, for other versions of Python to compare.
+"""Print the coefficients of four synthetic strides, digit by digit, for other versions of Python to compare.
 
 `python -m tests.estimation.coefficient_digits` needs no package, so it runs in any interpreter.
 """

@@ -1,6 +1,6 @@
 """A stride of one flipper at 380 Hz through mud that keeps the estimator's own laws: samples for tests.
 
-The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ, what crosses over from the plate's face,
+The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ, the cross-coupling of the plate's face,
 gravity, inertia and noise, so surface, stance and extraction are found as on a robot.
 """
 
@@ -36,7 +36,7 @@ class Sample(NamedTuple):
 
 
 def motion() -> list[Sample]:
-    """One stride, without any current."""
+    """Return one stride, without any current."""
     gait, samples = Gait(GAIT, GEOMETRY), list[Sample]()
     gait.reset(DEPTH_M)
     for tick in range(1, int(stride_duration_s(GAIT, GEOMETRY, DEPTH_M) / PERIOD_S)):
@@ -49,12 +49,12 @@ def motion() -> list[Sample]:
 
 
 def sample_of(now_s: float, phase: Phase, sweep: tuple[float, float], adduction: tuple[float, float]) -> Sample:
-    """Of angles and velocities, with messages of this very tick."""
+    """Return a sample of these angles and velocities, with messages of this very tick."""
     return Sample(now_s, phase, DriveState(*sweep, now_s, 0.0, now_s), DriveState(*adduction, now_s, 0.0, now_s))
 
 
 def mud_torques_nm(sample: Sample) -> tuple[float, float]:
-    """Of the mud on (sweep, adduction)."""
+    """Return the torques of the mud on (sweep, adduction)."""
     sweep_rad, adduction_rad = sample.sweep.angle_rad, sample.adduction.angle_rad
     plate = submerged_plate(GEOMETRY, sweep_rad, adduction_rad, SURFACE_M)
     if sample.phase is Phase.STANCE:
@@ -65,8 +65,8 @@ def mud_torques_nm(sample: Sample) -> tuple[float, float]:
 
 
 def stride_samples(seed: int = 1) -> list[Sample]:
-    """With currents. Accelerations reach from the sample before to the one after: in a quick extraction inertia is as
-    much as the mud's load, and half a tick aside would show.
+    """Return one stride with currents. Accelerations span from the sample before to the one after: in a quick
+    extraction the inertia is as large as the mud's load, and a shift of half a tick would show.
     """
     random, samples, loaded = Random(seed), motion(), list[Sample]()
     for before, sample, after in zip(samples[:1] + samples, samples, samples[1:] + samples[-1:], strict=False):

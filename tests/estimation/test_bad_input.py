@@ -1,4 +1,4 @@
-"""Samples as no robot should send them: the estimator may learn nothing from them, and must survive them."""
+"""Samples that no robot should send: the estimator learns nothing from them and does not fail."""
 
 from collections.abc import Callable
 from math import isfinite, nan
@@ -22,7 +22,7 @@ DRIVE = FlipperDrive(ArmMass(0.0, 0.0, 0.0, 0.0), 0.083, 0.083, current_limit_a=
 STRIDES = 4
 METHODS: tuple[Method, ...] = ("default", "paper")
 COEFFICIENT = {Phase.INSERTION: "k_p", Phase.STANCE: "k_s", Phase.EXTRACTION: "k_e"}
-NO_MUD_N_M3 = COEFFICIENTS_N_M3[0]  # the memory forgets what is below it: here roundings of torques that are zero
+NO_MUD_N_M3 = COEFFICIENTS_N_M3[0]  # the memory ignores smaller values: here roundings of torques that are zero
 Row = tuple[float, Phase, float, float, float, float]  # time, phase, sweep, adduction and their currents
 
 
@@ -46,7 +46,7 @@ def fed(mud: MudEstimator, rows: list[Row], body_m: float = 0.0) -> list[StrideE
 
 
 def walk() -> list[Row]:
-    """Currents in proportion to depth, in each stroke those that oppose it, up to 9 A."""
+    """Return rows whose currents are in proportion to depth and oppose each stroke, up to 9 A."""
     gait, rows = Gait(GaitParameters(), GEOMETRY), list[Row]()
     gait.reset(0.03)
     while gait.stride < STRIDES / 2:
@@ -59,25 +59,25 @@ def walk() -> list[Row]:
     return rows
 
 
-def assert_is_honest(estimate: Estimate) -> None:
-    """A value, a lower bound with its reason, or nothing with its reason."""
+def assert_is_consistent(estimate: Estimate) -> None:
+    """Check that an estimate is a value, a lower bound with its reason, or nothing with its reason."""
     assert estimate.valid == (estimate.reason == "" or estimate.at_least)
     assert not estimate.at_least or estimate.reason
     assert not estimate.valid or (estimate.value > 0.0 and isfinite(estimate.value + estimate.std_error))
 
 
-def assert_honest(strides: list[StrideEstimate]) -> None:
+def assert_all_consistent(strides: list[StrideEstimate]) -> None:
     for stride in strides:
         for estimate in (stride.k_p, stride.k_s, stride.k_e):
-            assert_is_honest(estimate)
+            assert_is_consistent(estimate)
 
 
-def test_the_walk_below_is_a_good_one(method: Method) -> None:
+def test_the_unaltered_walk_gives_every_coefficient(method: Method) -> None:
     strides = fed(new_estimator(method), walk())
     assert len(strides) == STRIDES
     for stride in strides:
         assert all(each.valid and not each.at_least for each in (stride.k_p, stride.k_s, stride.k_e))
-    assert_honest(strides)
+    assert_all_consistent(strides)
 
 
 def test_an_estimator_without_samples_knows_nothing() -> None:
@@ -93,7 +93,7 @@ def test_a_single_sample_closes_nothing(phase: Phase, method: Method) -> None:
 def test_constant_samples_give_no_coefficient(current_a: float, method: Method) -> None:
     strides = fed(new_estimator(method), [(t, phase, 0.1, -0.5, current_a, current_a) for t, phase, *_ in walk()])
     assert len(strides) == STRIDES
-    assert_honest(strides)
+    assert_all_consistent(strides)
     for stride in strides:
         assert not any(each.valid and not each.at_least for each in (stride.k_p, stride.k_s, stride.k_e))
 
@@ -101,7 +101,7 @@ def test_constant_samples_give_no_coefficient(current_a: float, method: Method) 
 def test_samples_of_nothing_but_nan_give_no_coefficient(method: Method) -> None:
     strides = fed(new_estimator(method), [(t, phase, nan, nan, nan, nan) for t, phase, *_ in walk()])
     assert len(strides) == STRIDES
-    assert_honest(strides)
+    assert_all_consistent(strides)
     for stride in strides:
         assert not (stride.k_p.valid or stride.k_s.valid or stride.k_e.valid)
 
@@ -126,7 +126,7 @@ def held_still(rows: list[Row]) -> list[Row]:
 
 
 def pressed_against_its_limit(rows: list[Row]) -> list[Row]:
-    """Where it is, it stays, whatever the motors give."""
+    """Hold the flipper at the last angles of the stroke, while both motors give -10 A."""
     return [(now_s, phase, *rows[-1][2:4], -10.0, -10.0) for now_s, phase, *_ in rows]
 
 
@@ -143,11 +143,11 @@ def without_load(rows: list[Row]) -> list[Row]:
 
 
 def drawn_along(rows: list[Row]) -> list[Row]:
-    """The force helps the motion."""
+    """Reverse the currents, so that the force helps the motion."""
     return [(*row[:4], -row[4], -row[5]) for row in rows]
 
 
-SPOILS = [
+ALTERATIONS = [
     emptied,
     without_angles,
     without_currents,
@@ -160,27 +160,27 @@ SPOILS = [
 ]
 
 
-def invalid(stroke: Phase, spoil: Callable[[list[Row]], list[Row]]) -> list[Row]:
-    """A walk whose every stroke of one kind is spoilt."""
+def altered_walk(stroke: Phase, alter: Callable[[list[Row]], list[Row]]) -> list[Row]:
+    """Return a walk in which `alter` has changed every stroke of one kind."""
     rows, result, batch = walk(), list[Row](), list[Row]()
     for row in rows:
         if row[1] is stroke:
             batch.append(row)
             continue
-        result += spoil(batch) if batch else []
+        result += alter(batch) if batch else []
         batch = []
         result.append(row)
     return result
 
 
-@pytest.mark.parametrize("spoil", SPOILS, ids=lambda spoil: spoil.__name__)
+@pytest.mark.parametrize("alter", ALTERATIONS, ids=lambda alter: alter.__name__)
 @pytest.mark.parametrize("stroke", COEFFICIENT)
-def test_a_invalid_stroke_gives_no_number_for_a_value(
-    stroke: Phase, spoil: Callable[[list[Row]], list[Row]], method: Method
+def test_an_altered_stroke_gives_no_value(
+    stroke: Phase, alter: Callable[[list[Row]], list[Row]], method: Method
 ) -> None:
-    strides = fed(new_estimator(method), invalid(stroke, spoil))
+    strides = fed(new_estimator(method), altered_walk(stroke, alter))
     assert len(strides) == STRIDES
-    assert_honest(strides)
+    assert_all_consistent(strides)
     for stride in strides:
         estimate = getattr(stride, COEFFICIENT[stroke])
         assert not estimate.valid or estimate.at_least or estimate.value < NO_MUD_N_M3
@@ -188,49 +188,49 @@ def test_a_invalid_stroke_gives_no_number_for_a_value(
 
 @pytest.mark.parametrize("stroke", COEFFICIENT)
 def test_a_stroke_that_is_left_out_closes_no_stride(stroke: Phase, method: Method) -> None:
-    assert fed(new_estimator(method), invalid(stroke, lambda rows: [])) == []
+    assert fed(new_estimator(method), altered_walk(stroke, lambda rows: [])) == []
 
 
 @pytest.mark.parametrize("stroke", COEFFICIENT)
 def test_a_stroke_that_runs_backward_gives_nothing_or_the_law_that_its_pairs_still_keep(
     stroke: Phase, method: Method
 ) -> None:
-    """Depths and forces belong together in any order; only how they came about is wrong."""
+    """Depths and forces still belong together; only their order is wrong."""
 
     def backward(rows: list[Row]) -> list[Row]:
         return [(row[0], *other[1:]) for row, other in zip(rows, rows[::-1], strict=True)]
 
     good = getattr(fed(new_estimator(method), walk())[0], COEFFICIENT[stroke]).value
-    strides = fed(new_estimator(method), invalid(stroke, backward))
-    assert_honest(strides)
+    strides = fed(new_estimator(method), altered_walk(stroke, backward))
+    assert_all_consistent(strides)
     for stride in strides:
         estimate = getattr(stride, COEFFICIENT[stroke])
         assert not estimate.valid or estimate.at_least or estimate.value == pytest.approx(good, rel=0.25)
 
 
 def stuck(fraction: float) -> Callable[[list[Row]], list[Row]]:
-    """The sweep motor gives its 10 A all along, and the flipper stops after that share of the stance."""
+    """Let the sweep motor give 10 A throughout and the flipper stop after that fraction of the stance."""
 
-    def spoil(rows: list[Row]) -> list[Row]:
+    def alter(rows: list[Row]) -> list[Row]:
         stop = rows[int(fraction * len(rows))][2:4]
         return [(*row[:2], *(row[2:4] if row[2] > stop[0] else stop), -10.0, 0.0) for row in rows]
 
-    return spoil
+    return alter
 
 
 @pytest.mark.parametrize("fraction", [0.05, 0.1, 0.2])
 def test_a_motor_at_its_limit_that_never_moved_the_mud_gives_a_bound(fraction: float) -> None:
-    """The mud bore 10 A where the walk's yields at 9: it is at least so much stronger."""
+    """The mud withstood 10 A where the walk yields at 9 A, so it is at least that much stronger."""
     good = fed(new_estimator("default"), walk())[0].k_s.value
-    for stride in fed(new_estimator("default"), invalid(Phase.STANCE, stuck(fraction))):
+    for stride in fed(new_estimator("default"), altered_walk(Phase.STANCE, stuck(fraction))):
         assert stride.k_s.reason
         assert not stride.k_s.valid or stride.k_s.at_least
         assert not stride.k_s.valid or stride.k_s.value == pytest.approx(good * 10.0 / 9.0, rel=0.25)
 
 
-def test_a_motor_at_its_limit_that_moved_the_mud_for_a_while_gives_what_the_mud_bore() -> None:
+def test_a_motor_at_its_limit_that_moved_the_mud_for_a_while_gives_its_strength() -> None:
     good = fed(new_estimator("default"), walk())[0].k_s.value
-    for stride in fed(new_estimator("default"), invalid(Phase.STANCE, stuck(0.6))):
+    for stride in fed(new_estimator("default"), altered_walk(Phase.STANCE, stuck(0.6))):
         assert stride.k_s.valid
         assert stride.k_s.value == pytest.approx(good * 10.0 / 9.0, rel=0.15)
 
@@ -239,23 +239,23 @@ def test_a_motor_at_its_limit_that_moved_the_mud_for_a_while_gives_what_the_mud_
 
 
 def test_a_walk_backward_in_time_is_survived(method: Method) -> None:
-    assert_honest(fed(new_estimator(method), walk()[::-1]))
+    assert_all_consistent(fed(new_estimator(method), walk()[::-1]))
 
 
 def test_strokes_reversed_under_a_running_clock_are_survived(method: Method) -> None:
     rows = walk()
     times = [row[0] for row in rows]
-    assert_honest(fed(new_estimator(method), [(t, *row[1:]) for t, row in zip(times, rows[::-1], strict=True)]))
+    assert_all_consistent(fed(new_estimator(method), [(t, *row[1:]) for t, row in zip(times, rows[::-1], strict=True)]))
 
 
 def test_a_clock_that_stands_still_closes_nothing(method: Method) -> None:
     assert fed(new_estimator(method), [(1.0, *row[1:]) for row in walk()]) == []
 
 
-def test_a_walk_without_a_pose_is_honest(method: Method) -> None:
+def test_a_walk_without_a_pose_gives_consistent_estimates(method: Method) -> None:
     strides = fed(new_estimator(method), walk(), body_m=nan)
     assert len(strides) == STRIDES
-    assert_honest(strides)
+    assert_all_consistent(strides)
 
 
 def test_phases_in_any_order_leave_the_next_good_stride_as_it_is(method: Method) -> None:
@@ -276,11 +276,11 @@ def test_nothing_makes_the_estimator_raise(rows: list[Row], method: Method) -> N
 
 @given(st.lists(anything, min_size=1, max_size=30), st.sampled_from(METHODS))
 def test_no_currents_make_a_good_walk_raise(currents_a: list[float], method: Method) -> None:
-    """Every stroke closes here, which rows of anything hardly ever bring about."""
+    """Every stroke closes here, which random rows hardly ever achieve."""
     rows = [
         (*row[:4], currents_a[i % len(currents_a)], currents_a[-i % len(currents_a)]) for i, row in enumerate(walk())
     ]
-    assert_honest(fed(new_estimator(method), rows))
+    assert_all_consistent(fed(new_estimator(method), rows))
 
 
 modest = st.floats(-1.5, 1.5) | st.just(nan)
@@ -288,16 +288,16 @@ modest_rows = st.tuples(st.floats(0.0, 10.0), st.sampled_from(Phase), modest, mo
 
 
 @given(st.lists(modest_rows, max_size=60), st.sampled_from(METHODS))
-def test_modest_nonsense_never_gives_a_dishonest_estimate(rows: list[Row], method: Method) -> None:
-    assert_honest(fed(new_estimator(method), sorted(rows, key=lambda row: row[0])))
+def test_modest_nonsense_never_gives_an_inconsistent_estimate(rows: list[Row], method: Method) -> None:
+    assert_all_consistent(fed(new_estimator(method), sorted(rows, key=lambda row: row[0])))
 
 
 @given(st.lists(st.floats(), min_size=13, max_size=13), st.sampled_from(Phase), st.sampled_from(METHODS))
 def test_velocities_and_poses_of_any_value_are_survived(values: list[float], phase: Phase, method: Method) -> None:
     mud = new_estimator(method)
     a, b, c, d = values[:4]
-    for now_s, where in ((values[12], phase), (1.0, Phase.STANCE), (1.0, Phase.EXTRACTION), (2.0, Phase.SWING)):
+    for now_s, stroke in ((values[12], phase), (1.0, Phase.STANCE), (1.0, Phase.EXTRACTION), (2.0, Phase.SWING)):
         first = recorded_states(now_s, (0.1, 0.2, 0.3, 0.4), (a, b, c, d), values[4:8])
         second = recorded_states(now_s, (0.1, 0.2, 0.3, 0.5), (d, c, b, a), (values[8], values[9], 0.0, 0.0))
-        mud.update(now_s, where, first, BodyPose(now_s, a))
-        mud.update(now_s, where, second, BodyPose(now_s, values[11]))
+        mud.update(now_s, stroke, first, BodyPose(now_s, a))
+        mud.update(now_s, stroke, second, BodyPose(now_s, values[11]))

@@ -1,10 +1,10 @@
-"""Strokes through made-up mud that keeps the estimator's own laws, so that the truth is known to the last digit.
+"""Strokes through synthetic mud that keeps the estimator's own laws, so that the truth is known to the last digit.
 
-The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ of control/plate on the true surface,
-what the plate's face bears, gravity, inertia, friction and mud that clings. Without noise only two things are left in
-between: strokes are averaged over pieces of the way, and the surface has to be found first. The law bends a line of
-force against depth by 3 % at 2 cm, 8 % at 3 cm and 20 % at 4 cm (the plate leans more, the deeper it is), which reads
-as a surface that is too deep. Where a test wants the laws without that, it says beforehand where the surface is.
+The joints follow the gait exactly. The currents carry k_p Φ, k_s Ψ and k_e Φ of control/plate on the true surface, the
+load on the plate's face, gravity, inertia, friction and clinging mud. Without noise only two errors remain: strokes are
+averaged over pieces of travel, and the surface has to be found first. The law bends a line of force against depth by 3
+% at 2 cm, 8 % at 3 cm and 20 % at 4 cm (the plate leans more, the deeper it is), which looks like a surface that is too
+deep. Tests that need the laws without this error state the surface beforehand.
 """
 
 from collections.abc import Iterable, Sequence
@@ -37,7 +37,7 @@ LENGTH_M, DROP_M = GEOMETRY.flipper_length_m, GEOMETRY.drop_m
 FRICTION = JointFriction(0.01, 0.002, 0.01, 14, 20.0)
 WEIGHTLESS = FlipperDrive(ArmMass(0.0, 0.0, 0.0, 0.0), 0.083, 0.09)
 HEAVY = FlipperDrive(ArmMass(0.3, 0.07, 0.0004, 0.0006), 0.083, 0.09, FRICTION, FRICTION)
-KNOWN_M = 1e-6  # doubt of a surface that is as good as known
+KNOWN_M = 1e-6  # uncertainty of a surface that is practically known
 NOISE_A = 0.2  # the authors' logs show 0.1 to 0.3
 
 
@@ -46,7 +46,7 @@ class Mud(NamedTuple):
     k_s: float = 0.6e6
     k_e: float = 0.7e6
     surface_m: float = 0.0
-    face_fraction: float = 0.0  # of the stance's load that the face also bears in insertion and extraction
+    face_fraction: float = 0.0  # of the stance's load that the face also carries in insertion and extraction
     weight_n: float = 0.0  # clings to the flipper
     friction_nm: float = 0.0  # dry, of both joints
 
@@ -58,6 +58,8 @@ MUD = Mud()
 
 
 class Moment(NamedTuple):
+    """The exact motion of one flipper at one tick."""
+
     now_s: float
     phase: Phase
     sweep_rad: float
@@ -85,7 +87,7 @@ class Row(NamedTuple):
         return self._replace(adduction=self.adduction._replace(angle_rad=nan))
 
     def pushed(self, sweep_a: float, adduction_a: float) -> "Row":
-        """With more current."""
+        """Return the row with more current."""
         sweep = self.sweep._replace(current_a=self.sweep.current_a + sweep_a)
         return self._replace(
             sweep=sweep, adduction=self.adduction._replace(current_a=self.adduction.current_a + adduction_a)
@@ -93,7 +95,7 @@ class Row(NamedTuple):
 
 
 def joints(target: GaitTarget) -> tuple[float, float, float, float]:
-    """Angles and velocities that follow the gait exactly."""
+    """Return the angles and velocities of joints that follow the gait exactly."""
     lift_rad = GEOMETRY.adduction_rad(target.sweep_rad, target.depth_m)
     lift_rad_s = GEOMETRY.adduction_velocity_rad_s(
         target.sweep_rad, lift_rad, target.sweep_velocity_rad_s, target.depth_velocity_m_s
@@ -105,7 +107,7 @@ def joints(target: GaitTarget) -> tuple[float, float, float, float]:
 def motion(
     depth_m: float = 0.03, gait: GaitParameters = GAIT, strides: int = 1, rate_hz: float = RATE_HZ
 ) -> tuple[Moment, ...]:
-    """Whole strides, from the swing before the first one to the sample that closes the last."""
+    """Return whole strides, from the swing before the first one to the sample that closes the last."""
     walk, moments = Gait(gait, GEOMETRY), list[Moment]()
     walk.reset(depth_m)
     for tick in range(1, int((strides + 1) * stride_duration_s(gait, GEOMETRY, depth_m) * rate_hz)):
@@ -118,13 +120,13 @@ def motion(
 
 
 def mud_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
-    """By the laws, of the mud on (sweep, adduction)."""
+    """Return the torques of the mud on (sweep, adduction), by the laws."""
     plate = submerged_plate(GEOMETRY, moment.sweep_rad, moment.adduction_rad, mud.surface_m)
     stance_nm = mud.k_s * stance_moment_m4(GEOMETRY, plate)
     stroke_m4 = stroke_moment_m4(GEOMETRY, plate, moment.sweep_rad)
     fraction, k = {
         Phase.INSERTION: (mud.face_fraction, mud.k_p),
-        Phase.STANCE: (1.0, 0.5 * mud.k_p),  # whatever holds a flipper up in stance: it must not matter
+        Phase.STANCE: (1.0, 0.5 * mud.k_p),  # any upward load in stance must not matter
         Phase.EXTRACTION: (-mud.face_fraction, -mud.k_e),
     }.get(moment.phase, (0.0, 0.0))
     sweep_nm = fraction * stance_nm
@@ -132,7 +134,10 @@ def mud_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
 
 
 def clinging_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
-    """-W ∂z/∂q of the point CLINGING_M above the edge, whose height is l cos α sin β - (h - CLINGING_M) cos β."""
+    """Return the torques of clinging mud, -W ∂z/∂q, and of dry friction.
+
+    The weight acts CLINGING_M above the edge, at the height l cos α sin β - (h - CLINGING_M) cos β.
+    """
     sa, ca, sb, cb = (trig(angle) for angle in (moment.sweep_rad, moment.adduction_rad) for trig in (sin, cos))
     sweep_nm, adduction_nm = (
         -copysign(mud.friction_nm, speed_rad_s) if speed_rad_s else 0.0
@@ -143,7 +148,7 @@ def clinging_torques_nm(moment: Moment, mud: Mud) -> tuple[float, float]:
 
 
 def rows_of(moments: Iterable[Moment], mud: Mud = MUD, drive: FlipperDrive = WEIGHTLESS) -> list[Row]:
-    """What the drives measure while they move the flipper so: k_t I = J ω' - gravity - load + friction."""
+    """Return what the drives measure during these motions: k_t I = J ω' - gravity - load + friction."""
     rows, mass = [], drive.mass
     for moment in moments:
         now_s, phase, sweep_rad, lift_rad, sweep_rad_s, lift_rad_s, sweep_rad_s2, lift_rad_s2 = moment
@@ -172,7 +177,7 @@ def estimator(
 
 
 def waiting(rows: Sequence[Row]) -> list[Row]:
-    """The flipper stays where its extraction ended, for longer than it has to come out."""
+    """Let the flipper stay where its extraction ended, for longer than the time that it has to come out."""
     lifted_rad, ticks = rows[-2].adduction.angle_rad, round(1.1 * GRACE_S * RATE_HZ)
     assert rows[-2].phase is not rows[-1].phase is Phase.SWING
     return [*rows[:-1], *(later(rows[-1], tick / RATE_HZ, lifted_rad) for tick in range(ticks))]
@@ -210,8 +215,9 @@ def uncertainties(stride: StrideEstimate) -> list[float]:
 def test_where_the_surface_is_known_shear_and_extraction_are_found(
     depth_m: float, gait: GaitParameters, drive: FlipperDrive
 ) -> None:
-    """0.1 %: batches of 6 mm on a law that is not quite a line. 1 % for k_e: what bends in the insertion also leaves a
-    level of up to 10 mN for the zero, and a tick of the quick extraction is 3 % of its ramp's sine.
+    """The tolerance of 0.1 % covers batches of 6 mm on a law that is not quite a line. k_e has 1 %: the bend of the
+    insertion also leaves a level of up to 10 mN for the zero, and a tick of the quick extraction is 3 % of its ramp's
+    sine.
     """
     mud = MUD._replace(face_fraction=0.3)
     stride = one(rows_of(motion(depth_m, gait), mud, drive), estimator(drive, KNOWN_M))
@@ -223,10 +229,10 @@ def test_where_the_surface_is_known_shear_and_extraction_are_found(
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
 @pytest.mark.parametrize("depth_m", [0.02, 0.025, 0.03])
 @pytest.mark.parametrize("factor", [0.4, 1.0, 3.0])  # softer mud at 17 mm pushes as little as friction
-def test_where_the_surface_has_to_be_found_truth_is_within_the_uncertainty_of_it(
+def test_surface_and_coefficients_are_found_without_prior_knowledge(
     factor: float, depth_m: float, surface_m: float
 ) -> None:
-    """Nothing is known beforehand, nothing is noisy: the surface is told to 0.8 mm, and each coefficient to 6 %."""
+    """Without prior knowledge and without noise the surface is found to 0.8 mm and each coefficient to 6 %."""
     mud = MUD.times(factor)._replace(surface_m=surface_m)
     stride = one(rows_of(motion(depth_m), mud), estimator(surface_error_m=0.05))
     assert all(each.valid for each in coefficients(stride))
@@ -238,8 +244,9 @@ def test_where_the_surface_has_to_be_found_truth_is_within_the_uncertainty_of_it
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.003])
 @pytest.mark.parametrize("depth_m", [0.02, 0.03, 0.04])
 def test_without_noise_all_error_is_that_of_the_surface(depth_m: float, surface_m: float) -> None:
-    """k_p and k_e go with V of a slope through it, 3/2 dδ/z; k_s with its square. Taken off to first order in dδ/z,
-    which is up to 4 %, so its square is left; and a quarter of the way up is not fitted, so k_e is more than 3/2.
+    """A surface error dδ changes k_p and k_e by 3/2 dδ/z and k_s by 2 dδ/z. The correction is of first order in dδ/z,
+    which is up to 4 %, so its square remains; the first quarter of the rise is not fitted, so k_e changes by more than
+    3/2 dδ/z.
     """
     mud = MUD._replace(surface_m=surface_m)
     stride = one(rows_of(motion(depth_m), mud), estimator(surface_error_m=0.05))
@@ -251,21 +258,21 @@ def test_without_noise_all_error_is_that_of_the_surface(depth_m: float, surface_
 
 
 def test_softer_and_firmer_mud_are_read_alike() -> None:
-    """0.5 %: the zero is allowed to have crept by the same 0.05 N in any mud."""
+    """The tolerance is 0.5 %, because the zero may creep by the same 0.05 N in any mud."""
     readings = [ratios(one(rows_of(motion(), MUD.times(factor))), MUD.times(factor)) for factor in (0.1, 1.0, 5.0)]
     assert readings[0] == pytest.approx(readings[1], rel=5e-3)
     assert readings[2] == pytest.approx(readings[1], rel=5e-3)
 
 
 @pytest.mark.parametrize("factor", [-1.0, 0.0])
-def test_mud_that_pushes_the_wrong_way_has_no_coefficient(factor: float) -> None:
+def test_mud_that_pushes_along_the_motion_has_no_coefficient(factor: float) -> None:
     for each in coefficients(one(noisy(rows_of(motion(), MUD.times(factor)), 1, 0.01))):
         assert not each.valid
         assert each.reason
 
 
 def test_gravity_inertia_and_friction_left_in_would_be_taken_for_mud() -> None:
-    """So the tests above would notice if one of them were not taken off."""
+    """The tests above would therefore notice if one of them were not subtracted."""
     whole = HEAVY.mass
     for lacking in (
         HEAVY._replace(mass=ArmMass(0.0, 0.0, whole.sweep_inertia_kg_m2, whole.adduction_inertia_kg_m2)),
@@ -278,8 +285,8 @@ def test_gravity_inertia_and_friction_left_in_would_be_taken_for_mud() -> None:
 
 @pytest.mark.parametrize("face_fraction", [-0.3, 0.15, 0.3])
 def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_fraction: float) -> None:
-    """At -30 % to 30 % of the stance's load it would change k_p by up to 14 % and k_e by as much, were it not taken
-    off; where the force begins to rise it blurs by a few tenths of a millimetre, which the doubt covers.
+    """Uncorrected, a face load of -30 % to 30 % of the stance's load would change k_p and k_e by up to 14 %. It blurs
+    the depth at which the force begins to rise by a few tenths of a millimetre, which the uncertainty covers.
     """
     plain, faced = (
         one(rows_of(motion(), MUD._replace(face_fraction=fraction)), estimator(surface_error_m=0.05))
@@ -288,11 +295,13 @@ def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_f
     assert faced.k_p.value == pytest.approx(MUD.k_p, abs=2.0 * faced.k_p.std_error)
     late = [(each.surface_m / each.depth_m) for each in (plain, faced)]
     corrected = [each.k_p.value * (1.0 - fraction) ** 1.5 for each, fraction in zip((plain, faced), late, strict=True)]
-    assert corrected[1] == pytest.approx(corrected[0], rel=0.01)  # the square of the surfaces' difference
+    assert corrected[1] == pytest.approx(corrected[0], rel=0.01)  # the square of the surfaces' difference remains
 
 
 def test_a_load_on_the_face_adds_to_the_uncertainty() -> None:
-    """By an eighth of what is taken off, 7 % of k_e: 0.9 % beside the 3.2 % of the torque constant."""
+    """The uncertainty of k_e grows by an eighth of the correction of 7 %: 0.9 %, next to 3.2 % of the torque
+    constant.
+    """
     plain, faced = (
         one(rows_of(motion(), MUD._replace(face_fraction=fraction)), estimator(surface_error_m=KNOWN_M))
         for fraction in (0.0, 0.3)
@@ -303,15 +312,15 @@ def test_a_load_on_the_face_adds_to_the_uncertainty() -> None:
 
 
 def test_at_five_centimetres_and_thirty_degrees_the_upper_part_is_observed() -> None:
-    """The arm hangs so steeply there that its adduction joint has 14 mm of lever left. Both k_p and k_e are from the
-    poses in which it has more.
+    """The arm hangs so steeply that its adduction joint has a lever of only 14 mm. Both k_p and k_e come from the poses
+    in which the lever is longer.
     """
     front_rad = radians(30.0)
     assert GEOMETRY.vertical_lever_m(front_rad, GEOMETRY.adduction_rad(front_rad, 0.05)) < MIN_VERTICAL_LEVER_M
     stride = one(rows_of(motion(0.05)), estimator(surface_error_m=KNOWN_M))
     assert all(each.valid for each in coefficients(stride))
     assert ratios(stride, MUD)[1:] == pytest.approx([1.0, 1.0], abs=0.01)  # as at smaller depths
-    assert abs(stride.k_p.value - MUD.k_p) < 2.0 * stride.k_p.std_error  # what bends at the steep end leaves a level
+    assert abs(stride.k_p.value - MUD.k_p) < 2.0 * stride.k_p.std_error  # the bend at the steep end leaves a level
 
 
 def test_at_five_centimetres_a_narrow_sweep_can_be_observed() -> None:
@@ -323,7 +332,7 @@ def test_at_five_centimetres_a_narrow_sweep_can_be_observed() -> None:
 
 
 def test_mud_that_clings_and_its_drift_are_reported() -> None:
-    """To 0.02 N: a hundredth of the force on the way down, whose bend leaves a level."""
+    """The tolerance of 0.02 N is a hundredth of the force of the insertion, whose bend leaves a level."""
     single = motion(strides=1)
     weights_n, period_s = (0.7, 1.1, 0.9), single[-1].now_s - single[0].now_s
     rows = [
@@ -338,11 +347,11 @@ def test_mud_that_clings_and_its_drift_are_reported() -> None:
     assert [stride.tare_n for stride in strides] == pytest.approx(weights_n, abs=0.02)
     first, *later = [stride.tare_drift_n for stride in strides]
     assert not isfinite(first)
-    assert later == pytest.approx([0.4, -0.2], abs=2e-3)  # the first sample of a swing is half of the stride before
+    assert later == pytest.approx([0.4, -0.2], abs=2e-3)  # half of a swing's first sample belongs to the stride before
 
 
 @pytest.mark.parametrize(("weight_n", "friction_nm"), [(0.7, 0.0), (0.0, 0.02), (1.5, 0.06)])
-def test_what_clings_and_dry_friction_change_no_coefficient(weight_n: float, friction_nm: float) -> None:
+def test_clinging_mud_and_dry_friction_change_no_coefficient(weight_n: float, friction_nm: float) -> None:
     clean, dirty = (
         one(rows_of(motion(), mud)) for mud in (MUD, MUD._replace(weight_n=weight_n, friction_nm=friction_nm))
     )
@@ -352,8 +361,8 @@ def test_what_clings_and_dry_friction_change_no_coefficient(weight_n: float, fri
 
 
 def test_without_air_before_it_the_insertion_itself_gives_the_zero() -> None:
-    """A walk that begins with an insertion: its way down to the mud shows 0.7 N of clinging mud to a tenth of a newton,
-    which is 5 % of k_p. Left in, it would be a third of it.
+    """The walk begins with an insertion: its path down to the mud shows 0.7 N of clinging mud to a tenth of a newton,
+    which is 5 % of k_p. Uncorrected, the weight would be a third of k_p.
     """
     rows = [row for row in rows_of(motion(), MUD._replace(weight_n=0.7)) if row.phase is not Phase.SWING]
     stride = one([*rows, rows_of(motion())[-1]])
@@ -366,7 +375,7 @@ def test_without_air_before_it_the_insertion_itself_gives_the_zero() -> None:
 
 @pytest.mark.parametrize("times", [2, 3, 10])
 def test_rows_that_repeat_change_neither_value_nor_uncertainty(times: int) -> None:
-    """But for the moment at which a batch ends, which only its speed shows."""
+    """Only the time at which a batch ends may change, and only the batch's speed shows it."""
     rows = noisy(rows_of(motion(), MUD, HEAVY), 3)
     step_s = 1.0 / RATE_HZ / times
     repeated = [row._replace(now_s=row.now_s + again * step_s) for row in rows for again in range(times)]
@@ -377,8 +386,8 @@ def test_rows_that_repeat_change_neither_value_nor_uncertainty(times: int) -> No
 
 @pytest.mark.parametrize("ticks", [2, 4, 10])
 def test_slow_messages_change_value_and_error_little(ticks: int) -> None:
-    """190 to 38 messages a second. With a tenth of the messages there is √10 of the noise; of 0.02 A that is nothing
-    beside the torque constants' 3.2 %.
+    """The messages come 190 to 38 times a second. A tenth of the messages has √10 of the noise; with 0.02 A that is
+    negligible compared with the torque constants' 3.2 %.
     """
     rows = noisy(rows_of(motion(gait=SINGLE_FLIPPER), MUD, HEAVY), 3, 0.02)
     held = [rows[i - i % ticks]._replace(now_s=row.now_s, phase=row.phase) for i, row in enumerate(rows)]
@@ -405,7 +414,7 @@ def _invalid(row: Row, joint: str, field: str, bad: float) -> Row:
 
 @pytest.mark.parametrize("lost", [5, 20])
 def test_a_gap_in_each_stroke_moves_no_coefficient_by_more_than_its_uncertainty(lost: int) -> None:
-    """Of 13 and 52 ms: longer than what two samples say together of one motion."""
+    """The gaps last 13 and 52 ms: less and more than LONGEST_GAP_S, up to which two samples belong to one motion."""
     rows = rows_of(motion(gait=SINGLE_FLIPPER), MUD, HEAVY)
     whole = one(rows, estimator(HEAVY))
     gaps = {i for phase in (1, 2, 3) for i in _middle(rows, Phase(phase), lost)}
@@ -416,18 +425,18 @@ def test_a_gap_in_each_stroke_moves_no_coefficient_by_more_than_its_uncertainty(
 
 
 def _middle(rows: Sequence[Row], phase: Phase, count: int) -> range:
-    places = [i for i, row in enumerate(rows) if row.phase is phase]
-    middle = places[len(places) // 2]
+    indices = [i for i, row in enumerate(rows) if row.phase is phase]
+    middle = indices[len(indices) // 2]
     return range(middle - count // 2, middle - count // 2 + count)
 
 
-def assert_wild_samples_are_borne(rows: Sequence[Row], phase: Phase, wild_a: float) -> None:
-    """One at a time, all along the stroke. 10 A is as much as the drives give and five times what they do here. It is
-    in two loads, each half-way between samples, and so in two batches where these meet.
+def assert_wild_samples_are_tolerated(rows: Sequence[Row], phase: Phase, wild_a: float) -> None:
+    """Check one wild sample at a time, all along the stroke. 10 A is the most that the drives give and five times their
+    current here. Each sample is in two loads, half-way to its neighbours, and so in two batches where these meet.
     """
     calm = one(rows)
-    for place in [i for i, row in enumerate(rows) if row.phase is phase][3::17]:
-        wild = one([*rows[:place], rows[place].pushed(wild_a, wild_a), *rows[place + 1 :]])
+    for index in [i for i, row in enumerate(rows) if row.phase is phase][3::17]:
+        wild = one([*rows[:index], rows[index].pushed(wild_a, wild_a), *rows[index + 1 :]])
         for a, b in zip(coefficients(calm), coefficients(wild), strict=True):
             assert abs(b.value - a.value) < 1.96 * b.std_error
 
@@ -435,13 +444,13 @@ def assert_wild_samples_are_borne(rows: Sequence[Row], phase: Phase, wild_a: flo
 @pytest.mark.parametrize("wild_a", [-10.0, 10.0])
 @pytest.mark.parametrize("phase", [Phase.SWING, Phase.STANCE, Phase.EXTRACTION])
 def test_one_wild_sample_moves_no_coefficient_out_of_its_interval(phase: Phase, wild_a: float) -> None:
-    assert_wild_samples_are_borne(noisy(rows_of(motion(gait=SINGLE_FLIPPER)), 4), phase, wild_a)
+    assert_wild_samples_are_tolerated(noisy(rows_of(motion(gait=SINGLE_FLIPPER)), 4), phase, wild_a)
 
 
 @pytest.mark.parametrize("wild_a", [-10.0, 10.0])
 def test_one_wild_sample_in_the_insertion_moves_no_coefficient_out_of_its_interval(wild_a: float) -> None:
-    """Unfiltered, one at 8 mm would move the surface by 6 mm and all coefficients by a third to a half."""
-    assert_wild_samples_are_borne(noisy(rows_of(motion()), 4), Phase.INSERTION, wild_a)
+    """Unfiltered, a sample at 8 mm would move the surface by 6 mm and all coefficients by a third to a half."""
+    assert_wild_samples_are_tolerated(noisy(rows_of(motion()), 4), Phase.INSERTION, wild_a)
 
 
 # noise
@@ -449,8 +458,8 @@ def test_one_wild_sample_in_the_insertion_moves_no_coefficient_out_of_its_interv
 
 @cache
 def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
-    """A stride in which all that the doubt allows for varies as it allows for: 1 mm of surface, 3.2 % of each torque
-    constant, a quarter of what crosses over from a face that bears 20 %, current noise; and mud that clings.
+    """Return a stride with random errors of 1 mm in the surface, 3.2 % in each torque constant and noise in the
+    currents; the face carries 20 % of the stance's load, and mud clings to the flipper.
     """
     random = np.random.default_rng(seed)
     mud = Mud(surface_m=random.normal(0.0, 0.001), face_fraction=0.2, weight_n=random.uniform(0.3, 1.0))
@@ -460,20 +469,21 @@ def drawn(seed: int) -> tuple[Mud, StrideEstimate]:
 
 
 def test_the_interval_of_95_percent_covers_the_truth_about_that_often() -> None:
-    """Of 300 strides: k_p 98 %, k_s 94 %, k_e 93 %. A true 95 % would read 92.2 to 97.4 % in 49 of 50 such tests; 88
-    and 99.5 % are where intervals would be half as wide or twice as wide as they should be.
+    """Of 300 strides k_p covers 98 %, k_s 94 % and k_e 93 %. A true 95 % would read 92.2 to 97.4 % in 49 of 50 such
+    tests; intervals half or twice as wide as they should be would read 88 and 99.5 %.
     """
     reported = [drawn(seed) for seed in range(300)]
-    for place in range(3):
-        pairs = [(coefficients(stride)[place], mud[place]) for mud, stride in reported]
+    for index in range(3):
+        pairs = [(coefficients(stride)[index], mud[index]) for mud, stride in reported]
         assert sum(each.valid for each, _ in pairs) >= 297
         hits = [abs(each.value - truth) <= 1.96 * each.std_error for each, truth in pairs if each.valid]
-        assert 0.88 <= np.mean(hits) <= 0.998  # k_p's includes the error of the law, which this mud does not have
+        assert 0.88 <= np.mean(hits) <= 0.998  # k_p's interval includes the error of the law, absent in this mud
 
 
 def test_no_coefficient_is_biased_by_more_than_half_its_uncertainty() -> None:
-    """The bent law makes 3 to 5 %, a whole doubt; the surface's nominal height, which is weighed against it, and the
-    face, whose load rises with depth squared, take most of that back. Of 100 strides a mean errs by a tenth.
+    """The bend of the law makes 3 to 5 %, a whole standard error; the surface's nominal height, which is weighed
+    against it, and the load on the face, which rises with depth squared, compensate most of it. The mean of 100 strides
+    errs by a tenth.
     """
     reported = [drawn(seed) for seed in range(100)]
     scores = [
@@ -494,7 +504,7 @@ def test_more_noise_makes_more_uncertainty() -> None:
 
 
 def stuck(at_rad: float) -> list[Moment]:
-    """The sweep stops on its way and stays there, the rest of the stance long; up it comes in the same place."""
+    """Return a motion whose sweep stops at `at_rad` for the rest of the stance and rises from there."""
     moments = []
     for moment in motion():
         if moment.sweep_rad < at_rad and moment.phase in (Phase.STANCE, Phase.EXTRACTION):
@@ -507,7 +517,7 @@ def stuck(at_rad: float) -> list[Moment]:
 
 @pytest.mark.parametrize("base", [Base.FIXED, Base.FREE])
 def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_strength(base: Base) -> None:
-    """The mud could withstand more than this motor gives, 1.7 N·m on 1.5 cm⁴ of Ψ at 10 degrees."""
+    """The mud could withstand more than this motor gives, 1.7 N·m on 150 cm⁴ of Ψ at 10 degrees."""
     limit_a = 20.0
     drive = WEIGHTLESS._replace(current_limit_a=limit_a)
     rows = [
@@ -524,7 +534,7 @@ def test_a_stance_that_sticks_with_its_motor_at_the_limit_bounds_the_shear_stren
 
 
 def test_a_stance_that_stops_almost_at_once_gives_not_even_a_bound() -> None:
-    """However long the motor pushes: what stands is one batch, and a bound is what three in a row have borne."""
+    """However long the motor pushes, the flipper at rest makes one batch, and a bound needs three batches in a row."""
     stride = one(noisy(rows_of(stuck(radians(25.0))), 1, 0.01), estimator(WEIGHTLESS._replace(current_limit_a=1.0)))
     assert (stride.stance, stride.k_s.reason) == ("saturated", "a motor at its limit")
     assert not stride.k_s.valid and not stride.k_s.at_least
@@ -536,10 +546,10 @@ def test_a_stance_that_sticks_below_the_limit_is_not_called_saturated() -> None:
 
 
 def carried(rows: Sequence[Row], fraction: float) -> list[Row]:
-    """The body advances by a share of what the flipper goes back in stance: the rest is slip."""
+    """Let the body advance by a fraction of the flipper's travel in stance; the rest is slip."""
     front_m, lifted = LENGTH_M * sin(radians(30.0)), (Phase.SWING, Phase.INSERTION)
-    ways_m = [0.0 if row.phase in lifted else front_m - LENGTH_M * sin(row.sweep.angle_rad) for row in rows]
-    return [row._replace(body_m=fraction * path_m) for row, path_m in zip(rows, ways_m, strict=True)]
+    paths_m = [0.0 if row.phase in lifted else front_m - LENGTH_M * sin(row.sweep.angle_rad) for row in rows]
+    return [row._replace(body_m=fraction * path_m) for row, path_m in zip(rows, paths_m, strict=True)]
 
 
 @pytest.mark.parametrize(("fraction", "case"), [(0.0, "yield"), (0.5, "mixed"), (0.97, "body")])
@@ -558,7 +568,7 @@ def test_without_a_pose_the_stance_is_unknown_and_the_shear_strength_a_bound() -
 
 
 def test_step_and_position_are_the_bodys() -> None:
-    """Advance from close to close; the place where the insertion ended."""
+    """The step is the advance from close to close; the position is where the insertion ended."""
     rows = [row._replace(body_m=7.0 + 0.05 * row.now_s) for row in rows_of(motion(strides=3))]
     first, *later = strides = closed(rows)
     assert len(strides) == 3
@@ -573,8 +583,8 @@ def test_step_and_position_are_the_bodys() -> None:
 
 
 def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
-    """To 10 mN·m, which is 0.08 N of the zero; half a tick before the newest sample, since acceleration is told
-    between two.
+    """The tolerance of 10 mN·m is 0.08 N of the zero. The load is that of half a tick before the newest sample, since
+    the acceleration is measured between two samples.
     """
     mud, flipper = MUD._replace(weight_n=0.7, friction_nm=0.02), estimator()
     moments = motion()
@@ -583,12 +593,12 @@ def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
         if row.phase is Phase.STANCE is moments[i - 1].phase:
             sweep_nm, adduction_nm = mud_torques_nm(moments[i], mud)
             assert load.sweep_torque_nm == pytest.approx(sweep_nm, abs=0.01)
-            assert load.adduction_torque_nm == pytest.approx(adduction_nm, abs=0.01 + mud.friction_nm)  # either way
+            assert load.adduction_torque_nm == pytest.approx(adduction_nm, abs=0.01 + mud.friction_nm)  # of any sign
             assert load.depth_m == pytest.approx(row.depth_m, abs=1e-4)
 
 
 def test_forces_are_the_smallest_ones_and_in_stance_none_upward_is_reported() -> None:
-    """Of the pose half-way between two samples."""
+    """The pose is half-way between two samples."""
     flipper, rows = estimator(), rows_of(motion())[:-1]
     loads = [flipper.update(*row)[0] for row in rows]
     for before, row, load in zip(rows, rows[1:], loads[1:], strict=False):
@@ -610,7 +620,9 @@ def test_a_row_that_repeats_shows_the_same_load() -> None:
 
 
 def test_the_largest_forces_of_the_stride_are_reported() -> None:
-    """To 3 %: the level that the insertion leaves for the zero, and the quick extraction's half a tick."""
+    """The tolerance of 3 % covers the level that the insertion leaves for the zero and half a tick of the quick
+    extraction.
+    """
     stride, forces = one(rows_of(motion())), dict[Phase, list[tuple[float, float]]]()
     for moment in motion():
         torques_nm = mud_torques_nm(moment, MUD)
@@ -625,9 +637,9 @@ def test_the_largest_forces_of_the_stride_are_reported() -> None:
 
 
 def stopped(rows: Sequence[Row], phase: Phase) -> list[Row]:
-    """Cut short in the middle of a stroke."""
-    places = [i for i, row in enumerate(rows) if row.phase is phase]
-    middle = places[len(places) // 2]
+    """Cut the rows short in the middle of a stroke."""
+    indices = [i for i, row in enumerate(rows) if row.phase is phase]
+    middle = indices[len(indices) // 2]
     return [*rows[:middle], rows[middle]._replace(phase=Phase.REST)]
 
 
@@ -638,7 +650,7 @@ def test_a_stride_cut_short_does_not_close_and_is_not_counted(phase: Phase) -> N
     later = [row._replace(now_s=row.now_s + 60.0) for row in rows]
     stride = one(later, flipper)
     assert stride.index == 0
-    assert ratios(stride, MUD) == pytest.approx(ratios(one(rows), MUD), rel=0.01)  # zero and surface are those of both
+    assert ratios(stride, MUD) == pytest.approx(ratios(one(rows), MUD), rel=0.01)  # both share the zero and the surface
 
 
 @pytest.mark.parametrize("lacking", [Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION])
@@ -665,7 +677,7 @@ def test_a_flipper_that_meets_no_mud_gives_a_reason() -> None:
 
 
 def lifted_to(highest_m: float) -> list[Moment]:
-    """The extraction ends below `highest_m`: mud that holds on."""
+    """Return a motion whose extraction ends below `highest_m`, as in mud that holds the flipper."""
     moments = []
     for moment in motion():
         depth_m = GEOMETRY.depth_m(moment.sweep_rad, moment.adduction_rad)
@@ -676,7 +688,7 @@ def lifted_to(highest_m: float) -> list[Moment]:
 
 
 def edge_depth_m(lowest_depth_m: float) -> float:
-    """Of the edge's middle, at the rear, where the plate's lowest corner is so deep."""
+    """Return the depth of the edge's middle, at the rear, for that depth of the plate's lowest corner."""
     rear_rad, edge_m = radians(-GAIT.sweep_angle_deg), lowest_depth_m
     for _ in range(20):
         edge_m += lowest_depth_m - lowest_point_m(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, edge_m))
@@ -695,7 +707,7 @@ def test_released_follows_the_gaits_condition_at_any_height_of_the_mud(
 
 
 def with_recovery(rows: Sequence[Row], weight_a: float) -> list[Row]:
-    """A second in which the flipper is pulled up by another current, before the swing."""
+    """Insert a second before the swing in which another current pulls the flipper up."""
     swing = max(i for i, row in enumerate(rows) if row.phase is Phase.SWING)
     held, ticks = rows[swing - 1], round(RATE_HZ)
     freed = [
@@ -730,7 +742,7 @@ def test_a_flipper_that_is_out_while_the_other_one_is_freed_was_released() -> No
 
 
 def test_a_recovery_does_not_shift_the_zero() -> None:
-    """It ends 14 mm above the mud with 2 A in excess: the next stride's zero is that of the swing alone."""
+    """The recovery ends 14 mm above the mud with 2 A in excess; the next stride's zero is that of the swing alone."""
     first = rows_of(motion(strides=2), MUD, HEAVY)
     border = next(i for i, (a, b) in enumerate(pairwise(first), 1) if a.phase is Phase.EXTRACTION is not b.phase)
     whole = with_recovery(first[: border + 1], 2.0)
@@ -740,7 +752,7 @@ def test_a_recovery_does_not_shift_the_zero() -> None:
 
 
 def test_a_flipper_that_stays_down_gives_only_a_lower_bound() -> None:
-    """To 5 %: a batch of 33 samples, the first of which is half in stance."""
+    """The tolerance of 5 % covers a batch of 33 samples whose first one is half in stance."""
     stride = one(noisy(waiting(rows_of(lifted_to(0.03))), 1, 0.01), estimator(surface_error_m=KNOWN_M))
     assert not stride.released
     assert (stride.k_e.at_least, stride.k_e.reason) == (True, NOT_OUT)
@@ -754,7 +766,7 @@ def test_a_flipper_that_stays_down_gives_only_a_lower_bound() -> None:
 def test_each_stride_of_a_walk_gives_the_same() -> None:
     strides = closed(rows_of(motion(strides=3)))
     assert [stride.index for stride in strides] == [0, 1, 2]
-    for stride in strides[1:]:  # ticks fall differently into each: up to one of 26 in a batch's way
+    for stride in strides[1:]:  # ticks fall differently into each: up to one of the 26 in a batch
         assert ratios(stride, MUD) == pytest.approx(ratios(strides[0], MUD), rel=0.02)
 
 

@@ -1,4 +1,4 @@
-"""The force maps: the paper's against its matrix and hand numbers, the truthful one against a pseudo-inverse."""
+"""The force maps: the paper's against its matrix and numbers by hand, the smallest force against a pseudo-inverse."""
 
 from math import pi, radians
 
@@ -65,7 +65,7 @@ geometries = st.builds(
 def test_the_smallest_force_is_the_pseudo_inverse_of_the_jacobians_transpose(
     geometry: FlipperGeometry, sweep: float, adduction: float, sweep_nm: float, adduction_nm: float
 ) -> None:
-    """To rounding times the condition of JᵀJ, which is a hundred at most in these poses."""
+    """The tolerance is rounding times the condition of JᵀJ, which is a hundred at most in these poses."""
     jacobian = np.reshape(geometry.jacobian(sweep, adduction), (3, 2))
     force = np.linalg.pinv(jacobian.T) @ [sweep_nm, adduction_nm]
     found = smallest_force_n(geometry, sweep, adduction, sweep_nm, adduction_nm)
@@ -76,7 +76,9 @@ def test_the_smallest_force_is_the_pseudo_inverse_of_the_jacobians_transpose(
 def test_no_other_force_with_the_same_torques_is_smaller(
     sweep: float, adduction: float, sweep_nm: float, adduction_nm: float
 ) -> None:
-    """It has none of the direction across both columns of J, in which a force turns no joint, and has the torques."""
+    """The force has the given torques and no part along the normal of both columns of J, along which a force turns no
+    joint.
+    """
     geometry = FlipperGeometry()
     jacobian = np.reshape(geometry.jacobian(sweep, adduction), (3, 2))
     unfelt = np.cross(jacobian[:, 0], jacobian[:, 1])
@@ -89,7 +91,7 @@ def test_no_other_force_with_the_same_torques_is_smaller(
 
 @given(st.floats(0.05, 0.5), angles, angles, torques)
 def test_without_drop_and_level_both_maps_agree(length_m: float, sweep: float, adduction: float, torque: float) -> None:
-    """In the sweep column everywhere, in the other where cos² α = 1: section 2.1 of the physics."""
+    """The maps agree in the sweep column everywhere, and in the other where cos² α = 1: section 2.1 of the physics."""
     geometry = FlipperGeometry(length_m, 0.0, 0.06)
     truthful, paper = (
         smallest_force_n(geometry, sweep, adduction, torque, 0.0),

@@ -1,4 +1,6 @@
-"""From currents to joint loads: the balance of torques on an arm that is simulated here, and what is no new sample."""
+"""Joint loads from currents: the balance of torques on an arm that is simulated here, and which samples count as
+new.
+"""
 
 from math import cos, inf, isfinite, nan, pi, sin
 from typing import Any
@@ -56,7 +58,7 @@ def test_without_mass_the_load_is_the_papers(sweep: float, lift: float, sweep_a:
 
 
 @given(angles, angles)
-def test_what_carries_the_arm_in_the_air_is_no_load(sweep: float, lift: float) -> None:
+def test_the_torque_that_holds_the_arm_in_the_air_is_no_load(sweep: float, lift: float) -> None:
     gravity_nm = MASS.gravity_torques_nm(sweep, lift)
     held = (sample(sweep, 0.0, -gravity_nm[0] / SWEEP_NM_A, 1.0), sample(lift, 0.0, -gravity_nm[1] / LIFT_NM_A, 1.0))
     load = one(DRIVE, *held)
@@ -109,7 +111,7 @@ def test_friction_of_an_unknown_velocity_leaves_cogging_alone() -> None:
     ],
 )
 def test_a_motor_at_its_limit_is_reported(sweep_a: float, lift_a: float, saturated: bool) -> None:
-    """Clipped currents waver a little under the limit."""
+    """Clipped currents fluctuate a little below the limit."""
     assert SATURATION == 0.98
     limited = DRIVE._replace(current_limit_a=10.0)
     assert one(limited, sample(0.0, 0.0, sweep_a, 1.0), sample(0.0, 0.0, lift_a, 1.0)).saturated is saturated
@@ -123,7 +125,7 @@ def test_a_drive_of_unknown_limit_never_saturates() -> None:
 
 
 def swinging(now_s: float, rate_rad_s: float, amplitude_rad: float) -> tuple[float, float, float]:
-    """Angle, velocity and acceleration."""
+    """Return the angle, velocity and acceleration."""
     phase = rate_rad_s * now_s
     return (
         amplitude_rad * sin(phase),
@@ -133,15 +135,17 @@ def swinging(now_s: float, rate_rad_s: float, amplitude_rad: float) -> tuple[flo
 
 
 def loads_of_a_free_arm(angle_every_s: float, current_every_s: float, shift_s: float) -> list[JointLoad]:
-    """Both joints swing in the air as fast as an extraction; angle and current are messages of their own."""
+    """Return the loads of joints that swing in the air as fast as an extraction; angle and current come in separate
+    messages.
+    """
 
-    def joint(now_s: float, constant_nm_a: float, inertia_kg_m2: float, place: int) -> DriveState:
+    def joint(now_s: float, constant_nm_a: float, inertia_kg_m2: float, index: int) -> DriveState:
         angle_s = now_s - now_s % angle_every_s
         current_s = now_s - (now_s - shift_s) % current_every_s
         poses = [[swinging(at_s, 20.0, 0.3), swinging(at_s + 0.02, 25.0, 0.2)] for at_s in (angle_s, current_s)]
-        angle_rad, velocity_rad_s, _ = poses[0][place]
-        gravity_nm = MASS.gravity_torques_nm(poses[1][0][0], poses[1][1][0])[place]
-        current_a = (inertia_kg_m2 * poses[1][place][2] - gravity_nm) / constant_nm_a
+        angle_rad, velocity_rad_s, _ = poses[0][index]
+        gravity_nm = MASS.gravity_torques_nm(poses[1][0][0], poses[1][1][0])[index]
+        current_a = (inertia_kg_m2 * poses[1][index][2] - gravity_nm) / constant_nm_a
         return DriveState(angle_rad, velocity_rad_s, angle_s, current_a, current_s)
 
     loads, seen = JointLoads(GEOMETRY, DRIVE), list[JointLoad]()
@@ -163,27 +167,27 @@ INERTIA_NM = MASS.adduction_inertia_kg_m2 * 0.2 * 25.0**2
 
 
 def test_a_free_arm_in_quick_motion_withstands_no_load() -> None:
-    """Of the 0.08 N·m that its inertia takes, (ω dt)²/8 is left by taking lines for curves: 0.1 %."""
+    """Lines instead of curves leave (ω dt)²/8 of the 0.08 N·m that the inertia takes: 0.1 %."""
     assert largest_nm(loads_of_a_free_arm(PERIOD_S, PERIOD_S, 0.0)) < 0.002 * INERTIA_NM
 
 
 @pytest.mark.parametrize("shift_s", [0.0005, 0.001, 0.0015])
-def test_a_current_that_is_measured_at_another_moment_is_brought_to_that_of_the_acceleration(shift_s: float) -> None:
-    """Left where it is, a current half a tick aside would leave ω dt/2 = 3 %."""
+def test_a_current_of_another_time_is_interpolated_to_that_of_the_acceleration(shift_s: float) -> None:
+    """Without interpolation a current half a tick aside would leave ω dt/2 = 3 %."""
     loads = loads_of_a_free_arm(PERIOD_S, PERIOD_S, shift_s)
     assert largest_nm(loads) < 0.01 * INERTIA_NM
 
 
 @pytest.mark.parametrize("ticks", [2, 4])
 def test_a_current_that_comes_without_a_new_angle_keeps_the_last_acceleration(ticks: int) -> None:
-    """Without it all inertia would be left, several times a message. (ω dt)²/8 grows with the angle's interval."""
+    """Otherwise all inertia would be left, several times per message. (ω dt)²/8 grows with the angle's interval."""
     loads = loads_of_a_free_arm(ticks * PERIOD_S, PERIOD_S, 0.0005)
     assert len(loads) > 100
     assert largest_nm(loads) < 0.02 * INERTIA_NM
 
 
 def test_a_joint_whose_message_is_late_does_not_lose_its_inertia() -> None:
-    """The other joint alone is new."""
+    """Only the other joint is new."""
     loads = JointLoads(GEOMETRY, DRIVE)
     loads.update(sample(0.1, 1.0, 0.0, 1.0), sample(0.0, 0.0, 0.0, 1.0))
     plain = loads.update(sample(0.1, 1.0, 1.0, 1.01), sample(0.0, 2.0, 0.0, 1.01))
@@ -217,7 +221,7 @@ def test_between_two_samples_everything_is_half_way(
 
 
 @pytest.mark.parametrize("gap_s", [LONGEST_GAP_S, 1.0, 0.0, -0.01, nan, inf])
-def test_samples_that_do_not_give_of_one_motion_are_taken_as_they_are(gap_s: float) -> None:
+def test_samples_that_are_not_of_one_motion_are_used_unchanged(gap_s: float) -> None:
     motion = motion_between(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0 + gap_s))
     assert motion == (0.3, 3.0, 0.0, 4.0)
 
@@ -225,13 +229,13 @@ def test_samples_that_do_not_give_of_one_motion_are_taken_as_they_are(gap_s: flo
 @pytest.mark.parametrize(
     ("stamps_s", "current_a"),
     [
-        ((1.000, 1.010), 3.0),  # with the angles: half-way
-        ((1.005, 1.015), 2.0),  # the earlier one is of the very moment
+        ((1.000, 1.010), 3.0),  # at the times of the angles: half-way
+        ((1.005, 1.015), 2.0),  # the earlier current is of that very time
         ((0.995, 1.005), 4.0),
-        ((0.990, 1.000), 5.0),  # a little old: along the line, half a gap further
-        ((0.970, 0.971), 6.0),  # long ago: no further than one gap beyond the last
-        ((1.020, 1.021), 0.0),  # long after: no further than one gap before the first
-        ((1.005, 1.005), 4.0),  # the same message: as it is
+        ((0.990, 1.000), 5.0),  # a little old: extrapolated by half a gap
+        ((0.970, 0.971), 6.0),  # long ago: extrapolated by at most one gap beyond the last
+        ((1.020, 1.021), 0.0),  # long after: extrapolated by at most one gap before the first
+        ((1.005, 1.005), 4.0),  # the same message: unchanged
         ((1.006, 1.004), 4.0),
     ],
 )
@@ -244,12 +248,12 @@ def test_the_current_is_that_of_the_moment_between_the_angles(stamps_s: tuple[fl
 @pytest.mark.parametrize(
     ("stamps_s", "commands_s", "current_a"),
     [
-        ((0.999, 1.009), (0.995, 1.002), 3.6),  # two tenths of the time by the earlier one
-        ((0.999, 1.009), (0.990, 0.9995), 4.0),  # all of it by the later one
-        ((1.008, 1.012), (1.000, 1.011), 2.0),  # all of it by the earlier one
+        ((0.999, 1.009), (0.995, 1.002), 3.6),  # the earlier command counts for two tenths of the time
+        ((0.999, 1.009), (0.990, 0.9995), 4.0),  # the later command counts for all of it
+        ((1.008, 1.012), (1.000, 1.011), 2.0),  # the earlier command counts for all of it
     ],
 )
-def test_the_current_is_that_of_each_of_two_commands_for_its_time(
+def test_the_current_of_each_of_two_commands_counts_for_its_time(
     stamps_s: tuple[float, float], commands_s: tuple[float, float], current_a: float
 ) -> None:
     before = DriveState(0.0, 0.0, 1.00, 2.0, stamps_s[0])
@@ -260,13 +264,13 @@ def test_the_current_is_that_of_each_of_two_commands_for_its_time(
 @pytest.mark.parametrize(
     "commands_s",
     [
-        (1.000, 1.005),  # the current before answers an older one
-        (0.990, 1.0095),  # the current now does not answer the later one yet
-        (0.990, 0.9985),  # both answer the later one
+        (1.000, 1.005),  # the earlier current answers an older command
+        (0.990, 1.0095),  # the later current does not answer the later command yet
+        (0.990, 0.9985),  # both currents answer the later command
         (nan, 1.005),
     ],
 )
-def test_where_two_currents_do_not_answer_the_last_two_commands_it_is_that_of_the_line(
+def test_currents_that_do_not_answer_the_last_two_commands_are_interpolated(
     commands_s: tuple[float, float],
 ) -> None:
     before = DriveState(0.0, 0.0, 1.00, 2.0, 0.999)
@@ -278,9 +282,9 @@ MUD_NM = -0.1
 
 
 def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
-    """Of an adduction joint against mud, without gravity, whose motor gets another torque in every tick, up to
-    0.5 N·m from the one before, as in a walk's extraction. Its motion is exact: from tick to tick it turns evenly
-    faster. `known`: whether the estimator is told when.
+    """Return the loads of an adduction joint against mud, without gravity, whose motor changes its torque in every tick
+    by up to 0.5 N·m, as in the extraction of a walk. The motion is exact: the acceleration is constant within a tick.
+    `known` states whether the estimator gets the times of the commands.
     """
     torques_nm = np.random.default_rng(1).uniform(-0.25, 0.25, 400)
     drive = DRIVE._replace(mass=ArmMass(0.0, 0.0, 0.0004, 0.0006))
@@ -291,12 +295,12 @@ def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
     for tick in range(5, 400):
         now_s = float(times_s[tick])
         angle_s, current_s = (now_s - (now_s - shift_s) % message_s for shift_s in (0.0003, 0.0008))
-        place = int(current_s / PERIOD_S)
+        index = int(current_s / PERIOD_S)
         sample = DriveState(
             angle_rad=float(np.interp(angle_s, times_s, angles_rad)),
             velocity_rad_s=float(np.interp(angle_s, times_s, speeds_rad_s)),
             angle_stamp_s=angle_s,
-            current_a=float(torques_nm[place]) / LIFT_NM_A,
+            current_a=float(torques_nm[index]) / LIFT_NM_A,
             current_stamp_s=current_s,
         )
         commands_s = (float(times_s[tick - 2]), float(times_s[tick - 1])) if known else NO_COMMANDS
@@ -306,9 +310,9 @@ def loads_of_a_driven_arm(message_s: float, known: bool) -> list[float]:
     return reported
 
 
-def test_a_load_is_found_beside_torques_that_are_held_from_tick_to_tick() -> None:
-    """Of messages every millisecond all is known; of those every second one, all but what four milliseconds without
-    a message reach back beyond the last two commands: 0.7 ms of a third one's.
+def test_a_load_is_found_under_torques_that_are_held_from_tick_to_tick() -> None:
+    """Messages every millisecond determine the load exactly. Messages every second millisecond leave an error where
+    four milliseconds without a message reach back beyond the last two commands, into 0.7 ms of a third one.
     """
     assert np.abs(np.array(loads_of_a_driven_arm(0.001, known=True)) - MUD_NM).max() < 1e-9
     errors_nm = np.array(loads_of_a_driven_arm(0.002, known=True)) - MUD_NM
@@ -316,7 +320,7 @@ def test_a_load_is_found_beside_torques_that_are_held_from_tick_to_tick() -> Non
     assert np.sqrt(np.mean(errors_nm**2)) < 0.03
 
 
-def test_along_a_line_through_currents_half_of_that_load_would_be_lost() -> None:
+def test_interpolated_currents_would_lose_half_of_that_load() -> None:
     errors_nm = np.array(loads_of_a_driven_arm(0.002, known=False)) - MUD_NM
     assert np.sqrt(np.mean(errors_nm**2)) > 0.5 * abs(MUD_NM)
 
@@ -351,7 +355,7 @@ def test_an_unknown_joint_does_not_invalidate_the_other_one() -> None:
 # what is new
 
 
-def test_a_sample_that_repeats_the_one_before_is_none() -> None:
+def test_a_sample_that_repeats_the_one_before_gives_no_load() -> None:
     loads = JointLoads(GEOMETRY, DRIVE)
     pair = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
     assert loads.update(*pair) is not None
@@ -360,14 +364,14 @@ def test_a_sample_that_repeats_the_one_before_is_none() -> None:
     assert loads.update(sweep, adduction) is None
 
 
-@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("index", [0, 1])
 @pytest.mark.parametrize("field", ["angle_rad", "current_a"])
-def test_a_change_of_any_angle_or_current_is_new(place: int, field: str) -> None:
+def test_a_change_of_any_angle_or_current_is_new(index: int, field: str) -> None:
     loads = JointLoads(GEOMETRY, DRIVE)
     pair = [sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0)]
     loads.update(pair[0], pair[1])
     change: dict[str, Any] = {field: 0.5}
-    pair[place] = pair[place]._replace(**change)
+    pair[index] = pair[index]._replace(**change)
     assert loads.update(pair[0], pair[1]) is not None
 
 
@@ -394,7 +398,7 @@ samples = st.builds(DriveState, anything, anything, anything, anything, anything
 
 
 @given(st.lists(st.tuples(samples, samples, st.tuples(anything, anything)), max_size=5))
-def test_nothing_but_an_angle_without_a_sine_makes_it_raise(
+def test_no_finite_angle_and_current_make_it_raise(
     rows: list[tuple[DriveState, DriveState, CommandTimes]],
 ) -> None:
     """The estimator skips samples whose angle or current is not finite."""

@@ -1,7 +1,7 @@
-"""The memory from stride to stride: against numpy's weighted least squares, and against muds that stay or change.
+"""The memory from stride to stride: against numpy's weighted least squares, and in muds that stay or change.
 
-Muds here are made of numbers, not of the estimator: every stride's k is the truth times a lognormal scatter of 8 %
-(the authors' repeatability) and the doubt that the stride itself tells.
+The muds are numbers, without an estimator: every stride's k is the truth times a lognormal scatter of 8 % (the authors'
+repeatability) and the uncertainty that the stride itself reports.
 """
 
 import pickle
@@ -57,14 +57,14 @@ def after(*strides: StrideEstimate) -> MudEstimate:
 
 
 def walked(knowledge: MudKnowledge, *strides: StrideEstimate) -> MudEstimate:
-    """One stride at a time; the last belief."""
+    """Update the memory with one stride at a time and return the last estimate."""
     mud_estimate = knowledge.mud_estimate
     for each in strides:
         mud_estimate = knowledge.update([each])
     return mud_estimate
 
 
-def telling(estimates: dict[str, Estimate]) -> StrideEstimate:
+def stride_with(estimates: dict[str, Estimate]) -> StrideEstimate:
     return stride(
         estimates.get("k_p", NOT_REPORTED), estimates.get("k_s", NOT_REPORTED), estimates.get("k_e", NOT_REPORTED)
     )
@@ -84,7 +84,7 @@ def is_bound(coefficient: Coefficient | None, value: float) -> bool:
 
 
 def readings(count: int, seed: int, variance: tuple[float, float] = (0.05, 0.2)) -> list[Reading]:
-    """Around one line, at scattered depths."""
+    """Return readings around one line, at scattered depths."""
     random = np.random.default_rng(seed)
     log_depths = np.log(random.uniform(0.02, 0.06, count))
     variances = random.uniform(*variance, count)
@@ -115,7 +115,7 @@ class TestOneMud:
             at = np.array([1.0, log_depth])
             assert line.expected(log_depth) == pytest.approx((at @ solution, at @ covariance @ at), rel=1e-6)
 
-    def test_a_estimate_at_another_depth_is_what_the_line_expects_there(self) -> None:
+    def test_an_estimate_at_another_depth_is_what_the_line_expects_there(self) -> None:
         line = line_through(readings(6, 1))
         k, std_error = line.coefficient().at(0.05)
         expected, variance = line.expected(log(0.05))
@@ -124,7 +124,7 @@ class TestOneMud:
     @given(st.lists(st.tuples(st.floats(0.95, 1.05), st.floats(0.0, 0.3)), min_size=1, max_size=8))
     def test_strides_are_merged_by_their_precision(self, rows: list[tuple[float, float]]) -> None:
         for name in ("k_p", "k_s", "k_e"):
-            mud_estimate = after(*(telling({name: reported(1e6 * value, relative)}) for value, relative in rows))
+            mud_estimate = after(*(stride_with({name: reported(1e6 * value, relative)}) for value, relative in rows))
             weights = [1.0 / (relative**2 + REPEATABILITY**2) for _, relative in rows]
             mean = float(np.average([log(value) for value, _ in rows], weights=weights))
             merged = found(getattr(mud_estimate, name))
@@ -217,13 +217,13 @@ def pickled_after(seed: int, strides: int) -> bytes:
 
 
 class Following(NamedTuple):
-    reported: float  # share of the walks in which a boundary was told within two strides of it
-    nearer: float  # share of the flippers that believed the new mud rather than the old after two strides
+    reported: float  # fraction of the walks in which a boundary was reported within two strides
+    nearer: float  # fraction of the flippers whose estimate was nearer to the new mud after two strides
     uncertainty: float  # median of their relative standard error
 
 
 def following(step_s: float, step_p: float, walks: int = 400, strides_before: int = 12) -> Following:
-    """Of k_s behind a boundary."""
+    """Return how k_s follows a boundary at which the truths change by `step_s` and `step_p`."""
     boundaries, errors, uncertainties = 0, [], []
     for seed in range(walks):
         mud = pickle.loads(pickled_after(seed, strides_before))
@@ -238,7 +238,7 @@ def following(step_s: float, step_p: float, walks: int = 400, strides_before: in
 
 
 def reported_on_uniform_mud(walks: int, strides: int, depths_m: Sequence[float]) -> float:
-    """Share of the strides of the robot (of both flippers) that were called a boundary where there is none."""
+    """Return the fraction of the robot's strides (of both flippers) that were called a boundary on uniform mud."""
     muds = [Mud(seed, depths_m=depths_m) for seed in range(walks)]
     return sum(mud.walk().boundary for mud in muds for _ in range(strides)) / (walks * strides)
 
@@ -269,7 +269,7 @@ class TestBoundaries:
     def test_without_scatter_the_first_stride_of_another_mud_stands_alone_and_the_second_joins_it(
         self, name: str, step: float
     ) -> None:
-        old, new = telling({name: reported(1e6)}), telling({name: reported(1e6 * step)})
+        old, new = stride_with({name: reported(1e6)}), stride_with({name: reported(1e6 * step)})
         knowledge = MudKnowledge()
         assert not walked(knowledge, *[old] * 12).boundary
         for strides, boundary in ((1, True), (2, False), (3, False)):
@@ -285,7 +285,7 @@ class TestBoundaries:
             assert after(*known, stride(k_s=reported(K_S * exp(sign * (CHANGE + 0.01) * deviation)))).boundary
             assert not after(*known, stride(k_s=reported(K_S * exp(sign * (CHANGE - 0.01) * deviation)))).boundary
 
-    def test_two_strides_that_each_might_be_chance_are_none_together(self) -> None:
+    def test_two_changed_strides_that_each_might_be_chance_make_a_boundary(self) -> None:
         deviation = sqrt(REPEATABILITY**2 / 2.0 + REPEATABILITY**2 / 8.0)
         for sign in (-1.0, 1.0):
             knowledge = MudKnowledge()
@@ -308,8 +308,8 @@ class TestBoundaries:
 
     def test_an_alarm_that_the_next_stride_does_not_confirm_is_taken_back(self) -> None:
         knowledge = MudKnowledge()
-        known, odd, next_one = (stride(k_s=reported(K_S * exp(off))) for off in (0.0, 0.225, 0.03))
-        assert walked(knowledge, *[known] * 8, odd).boundary
+        known, outlier, next_one = (stride(k_s=reported(K_S * exp(off))) for off in (0.0, 0.225, 0.03))
+        assert walked(knowledge, *[known] * 8, outlier).boundary
         mud_estimate = walked(knowledge, next_one)
         assert not mud_estimate.boundary
         assert found(mud_estimate.k_s).strides == 10
@@ -328,12 +328,12 @@ class TestBoundaries:
         known = {"k_p": reported(K_P), "k_s": reported(K_S), "k_e": reported(K_E)}
         new = known | {changed: reported(2.0 * known[changed].value), also: reported(1.05 * known[also].value)}
         knowledge = MudKnowledge()
-        first = walked(knowledge, *[telling(known)] * 8, telling(new))
+        first = walked(knowledge, *[stride_with(known)] * 8, stride_with(new))
         assert (found(getattr(first, also)).strides, first.boundary) == (1, True)
-        second = walked(knowledge, telling(new))
+        second = walked(knowledge, stride_with(new))
         assert found(getattr(second, also)).strides == 2
         assert found(getattr(second, also)).value == pytest.approx(1.05 * known[also].value)
-        silent = walked(MudKnowledge(), *[telling(known)] * 8, telling(new | {also: NOT_REPORTED}))
+        silent = walked(MudKnowledge(), *[stride_with(known)] * 8, stride_with(new | {also: NOT_REPORTED}))
         assert getattr(silent, also) is None
 
     def test_suction_that_changes_alone_is_forgotten_alone(self) -> None:
@@ -348,7 +348,7 @@ class TestBoundaries:
         )
         assert found(mud_estimate.k_e).value == pytest.approx(2.0 * K_E)
 
-    def test_what_was_silent_in_two_new_muds_is_not_remembered_from_the_first(self) -> None:
+    def test_a_coefficient_missing_in_the_new_muds_is_not_remembered(self) -> None:
         knowledge = MudKnowledge()
         walked(knowledge, *[stride(reported(K_P), reported(K_S))] * 4)
         for k_p in (3.0 * K_P, 0.3 * K_P, 3.0 * K_P):
@@ -376,7 +376,7 @@ class TestBoundaries:
 
 
 class TestBothFlippers:
-    def believed(self, left: Estimate, right: Estimate, strides: int = 8, depth_m: float = 0.03) -> MudEstimate:
+    def estimated(self, left: Estimate, right: Estimate, strides: int = 8, depth_m: float = 0.03) -> MudEstimate:
         knowledge = MudKnowledge()
         for _ in range(strides):
             rows = [stride(left), stride(right, depth_m=depth_m, flipper="right")]
@@ -384,7 +384,7 @@ class TestBothFlippers:
         return knowledge.mud_estimate
 
     def test_where_they_agree_they_are_merged_by_precision(self) -> None:
-        mud_estimate = self.believed(reported(K_P), reported(1.02 * K_P, 0.1), strides=1)
+        mud_estimate = self.estimated(reported(K_P), reported(1.02 * K_P, 0.1), strides=1)
         variances = np.array([REPEATABILITY**2, REPEATABILITY**2 + 0.1**2])
         together = found(mud_estimate.k_p)
         assert together.value == pytest.approx(K_P * exp(np.average([0.0, log(1.02)], weights=1.0 / variances)))
@@ -392,44 +392,44 @@ class TestBothFlippers:
         assert together.strides == 2
 
     def test_a_difference_beyond_the_errors_stays_in_the_error(self) -> None:
-        apart, alike = (found(self.believed(reported(K_P), reported(k)).k_p) for k in (1.18 * K_P, K_P))
+        apart, alike = (found(self.estimated(reported(K_P), reported(k)).k_p) for k in (1.18 * K_P, K_P))
         assert apart.std_error / apart.value == pytest.approx(log(1.18) / 2.0, rel=0.01)
         assert alike.std_error / alike.value == pytest.approx(REPEATABILITY / 4.0)
 
-    def test_in_two_muds_there_is_no_such_thing_as_the_mud(self) -> None:
+    def test_flippers_in_two_muds_give_no_common_estimate(self) -> None:
         spread = CHANGE * sqrt(2.0 * REPEATABILITY**2 / 8.0 + 2.0 * FLIPPER_SPREAD**2)
-        near, far = (self.believed(reported(K_P), reported(K_P * exp(spread + off))) for off in (-0.001, 0.001))
+        near, far = (self.estimated(reported(K_P), reported(K_P * exp(spread + off))) for off in (-0.001, 0.001))
         assert near.k_p is not None
         assert far.k_p is None
         assert found(far.left.k_p).value == pytest.approx(K_P)
         assert found(far.right.k_p).value == pytest.approx(K_P * exp(spread + 0.001))
 
-    def test_one_that_knows_speaks_for_both(self) -> None:
-        assert self.believed(reported(K_P), NOT_REPORTED).k_p == after(*[stride(reported(K_P))] * 8).left.k_p
-        assert found(self.believed(NOT_REPORTED, reported(K_P)).k_p).value == pytest.approx(K_P)
+    def test_the_estimate_of_one_flipper_alone_counts_for_both(self) -> None:
+        assert self.estimated(reported(K_P), NOT_REPORTED).k_p == after(*[stride(reported(K_P))] * 8).left.k_p
+        assert found(self.estimated(NOT_REPORTED, reported(K_P)).k_p).value == pytest.approx(K_P)
 
     def test_they_are_compared_at_one_depth(self) -> None:
         deeper = reported(K_P * (0.05 / 0.03) ** STROKE_LAW.exponent)
-        together = found(self.believed(reported(K_P), deeper, depth_m=0.05).k_p)
+        together = found(self.estimated(reported(K_P), deeper, depth_m=0.05).k_p)
         assert together.depth_m == pytest.approx(sqrt(0.03 * 0.05))
         assert together.at(0.03)[0] == pytest.approx(K_P)
 
     def test_the_depth_laws_error_does_not_shrink_with_two_flippers(self) -> None:
-        together = found(self.believed(reported(K_P), reported(K_P)).k_p)
+        together = found(self.estimated(reported(K_P), reported(K_P)).k_p)
         assert (together.exponent, together.exponent_std_error) == pytest.approx(STROKE_LAW)
 
     def test_the_lower_of_two_bounds_counts_for_both(self) -> None:
-        assert is_bound(self.believed(bound(K_P), bound(2.0 * K_P)).k_p, K_P)
-        assert is_bound(self.believed(bound(2.0 * K_P), bound(K_P)).k_p, K_P)
+        assert is_bound(self.estimated(bound(K_P), bound(2.0 * K_P)).k_p, K_P)
+        assert is_bound(self.estimated(bound(2.0 * K_P), bound(K_P)).k_p, K_P)
 
     def test_a_value_stands_for_both_unless_the_others_bound_is_above_it(self) -> None:
         for mud_estimate in (
-            self.believed(reported(K_P), bound(1.1 * K_P)),
-            self.believed(bound(1.1 * K_P), reported(K_P)),
+            self.estimated(reported(K_P), bound(1.1 * K_P)),
+            self.estimated(bound(1.1 * K_P), reported(K_P)),
         ):
             assert is_value(mud_estimate.k_p, K_P)
-        assert self.believed(reported(K_P), bound(2.0 * K_P)).k_p is None
-        assert self.believed(bound(2.0 * K_P), reported(K_P)).k_p is None
+        assert self.estimated(reported(K_P), bound(2.0 * K_P)).k_p is None
+        assert self.estimated(bound(2.0 * K_P), reported(K_P)).k_p is None
 
 
 class TestLowerBounds:
@@ -484,7 +484,7 @@ class TestLowerBounds:
             return after(*(stride(k_s=bound(factor * K_S)) for factor in factors)).k_s
 
         assert is_bound(kept(0.5), 0.5 * K_S)
-        assert is_bound(kept(3.0, 0.5), 0.5 * K_S)  # a wild one is believed for one stride
+        assert is_bound(kept(3.0, 0.5), 0.5 * K_S)  # a wild bound counts for one stride
         assert is_bound(kept(0.5, 1.0, 0.7), 0.7 * K_S)
         assert is_bound(kept(1.0, 1.0, *[0.7] * (REMEMBERED_STRIDES - 2)), K_S)
         assert is_bound(kept(1.0, 1.0, *[0.7] * (REMEMBERED_STRIDES - 1)), 0.7 * K_S)
@@ -506,7 +506,7 @@ class TestLowerBounds:
         valued = [stride(reported(K_P), reported(K_S))] * 8
         assert is_bound(after(*valued, stride(new_k_p, bound(0.6 * K_S)), stride(new_k_p)).k_s, 0.6 * K_S)
 
-    def test_bounds_of_before_a_value_came_are_not_remembered_behind_it(self) -> None:
+    def test_bounds_from_before_a_value_are_not_remembered_after_a_boundary(self) -> None:
         deviation = sqrt(REPEATABILITY**2 / 2.0 + REPEATABILITY**2 / 8.0)
         new_k_p = reported(K_P * exp(-(PAIR_CHANGE + 0.01) * deviation))
         known = [stride(reported(K_P), bound(0.9 * K_S)), *[stride(reported(K_P), reported(K_S))] * 7]
@@ -564,11 +564,11 @@ class TestDepthLaw:
         before = found(mud.knowledge.mud_estimate.left.k_s)
         mud.scale_s = mud.scale_p = 0.25
         mud.walk()
-        behind = found(mud.knowledge.mud_estimate.left.k_s)
-        assert behind.strides == 1
-        assert behind.exponent == pytest.approx(before.exponent, abs=0.02)
+        after_change = found(mud.knowledge.mud_estimate.left.k_s)
+        assert after_change.strides == 1
+        assert after_change.exponent == pytest.approx(before.exponent, abs=0.02)
         assert before.exponent_std_error < 0.13
-        assert behind.exponent_std_error == pytest.approx(SHEAR_LAW.std_error / 2.0)
+        assert after_change.exponent_std_error == pytest.approx(SHEAR_LAW.std_error / 2.0)
 
 
 NONSENSE = [
@@ -601,12 +601,12 @@ class TestBadInput:
     @pytest.mark.parametrize("at_least", [False, True])
     def test_nonsense_that_is_called_valid_changes_nothing(self, nonsense: Estimate, at_least: bool) -> None:
         known = [stride(reported(K_P), reported(K_S), reported(K_E))] * 3
-        odd = nonsense._replace(at_least=at_least)
-        assert after(*known, stride(odd, odd, odd)) == after(*known)
-        assert after(stride(odd, odd, odd)) == NOTHING_KNOWN
+        bad = nonsense._replace(at_least=at_least)
+        assert after(*known, stride(bad, bad, bad)) == after(*known)
+        assert after(stride(bad, bad, bad)) == NOTHING_KNOWN
 
     @pytest.mark.parametrize("depth_m", [nan, inf, -inf, 0.0, -0.01, 1e-9, 0.004, 1e9])
-    def test_a_depth_that_cannot_be_teaches_nothing(self, depth_m: float) -> None:
+    def test_an_impossible_depth_changes_nothing(self, depth_m: float) -> None:
         known = [stride(reported(K_P), reported(K_S), reported(K_E))] * 3
         assert after(*known, stride(reported(K_P), reported(K_S), bound(9 * K_E), depth_m)) == after(*known)
 

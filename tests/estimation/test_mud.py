@@ -1,7 +1,7 @@
-"""Both flippers together: whose sample goes where, what the messages' ages do, and what is kept from stride to stride.
+"""Both flippers together: the samples that each one gets, the messages' ages, and what is remembered between strides.
 
-The strokes are synthetic, through mud that keeps the estimator's own laws. That each flipper reads them
-rightly is for its own tests; here it must be told what it would be told alone.
+The strokes are synthetic, through mud that keeps the estimator's own laws. One flipper's estimates have their own
+tests; here each flipper must give what it would give alone.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0
 
 
 def walk(seed: int, strides: int = STRIDES) -> list[Sample]:
-    """The last row, with which a swing begins, closes the last stride."""
+    """Return a walk whose last row, with which a swing begins, closes the last stride."""
     once = stride_samples(seed)
     return [sample for stride in range(strides) for sample in later(once, PERIOD_OF_STRIDE_S * stride)]
 
@@ -86,7 +86,9 @@ def test_both_strides_close_with_one_sample() -> None:
 
 @pytest.mark.parametrize("late", FLIPPERS)
 def test_a_flipper_that_leaves_the_mud_late_is_waited_for(late: str) -> None:
-    """Its extraction ends in the mud: the other flipper's stride closes with it, and the left one comes first."""
+    """Its extraction ends in the mud: the other flipper's stride closes together with it, and the left one comes
+    first.
+    """
     swings = [i for i, (a, b) in enumerate(pairwise(walk(1)), 1) if a.phase is Phase.EXTRACTION is not b.phase]
     rows = {flipper: walk(seed) for seed, flipper in enumerate(FLIPPERS, 1)}
     for i in swings[:-1]:
@@ -99,7 +101,7 @@ def test_a_flipper_that_leaves_the_mud_late_is_waited_for(late: str) -> None:
     assert not readings[swings[0]]
 
 
-def test_a_flipper_that_is_not_heard_does_not_disturb_the_other_one() -> None:
+def test_a_silent_flipper_does_not_disturb_the_other_one() -> None:
     left = walk(1)
     silent = [sample._replace(sweep=sample.sweep._replace(angle_rad=nan)) for sample in walk(2)]
     both, alone = strides_of(estimator(), left, walk(2)), strides_of(estimator(), left, silent)
@@ -191,7 +193,7 @@ def test_the_papers_strides_are_remembered_like_ours(method: Method) -> None:
 
 
 def test_the_map_contains_both_flippers_strides_at_the_body_position() -> None:
-    """0.1 m/s, a stride every 2 s: 20 cm from close to close, which are four pieces."""
+    """The body moves at 0.1 m/s with a stride every 2 s: 20 cm from close to close, which are four pieces."""
     mud = estimator()
     strides = strides_of(mud, walk(1), walk(2), speed_m_s=0.1)
     rows = mud.map.rows()
@@ -201,7 +203,7 @@ def test_the_map_contains_both_flippers_strides_at_the_body_position() -> None:
     assert [row.k_p.strides for row in rows if row.k_p is not None] == [2] * STRIDES
 
 
-def test_without_a_pose_there_is_a_estimate_and_no_map() -> None:
+def test_without_a_pose_there_is_an_estimate_and_no_map() -> None:
     mud = estimator()
     strides_of(mud, walk(1), walk(2), speed_m_s=nan)
     assert mud.mud_estimate.k_p is not None
@@ -225,13 +227,13 @@ def test_a_reset_forgets_strides_estimate_and_map(method: Method) -> None:
 
 
 ARM = FlipperDrive(ArmMass(0.0, 0.0, 0.0004, 0.0006), 0.083, 0.083)
-SWAY_RAD, SWAY_RAD_S = 0.15, 2.0 * pi * 5.0  # up to 150 rad/s²: a quick extraction has as much
+SWAY_RAD, SWAY_RAD_S = 0.15, 2.0 * pi * 5.0  # up to 150 rad/s², as much as a quick extraction
 LARGEST_NM = 0.0006 * SWAY_RAD * SWAY_RAD_S**2
 
 
 def swayed(tick: int, age_s: float) -> tuple[float, float, float]:
-    """Angle, velocity and acceleration of an arm so long before a tick. A motor holds its torque from tick to tick: its
-    arm turns evenly faster between them, by so much that it meets a swaying one's speed at each.
+    """Return the angle, velocity and acceleration of an arm `age_s` before a tick. A motor holds its torque from tick
+    to tick, so its arm accelerates evenly between ticks and has the speed of a sine at each of them.
     """
     sways = [SWAY_RAD_S * PERIOD_S * (tick - ticks) for ticks in (0, 1)]
     after, before = (SWAY_RAD * SWAY_RAD_S * sin(sway + pi / 2.0) for sway in sways)
@@ -244,9 +246,10 @@ def swayed(tick: int, age_s: float) -> tuple[float, float, float]:
 
 
 def load_of_a_free_arm_nm(angle_ages_s: Four, current_ages_s: Four, reported: bool) -> list[float]:
-    """Largest load of each joint, of arms that sway in the air: what moves them is all inertia, so there is none.
+    """Return the largest load of each joint of arms that sway in the air, where all torque is inertia and there is no
+    load.
 
-    `told`: whether the estimator knows the ages.
+    `reported` states whether the estimator knows the ages.
     """
     mud, largest_nm = MudEstimator(GEOMETRY, (ARM, ARM)), [0.0] * 4
     inertias = (0.0004, 0.0006, 0.0004, 0.0006)
@@ -260,7 +263,7 @@ def load_of_a_free_arm_nm(angle_ages_s: Four, current_ages_s: Four, reported: bo
         states = recorded_states(now_s, angles, speeds, currents, *ages)
         reading = mud.update(now_s, Phase.REST, states, BodyPose(now_s, 0.0))
         loads = [getattr(load, name) for load in reading.loads for name in ("sweep_torque_nm", "adduction_torque_nm")]
-        if tick > 1:  # two samples tell an acceleration
+        if tick > 1:  # an acceleration needs two samples
             largest_nm = [max(a, abs(b)) for a, b in zip(largest_nm, loads, strict=True)]
     return largest_nm
 
@@ -278,7 +281,7 @@ def test_messages_of_any_age_give_the_load_of_fresh_ones(ages: tuple[Four, Four]
 
 @pytest.mark.parametrize("ages", [ANGLES_OLD, BOTH_OLD])
 def test_unknown_ages_would_be_taken_for_mud(ages: tuple[Four, Four]) -> None:
-    """A millisecond of 5 Hz is 3 % of the inertia."""
+    """A millisecond at 5 Hz is 3 % of the inertia."""
     assert max(load_of_a_free_arm_nm(*ages, reported=False)) > 0.03 * LARGEST_NM
 
 

@@ -33,7 +33,7 @@ def mapped(*strides: StrideEstimate, position_m: float = 0.01) -> MudMap:
 
 
 def only(mud_map: MudMap) -> Mapped:
-    """k_s of the only piece."""
+    """Return k_s of the only piece."""
     (row,) = mud_map.rows()
     assert row.k_s is not None
     return row.k_s
@@ -80,7 +80,7 @@ def test_pieces_are_five_centimetres_long_and_known_in_the_order_of_positions() 
     assert [row.k_s.strides for row in rows if row.k_s] == [1, 2, 2, 1]
 
 
-def test_a_boundary_of_muds_stands_where_it_was_walked_over() -> None:
+def test_a_boundary_lies_where_it_was_crossed() -> None:
     mud_map = MudMap()
     for step in range(40):
         position_m = 0.04 + 0.05 * step
@@ -96,7 +96,7 @@ def test_a_stride_without_a_position_is_on_no_map(position_m: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "odd",
+    "uninformative",
     [
         stride(),
         stride(k_s=reported(nan)),
@@ -107,10 +107,10 @@ def test_a_stride_without_a_position_is_on_no_map(position_m: float) -> None:
         stride(k_s=reported(1e6)._replace(valid=False)),
     ],
 )
-def test_a_stride_that_gives_no_estimate_leaves_no_trace(odd: StrideEstimate) -> None:
-    assert mapped(odd).rows() == ()
+def test_a_stride_that_gives_no_estimate_leaves_no_trace(uninformative: StrideEstimate) -> None:
+    assert mapped(uninformative).rows() == ()
     known = stride(k_s=reported(1e6))
-    assert mapped(known, odd).rows() == mapped(known).rows()
+    assert mapped(known, uninformative).rows() == mapped(known).rows()
 
 
 def test_a_bound_stands_only_until_a_value_comes() -> None:
@@ -126,15 +126,15 @@ def test_a_bound_stands_only_until_a_value_comes() -> None:
         assert piece.value == pytest.approx(1.2e6)
 
 
-def test_a_long_walk_gives_up_the_pieces_that_were_walked_on_longest_ago() -> None:
+def test_a_long_walk_drops_the_pieces_that_were_visited_longest_ago() -> None:
     mud_map = MudMap()
     for number in range(MOST_PIECES):
         mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=reported(1e6))])
     mud_map.update(0.5 * PIECE_M, [stride(k_s=reported(1e6))])  # back at the first one
     for number in range(MOST_PIECES, MOST_PIECES + 3):
         mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=reported(1e6))])
-    places = [round(row.position_m / PIECE_M - 0.5) for row in mud_map.rows()]
-    assert places == [0, *range(4, MOST_PIECES + 3)]
+    pieces = [round(row.position_m / PIECE_M - 0.5) for row in mud_map.rows()]
+    assert pieces == [0, *range(4, MOST_PIECES + 3)]
 
 
 def test_reset_empties_the_map() -> None:

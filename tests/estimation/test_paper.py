@@ -1,7 +1,7 @@
-"""The paper's method on strokes through made-up mud that keeps the paper's laws: whether it finds them again, and the
-bias that its trigger is known to have.
+"""The paper's method on strokes through synthetic mud that keeps the paper's laws: it recovers them, with the known
+bias of its trigger.
 
-Strides are compared by their text: what is unknown is NaN, which is not equal to itself.
+Strides are compared by their text, since unknown values are NaN, which is not equal to itself.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -71,14 +71,14 @@ MUD = Mud()
 
 
 def law_of(mud: Mud) -> Law:
-    """The paper's three laws below the mud's surface."""
+    """Return the paper's three laws below the mud's surface."""
 
     def force_n(sample: Sample) -> Force:
         submerged_m = max(0.0, sample.depth_m - mud.surface_m)
         if sample.phase is Phase.INSERTION:
             return 0.0, mud.k_p * EDGE_M2 * submerged_m
         if sample.phase is Phase.STANCE:
-            return mud.k_s * WIDTH_M * submerged_m**2 / 2.0, 1.5  # no law of the upward force: it must not matter
+            return mud.k_s * WIDTH_M * submerged_m**2 / 2.0, 1.5  # the upward force follows no law and must not matter
         if sample.phase is Phase.EXTRACTION:
             return 0.0, -mud.k_e * EDGE_M2 * submerged_m
         return 0.0, 0.0
@@ -88,7 +88,7 @@ def law_of(mud: Mud) -> Law:
 
 @cache
 def motion(depth_m: float = 0.03, gait: GaitParameters = GAIT, strides: int = 1) -> Sequence[Sample]:
-    """Joints that follow the gait exactly, without any current."""
+    """Return samples of joints that follow the gait exactly, without any current."""
     walk, samples = Gait(gait, GEOMETRY), list[Sample]()
     walk.reset(depth_m)
     for tick in range(int(strides * stride_duration_s(gait, GEOMETRY, depth_m) / PERIOD_S)):
@@ -107,7 +107,7 @@ def first_below(samples: Iterable[Sample], depth_m: float) -> Sample:
 
 
 def loaded(samples: Sequence[Sample], law: Law, mass: ArmMass = WEIGHTLESS) -> list[Sample]:
-    """The currents that carry the law's forces: the paper's map inverted, gravity and inertia added."""
+    """Return the samples with the currents of the law's forces: the paper's map inverted, plus gravity and inertia."""
     result, before = [], samples[0]
     for sample in samples:
         force_x_n, force_z_n = law(sample)
@@ -128,7 +128,7 @@ def loaded(samples: Sequence[Sample], law: Law, mass: ArmMass = WEIGHTLESS) -> l
 
 
 def triggered(samples: Sequence[Sample], mud: Mud, mass: ArmMass = WEIGHTLESS) -> list[Sample]:
-    """As `loaded`, with the law starting at a sample whose jump in force is what the trigger takes for the surface.
+    """Load the samples as `loaded` does, from a sample on whose jump in force the trigger takes for the surface.
 
     There is no mud above it, so nothing is biased by finding the surface late.
     """
@@ -142,7 +142,7 @@ def estimator(mass: ArmMass = WEIGHTLESS) -> PaperEstimator:
 
 
 def states_of(sample: Sample) -> FlipperJoints[DriveState]:
-    """Messages that are as new as the tick."""
+    """Return messages that are as new as the tick."""
     now_s, _, sweep_rad, adduction_rad, sweep_rad_s, adduction_rad_s, sweep_a, adduction_a, _ = sample
     sweep = DriveState(sweep_rad, sweep_rad_s, now_s, sweep_a, now_s)
     return FlipperJoints(sweep, DriveState(adduction_rad, adduction_rad_s, now_s, adduction_a, now_s))
@@ -303,7 +303,7 @@ def test_with_current_noise_the_truth_is_within_a_few_standard_errors() -> None:
         found = ((stride.k_p, MUD.k_p), (stride.k_s, MUD.k_s), (stride.k_e, MUD.k_e))
         scores.append([(estimate.value - truth) / estimate.std_error for estimate, truth in found])
     assert np.abs(scores).max() < 5.0
-    assert np.std(scores, axis=0)[1:] == pytest.approx([1.0, 1.0], abs=0.3)  # of k_p the jump alone adds doubt
+    assert np.std(scores, axis=0)[1:] == pytest.approx([1.0, 1.0], abs=0.3)  # in k_p only the jump adds to the error
 
 
 def test_more_noise_makes_more_uncertainty() -> None:
@@ -384,7 +384,7 @@ def advancing(samples: Sequence[Sample], speed_m_s: float) -> list[Sample]:
 
 
 def test_half_of_the_drag_is_added_while_the_body_advances() -> None:
-    """At 0.2 m/s it has advanced by 2 mm long before the steady part of stance."""
+    """At 0.2 m/s the body has advanced by 2 mm long before the steady part of stance."""
     samples, drag_n = triggered(motion(), MUD), 2.5
     plain = one(samples)
     reported = one(advancing(samples, 0.2), PaperEstimator("left", GEOMETRY, DRIVE, drag_n))
@@ -407,7 +407,7 @@ def test_without_compensation_no_drag_is_added() -> None:
     assert one(advancing(samples, 0.2)).k_s == one(samples).k_s
 
 
-# what closes a stride, and what it then says
+# when a stride closes, and what it reports
 
 
 @pytest.mark.parametrize("last", [Phase.INSERTION, Phase.STANCE])
@@ -461,11 +461,11 @@ def test_a_flipper_that_stays_down_is_not_released() -> None:
 def test_a_flipper_is_released_from_where_its_lowest_corner_counts_as_out(below_m: float, released: bool) -> None:
     held = waiting(held_at(triggered(motion(), MUD), OUT_M + below_m))
     assert one(held).released is released
-    assert one(held).surface_m > 0.002  # the height that the mud was found at does not count
+    assert one(held).surface_m > 0.002  # the height at which the mud was found does not count
 
 
 def test_a_flipper_that_comes_out_at_the_last_moment_is_released() -> None:
-    """The sample that tells it is the last one before swing."""
+    """Only the last sample before the swing shows it."""
     samples = held_at(triggered(motion(), MUD), 0.01)
     assert not one(waiting(samples)).released
     *_, last = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
@@ -480,7 +480,7 @@ def test_a_recovered_flipper_was_not_released_and_the_other_was() -> None:
         assert stride.released is released
 
 
-def test_a_recovery_teaches_nothing() -> None:
+def test_a_recovery_changes_no_estimate() -> None:
     samples = held_at(triggered(motion(), MUD), 0.01)
     stride, longer = one(waiting(samples)), one(recovered(samples))
     assert longer.k_e == stride.k_e
@@ -489,7 +489,7 @@ def test_a_recovery_teaches_nothing() -> None:
 
 
 def waiting(samples: Sequence[Sample]) -> list[Sample]:
-    """The flipper stays where its extraction ended, for longer than it has to come out."""
+    """Let the flipper stay where its extraction ended, for longer than the time that it has to come out."""
     *_, end = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
     held, out_s = samples[end], samples[end].now_s + 1.1 * GRACE_S
     return [
@@ -499,7 +499,7 @@ def waiting(samples: Sequence[Sample]) -> list[Sample]:
 
 
 def held_at(samples: Sequence[Sample], lowest_depth_m: float) -> list[Sample]:
-    """Mud that does not let the plate's lowest corner rise above that depth in extraction."""
+    """Keep the plate's lowest corner from rising above that depth in extraction."""
 
     def held(sample: Sample) -> Sample:
         low_rad, high_rad = -1.0, 0.3
@@ -513,7 +513,7 @@ def held_at(samples: Sequence[Sample], lowest_depth_m: float) -> list[Sample]:
 
 
 def recovered(samples: Sequence[Sample]) -> list[Sample]:
-    """With a second of recovery at ten times the current before the swing, at whose end the flipper is up."""
+    """Insert a second of recovery at ten times the current before the swing; at its end the flipper is up."""
     swing = next(i for i, sample in enumerate(samples) if sample.phase is Phase.SWING)
     held, ticks = samples[swing - 1], round(1.0 / PERIOD_S)
     freed = [
@@ -604,7 +604,7 @@ def test_each_flipper_finds_its_own_mud() -> None:
     assert_found(right, other)
 
 
-def test_a_flipper_that_is_not_heard_does_not_disturb_the_other_one() -> None:
+def test_a_silent_flipper_does_not_disturb_the_other_one() -> None:
     samples = triggered(motion(), MUD)
     lost = [sample._replace(sweep_rad=nan, adduction_current_a=nan) for sample in samples]
     assert repr(both(samples, lost)[0]) == repr(both(samples, samples)[0])

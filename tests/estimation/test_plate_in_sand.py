@@ -1,4 +1,4 @@
-"""The vertical law on a measurement that no one here made: round plates pushed into dry sand with a force sensor.
+"""The vertical law on independent measurements: round plates pushed into dry sand with a force sensor.
 
 The file's own note says: a straight line fits with k = 1.0 to 1.6 N/cm³ and 5 to 7.5 % residual, and the true curve
 bends upward with an exponent of 1.33 to 1.6. That holds over the first 3 cm, the depths of a flipper; the three plates
@@ -18,11 +18,11 @@ from tests.folders import SHARED_DATA
 FOLDER = SHARED_DATA / "plate_in_sand"
 RUNS = sorted(FOLDER.glob("*.csv.gz"))
 DEEPEST_M = 0.03
-pytestmark = pytest.mark.skipif(not RUNS, reason="the shared measurements are not beside the repository")
+pytestmark = pytest.mark.skipif(not RUNS, reason="the shared measurements are not next to the repository")
 
 
 def pushed(path: Path) -> tuple[np.ndarray, np.ndarray, float]:
-    """Depth, upward force on the way down, and the plate's area."""
+    """Return the depth and upward force of the descent, and the plate's area."""
     with gzip.open(path, "rt") as file:
         rows = np.loadtxt(file.read().splitlines()[2:], delimiter=",")
     depth_m, force_n = rows[:, 1] / 1000.0, rows[:, 2]
@@ -34,7 +34,7 @@ def pushed(path: Path) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def best_exponent(depth_m: np.ndarray, force_n: np.ndarray) -> float:
-    """Of force ∝ depth^n, by least squares on a grid of n."""
+    """Return n of force ∝ depth^n, by least squares on a grid of n."""
 
     def squares(n: float) -> float:
         power = depth_m**n

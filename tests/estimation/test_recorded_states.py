@@ -1,4 +1,4 @@
-"""A log's ages become the stamps again that the loop had, so that live and replay agree to the last digit."""
+"""A log's ages turn back into the stamps that the loop had, so that live and replay agree to the last digit."""
 
 from math import inf
 

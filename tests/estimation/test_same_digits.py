@@ -30,7 +30,7 @@ def test_another_python_computes_the_same_digits(version: str) -> None:
 
 
 def test_no_sum_of_floats_depends_on_the_version_of_python() -> None:
-    """`sum` may count samples, and what is only tested for being finite."""
+    """`sum` may count samples, and may add values that are only tested for being finite."""
     sources = chain((ROOT / "control").rglob("*.py"), (ROOT / "estimation").rglob("*.py"))
     found = [f"{path}: {text}" for path in sources for text in bare_sums(path.read_text(encoding="utf-8"))]
     assert not found, f"use exact_sum, see control/exact_sum.py: {found}"

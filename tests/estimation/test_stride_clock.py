@@ -16,7 +16,7 @@ EXTRACTION, SWING, PAUSE = Phase.EXTRACTION, Phase.SWING, Phase.PAUSE
 
 
 def changes(phases: Iterable[Phase], clock: StrideClock | None = None, period_s: float = 1.0) -> list[Change]:
-    """As an estimator drives it: asked at a change alone, and begun where a stride begins."""
+    """Drive the clock as an estimator does: ask it at changes only, and begin a stride where it says so."""
     clock, seen = clock or StrideClock(), list[Change]()
     for tick, phase in enumerate(phases, 1):
         if phase is clock.phase:
@@ -132,5 +132,5 @@ def test_a_stride_closes_only_after_all_its_strokes_and_never_into_rest(phases: 
 
 
 def _distinct(phases: list[Phase]) -> list[Phase]:
-    """Each phase that differs from the one before, the first from rest."""
+    """Return each phase that differs from the one before, the first compared with rest."""
     return [phase for before, phase in zip([REST, *phases], phases, strict=False) if phase is not before]

@@ -18,7 +18,7 @@ BASES = pytest.mark.parametrize("fixed_base", [True, False])
 
 
 def strides_over(surfaces_m: list[float]) -> list[StrideEstimate]:
-    """One stride on each surface, with the noise of the authors' currents."""
+    """Return one stride on each surface, with the noise of the authors' currents."""
     moments = motion(strides=len(surfaces_m))
     begins = [0, *(i for i, (a, b) in enumerate(pairwise(moments), 1) if a.phase is not b.phase is Phase.INSERTION)]
     begins = [*begins[:1], *begins[2:], len(moments)]
@@ -53,14 +53,14 @@ def others_m(depths_m: list[float], fixed_base: bool) -> list[float]:
 @BASES
 def test_the_other_surface_is_the_mean_of_the_other_finds(fixed_base: bool) -> None:
     others = others_m([0.0, 0.001, 0.010, 0.0105, 0.0005], fixed_base)
-    assert np.isnan(others[:3]).all()  # two finds of either are needed
+    assert np.isnan(others[:3]).all()  # each surface needs two finds
     assert others[3:] == [pytest.approx(0.0005, abs=1e-6), pytest.approx(0.01025, abs=1e-6)]
 
 
 @BASES
 @pytest.mark.parametrize("count", [4, 6, 8])
 @pytest.mark.parametrize(("apart_m", "least", "most"), [(0.0, 0.0, 0.04), (0.006, 0.88, 1.0), (0.009, 0.98, 1.0)])
-def test_two_surfaces_are_found_as_often_as_promised(
+def test_two_surfaces_are_found_as_often_as_predicted(
     count: int, apart_m: float, least: float, most: float, fixed_base: bool
 ) -> None:
     random, hits = np.random.default_rng(count), 0

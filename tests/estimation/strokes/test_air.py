@@ -13,7 +13,9 @@ COUNT = 200
 def swing(
     air: AirSwing, friction_nm: float, inertia_nm: float = 0.0, offset_nm: float = 0.0, back: bool = False
 ) -> None:
-    """From -35 to +35 degrees, from rest to rest: dry friction, inertia, and an offset of the current."""
+    """Feed a swing from -35 to +35 degrees, from rest to rest, with dry friction, inertia and an offset of the
+    current.
+    """
     for i in range(COUNT + 1):
         time = i / COUNT
         sweep_rad = -0.6 * cos(pi * time) * (-1.0 if back else 1.0)
@@ -53,7 +55,7 @@ def test_dragged_mud_only_adds_so_the_least_swing_counts() -> None:
     assert air.friction_nm == pytest.approx(0.05, abs=1e-3)
 
 
-def test_a_swing_through_mud_is_no_air_and_changes_nothing() -> None:
+def test_a_swing_through_mud_does_not_count_as_air_and_changes_nothing() -> None:
     air = AirSwing()
     swing(air, 0.04)
     air.close()

@@ -1,4 +1,4 @@
-"""R² and residuals of a fit: by hand, against statsmodels, and of the samples that the estimator itself fitted."""
+"""R² and residuals of a fit: by hand, against statsmodels, and for the samples that the estimator itself fitted."""
 
 from math import isnan, sqrt
 from pathlib import Path
@@ -38,7 +38,7 @@ def test_a_constant_torque_is_no_evidence_of_the_law() -> None:
     assert almost.r_squared_about_mean < 0.0
 
 
-def test_the_samples_of_a_replay_are_those_behind_its_estimates(two_walks: Path) -> None:
+def test_a_replay_returns_the_samples_that_its_estimates_were_fitted_to(two_walks: Path) -> None:
     """The slope is the reported value to the last digit; a bound has no samples."""
     replayed = replay_files([two_walks])
     fitted = 0

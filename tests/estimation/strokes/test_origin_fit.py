@@ -31,22 +31,24 @@ def noisy(seed: int, count: int, noise: float = 0.1) -> tuple[Array, Array]:
     return x, K * x + noise * random.standard_normal(count)
 
 
-def invalid(seed: int, count: int) -> tuple[Array, Array]:
-    """One batch in seven is far off."""
+def with_outliers(seed: int, count: int) -> tuple[Array, Array]:
+    """Return samples in which one batch in seven is far off."""
     random = np.random.default_rng(seed)
     x, y = noisy(seed, count)
     return x, y + np.where(random.random(count) < 1.0 / 7.0, random.normal(0.0, 2.0, count), 0.0)
 
 
 def calm(seed: int, count: int) -> tuple[Array, Array]:
-    """Noise that is even, so no batch is off by three of its scales: every weight is one."""
+    """Return samples with uniform noise: no batch is off by three scales, so every weight is one."""
     random = np.random.default_rng(seed)
     x = np.sort(random.uniform(0.05, 1.0, count))
     return x, K * x + 0.1 * random.uniform(-1.0, 1.0, count)
 
 
 def bend_free(x: Array, y: Array) -> Array:
-    """`y` moved so that a line fitted to it passes through the origin: our standard error leaves such a bend out."""
+    """Return `y` shifted so that its line of best fit passes through the origin: our standard error leaves out such a
+    bend.
+    """
     slope, offset = np.polyfit(x, y, 1)
     through = float(x @ y / (x @ x))
     straightened: Array = through * x + (y - slope * x - offset)
@@ -58,34 +60,35 @@ def bend_free(x: Array, y: Array) -> Array:
 
 @pytest.mark.parametrize("clip", [1.345, HUBER])
 def test_the_slope_is_statsmodels_huber_fit(clip: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same problem: HuberT with our clip; its MAD of the same first slope's residuals, about zero and not about
-    their median, held fixed. Then the problem is convex and has one solution. Left over is NORMAL_MAD, rounded by
-    1.5e-6, which moves the clip as much, and CONVERGED, the change of a round when ours stops: below 1e-5 together.
+    """statsmodels solves the same problem: HuberT with our clip and a fixed scale, the MAD of the residuals of the same
+    first slope, taken about zero and not about their median. With a fixed scale the problem is convex and has one
+    solution. The remaining difference is below 1e-5: NORMAL_MAD is rounded by 1.5e-6, which moves the clip as much, and
+    our rounds stop at a change of CONVERGED.
     """
     monkeypatch.setattr(origin_fit, "HUBER", clip)
     clipped = 0
     for seed in range(60):
-        x, y = invalid(seed, 10 + seed)
+        x, y = with_outliers(seed, 10 + seed)
         start = float(np.median((y / x)[x > x.max() / 3.0]))
         scale = float(sm.robust.scale.mad(y - start * x, center=0.0))
         model = sm.RLM(y, x, M=sm.robust.norms.HuberT(clip))
         oracle = model.fit(start_scale=scale, update_scale=False, conv="coefs", tol=1e-12, maxiter=1000)
         assert fitted(x, y).slope == pytest.approx(float(oracle.params[0]), rel=1e-5)
         clipped += int((oracle.weights < 1.0).any())
-    assert clipped > 30  # else this were least squares
+    assert clipped > 30  # otherwise this would be least squares
 
 
 @given(st.integers(0, 10**6), st.integers(MIN_BATCHES, 60))
 def test_without_outliers_the_slope_is_numpys_least_squares(seed: int, count: int) -> None:
     x, y = noisy(seed, count, 0.0)
-    y += 0.1 * np.resize([1.0, -1.0], count)  # every residual about as large: nothing is clipped
+    y += 0.1 * np.resize([1.0, -1.0], count)  # residuals of about equal size: nothing is clipped
     solution = np.linalg.lstsq(x[:, None], y)[0]
     assert fitted(x, y).slope == pytest.approx(float(solution[0]), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_slope_is_what_recursive_least_squares_and_a_kalman_filter_end_at(seed: int) -> None:
-    """Both begin with a variance of 1e9, which pulls by 1e-9 of the samples' weight, about ten."""
+    """Both start with a variance of 1e9, whose weight is 1e-9 compared with about ten of the samples."""
     x, y = calm(seed, 30)
     rls = padasip.filters.FilterRLS(1, mu=1.0, eps=1e-9, w="zeros")
     constant = KalmanFilter(dim_x=1, dim_z=1)
@@ -105,7 +108,7 @@ def test_the_fit_is_unbiased() -> None:
 
 @pytest.mark.parametrize("scale", [1e-7, 1e-3, 1e6])
 def test_the_fit_does_not_care_about_the_unit_of_x(scale: float) -> None:
-    x, y = invalid(1, 25)
+    x, y = with_outliers(1, 25)
     small, plain = fitted(scale * x, y), fitted(x, y)
     assert small.slope * scale == pytest.approx(plain.slope, rel=1e-9)
     assert small.std_error * scale == pytest.approx(plain.std_error, rel=1e-7)
@@ -114,26 +117,28 @@ def test_the_fit_does_not_care_about_the_unit_of_x(scale: float) -> None:
 # wild batches
 
 
-@pytest.mark.parametrize("place", [0, 7, 19])
-def test_one_outlier_of_any_size_moves_the_slope_by_a_bounded_amount(place: int) -> None:
-    """It pulls no more than a residual of the clip, c s, would; least squares follows it everywhere."""
+@pytest.mark.parametrize("index", [0, 7, 19])
+def test_one_outlier_of_any_size_moves_the_slope_by_a_bounded_amount(index: int) -> None:
+    """The outlier pulls no more than a residual at the clip, c s, would; least squares follows it without limit."""
     x, y = noisy(3, 20)
     plain, slopes = fitted(x, y).slope, []
     for size in (1.0, 10.0, 1e3, 1e6, 1e9):
-        y[place] = K * x[place] + size
+        y[index] = K * x[index] + size
         slopes.append(fitted(x, y).slope)
-    largest = HUBER * 2.0 * 0.1 * x[place] / float(x @ x - x[place] ** 2)  # a scale is under twice the noise
+    largest = HUBER * 2.0 * 0.1 * x[index] / float(x @ x - x[index] ** 2)  # the scale is below twice the noise
     assert max(abs(slope - plain) for slope in slopes) <= largest
     assert slopes[-1] == pytest.approx(slopes[2], rel=1e-3)
     assert abs(float(x @ y / (x @ x)) - K) > 1e5
 
 
 def test_a_fifth_of_wild_batches_pulls_no_more_than_as_many_at_the_clip() -> None:
-    """All to one side. A scale that followed the fit would give way to them: 45 instead of 2 in one such case."""
+    """All outliers lie to one side. A scale that followed the fit would give way to them: 45 instead of 2 in one such
+    case.
+    """
     x, y = noisy(4, 30, 0.1)
     plain, wild = fitted(x, y).slope, np.arange(30) % 5 == 0
     y[wild] += 100.0
-    largest = HUBER * 2.0 * 0.1 * float(x[wild].sum() / (x[~wild] @ x[~wild]))  # a scale is under twice the noise
+    largest = HUBER * 2.0 * 0.1 * float(x[wild].sum() / (x[~wild] @ x[~wild]))  # the scale is below twice the noise
     assert abs(fitted(x, y).slope - plain) <= largest < 0.5
     assert float(x @ y / (x @ x)) > 5.0 * K
 
@@ -142,7 +147,7 @@ def test_a_fifth_of_wild_batches_pulls_no_more_than_as_many_at_the_clip() -> Non
 
 
 def test_the_students_factors_are_those_of_scipy() -> None:
-    """Seen through a fit of pure scatter; to the table's three digits."""
+    """The tolerance is that of the table's three digits."""
     for count in range(MIN_BATCHES, 61):
         freedom, table = count - 2, origin_fit.STUDENT
         factor = table[freedom] if freedom < len(table) else 1.0 + 1.3 / freedom
@@ -151,22 +156,23 @@ def test_the_students_factors_are_those_of_scipy() -> None:
 
 @given(st.integers(0, 10**6), st.integers(LAGS + 1, 60))
 def test_the_standard_error_is_statsmodels_newey_west_or_the_plain_one_whichever_is_more(seed: int, count: int) -> None:
-    """On data without outliers, and without the bend that ours leaves out. HAC with our lags and correction n/(n-1);
-    ours counts the bend's degree of freedom too, so both get (n-1)/(n-2) and Student's factor, which has three digits.
+    """The data have no outliers and no bend, which our standard error leaves out. HAC uses our lags and the correction
+    n/(n-1); ours also counts the bend's degree of freedom, so both get (n-1)/(n-2) and Student's factor, which has
+    three digits.
     """
     x, y = calm(seed, count)
     y = bend_free(x, y)
     plain = sm.OLS(y, x).fit()
     hac = sm.OLS(y, x).fit(cov_type="HAC", cov_kwds={"maxlags": LAGS, "use_correction": True})
     ours = fitted(x, y)
-    assume(abs(ours.slope - float(plain.params[0])) < 1e-12)  # else a batch was clipped after all
+    assume(abs(ours.slope - float(plain.params[0])) < 1e-12)  # otherwise a batch was clipped
     student = float(student_t.ppf(0.975, count - 2)) / 1.959964
     largest = max(float(hac.bse[0]), float(plain.bse[0]))
     assert ours.std_error == pytest.approx(student * sqrt((count - 1) / (count - 2)) * largest, rel=2e-3)
 
 
 def test_either_of_the_two_standard_errors_is_the_larger_one_at_times() -> None:
-    """Else the test above would hold for one of them alone."""
+    """Otherwise the test above would check only one of them."""
     larger = set()
     for seed in range(40):
         x, y = calm(seed, 30)
@@ -177,24 +183,26 @@ def test_either_of_the_two_standard_errors_is_the_larger_one_at_times() -> None:
 
 
 def autocorrelated(seed: int, count: int, correlation: float) -> tuple[Array, Array]:
-    """Residuals of sd 0.1 that follow the one before: AR(1)."""
+    """Return samples whose residuals are an AR(1) process of sd 0.1."""
     random = np.random.default_rng(seed)
     steps, noise = random.standard_normal(count + 60), np.zeros(count + 60)
-    for place in range(1, count + 60):
-        noise[place] = correlation * noise[place - 1] + sqrt(1.0 - correlation**2) * steps[place]
+    for index in range(1, count + 60):
+        noise[index] = correlation * noise[index - 1] + sqrt(1.0 - correlation**2) * steps[index]
     x = np.linspace(0.05, 1.0, count)
     return x, K * x + 0.1 * noise[60:]
 
 
 def coverage(count: int, correlation: float, runs: int = 800) -> float:
-    """Share of strokes whose true coefficient lies within two standard errors."""
+    """Return the fraction of strokes whose true coefficient lies within two standard errors."""
     fits = [fitted(*autocorrelated(seed, count, correlation)) for seed in range(runs)]
     return sum(abs(fit.slope - K) <= 2.0 * fit.std_error for fit in fits) / runs
 
 
 @pytest.mark.parametrize("count", [5, 8, 12, 20, 40])
 def test_two_standard_errors_cover_independent_noise_95_times_in_a_hundred_however_short_the_stroke(count: int) -> None:
-    """Four sampling errors of 800 runs to either side, and up to 2 % more where the larger of two was taken."""
+    """The limits allow four sampling errors of 800 runs to either side, and up to 2 % more since the larger error is
+    used.
+    """
     assert 0.92 <= coverage(count, 0.0) <= 0.985
 
 
@@ -202,15 +210,15 @@ def test_two_standard_errors_cover_independent_noise_95_times_in_a_hundred_howev
     ("count", "correlation", "measured"),
     [(8, 0.3, 0.87), (8, 0.6, 0.68), (20, 0.3, 0.87), (20, 0.6, 0.72), (20, 0.9, 0.36), (40, 0.6, 0.79)],
 )
-def test_noise_that_hangs_together_is_covered_less_often(count: int, correlation: float, measured: float) -> None:
-    """What it is, not what it should be: a stroke of twenty batches is too short for four lags to show it all, and
-    the line that is taken off takes the slowest part of such noise with it.
+def test_correlated_noise_is_covered_less_often(count: int, correlation: float, measured: float) -> None:
+    """The test pins the measured coverage, not the desired one: a stroke of twenty batches is too short for four lags
+    to show the whole correlation, and the line that is subtracted takes the slowest part of such noise with it.
     """
     assert coverage(count, correlation) == pytest.approx(measured, abs=0.07)
 
 
-def test_residuals_that_hang_together_widen_the_standard_error() -> None:
-    """The same residuals, in the order of a slow wave and shuffled: only neighbours differ."""
+def test_correlated_residuals_widen_the_standard_error() -> None:
+    """The same residuals come in the order of a slow wave and shuffled: only the correlation of neighbours differs."""
     random, widened = np.random.default_rng(1), 0
     x = np.linspace(0.5, 1.0, 60)
     for _ in range(50):
@@ -233,7 +241,9 @@ def test_a_law_without_noise_is_found_without_uncertainty() -> None:
 
 
 def test_a_bend_from_the_law_makes_no_uncertainty() -> None:
-    """Mud that starts at a force of its own: the slope is the mean law's, and scatter alone counts as doubt."""
+    """The mud starts at a force of its own: the slope is that of the mean law, and only scatter counts as
+    uncertainty.
+    """
     x, y = calm(2, 30)
     straight, bent = fitted(x, y), fitted(x, y + 0.05 - 0.05 * x)
     assert bent.std_error == pytest.approx(straight.std_error, rel=0.2)  # the weights may differ a little
@@ -252,17 +262,17 @@ def test_just_enough_batches_give_a_slope() -> None:
 
 
 @pytest.mark.parametrize("x", [0.0, -1.0, 1e-200])
-def test_regressors_of_nothing_give_no_estimate(x: float) -> None:
+def test_regressors_that_are_not_positive_give_no_estimate(x: float) -> None:
     """The last one vanishes when it is squared."""
     assert fit_through_origin([x] * 10, [1.0] * 10) is None
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf, 1e200])
-@pytest.mark.parametrize("place", [0, 5, 9])
-def test_a_regressor_that_is_no_number_gives_no_estimate(bad: float, place: int) -> None:
+@pytest.mark.parametrize("index", [0, 5, 9])
+def test_a_regressor_that_is_no_number_gives_no_estimate(bad: float, index: int) -> None:
     x = [0.1 * (i + 1) for i in range(10)]
     y = [2.0 * each for each in x]
-    x[place] = bad
+    x[index] = bad
     assert fit_through_origin(x, y) is None
 
 
@@ -279,7 +289,7 @@ def test_equal_batches_give_their_ratio() -> None:
 
 
 def test_more_than_half_of_the_batches_exactly_on_the_law_outvote_the_others() -> None:
-    """Their scale is zero, so the others weigh nothing: no division by it either."""
+    """Their scale is zero, so the other batches get no weight and nothing is divided by the scale."""
     x = np.linspace(0.1, 1.0, 10)
     assert fitted(x, np.where(np.arange(10) % 4 > 0, K * x, 50.0)).slope == pytest.approx(K)
 
@@ -297,7 +307,7 @@ modest = st.floats(-100.0, 100.0)
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 100.0), modest), min_size=MIN_BATCHES, max_size=30))
-def test_modest_numbers_give_a_finite_slope_and_a_uncertainty_that_is_not_negative(
+def test_modest_numbers_give_a_finite_slope_and_an_uncertainty_that_is_not_negative(
     pairs: list[tuple[float, float]],
 ) -> None:
     fit = fit_through_origin([x for x, _ in pairs], [y for _, y in pairs])

@@ -1,8 +1,8 @@
-"""Stances of made-up batches: whether the mud gave way or the body, and what that says about the mud's strength.
+"""Stances of synthetic batches: whether the mud or the body moved, and what that says about the mud's strength.
 
-A flipper sweeps back from 30 to -30 degrees at 3 cm in pieces of 6 mm, as the estimator's batches are. The mud bears
-k_s Ψ once it has been sheared far enough and less before, as mud does; the body stands, or goes forward by a share of
-the flipper's way.
+A flipper sweeps back from 30 to -30 degrees at 3 cm in pieces of 6 mm, like the estimator's batches. The mud resists
+with k_s Ψ once it has been sheared far enough and with less before, as real mud does; the body stands, or advances by a
+fraction of the flipper's travel.
 """
 
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ def moment_m4(batch: Batch, surface_m: float = 0.0) -> float:
 
 
 def poses(body_fraction: float = 0.0, depth_m: float = DEPTH_M, count: int = COUNT) -> list[Batch]:
-    """Without any load. The body advances by `body_share` of the flipper's way."""
+    """Return batches without load. The body advances by `body_fraction` of the flipper's travel."""
     batches, front_m = [], LENGTH_M * sin(FRONT_RAD)
     for i in range(count):
         sweep_rad = FRONT_RAD - STEP_RAD * i
@@ -52,12 +52,12 @@ def poses(body_fraction: float = 0.0, depth_m: float = DEPTH_M, count: int = COU
 
 
 def pressed(batches: Sequence[Batch], k_s: float = K_S, surface_m: float = 0.0) -> list[Batch]:
-    """Of mud that bears its whole strength in every batch."""
+    """Load every batch with the full strength of the mud."""
     return [batch._replace(sweep_nm=k_s * moment_m4(batch, surface_m)) for batch in batches]
 
 
 def sheared(batches: Sequence[Batch], k_s: float = K_S, base: Base = Base.FREE) -> list[Batch]:
-    """Of mud that bears the more, the farther it has been sheared, up to its strength at MOBILISED_M."""
+    """Load the batches with a strength that grows with the slip, up to the full strength at MOBILISED_M."""
     path_m, loaded = 0.0, []
     for batch, slip_m in zip(batches, [0.0, *(slips_m(GEOMETRY, batches, base) or ())], strict=True):
         path_m += slip_m
@@ -65,7 +65,7 @@ def sheared(batches: Sequence[Batch], k_s: float = K_S, base: Base = Base.FREE) 
     return loaded
 
 
-def blind(batches: Sequence[Batch]) -> list[Batch]:
+def without_pose(batches: Sequence[Batch]) -> list[Batch]:
     return [batch._replace(body_m=nan) for batch in batches]
 
 
@@ -78,7 +78,7 @@ def k_of(shear: Shear) -> float:
     return shear.fit.slope
 
 
-def borne(batches: Sequence[Batch]) -> list[float]:
+def withstood(batches: Sequence[Batch]) -> list[float]:
     return [batch.sweep_nm / moment_m4(batch) for batch in batches]
 
 
@@ -97,14 +97,14 @@ def test_a_body_at_rest_gives_the_strength_of_the_mud(base: Base, k_s: float, su
 @pytest.mark.parametrize("base", [Base.FREE, Base.FIXED])
 def test_the_load_before_the_mud_was_mobilised_does_not_count(base: Base) -> None:
     batches = sheared(poses(), base=base)
-    assert borne(batches)[2] < 0.6 * K_S  # so it would be noticed
+    assert withstood(batches)[2] < 0.6 * K_S  # so that the test would notice it
     assert k_of(found(batches, base)) == pytest.approx(K_S, rel=EXACT)
 
 
 def test_the_strength_is_fitted_to_the_pieces_that_had_been_sheared_far_enough() -> None:
-    """To just those, scattered by 2 %."""
+    """The fit takes exactly those pieces, whose torques alternate by ±2 %."""
     even = sheared(poses())
-    full = [fraction > (1.0 - EXACT) * K_S for fraction in borne(even)]
+    full = [fraction > (1.0 - EXACT) * K_S for fraction in withstood(even)]
     shaken = [b._replace(sweep_nm=b.sweep_nm * (1.02 if i % 2 else 0.98)) for i, b in enumerate(even)]
     reported = [b for b, is_full in zip(shaken, full, strict=True) if is_full]
     shear = found(shaken)
@@ -113,7 +113,7 @@ def test_the_strength_is_fitted_to_the_pieces_that_had_been_sheared_far_enough()
 
 
 def test_a_fixed_base_needs_no_pose() -> None:
-    assert found(blind(sheared(poses())), Base.FIXED) == found(sheared(poses()), Base.FIXED)
+    assert found(without_pose(sheared(poses())), Base.FIXED) == found(sheared(poses()), Base.FIXED)
 
 
 def test_a_fixed_base_ignores_the_pose() -> None:
@@ -121,7 +121,7 @@ def test_a_fixed_base_ignores_the_pose() -> None:
 
 
 def test_the_uncertainty_is_that_of_the_batches_that_yield() -> None:
-    """5 % up and down in turn: more doubt than without, and not more than 5 %."""
+    """The torques alternate by ±5 %: the error is larger than without scatter and smaller than 5 %."""
     batches = pressed(poses())
     shaken = [b._replace(sweep_nm=b.sweep_nm * (1.05 if i % 2 else 0.95)) for i, b in enumerate(batches)]
     fit = found(shaken).fit
@@ -133,7 +133,7 @@ def test_the_uncertainty_is_that_of_the_batches_that_yield() -> None:
 
 
 def test_where_the_body_goes_along_and_the_mud_holds_there_is_a_bound() -> None:
-    """The body's drag is all that the mud had to bear: a third of its strength."""
+    """The mud only has to withstand the body's drag, a third of its strength."""
     shear = found(pressed(poses(0.95), K_S / 3.0))
     assert (shear.case, shear.at_least, shear.reason) == ("body", True, "the mud held: the body moved")
     assert k_of(shear) == pytest.approx(K_S / 3.0, rel=EXACT)
@@ -142,21 +142,21 @@ def test_where_the_body_goes_along_and_the_mud_holds_there_is_a_bound() -> None:
 
 @pytest.mark.parametrize("body_fraction", [0.25, 0.5, 0.7])
 def test_where_the_plate_slips_while_the_body_advances_the_strength_is_reported(body_fraction: float) -> None:
-    """At 70 % of 12 cm it slips 3.6 cm, so few batches are left; but they have all of the strength."""
+    """At 70 % of 12 cm the plate slips 3.6 cm: few batches are left, but each has the full strength."""
     shear = found(sheared(poses(body_fraction), base=Base.FREE))
     assert (shear.case, shear.at_least) == ("mixed", False)
     assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
 
 
 def test_only_the_pieces_count_in_which_the_plate_slips() -> None:
-    """The body stands for half of the way and is then pushed along, with half of the force."""
+    """The body stands for half of the stance and is then pushed along with half of the force."""
     still, moved = pressed(poses(0.0)), pressed(poses(1.0), K_S / 2.0)
     middle = COUNT // 2
     start_m = moved[middle].body_m
     batches = [*still[:middle], *(batch._replace(body_m=batch.body_m - start_m) for batch in moved[middle:])]
     shear = found(batches)
     assert shear.case == "mixed"
-    assert k_of(shear) == pytest.approx(K_S, rel=0.02)  # the border's batch has half of either
+    assert k_of(shear) == pytest.approx(K_S, rel=0.02)  # the batch in between has half of each
 
 
 @pytest.mark.parametrize(("body_fraction", "case"), [(0.15, "yield"), (0.25, "mixed")])
@@ -165,13 +165,13 @@ def test_up_to_a_fifth_of_the_travel_the_body_counts_as_standing(body_fraction: 
 
 
 def test_a_plate_that_hardly_slips_is_held() -> None:
-    """Over a long way it would slip MOBILISED_M all the same."""
+    """Over a long path the plate would slip MOBILISED_M all the same."""
     fraction = 1.0 - 0.9 * SLIPPING
     assert found(pressed(poses(fraction))).case == "body"
 
 
-def test_a_body_that_slides_back_is_no_travel_of_the_plates() -> None:
-    """The plate is dragged backward faster than the flipper sweeps: it slips all the more."""
+def test_a_body_that_slides_back_adds_to_the_slip_of_the_plate() -> None:
+    """The plate is dragged backward faster than the flipper sweeps, so it slips even more."""
     shear = found(pressed(poses(-0.5)))
     assert shear.case == "yield"
     assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
@@ -184,7 +184,7 @@ def test_the_slip_is_the_path_back_through_the_mud() -> None:
     path_m = LENGTH_M * (sin(batches[0].sweep_rad) - sin(batches[-1].sweep_rad))
     assert sum(reported) == pytest.approx(0.6 * path_m)
     assert sum(slips_m(GEOMETRY, batches, Base.FIXED) or ()) == pytest.approx(path_m)
-    assert slips_m(GEOMETRY, blind(batches), Base.FREE) is None
+    assert slips_m(GEOMETRY, without_pose(batches), Base.FREE) is None
 
 
 # a motor at its limit
@@ -213,7 +213,7 @@ def test_fewer_than_three_batches_give_no_estimate(count: int) -> None:
     assert shear.reason == "a motor at its limit"
 
 
-def test_between_bound_and_value_lie_the_pieces_that_a_fit_needs() -> None:
+def test_a_bound_becomes_a_value_once_a_fit_has_enough_pieces() -> None:
     """As the stance gets longer, a bound becomes a value when MIN_BATCHES have yielded."""
     cases = [found(pressed(poses(count=count))).case for count in range(3, COUNT + 1)]
     first = cases.index("yield")
@@ -226,34 +226,36 @@ def test_between_bound_and_value_lie_the_pieces_that_a_fit_needs() -> None:
 
 
 def test_below_the_bodys_drag_the_body_cannot_have_moved() -> None:
-    """Both flippers together: 2 cos α τ / l is under 2 N everywhere for the strength of a third of that."""
+    """The thrust of both flippers, 2 cos α τ / l, is below 2 N everywhere, since the mud's strength is a third of
+    that.
+    """
     weak = 0.33 * STANDS * DRAG_N * LENGTH_M / moment_m4(poses()[COUNT // 2])
-    shear = found(blind(sheared(poses(), weak)))
+    shear = found(without_pose(sheared(poses(), weak)))
     assert (shear.case, shear.at_least, shear.reason) == ("yield", False, "")
     assert k_of(shear) == pytest.approx(weak, rel=EXACT)
 
 
 def test_above_the_bodys_drag_it_may_have_moved() -> None:
-    shear = found(blind(pressed(poses())))
+    shear = found(without_pose(pressed(poses())))
     assert (shear.case, shear.at_least) == ("unknown", True)
     assert shear.reason == "no pose: the body may have moved"
     assert k_of(shear) == pytest.approx(K_S, rel=EXACT)
 
 
 @pytest.mark.parametrize(("fraction", "case"), [(0.79, "yield"), (0.81, "unknown")])
-def test_four_fifths_of_the_drag_is_the_border(fraction: float, case: str) -> None:
+def test_the_body_stands_up_to_four_fifths_of_its_drag(fraction: float, case: str) -> None:
     batches = [batch._replace(sweep_nm=fraction * DRAG_N * LENGTH_M / cos(batch.sweep_rad)) for batch in poses()]
-    assert found(blind(batches)).case == case
+    assert found(without_pose(batches)).case == case
 
 
 def test_without_drag_there_is_never_a_value() -> None:
-    assert found(blind(pressed(poses(), 1e3)), drag_n=0.0).at_least
+    assert found(without_pose(pressed(poses(), 1e3)), drag_n=0.0).at_least
 
 
 def test_two_wild_pieces_do_not_move_the_body() -> None:
-    weak = blind(pressed(poses(), 0.05e6))
-    for place in (3, 12):
-        weak[place] = weak[place]._replace(sweep_nm=5.0)
+    weak = without_pose(pressed(poses(), 0.05e6))
+    for index in (3, 12):
+        weak[index] = weak[index]._replace(sweep_nm=5.0)
     assert found(weak).case == "yield"
 
 
@@ -264,8 +266,8 @@ def test_one_lost_position_of_the_body_is_no_pose() -> None:
 
 
 def test_without_a_pose_a_short_stance_gives_no_value() -> None:
-    """However small its force: so little way mobilises no mud."""
-    assert found(blind(pressed(poses(count=5), 1e3))).at_least
+    """However small the force is, such a short path mobilises no mud."""
+    assert found(without_pose(pressed(poses(count=5), 1e3))).at_least
 
 
 # bounds
@@ -276,21 +278,21 @@ loads_nm = st.lists(st.floats(0.0, 2.0), min_size=3, max_size=COUNT)
 
 @given(loads_nm)
 def test_a_bound_never_exceeds_the_load_of_two_batches(torques_nm: list[float]) -> None:
-    """The body moves all the way. One wild piece cannot make a bound: it is a median of three at least."""
+    """The body advances all the way. One outlier cannot make a bound, which is a median of at least three batches."""
     batches = [batch._replace(sweep_nm=torque_nm) for batch, torque_nm in zip(poses(1.0), torques_nm, strict=False)]
     shear = found(batches)
     assert shear.case == "body"
-    assert k_of(shear) <= sorted(borne(batches))[-2]
+    assert k_of(shear) <= sorted(withstood(batches))[-2]
 
 
 @given(st.lists(st.floats(0.1, 2.0), min_size=3, max_size=COUNT))
 def test_the_load_of_all_batches_is_a_bound(torques_nm: list[float]) -> None:
     batches = [batch._replace(sweep_nm=torque_nm) for batch, torque_nm in zip(poses(1.0), torques_nm, strict=False)]
-    assert k_of(found(batches)) >= min(borne(batches))
+    assert k_of(found(batches)) >= min(withstood(batches))
 
 
 def test_the_bound_is_the_largest_sustained_load() -> None:
-    """Half of the strength, all of it, and half again."""
+    """The batches withstand half of the strength, then all of it, then half again."""
     fractions = [0.5] * 7 + [1.0] * 7 + [0.5] * 7
     batches = [
         b._replace(sweep_nm=fraction * b.sweep_nm) for b, fraction in zip(pressed(poses(1.0)), fractions, strict=True)
@@ -317,7 +319,7 @@ def test_a_plate_in_the_air_gives_no_estimate(base: Base) -> None:
 
 
 def test_pieces_above_the_surface_withstand_nothing() -> None:
-    """A plate that comes in on the way: what lies before has no pressure, and no part in a bound."""
+    """The plate enters the mud during the stance: the pieces before have no pressure and no part in the bound."""
     batches = [*poses(1.0, -0.005, 4), *pressed(poses(1.0))[4:]]
     assert k_of(found(batches)) == pytest.approx(K_S, rel=EXACT)
 
@@ -328,9 +330,9 @@ def test_no_torque_makes_it_raise(
 ) -> None:
     batches = [batch._replace(sweep_nm=each) for batch, each in zip(poses(body_fraction), torques_nm, strict=True)]
     for base in Base:
-        for seen in (batches, blind(batches)):
+        for seen in (batches, without_pose(batches)):
             found(seen, base, drag_n, surface_m)
 
 
-def test_endless_torques_are_no_bound() -> None:
+def test_infinite_torques_are_no_bound() -> None:
     assert found([batch._replace(sweep_nm=inf) for batch in poses(1.0)]).fit is None

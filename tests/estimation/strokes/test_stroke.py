@@ -17,7 +17,9 @@ Row = tuple[float, float]  # time and travel
 def row(
     now_s: float, travel_m: float, saturated: bool = False, body_m: float | None = None
 ) -> tuple[float, float, float, float, float, float, float, bool]:
-    """All else in proportion to the travel, so that a batch's means can be told."""
+    """Return a sample whose values are in proportion to its travel, so that the mean of a batch shows in each of
+    them.
+    """
     body_m = 6.0 * travel_m if body_m is None else body_m
     return now_s, travel_m, 2.0 * travel_m, 3.0 * travel_m, 4.0 * travel_m, 5.0 * travel_m, body_m, saturated
 
@@ -65,7 +67,7 @@ def test_even_motion_leaves_batches_of_equal_travel_in_either_direction(directio
 
 
 def test_the_rate_of_messages_does_not_change_the_batches() -> None:
-    """A batch ends with the first sample that is a step away: later by less than the way between two samples."""
+    """A batch ends with the first sample that is a step away, late by less than the travel between two samples."""
     often, seldom = (stroke_of(even(rate_hz)).batches for rate_hz in (38000.0, 380.0))
     per_sample_m = SPEED_M_S / 380.0
     assert len(often) * STEP_M / (STEP_M + per_sample_m) - 1 <= len(seldom) <= len(often)
@@ -100,7 +102,9 @@ def test_a_stroke_without_end_takes_no_more_memory() -> None:
 
 
 def test_the_longest_stroke_of_this_robot_is_stored_whole() -> None:
-    """A sweep of ±60° at 6 mm, and 7 cm of insertion from 1.5 cm above the mud at 1.5 mm."""
+    """The longest strokes are a sweep of ±60° in steps of 6 mm, and 7 cm of insertion from 1.45 cm above the mud in
+    steps of 1.5 mm.
+    """
     assert 2.0 * np.deg2rad(60.0) * 0.12 / 0.006 < LONGEST
     assert (0.07 + 0.0145) / STEP_M < LONGEST
 

@@ -1,4 +1,4 @@
-"""From batches of one stroke to k_p and k_e: made-up strokes that keep the law, and strokes that bend from it."""
+"""k_p and k_e from the batches of one stroke: synthetic strokes that keep the law, and strokes that deviate from it."""
 
 from collections.abc import Callable, Sequence
 from math import cos, hypot, inf, isfinite, nan, radians
@@ -39,15 +39,15 @@ FRONT_RAD = radians(30.0)
 K = 1.0e6
 EXACT = 1e-9  # rounding
 
-Law = Callable[[float], float]  # share of k Φ at a depth
+Law = Callable[[float], float]  # fraction of k Φ at a depth
 
 
 def as_the_law(depth_m: float) -> float:
     return 1.0
 
 
-def bearing_at_once(depth_m: float) -> float:
-    """Mud that bears a sixth of the force at 3 cm as soon as it is touched."""
+def supporting_at_once(depth_m: float) -> float:
+    """Return the factor of mud that supports a sixth of the force at 3 cm as soon as it is touched."""
     return 1.0 + 0.005 / max(depth_m, 0.001)
 
 
@@ -64,7 +64,7 @@ def batch_at(travel_m: float, sweep_rad: float = FRONT_RAD, samples: int = SAMPL
 
 
 def loaded(batch: Batch, k: float, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0) -> Batch:
-    """τ₂ = k Φ and what crosses over from a face that turns the sweep joint by `face_nm`."""
+    """Load a batch with τ₂ = k Φ and the cross-coupling of a face load that turns the sweep joint by `face_nm`."""
     plate = submerged_plate(GEOMETRY, batch.sweep_rad, batch.adduction_rad, surface_m)
     moment_m4 = law(batch.travel_m - surface_m) * stroke_moment_m4(GEOMETRY, plate, batch.sweep_rad)
     across_nm = cross_coupling(GEOMETRY, plate, batch.sweep_rad) * face_nm
@@ -85,8 +85,8 @@ def down(
 def up(
     k: float = K, surface_m: float = 0.0, law: Law = as_the_law, face_nm: float = 0.0, sweep_rad: float = -FRONT_RAD
 ) -> list[Batch]:
-    ways = reversed(depths(step_m=0.002))
-    return [loaded(batch_at(travel_m, sweep_rad), -k, surface_m, law, face_nm) for travel_m in ways]
+    rising_m = reversed(depths(step_m=0.002))
+    return [loaded(batch_at(travel_m, sweep_rad), -k, surface_m, law, face_nm) for travel_m in rising_m]
 
 
 def insertion(batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0) -> Estimate:
@@ -106,7 +106,7 @@ def extraction(
 @pytest.mark.parametrize("surface_m", [-0.003, 0.0, 0.0021])
 @pytest.mark.parametrize("k", [1e4, 1e6, 3e7])
 def test_a_stroke_that_keeps_the_law_gives_its_coefficient(k: float, surface_m: float, face_nm: float) -> None:
-    """Exactly, whatever the face bears: that is what the sweep joint is asked for."""
+    """The coefficient is exact under any load on the face, because the sweep joint measures that load."""
     inserted = insertion(down(k, surface_m, face_nm=face_nm), surface_at(surface_m))
     extracted = extraction(up(k, surface_m, face_nm=face_nm), surface_at(surface_m))
     assert inserted.value == pytest.approx(k, rel=EXACT)
@@ -124,16 +124,16 @@ def test_a_face_load_that_was_left_in_would_be_taken_for_mud() -> None:
 
 
 def test_only_batches_in_the_mud_count() -> None:
-    """A force above the surface, and samples there, change nothing; nor do the first quarter of the way up."""
+    """Forces and samples above the surface change nothing, nor does the first quarter of the rise."""
     batches, rising = down(), up()
     start_m = 0.75 * 0.03
-    odd_down = [b._replace(adduction_nm=1.0, samples=1) if b.travel_m < -STEP_M else b for b in batches]
-    odd_up = [
+    altered_down = [b._replace(adduction_nm=1.0, samples=1) if b.travel_m < -STEP_M else b for b in batches]
+    altered_up = [
         b._replace(adduction_nm=1.0, samples=1) if b.travel_m > start_m + 0.001 or b.travel_m < -0.001 else b
         for b in rising
     ]
-    assert insertion(odd_down) == insertion(batches)
-    assert extraction(odd_up) == extraction(rising)
+    assert insertion(altered_down) == insertion(batches)
+    assert extraction(altered_up) == extraction(rising)
 
 
 def test_samples_are_those_of_the_batches_in_the_mud() -> None:
@@ -142,18 +142,18 @@ def test_samples_are_those_of_the_batches_in_the_mud() -> None:
 
 
 def test_batches_count_by_their_travel_and_not_by_their_number() -> None:
-    """The lower half in pieces a quarter as long: where the law bends, counting pieces would read 2 % less. Half a
-    percent is left, since the Huber weights ask all pieces for their median residual.
+    """The lower half comes in pieces a quarter as long: where the law bends, counting pieces would read 2 % less. Half
+    a percent remains, since the Huber weights use the median residual of all pieces.
     """
-    even = [loaded(batch_at(travel_m), K, law=bearing_at_once) for travel_m in depths()]
+    even = [loaded(batch_at(travel_m), K, law=supporting_at_once) for travel_m in depths()]
     halves = depths(-0.012, 0.015), depths(0.015, 0.03, STEP_M / 4.0)
-    finer = [loaded(batch_at(travel_m), K, law=bearing_at_once) for half in halves for travel_m in half]
-    assert counted_alike(finer) / counted_alike(even) < 0.985
+    finer = [loaded(batch_at(travel_m), K, law=supporting_at_once) for half in halves for travel_m in half]
+    assert equally_weighted(finer) / equally_weighted(even) < 0.985
     assert insertion(finer).value == pytest.approx(insertion(even).value, rel=0.005)
 
 
-def counted_alike(batches: Sequence[Batch]) -> float:
-    """Least squares over the batches in the mud."""
+def equally_weighted(batches: Sequence[Batch]) -> float:
+    """Fit the batches in the mud by least squares with equal weights."""
     wet = [b for b in batches if b.travel_m > 0.0]
     plates = [submerged_plate(GEOMETRY, b.sweep_rad, b.adduction_rad) for b in wet]
     moments = np.array([stroke_moment_m4(GEOMETRY, plate, FRONT_RAD) for plate in plates])
@@ -172,7 +172,7 @@ def counted_alike(batches: Sequence[Batch]) -> float:
 def test_the_travel_of_all_batches_between_two_depths_adds_up_to_the_distance(
     steps_m: list[float], shallowest_m: float, height_m: float, upward: bool
 ) -> None:
-    """Batches meet half-way between their means, and reach as far beyond the first and the last one."""
+    """Batches meet half-way between their means; the first and the last extend as far to their outer side."""
     means_m = list(np.cumsum(steps_m) - 0.012)
     first_m, last_m = means_m[0] - steps_m[1] / 2.0, means_m[-1] + steps_m[-1] / 2.0
     ordered = reversed(means_m) if upward else means_m
@@ -191,10 +191,11 @@ def test_one_batch_has_no_travel() -> None:
 
 @pytest.mark.parametrize("limit", ["surface", "start"])
 def test_a_coefficient_moves_smoothly_as_a_limit_crosses_batches(limit: str) -> None:
-    """Over two batches in steps of 10 µm. A batch taken in whole or not at all, a twentieth of the way with a value
-    that is off by some ten percent, would jump by about 1 %; the surface itself moves k by 3/2 · 10 µm / 2 cm a step.
+    """The limit moves over two batches in steps of 10 µm. A batch that counted wholly or not at all, a twentieth of the
+    path with a value that is off by some ten percent, would jump by about 1 %; the surface itself moves k by 3/2 · 10
+    µm / 2 cm per step.
     """
-    stroke = up(law=bearing_at_once)
+    stroke = up(law=supporting_at_once)
     values = []
     for i in range(400):
         moved_m = 1e-5 * i
@@ -205,16 +206,16 @@ def test_a_coefficient_moves_smoothly_as_a_limit_crosses_batches(limit: str) -> 
 
 
 def test_an_insertion_moves_smoothly_with_the_surface() -> None:
-    stroke = down(law=bearing_at_once)
+    stroke = down(law=supporting_at_once)
     values = [insertion(stroke, surface_at(1e-5 * i)).value for i in range(400)]
-    assert np.abs(np.diff(values)).max() / K < 2e-3  # as above
+    assert np.abs(np.diff(values)).max() / K < 2e-3  # as in the test above
 
 
-# the doubt
+# the uncertainty
 
 
 def pieces(surface_m: float, k: float = K, law: Law = as_the_law) -> tuple[list[float], list[float], list[float]]:
-    """Leverages for a surface at `surface_m`, torques of one at 0, and depths."""
+    """Return the moments for a surface at `surface_m`, the torques for a surface at 0, and the depths."""
     batches = [loaded(batch_at(travel_m), k, 0.0, law) for travel_m in depths() if travel_m > 0.004]
     plates = [submerged_plate(GEOMETRY, b.sweep_rad, b.adduction_rad, surface_m) for b in batches]
     moments = [stroke_moment_m4(GEOMETRY, plate, FRONT_RAD) for plate in plates]
@@ -226,23 +227,25 @@ def plain_slope(surface_m: float, law: Law) -> float:
     return float(moments @ torques / (moments @ moments))
 
 
-@pytest.mark.parametrize("law", [as_the_law, bearing_at_once])
+@pytest.mark.parametrize("law", [as_the_law, supporting_at_once])
 def test_the_slope_per_surface_is_the_numeric_derivative(law: Law) -> None:
-    """To 5 %: Φ falls by about Φ dδ/z, for the plate leans and its volume's middle moves."""
+    """The tolerance is 5 %: Φ falls only by about Φ dδ/z, since the plate leans and the centroid of its volume
+    moves.
+    """
     numeric = (plain_slope(1e-6, law) - plain_slope(-1e-6, law)) / 2e-6
     reported = _slope_per_surface(OriginFit(plain_slope(0.0, law), 0.0), *pieces(0.0, law=law))
     assert reported == pytest.approx(numeric, rel=0.05)
 
 
 def test_the_slope_per_surface_is_three_halves_of_slope_over_depth() -> None:
-    """Of an upright plate, whose Φ is in proportion to z, in many small pieces: Σz/Σz² = 3/(2 z)."""
+    """The plate is upright, so Φ is in proportion to z, and the pieces are many and small: Σz/Σz² = 3/(2 z)."""
     depths_m = [1e-5 * (i + 0.5) for i in range(3000)]
     reported = _slope_per_surface(OriginFit(K, 0.0), depths_m, [K * depth_m for depth_m in depths_m], depths_m)
     assert reported == pytest.approx(1.5 * K / 0.03, rel=1e-3)
 
 
 def systematic(estimate: Estimate) -> float:
-    """What is left of the doubt beside the torque's repeatability, as a share."""
+    """Return the relative uncertainty without the part of the torque's repeatability."""
     fraction = estimate.std_error / estimate.value
     return float(np.sqrt(fraction * fraction - TORQUE_REPEATABILITY * TORQUE_REPEATABILITY))
 
@@ -254,15 +257,16 @@ def test_without_noise_only_the_torques_repeatability_is_left() -> None:
 
 @pytest.mark.parametrize("error_m", [0.0002, 0.001])
 def test_the_uncertainty_of_the_surface_is_that_of_a_moved_one(error_m: float) -> None:
-    """To 10 %: first order in 1 mm of 3 cm, and Φ's fall as above."""
+    """The tolerance is 10 %: the error is of first order in 1 mm of 3 cm, and Φ falls as above."""
     reported = systematic(insertion(down(), surface_at(0.0, error_m)))
     deeper, higher = (insertion(down(), surface_at(sign * error_m)).value for sign in (1.0, -1.0))
     assert reported == pytest.approx((deeper - higher) / 2.0 / K, rel=0.1)
 
 
 def test_the_uncertainty_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
-    """3/2 of it over the edge and the depth, for a line through the origin: as of a plate that moves straight down.
-    A leaning one has less lever for a weight than for its volume, so this is more than enough, by half as much again.
+    """The uncertainty is 3/2 of the weight over the edge and the depth, as for a line through the origin and a plate
+    that moves straight down. A leaning plate has less lever for a weight than for its volume, so this exceeds the true
+    error by about half.
     """
     weight_n = 0.1
     reported = systematic(insertion(down(), zero_error_n=weight_n))
@@ -274,11 +278,11 @@ def test_the_uncertainty_of_the_zero_allows_for_a_weight_on_the_edge() -> None:
     assert truly < reported < 2.0 * truly
     assert reported == pytest.approx(
         1.5 * weight_n / (EDGE_M2 * 0.03) / K, rel=0.03
-    )  # the last batch's middle is higher
+    )  # the middle of the last batch is less deep
 
 
 @pytest.mark.parametrize("face_nm", [-0.3, 0.2])
-def test_a_quarter_of_the_cross_coupling_stays_uncertain(face_nm: float) -> None:
+def test_a_fraction_of_the_cross_coupling_stays_uncertain(face_nm: float) -> None:
     unfelt = insertion([batch._replace(sweep_nm=0.0) for batch in down(face_nm=face_nm)]).value
     reported = systematic(insertion(down(face_nm=face_nm)))
     assert reported == pytest.approx(CROSS_COUPLING_UNCERTAINTY * abs(unfelt / K - 1.0), rel=1e-3)
@@ -293,7 +297,7 @@ def test_scatter_of_the_batches_adds_to_the_uncertainty() -> None:
     assert 0.002 < uncertainties[0] < uncertainties[1] < 0.05
 
 
-# what is no coefficient
+# invalid coefficients
 
 
 def lever_m(batch: Batch) -> float:
@@ -302,20 +306,20 @@ def lever_m(batch: Batch) -> float:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_batches_in_poses_without_a_vertical_lever_do_not_count(sign: float) -> None:
-    """At 5 cm and 30 degrees there are 14 mm of it, and 30 mm at 4.68 cm."""
+    """The vertical lever is 14 mm at 5 cm and 30 degrees, and 30 mm at 4.68 cm."""
     batches = [loaded(batch_at(travel_m, sign * FRONT_RAD), sign * K) for travel_m in depths(end_m=0.05)[:: int(sign)]]
-    blind = [batch for batch in batches if lever_m(batch) < MIN_VERTICAL_LEVER_M]
-    wrong = [batch._replace(adduction_nm=9.0) if batch in blind else batch for batch in batches]
+    unobservable = [batch for batch in batches if lever_m(batch) < MIN_VERTICAL_LEVER_M]
+    wrong = [batch._replace(adduction_nm=9.0) if batch in unobservable else batch for batch in batches]
     reported, seen = ((insertion(each) if sign > 0.0 else extraction(each, start_m=0.07)) for each in (wrong, batches))
-    assert 0.0468 < min(batch.travel_m for batch in blind) < 0.0468 + STEP_M
+    assert 0.0468 < min(batch.travel_m for batch in unobservable) < 0.0468 + STEP_M
     assert reported == seen
     assert reported.valid
     assert reported.value == pytest.approx(K, rel=EXACT)
-    assert reported.samples == SAMPLES * sum(batch.travel_m > 0.0 and batch not in blind for batch in batches)
+    assert reported.samples == SAMPLES * sum(batch.travel_m > 0.0 and batch not in unobservable for batch in batches)
 
 
 def test_a_stroke_wholly_in_poses_without_a_vertical_lever_cannot_be_observed() -> None:
-    """In mud that begins 4.7 cm deep. One that ends above is as short of pieces, but not for their poses."""
+    """The mud begins 4.7 cm deep. A stroke that ends above has as few pieces, but not because of its poses."""
     batches = [loaded(batch_at(travel_m), K, 0.047) for travel_m in depths(end_m=0.05, step_m=0.0005)]
     reported = insertion(batches, surface_at(0.047))
     assert (reported.valid, reported.reason, reported.samples) == (False, UNOBSERVABLE, 0)
@@ -369,7 +373,7 @@ def test_an_error_up_to_its_limit_is_valid() -> None:
     ).valid
 
 
-@example([0.0] * 28, -5e-324, 0.0)  # a piece of way whose half is nothing
+@example([0.0] * 28, -5e-324, 0.0)  # a piece of travel whose half underflows to zero
 @given(st.lists(st.floats(), min_size=28, max_size=28), st.floats(-0.02, 0.02), st.floats(0.0, 1.0))
 def test_no_torque_makes_it_raise(torques_nm: list[float], surface_m: float, zero_error_n: float) -> None:
     batches = [b._replace(adduction_nm=t, sweep_nm=t / 2.0) for b, t in zip(down(), torques_nm, strict=True)]
@@ -385,8 +389,8 @@ def test_no_torque_makes_it_raise(torques_nm: list[float], surface_m: float, zer
 
 
 @pytest.mark.parametrize("level_nm", [-0.05, 0.0, 0.08])
-def test_a_level_is_taken_off_as_of_a_straight_arm(level_nm: float) -> None:
-    """It was told of the force τ₂ / cos α, so it is the same in all poses times cos α; nothing else changes."""
+def test_a_level_is_subtracted_in_proportion_to_the_arms_reach(level_nm: float) -> None:
+    """The level was measured as the force τ₂ / cos α, so each pose loses it times cos α; nothing else changes."""
     batches = [*down(face_nm=0.1), *up(face_nm=0.1)]
     lifted = [b._replace(adduction_nm=b.adduction_nm + level_nm * cos(b.sweep_rad)) for b in batches]
     for freed, batch in zip(level_free(lifted, level_nm), batches, strict=True):
@@ -398,7 +402,7 @@ def test_a_level_is_taken_off_as_of_a_straight_arm(level_nm: float) -> None:
 
 
 def test_mud_that_did_not_yield_gives_a_lower_bound() -> None:
-    """It rose by 6 mm: too little for a fit."""
+    """The flipper rose by 6 mm, too little for a fit."""
     batches = [loaded(batch_at(travel_m, -FRONT_RAD), -K, face_nm=0.2) for travel_m in (0.03, 0.028, 0.026, 0.024)]
     reported = bound_extraction(GEOMETRY, batches, surface_at(0.0))
     assert (reported.valid, reported.at_least, reported.reason) == (True, True, NOT_OUT)
@@ -407,7 +411,7 @@ def test_mud_that_did_not_yield_gives_a_lower_bound() -> None:
     assert reported.samples == 4 * SAMPLES
 
 
-def test_what_bore_nothing_is_no_bound() -> None:
+def test_batches_that_withstood_nothing_give_no_bound() -> None:
     for batches in ([], [batch_at(-0.01)], [loaded(batch_at(0.03), K)]):
         reported = bound_extraction(GEOMETRY, batches, surface_at(0.0))
         assert not reported.valid and not reported.at_least

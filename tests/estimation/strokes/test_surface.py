@@ -1,4 +1,4 @@
-"""The surface of made-up mud: how well it is found, whether its doubt is honest, and what is no surface at all."""
+"""The surface of synthetic mud: how well it is found, whether its uncertainty is right, and what is no surface."""
 
 from math import e, inf, nan, sqrt
 from typing import NamedTuple
@@ -21,12 +21,12 @@ from estimation.strokes.surface import (
 
 Array = NDArray[np.float64]
 ABOVE_M, BELOW_M = 0.0145, 0.03  # of an insertion: clearance and depth
-REFERENCE_NOISE_N, REFERENCE_COUNT = 0.096, 64  # what section 4's table comes out with, below the surface
+REFERENCE_NOISE_N, REFERENCE_COUNT = 0.096, 64  # they reproduce the table of section 4, below the surface
 BATCH_NOISE_N, BATCH_COUNT = 0.05, 20
 
 
 def depths(seed: int, count: int = BATCH_COUNT) -> Array:
-    """Even steps, anywhere within a step."""
+    """Return depths in even steps with a random start within one step."""
     step_m = BELOW_M / count
     return np.arange(-ABOVE_M, BELOW_M - step_m, step_m) + np.random.default_rng(seed).uniform(0.0, step_m)
 
@@ -42,12 +42,12 @@ def found(depths_m: Array, forces_n: Array) -> Surface:
 class Scores(NamedTuple):
     errors_mm: Array
     reported_mm: float  # standard error, on average
-    covered: float  # share within two of them
+    covered: float  # fraction within two standard errors
     errors_of_k: Array
 
 
 def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int, runs: int = 400) -> Scores:
-    """Of mud that bears a jump and a slope, over many insertions."""
+    """Return the errors over many insertions into mud whose force is a jump plus a slope."""
     errors_mm, reported_mm, covered, of_k = [], 0.0, 0, []
     for seed in range(runs):
         z = depths(seed, count)
@@ -71,9 +71,9 @@ def scores(slope_n_m: float, jump_n: float, noise_n: float, count: int, runs: in
     [(0.25, 0.055, 1.70), (0.5, 0.028, 0.61), (1.0, 0.014, 0.28), (1.6, 0.009, 0.18), (3.0, 0.004, 0.10)],
 )
 def test_k_law_mud_of_any_slope_has_little_bias(slope_n_cm: float, table_sd: float, trigger_bias: float) -> None:
-    """Beside section 4's table: slope and intercept of samples that are known to be in the mud have no bias and the
-    table's sd. Not knowing the border costs less than three times that, and a bias of under half the scatter, since
-    now and then noise makes a jump; the paper's trigger has a bias of 20 times the table's sd and more.
+    """The comparison is section 4's table: slope and intercept of samples that are known to be in the mud have no bias
+    and the table's sd. An unknown border costs less than three times that sd, and a bias of under half the scatter,
+    since noise occasionally looks like a jump; the paper's trigger has a bias of 20 times the table's sd and more.
     """
     k = scores(100.0 * slope_n_cm, 0.0, REFERENCE_NOISE_N, REFERENCE_COUNT).errors_of_k
     assert table_sd <= np.std(k) <= 3.0 * table_sd
@@ -86,7 +86,9 @@ def test_k_law_mud_of_any_slope_has_little_bias(slope_n_cm: float, table_sd: flo
     ("noise_n", "count"), [(REFERENCE_NOISE_N, REFERENCE_COUNT), (BATCH_NOISE_N, BATCH_COUNT)], ids=["rows", "batches"]
 )
 def test_two_standard_errors_cover_the_surface_of_k_law_mud(slope_n_cm: float, noise_n: float, count: int) -> None:
-    """Measured: 92 to 97 %, three sampling errors of 400 runs are 4 %; and no larger than they need be."""
+    """The measured coverage is 92 to 97 %, three sampling errors of 400 runs are 4 %; the errors are no larger than
+    needed.
+    """
     result = scores(100.0 * slope_n_cm, 0.0, noise_n, count)
     assert 0.88 <= result.covered <= 0.99
     assert 0.7 <= result.reported_mm / np.std(result.errors_mm) <= 1.3
@@ -94,7 +96,7 @@ def test_two_standard_errors_cover_the_surface_of_k_law_mud(slope_n_cm: float, n
 
 @pytest.mark.parametrize("shift_m", [-0.005, 0.0, 0.0007, 0.004])
 def test_a_surface_without_noise_is_found_to_a_seventh_of_a_batch(shift_m: float) -> None:
-    """The kink is exact. A jump half a batch aside at most fits as well, and keeps a share of 1/(1 + e)."""
+    """The kink is exact. A jump at most half a batch away fits as well and keeps a weight of 1/(1 + e)."""
     z = depths(1)
     surface = found(z, 1.5 + 80.0 * np.maximum(0.0, z - shift_m))
     assert abs(surface.depth_m - shift_m) <= BELOW_M / BATCH_COUNT / 2.0 / (1.0 + e) + 1e-6
@@ -102,12 +104,12 @@ def test_a_surface_without_noise_is_found_to_a_seventh_of_a_batch(shift_m: float
     assert surface.level_n == pytest.approx(1.5, abs=1e-3)
 
 
-@example(0.0, 0.03125, 6, 0.2)  # a kink right at a batch, which two borders explain equally well
+@example(0.0, 0.03125, 6, 0.2)  # a kink exactly at a batch, which two borders explain equally well
 @given(st.floats(-5.0, 5.0), st.floats(-0.1, 0.1), st.integers(0, 20), st.sampled_from([0.0, 0.2, 1.0]))
 def test_offsets_of_force_and_depth_only_move_the_result(
     offset_n: float, offset_m: float, seed: int, jump_n: float
 ) -> None:
-    """With shapes that the residuals decide on, and with ones that they do not."""
+    """The residuals decide the shape for some of these jumps and leave it open for others."""
     z = depths(seed)
     force = np.where(z > 0.0, jump_n + 100.0 * z, 0.0) + BATCH_NOISE_N * noise(seed, len(z))
     plain, moved = found(z, force), found(z + offset_m, force + offset_n)
@@ -119,7 +121,9 @@ def test_offsets_of_force_and_depth_only_move_the_result(
 
 @pytest.mark.parametrize(("slope_n_m", "jump_n"), [(100.0, 0.0), (100.0, 1.0)])
 def test_the_level_errs_by_its_standard_error(slope_n_m: float, jump_n: float) -> None:
-    """By the noise over the root of the batches above, nine or ten of them; a kink lends it a little more."""
+    """The standard error is the noise over the root of the nine or ten batches above; a kink adds a little
+    information.
+    """
     errors_n, reported_n = [], 0.0
     for seed in range(400):
         z = depths(seed)
@@ -131,7 +135,7 @@ def test_the_level_errs_by_its_standard_error(slope_n_m: float, jump_n: float) -
 
 
 def test_shapes_that_disagree_add_to_the_uncertainty() -> None:
-    """Where a jump and a kink fit alike, two millimetres apart, there is more doubt than of either."""
+    """Where a jump and a kink two millimetres apart fit equally well, the uncertainty is larger than that of either."""
     reported_mm = [scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200).reported_mm for jump_n in (0.0, 0.2, 1.0)]
     assert reported_mm[1] > 1.3 * max(reported_mm[0], reported_mm[2])
 
@@ -143,22 +147,22 @@ def test_more_noise_makes_more_uncertainty() -> None:
     assert errors_m == sorted(errors_m)
 
 
-# mud that bears at once
+# mud that resists at once
 
 
 @pytest.mark.parametrize(("jump_n", "slope_n_m"), [(0.5, 50.0), (1.0, 100.0), (2.0, 30.0), (1.0, 0.0)])
 def test_mud_that_jumps_begins_at_the_jump(jump_n: float, slope_n_m: float) -> None:
-    """The border lies within one batch, evenly: sd 1.5 mm/√12."""
+    """The border is uniformly distributed within one batch, with an sd of 1.5 mm/√12."""
     step_mm = 1000.0 * BELOW_M / BATCH_COUNT
     result = scores(slope_n_m or 1e-9, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200)
     assert np.mean(result.errors_mm) == pytest.approx(0.0, abs=0.1 * step_mm)
     assert np.std(result.errors_mm) == pytest.approx(step_mm / sqrt(12.0), rel=0.15)
-    assert result.covered >= 0.99  # an even distribution ends at √3 of its standard deviations
+    assert result.covered >= 0.99  # a uniform distribution ends at √3 of its standard deviations
     assert result.reported_mm == pytest.approx(step_mm / sqrt(12.0), rel=0.1)
 
 
 def test_a_jump_with_an_uncertain_border_has_a_large_error() -> None:
-    """A step of four noises and no slope below: the border may be a batch aside."""
+    """The jump is four times the noise without a slope below it: the border may be off by one batch."""
     weak, clear = (scores(1e-9, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200) for jump_n in (0.2, 1.0))
     assert np.std(weak.errors_mm) > 1.2 * np.std(clear.errors_mm)
     assert weak.reported_mm > 1.2 * clear.reported_mm
@@ -166,7 +170,9 @@ def test_a_jump_with_an_uncertain_border_has_a_large_error() -> None:
 
 
 def test_a_jump_hardly_above_the_noise_is_uncertain_not_missed() -> None:
-    """0.2 N at a slope of 1 N/cm: a kink 2 mm higher fits almost as well, and the doubt says so."""
+    """The jump is 0.2 N at a slope of 1 N/cm: a kink 2 mm higher fits almost as well, which the uncertainty
+    includes.
+    """
     weak, clear = (scores(100.0, jump_n, BATCH_NOISE_N, BATCH_COUNT, 200) for jump_n in (0.2, 1.0))
     assert np.mean(weak.errors_mm) == pytest.approx(-0.6, abs=0.4)
     assert 0.6 <= weak.covered < clear.covered
@@ -174,7 +180,9 @@ def test_a_jump_hardly_above_the_noise_is_uncertain_not_missed() -> None:
 
 @pytest.mark.parametrize(("exponent", "bias_mm"), [(0.5, 0.7), (0.8, 0.6), (1.2, 2.1)])
 def test_mud_between_the_shapes_is_found_to_a_few_millimetres(exponent: float, bias_mm: float) -> None:
-    """Exponents of the authors' logs, and one beyond: the more the force bends up, the deeper the surface seems."""
+    """The exponents are those of the authors' logs and one beyond: the more the force bends up, the deeper the surface
+    seems.
+    """
     errors_mm = []
     for seed in range(200):
         z = depths(seed)
@@ -188,7 +196,7 @@ def test_mud_between_the_shapes_is_found_to_a_few_millimetres(exponent: float, b
 
 @pytest.mark.parametrize("level_n", [0.0, -1.0, 3.0])
 def test_noise_alone_is_no_mud(level_n: float) -> None:
-    """One false alarm in 300 insertions through air, or two."""
+    """At most one insertion through air in a hundred gives a false alarm."""
     alarms = 0
     for seed in range(300):
         z = depths(seed)
@@ -217,14 +225,14 @@ def test_an_insertion_that_leads_upward_gives_no_estimate() -> None:
 
 
 def test_a_line_from_the_first_batch_on_has_its_surface_there_or_none() -> None:
-    """A flipper that is in mud all the way: no level to meet."""
+    """The flipper is in mud from the start, so there is no level that the line could meet."""
     z = np.linspace(0.0, BELOW_M, 20)
     surface = found(z, 100.0 * z + 0.01 * noise(5, 20))
     assert not surface.found or surface.depth_m < z[MIN_ABOVE]
 
 
 def test_a_flipper_at_rest_gives_no_slope() -> None:
-    """Depths that are equal to rounding: the spread of a line through them may come out below zero."""
+    """The depths are equal up to rounding: the spread of a line through them may come out below zero."""
     forces_n = [0.0, 0.0, 1.0, 2.0, 1.5, 1.0, 2.0, 1.5]
     assert find_surface([0.01] * 8, forces_n) == NO_SURFACE
     for depth_m in np.linspace(0.005, 0.04, 50).tolist():
@@ -245,7 +253,7 @@ modest_depths = st.floats(-0.1, 0.1)
 
 @given(st.lists(st.tuples(modest_depths, st.floats()), max_size=40))
 def test_nothing_makes_the_search_raise(pairs: list[tuple[float, float]]) -> None:
-    """Depths come from finite angles and may go to and fro; forces may be anything."""
+    """The depths come from finite angles and may go back and forth; the forces may be any float."""
     find_surface([depth_m for depth_m, _ in pairs], [force_n for _, force_n in pairs])
 
 
@@ -258,26 +266,26 @@ def test_a_surface_lies_where_the_flipper_was(pairs: list[tuple[float, float]]) 
         assert surface.std_error_m >= 0.0
 
 
-# wild batches
+# outliers
 
 
 @pytest.mark.parametrize("wild_n", [-1.5, 1.5])
 def test_a_wild_batch_that_no_neighbour_confirms_moves_no_surface_far(wild_n: float) -> None:
-    """By half a millimetre at most beyond its doubt, wherever on the way it is. (Of two in a row that lack force, just
-    below the surface, nothing tells.)
+    """The surface moves by at most half a millimetre beyond three standard errors, at any position of the outlier. (Two
+    batches in a row that lack force just below the surface cannot be recognised.)
     """
     depths_m = depths(1)
     forces_n = 50.0 * np.maximum(depths_m, 0.0) + 0.03 * noise(1, len(depths_m))
-    for place in range(2, len(depths_m) - 2):
+    for index in range(2, len(depths_m) - 2):
         wild = forces_n.copy()
-        wild[place] += wild_n
+        wild[index] += wild_n
         surface = found(depths_m, wild)
         assert abs(surface.depth_m) < 3.0 * surface.std_error_m + 0.0005
 
 
 @pytest.mark.parametrize("jump_n", [0.0, 1.0])
 def test_forces_without_wild_batches_are_left_as_they_are(jump_n: float) -> None:
-    """Jumps and kinks too: of 100 insertions one batch in a thousand changes."""
+    """This holds for jumps and kinks too: in 100 insertions fewer than one batch in a thousand changes."""
     changed = 0
     for seed in range(100):
         depths_m = depths(seed)

@@ -1,4 +1,4 @@
-"""The surface of a trial, from finds that are better or worse than they claim."""
+"""The surface of a trial, from finds that are more or less accurate than they claim."""
 
 from math import inf, sqrt
 
@@ -27,7 +27,7 @@ def surfaces(memory: SurfaceMemory, depths_m: list[float], error_m: float = 0.00
 def test_a_first_find_within_its_errors_is_combined_by_precision(
     fixed_base: bool, error_m: float, expected_m: float, sample_m: float, deviations: float
 ) -> None:
-    """As two independent normal readings: one at the depth, one at the nominal height, zero."""
+    """The result is that of two independent normal readings: one at the depth, one at the nominal height, zero."""
     own_m2 = error_m**2 + sample_m**2 / 3.0
     depth_m = deviations * sqrt(own_m2 + expected_m**2)
     surface = SurfaceMemory(expected_m, fixed_base).update(find(depth_m, error_m), sample_m)
@@ -50,7 +50,7 @@ def test_a_surface_lies_between_the_nominal_height_and_the_finds(
 
 
 def test_on_a_bench_finds_that_scatter_beyond_their_claims_hardly_move_the_surface() -> None:
-    """The truth is the nominal height; finds scatter by 3 mm and claim 0.6 mm, as in the authors' logs."""
+    """The truth is the nominal height; the finds scatter by 3 mm and claim 0.6 mm, as in the authors' logs."""
     random, depths_m = np.random.default_rng(1), []
     for _ in range(100):
         memory = SurfaceMemory(0.0003, fixed_base=True)
@@ -60,7 +60,7 @@ def test_on_a_bench_finds_that_scatter_beyond_their_claims_hardly_move_the_surfa
 
 
 def test_on_a_bench_the_claims_of_good_finds_are_those_of_the_surfaces() -> None:
-    """The truths scatter by 1.5 mm, as configured: the errors are as large as they claim."""
+    """The truths scatter by 1.5 mm, as configured: the errors are as large as the surfaces claim."""
     random, missed = np.random.default_rng(2), []
     for _ in range(200):
         truths_m = 0.0015 * random.standard_normal(3)

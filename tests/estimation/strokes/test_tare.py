@@ -16,7 +16,7 @@ EXACT = 1e-12
 
 
 def hang(tare: Tare, poses: list[tuple[float, float]], weight_n: float, noise_nm: float = 0.0, seed: int = 1) -> None:
-    """A weight at the lower edge turns the adduction joint by -W ∂z/∂β."""
+    """Feed a weight at the lower edge, which turns the adduction joint by -W ∂z/∂β."""
     random = np.random.default_rng(seed)
     for sweep_rad, adduction_rad in poses:
         jacobian = GEOMETRY.jacobian(sweep_rad, adduction_rad)
@@ -25,7 +25,7 @@ def hang(tare: Tare, poses: list[tuple[float, float]], weight_n: float, noise_nm
 
 
 def swing(count: int = 100) -> list[tuple[float, float]]:
-    """Forward through the air, from minus to plus 30 degrees."""
+    """Return the poses of a swing forward through the air, from -30 to +30 degrees."""
     return [(pi / 6.0 * sin(pi * (i / count - 0.5)), 0.2 * cos(pi * i / count)) for i in range(count)]
 
 
@@ -57,7 +57,9 @@ def test_the_zero_takes_effect_when_it_is_taken() -> None:
 
 
 def test_the_standard_error_is_that_of_the_weights_scatter() -> None:
-    """A fading mean of MEMORY samples errs by σ/√(2 MEMORY - 1); the doubt is a plain mean's, σ/√MEMORY, and more."""
+    """A fading mean of MEMORY samples errs by σ/√(2 MEMORY - 1); the reported error is that of a plain mean, σ/√MEMORY,
+    which is larger.
+    """
     level = [(0.0, 0.1)] * 200
     per_nm = 1.0 / GEOMETRY.jacobian(0.0, 0.1).z_adduction
     zeros = [taken(level, WEIGHT_N, NOISE_NM, seed).zero for seed in range(300)]
@@ -68,22 +70,22 @@ def test_the_standard_error_is_that_of_the_weights_scatter() -> None:
     assert np.mean([zero.weight_n for zero in zeros]) == pytest.approx(WEIGHT_N, abs=4.0 * scatter_n / sqrt(300))
 
 
-def test_of_few_samples_the_squared_uncertainty_is_that_of_their_mean() -> None:
-    """σ²/n without bias: the variance is counted about the samples' own mean."""
+def test_few_samples_give_the_squared_error_of_their_mean() -> None:
+    """σ²/n is without bias, because the variance is taken about the samples' own mean."""
     per_nm = 1.0 / GEOMETRY.jacobian(0.0, 0.1).z_adduction
     squares = [taken([(0.0, 0.1)] * 8, WEIGHT_N, NOISE_NM, seed).zero.std_error_n ** 2 for seed in range(1000)]
     assert np.mean(squares) == pytest.approx((per_nm * NOISE_NM) ** 2 / 8.0, rel=0.07)  # four sampling errors
 
 
 def test_a_weight_that_is_there_from_the_start_is_no_scatter() -> None:
-    """The first sample's way from nothing to the weight is none either."""
+    """The step of the first sample from zero to the weight is no scatter either."""
     zero = taken(swing(FEWEST), 5.0).zero
     assert zero.weight_n == pytest.approx(5.0)
     assert zero.std_error_n == pytest.approx(0.0, abs=1e-9)
 
 
 def test_mud_that_drips_off_is_followed() -> None:
-    """The tail of the swing counts: after 3 MEMORY samples the weight before has faded to e⁻³."""
+    """The end of the swing counts: after 3 MEMORY samples the weight before has faded to e⁻³."""
     tare = Tare()
     hang(tare, [(0.0, 0.1)] * 100, 2.0)
     hang(tare, [(0.0, 0.1)] * 3 * MEMORY, 0.5)
@@ -100,7 +102,7 @@ def test_a_stride_with_hardly_any_air_keeps_the_zero_of_the_one_before(count: in
     assert tare.zero == before
 
 
-def test_what_was_too_little_air_does_not_count_for_the_next_stride() -> None:
+def test_too_little_air_does_not_count_for_the_next_stride() -> None:
     tare = taken(swing(), WEIGHT_N)
     hang(tare, swing()[:3], 100.0)
     tare.set_zero()
@@ -118,7 +120,7 @@ def test_the_drift_is_the_change_from_stride_to_stride() -> None:
         assert tare.drift_n == pytest.approx(drift_n)
 
 
-def test_the_drift_is_that_in_air_for_any_correction_on_the_way_down() -> None:
+def test_a_correction_in_the_insertion_does_not_change_the_drift() -> None:
     tare = taken(swing(), 1.0)
     tare.correct(0.5, 0.001)
     hang(tare, swing(), 1.0)
@@ -128,7 +130,9 @@ def test_the_drift_is_that_in_air_for_any_correction_on_the_way_down() -> None:
 
 @given(st.floats(-1.0, 1.0), st.floats(1e-4, 1.0))
 def test_a_correction_is_weighed_by_its_own_error_against_the_zeros(weight_n: float, std_error_n: float) -> None:
-    """Two readings of one weight: the air's with its scatter and what may fall off, and the way down's."""
+    """Two readings of one weight are combined: that in air, with its scatter and what may fall off, and that of the
+    insertion.
+    """
     tare = taken([(0.0, 0.1)] * 50, WEIGHT_N, NOISE_NM)
     before = tare.zero
     own = before.std_error_n**2 + CREEP_N**2 + (SHAKEN_FRACTION * before.weight_n) ** 2
@@ -138,7 +142,7 @@ def test_a_correction_is_weighed_by_its_own_error_against_the_zeros(weight_n: fl
     assert tare.zero.std_error_n == pytest.approx((1.0 / own + 1.0 / std_error_n**2) ** -0.5)
 
 
-def test_a_correction_of_which_nothing_is_known_changes_no_weight() -> None:
+def test_a_correction_of_infinite_error_changes_no_weight() -> None:
     tare = taken(swing(), WEIGHT_N)
     assert tare.correct(0.0, inf) == 0.0
     assert tare.zero.weight_n == pytest.approx(WEIGHT_N)
