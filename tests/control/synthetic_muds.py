@@ -1,6 +1,6 @@
-"""Muds, strides and beliefs that are made up for the tests of the choice of depth, and the plate in numpy.
+"""Synthetic muds, strides and estimates for the tests of the choice of depth, and the plate in numpy.
 
-What the plate meets is summed over small pieces of it here, not by the formulas of control/plate.
+The plate is summed over small pieces here, without the formulas of control/plate.
 """
 
 from math import nan
@@ -25,7 +25,7 @@ def reported(
     exponent: float = 0.0,
     exponent_uncertainty: float = 0.0,
 ) -> Coefficient:
-    """By the paper's own law (one k at every depth), unless an exponent is given."""
+    """Return a coefficient of the paper's own law (one k at every depth), unless an exponent is given."""
     return Coefficient(value, uncertainty, depth_m, exponent, exponent_uncertainty, 8)
 
 
@@ -37,14 +37,14 @@ def measured(value: float, at_least: bool = False) -> Estimate:
     return Estimate(value, 0.01 * value, 20, True, at_least=at_least)
 
 
-def believed(k_s: Coefficient | None, k_e: Coefficient | None = None, k_p: Coefficient | None = None) -> MudEstimate:
-    """By both flippers alike."""
+def estimated(k_s: Coefficient | None, k_e: Coefficient | None = None, k_p: Coefficient | None = None) -> MudEstimate:
+    """Return the same estimate for both flippers."""
     flipper = FlipperEstimate(k_p, k_s, k_e)
     return MudEstimate(k_p, k_s, k_e, flipper, flipper)
 
 
 def apart(left: FlipperEstimate, right: FlipperEstimate) -> MudEstimate:
-    """Flippers in two muds."""
+    """Return the estimate of flippers in two muds."""
     return MudEstimate(left=left, right=right)
 
 
@@ -89,7 +89,9 @@ def both(
 def plate_pieces(
     sweep_rad: float, depth_m: float, surface_m: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Depth ζ, and u outward and s up from the lower edge's middle, of small pieces under the surface; one's area."""
+    """Return ζ (depth), u (outward) and s (up from the lower edge's middle) of small wet pieces, and the area of one
+    piece.
+    """
     adduction_rad = GEOMETRY.adduction_rad(sweep_rad, depth_m)
     width_m, height_m = GEOMETRY.plate_width_m, GEOMETRY.plate_height_m
     u, s = np.meshgrid((np.arange(100) + 0.5) / 100 * width_m - width_m / 2, (np.arange(1400) + 0.5) / 1400 * height_m)
@@ -100,13 +102,13 @@ def plate_pieces(
 
 
 def thrust_m3(depth_m: float, surface_m: float = 0.0) -> float:
-    """∫ζ dA with the flipper straight out."""
+    """Return ∫ζ dA with the flipper straight out."""
     depths, _, _, piece_m2 = plate_pieces(0.0, depth_m, surface_m)
     return float(np.sum(depths)) * piece_m2
 
 
 def lift_m4(depth_m: float, surface_m: float = 0.0) -> float:
-    """Submerged volume times the way of its centre per radian, at the rear of the sweep."""
+    """Return the submerged volume times the path of its centre per radian, at the rear of the sweep."""
     rear_rad = -np.radians(GAIT.sweep_angle_deg)
     _, u, s, piece_m2 = plate_pieces(rear_rad, depth_m, surface_m)
     volume_m3 = GEOMETRY.plate_thickness_m * u.size * piece_m2

@@ -1,4 +1,4 @@
-"""What drives tell of joints at rest."""
+"""States that the drives of joints at rest report."""
 
 from __future__ import annotations
 

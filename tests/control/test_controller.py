@@ -1,4 +1,4 @@
-"""What the controller wants in each mode, read back through gains that turn torques into targets."""
+"""The targets of the controller in each mode, read back through gains that turn torques into targets."""
 
 from math import nan, radians
 
@@ -40,7 +40,7 @@ def recovery(attempts: int = 0) -> Recovery:
 
 
 def weightless(gains: JointGains = SPRING, attempts: int = 0) -> Controller:
-    """Without gravity term and without fade, so that every torque tells its target."""
+    """Return a controller without gravity term and without fade, so that every torque shows its target."""
     return Controller(GAIT, GEOMETRY, gains, ArmMass(arm_mass_kg=0.0), MotionParameters(1.0, 0.0), recovery(attempts))
 
 
@@ -368,7 +368,7 @@ def test_the_hold_time_restarts_with_every_move() -> None:
 
 
 def stopping_ticks(pose: JointAngles) -> int:
-    """Of flippers that stay where they are, whatever torque there is."""
+    """Return the ticks of a stop of flippers that no torque moves."""
     controller = weightless()
     for tick in range(1, 3000):
         controller.step(PERIOD_S, Mode.STOPPING, states_at(pose))
@@ -385,7 +385,7 @@ def test_flippers_that_the_mud_keeps_are_waited_for_but_not_long(low_rad: float)
 
 
 def test_a_stop_never_takes_longer_than_a_soft_stop_may() -> None:
-    """Also on a path that is too long for it: of an arm that was turned far up by hand."""
+    """This also holds on a path that is too long, of an arm that was turned far up by hand."""
     assert stopping_ticks(Joints(0.0, 3.0, 0.0, 3.0)) * PERIOD_S == pytest.approx(SOFT_STOP_S, abs=0.01)
 
 

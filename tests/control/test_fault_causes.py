@@ -1,4 +1,4 @@
-"""Faults of one cause are one group: what happened once is said once."""
+"""Faults of one cause are one group, so that each cause is reported once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ K = FaultKind
 
 
 def causes(*faults: Fault, age_s: float = 1.0) -> list[tuple[FaultKind, list[str], int]]:
-    """Each cause: its kind, its subjects and the number of consequences."""
+    """Return the kind, the subjects and the number of consequences of each cause."""
     grouped = group_by_cause([AgedFault(fault, age_s) for fault in faults], BUS_OF)
     return [
         (cause.root.kind, [each.fault.subject for each in cause.faults], len(cause.consequences)) for cause in grouped

@@ -1,4 +1,4 @@
-"""When faults begin, stand and end: single claims, and a model that is told the same and must agree for ever."""
+"""When faults begin, stand and end: single claims, and a model that gets the same input and must always agree."""
 
 import pytest
 from hypothesis import settings
@@ -21,7 +21,7 @@ ALL = [LATE, STALE, HOT, QUIET, SILENT, BUG, DISK, fault_of("drive_silent", "rig
 
 
 def ticks_standing(fault: Fault, energised: bool, energised_after: bool, clearing: bool = False) -> int:
-    """After a tick in which it was there; 1000 and more are for ever."""
+    """Return for how many ticks a fault stands after the tick in which it was present; 1001 means for ever."""
     latch = FaultLatch()
     latch.update([fault], energised)
     for tick in range(1, 1001):
@@ -71,7 +71,7 @@ def test_where_torque_was_on_it_stands_by_its_kind(fault: Fault, energised_after
 
 
 @pytest.mark.parametrize(("fault", "expected"), [(HOT, 1), (QUIET, 1), (SILENT, 1), (BUG, FOR_EVER)])
-def test_a_person_clears_all_but_a_bug(fault: Fault, expected: int) -> None:
+def test_an_operator_clears_all_but_a_bug(fault: Fault, expected: int) -> None:
     assert ticks_standing(fault, True, False, clearing=True) == expected
 
 
@@ -85,7 +85,7 @@ def test_clearing_does_not_help_while_the_cause_lasts() -> None:
     assert not latch.present
 
 
-def test_what_was_latched_once_stays_so_however_often_it_is_seen_without_torque() -> None:
+def test_a_latched_fault_stays_latched_however_often_it_is_seen_without_torque() -> None:
     latch = FaultLatch()
     latch.update([SILENT], True)
     for _ in range(100):
@@ -95,7 +95,7 @@ def test_what_was_latched_once_stays_so_however_often_it_is_seen_without_torque(
     assert latch.present == [SILENT]
 
 
-def test_what_was_seen_without_torque_is_latched_once_torque_meets_it() -> None:
+def test_a_fault_that_was_seen_without_torque_is_latched_once_torque_is_on() -> None:
     latch = FaultLatch()
     latch.update([SILENT], False)
     latch.update([SILENT], True)
@@ -124,7 +124,7 @@ def test_an_event_is_reported_in_one_tick_only() -> None:
     assert sum(len(begun) + len(over) for begun, over in reported) == 4
 
 
-def test_the_sentence_is_that_of_the_last_time_and_the_news_that_of_the_first() -> None:
+def test_the_message_is_that_of_the_last_time_and_the_event_that_of_the_first() -> None:
     latch = FaultLatch()
     latch.update([LATE], False)
     later = LATE.with_values(age_s=0.009)
@@ -184,7 +184,9 @@ def test_a_reset_forgets_everything_even_a_bug() -> None:
 
 
 class Oracle(RuleBasedStateMachine):
-    """Keeps the whole history of each fault and judges it anew every tick, from the words of the page of faults."""
+    """A model that stores the history of each fault and evaluates it again in every tick, by the text of the page of
+    faults.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -192,7 +194,7 @@ class Oracle(RuleBasedStateMachine):
         self.now = 0
         self.last_seen: dict[Fault, int] = {}  # of those that stand
         self.met_torque: set[Fault] = set()
-        self.events: dict[Fault, int] = dict.fromkeys(ALL, 0)  # begun less over
+        self.events: dict[Fault, int] = dict.fromkeys(ALL, 0)  # begun minus over
 
     @rule(
         present=st.lists(st.sampled_from(ALL), unique=True, max_size=4),

@@ -24,7 +24,7 @@ adductions = st.floats(-pi / 2, pi / 2)
 
 
 def rotated_edge(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> NDArray[np.float64]:
-    """The arm as a vector, turned about the flipper's own axis and then about the body's fore-aft axis."""
+    """Return the arm as a vector, turned about the flipper's own axis and then about the body's fore-aft axis."""
     ca, sa, cb, sb = np.cos(sweep_rad), np.sin(sweep_rad), np.cos(adduction_rad), np.sin(adduction_rad)
     sweep_about_z = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])  # forward positive: clockwise from above
     adduction_about_x = np.array([[1.0, 0.0, 0.0], [0.0, cb, -sb], [0.0, sb, cb]])

@@ -28,7 +28,7 @@ frictions = st.builds(
 
 @given(frictions, angles, velocities)
 def test_friction_is_the_docstrings_sum(friction: JointFriction, angle: float, velocity: float) -> None:
-    """To 1e-9 of the bounds: a thousand periods a turn multiply the rounding of the angle by as much."""
+    """The tolerance is 1e-9, because a thousand periods a turn multiply the rounding of the angle by as much."""
     phase = np.deg2rad(friction.cogging_phase_deg)
     expected = (
         friction.coulomb_nm * np.tanh(velocity / SLOW_RAD_S)
@@ -60,7 +60,7 @@ def test_viscous_friction_is_in_proportion_to_the_velocity() -> None:
 
 
 @given(velocities, angles)
-def test_what_moves_a_joint_is_spent_not_gained(velocity: float, angle: float) -> None:
+def test_friction_never_gives_a_joint_energy(velocity: float, angle: float) -> None:
     friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004)
     assert friction.torque_nm(angle, velocity) * velocity >= 0.0
 
@@ -87,7 +87,7 @@ def test_the_phase_of_cogging_is_that_of_the_sine_at_angle_zero() -> None:
 
 @pytest.mark.parametrize("velocity", [3.4e38, -3.4e38])
 def test_dry_friction_keeps_its_bound_at_any_velocity(velocity: float) -> None:
-    """The largest that the bus can carry; what is not finite never gets here."""
+    """The velocities are the largest that the bus can carry; values that are not finite never get here."""
     assert abs(DRY.torque_nm(0.0, velocity)) <= 0.02
 
 

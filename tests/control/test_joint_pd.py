@@ -41,7 +41,7 @@ def turning(velocities: tuple[float, ...]) -> DriveStates:
 
 
 def potential_energy_j(mass: ArmMass, sweep_rad: float, adduction_rad: float) -> float:
-    """m g times the height of a point on the arm, which rotation matrices put there."""
+    """Return m g times the height of a point on the arm, by rotation matrices."""
     arm = np.array([np.sin(sweep_rad), np.cos(sweep_rad), 0.0]) * mass.center_of_mass_m
     about_x = np.array([np.sin(adduction_rad), np.cos(adduction_rad)])
     return float(mass.arm_mass_kg * 9.81 * about_x @ arm[1:])
@@ -141,7 +141,9 @@ def test_the_speed_of_an_encoder_that_is_not_trusted_may_be_anything() -> None:
 
 @pytest.mark.parametrize("damping_nm_s_rad", [0.03, 0.06, 0.12])
 def test_the_phase_margin_says_where_a_delayed_joint_begins_to_oscillate(damping_nm_s_rad: float) -> None:
-    """A joint in small steps, with the torque of the motion a delay ago, grows or decays on both sides of the bound."""
+    """A joint in small steps, under the torque of the motion one delay ago, decays below the bound and grows above
+    it.
+    """
     inertia_kg_m2, step_s = 0.0004, LOOP_DELAY_S / 200
     low, high = 0.0, 100.0
     while high - low > 1e-6:

@@ -1,4 +1,4 @@
-"""`apply_limits` swept densely over the edge of each of its bounds, and with everything hypothesis can think of."""
+"""`apply_limits` swept densely over the edge of each of its bounds, and with any input that hypothesis finds."""
 
 from math import inf, isfinite, nan, nextafter, radians
 
@@ -53,12 +53,12 @@ STILL: DriveStates = Joints(state(), state(), state(), state())
 
 
 def settled_nm(wanted_nm: float, joint: DriveState) -> float:
-    """What is left of a wanted torque when the slew rate does not bind."""
+    """Return what is left of a wanted torque when the slew rate does not bind."""
     return limited_torque_nm(wanted_nm, 0.0, joint, LIMITS, SPAN, dt_s=1.0)
 
 
 def limited_like(joint: int, wanted_nm: float, measured: DriveState) -> LimitedTorques:
-    """All joints at rest without torque but one."""
+    """Limit the torques of joints at rest, of which only one wants a torque."""
     wanted, drives = list(NO_TORQUE), list(STILL)
     wanted[joint], drives[joint] = wanted_nm, measured
     return apply_limits(Joints(*wanted), NO_TORQUE, Joints(*drives), LIMITS, RANGES, PERIOD_S)
@@ -203,7 +203,9 @@ def test_warm_and_hot_at_one_temperature_switch_off_at_it() -> None:
 
 
 def test_the_default_limits_are_those_of_the_robot() -> None:
-    """The torque of an R60 in two ticks, the speed of an extraction, the joints' range, a motor's temperatures."""
+    """They are the torque of an R60 in two ticks, the speed of an extraction, the joints' range and a motor's
+    temperatures.
+    """
     assert JointLimits() == JointLimits(
         torque_nm=0.75,
         torque_rate_nm_s=150.0,

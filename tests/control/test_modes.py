@@ -1,4 +1,4 @@
-"""Every mode with every request, every reaction and every state of health, against the rules that people rely on."""
+"""Every mode with every request, every reaction and every state of health, against the rules that operators rely on."""
 
 from itertools import product
 
@@ -53,7 +53,7 @@ def test_arming_ends_at_any_fault_that_would_stop_a_walk() -> None:
 
 
 def test_a_fault_never_makes_the_reaction_milder() -> None:
-    """Of two healths that differ in the fault alone, the one with the worse fault leads to the harder mode."""
+    """Of two healths that differ only in the fault, the one with the worse fault leads to the harder mode."""
     for mode, request, health in product(MOVING, Request, HEALTHS):
         if health.worst is None or request is Request.WALK:
             continue
@@ -123,7 +123,7 @@ def test_a_stop_while_drives_are_armed_lets_them_go_idle() -> None:
 
 
 def test_a_stop_raises_flippers_that_a_fault_left_in_the_mud() -> None:
-    """And moves nothing of a robot that holds a pose for another reason."""
+    """A stop moves nothing of a robot that holds a pose for another reason."""
     for health in (WELL, faulty(Reaction.WARN), faulty(Reaction.HOLD)):
         cut_short = health._replace(cut_short=True)
         assert next_mode(Mode.HOLD, Request.STOP, cut_short) is Mode.STOPPING
@@ -147,7 +147,7 @@ def test_a_fault_that_holds_ends_a_walk_where_it_is_and_lets_a_stop_go_on() -> N
 
 
 def test_a_stop_is_handled_also_in_the_tick_of_a_fault_that_holds() -> None:
-    """Or the flippers would stay in the mud, against a person's wish."""
+    """Otherwise the flippers would stay in the mud, against the operator's request."""
     assert next_mode(Mode.WALKING, Request.STOP, faulty(Reaction.HOLD)) is Mode.STOPPING
 
 
@@ -167,9 +167,9 @@ def test_boot_ends_when_every_drive_was_heard_and_at_nothing_else() -> None:
 
 
 def test_every_row_of_the_table_applies_for_some_input() -> None:
-    """A row that is hidden by those above it in each of its modes would be a lie in the diagram."""
-    for place, row in enumerate(TRANSITIONS):
-        above = TRANSITIONS[:place]
+    """A row that is hidden by those above it in each of its modes would make the diagram wrong."""
+    for index, row in enumerate(TRANSITIONS):
+        above = TRANSITIONS[:index]
         for source in row.sources:
             hidden = [other for other in above if source in other.sources]
             assert any(
@@ -184,7 +184,7 @@ def test_a_request_is_refused_exactly_where_it_could_change_nothing() -> None:
             continue  # a fault has already ended the mode, or is about to
         effective = next_mode(mode, request, health) is not next_mode(mode, Request.NONE, health)
         if mode is Mode.IDLE and not health.drives_heard:
-            continue  # never so: BOOT lasts until they are
+            continue  # impossible: BOOT lasts until every drive is heard
         assert (refusal(mode, request, health) is None) == effective, (mode, request, health)
 
 
@@ -199,7 +199,7 @@ def test_before_all_drives_are_heard_a_refusal_is_that_of_boot() -> None:
     assert refusal(Mode.IDLE, Request.ARM, Health()) == Refusal(Mode.BOOT, Request.ARM, ())
 
 
-def test_what_is_not_known_of_the_robot_permits_nothing() -> None:
+def test_an_unknown_state_of_the_robot_permits_nothing() -> None:
     assert not any(Health()) and Health().reaction is Reaction.NONE
 
 

@@ -1,4 +1,4 @@
-"""A coefficient at another depth, against numpy's power law and against samples drawn from what it says it doubts."""
+"""A coefficient at another depth, against numpy's power law and against samples drawn from its stated uncertainty."""
 
 from math import inf, isnan, log, nan
 

@@ -1,4 +1,4 @@
-"""The choice of the next depth, against a search of every depth and in muds made up by clay practice."""
+"""The choice of the next depth, against a search of every depth, and in synthetic clay."""
 
 from math import inf, log, nan, radians
 from typing import NamedTuple
@@ -21,9 +21,9 @@ from tests.control.synthetic_muds import (
     MOTOR_FORCE_N,
     PARAMETERS,
     apart,
-    believed,
     both,
     bound,
+    estimated,
     lift_m4,
     reported,
     stride,
@@ -31,7 +31,7 @@ from tests.control.synthetic_muds import (
 )
 
 DEPTHS_M = [0.015 + 0.0025 * i for i in range(15)]
-BEARABLE_NM = 0.95 * LIFTING_NM
+ALLOWED_NM = 0.95 * LIFTING_NM
 FIRM, SOFT, BOTTOMLESS = reported(1.2e6), reported(0.3e6), reported(0.01e6)
 LOOSE, STICKY = reported(0.3e6), reported(1.5e6)
 
@@ -49,13 +49,13 @@ def chosen(
 
 
 def duration_s(depth_m: float) -> float:
-    """Down and up from 1.45 cm above the mud, the stance's arc of 2 α l, and 0.8 s of swing."""
+    """Return the time down and up from 1.45 cm above the mud, in the stance's arc of 2 α l, and in 0.8 s of swing."""
     travel_m = 0.0145 + depth_m
     return travel_m / 0.1 + 2.0 * radians(30.0) * 0.12 / 0.5 + travel_m / 0.5 + 0.8
 
 
-def promised_m(thrust_n: float, k_s: float, depth_m: float) -> float:
-    """The step where the pad of 1.5 cm drags 2 cm deep through the same mud."""
+def predicted_m(thrust_n: float, k_s: float, depth_m: float) -> float:
+    """Return the predicted step of a body whose pad of 1.5 cm drags 2 cm deep through the same mud."""
     drag = BodyDrag(2.5 + k_s * 0.015 * 0.02**2 / 2.0, 6.0, 1.0)
     return step_m(GAIT, 0.12, drag, Traction(thrust_n, 2.0 * 250.0), depth_m)
 
@@ -67,15 +67,15 @@ def forecast(mud_estimate: MudEstimate, strides: list[StrideEstimate], commanded
 
 
 def steps_m(reported: DepthForecast) -> dict[float, float]:
-    return {z: promised_m(reported.thrust_n(z) or 0.0, reported.shear_at(0.02), z) for z in DEPTHS_M}
+    return {z: predicted_m(reported.thrust_n(z) or 0.0, reported.shear_at(0.02), z) for z in DEPTHS_M}
 
 
 def same_depth(depth_m: float) -> object:
-    """Depths of the grid, however their sums round."""
+    """Match a depth of the grid up to the rounding of its sum."""
     return pytest.approx(depth_m, abs=1e-9)
 
 
-made_up_strides = st.builds(
+synthetic_strides = st.builds(
     lambda *each: [stride("left", *each[:3]), stride("right", *each[3:])],
     *[st.floats(0.01, 0.05), st.booleans(), st.floats(-0.005, 0.005)] * 2,
 )
@@ -85,13 +85,13 @@ exponents = st.floats(-1.0, 0.2)
 
 
 class TestTheFastestDepth:
-    @given(shears, suctions, exponents, exponents, made_up_strides)
+    @given(shears, suctions, exponents, exponents, synthetic_strides)
     def test_it_predicts_the_highest_speed_of_all_that_come_out(
         self, k_s: float, k_e: float, m_s: float, m_e: float, strides: list[StrideEstimate]
     ) -> None:
-        mud_estimate = believed(reported(k_s, exponent=m_s), reported(k_e, exponent=m_e))
+        mud_estimate = estimated(reported(k_s, exponent=m_s), reported(k_e, exponent=m_e))
         known = forecast(mud_estimate, strides)
-        out = {z: step / duration_s(z) for z, step in steps_m(known).items() if known.extraction_nm(z) < BEARABLE_NM}
+        out = {z: step / duration_s(z) for z, step in steps_m(known).items() if known.extraction_nm(z) < ALLOWED_NM}
         assume(out and max(out.values()) > 0.0)
         choice = chosen(mud_estimate, strides)
         best_m = max(out, key=lambda depth_m: out[depth_m])
@@ -100,43 +100,45 @@ class TestTheFastestDepth:
         )
 
     def test_it_slips_where_less_than_half_an_arm_is_predicted(self) -> None:
-        """6 cm. At 5 cm, in muds that grow firmer in steps of 1 %, which is at most 3 mm of step."""
+        """Half an arm is 6 cm. The depth is 5 cm in muds that grow firmer by 1 %, which changes the step by at most 3
+        mm.
+        """
         slipping, walking = list[float](), list[float]()
         for k_s in 0.06e6 * 1.01 ** np.arange(60):
-            mud_estimate = believed(reported(k_s), LOOSE)
-            choice, promised = chosen(mud_estimate), steps_m(forecast(mud_estimate, both()))[DEPTHS_M[-1]]
+            mud_estimate = estimated(reported(k_s), LOOSE)
+            choice, predicted = chosen(mud_estimate), steps_m(forecast(mud_estimate, both()))[DEPTHS_M[-1]]
             assert choice.depth_m == same_depth(0.05)
-            (slipping if choice.slips else walking).append(promised)
+            (slipping if choice.slips else walking).append(predicted)
         assert 0.057 < max(slipping) < 0.06 <= min(walking) < 0.063
 
-    @given(shears, suctions, made_up_strides)
+    @given(shears, suctions, synthetic_strides)
     def test_it_slips_by_what_is_predicted_of_the_chosen_depth(
         self, k_s: float, k_e: float, strides: list[StrideEstimate]
     ) -> None:
-        mud_estimate = believed(reported(k_s), reported(k_e))
+        mud_estimate = estimated(reported(k_s), reported(k_e))
         choice, steps = chosen(mud_estimate, strides), steps_m(forecast(mud_estimate, strides))
-        promised = next(step for z, step in steps.items() if abs(z - choice.depth_m) < 1e-9)
-        assume(abs(promised - 0.06) > 1e-9)
-        assert choice.slips == (promised < 0.06)
+        predicted = next(step for z, step in steps.items() if abs(z - choice.depth_m) < 1e-9)
+        assume(abs(predicted - 0.06) > 1e-9)
+        assert choice.slips == (predicted < 0.06)
 
     def test_firm_mud_is_walked_shallow_and_soft_mud_deep(self) -> None:
-        firm, soft = chosen(believed(FIRM, LOOSE)), chosen(believed(SOFT, LOOSE))
+        firm, soft = chosen(estimated(FIRM, LOOSE)), chosen(estimated(SOFT, LOOSE))
         assert firm.depth_m < PARAMETERS.initial_depth_m < soft.depth_m
         assert not firm.slips and not soft.slips
         assert firm.reason == soft.reason == "fastest"
 
     def test_mud_that_grows_sticky_is_walked_shallower(self) -> None:
         adaptation = adapted()
-        before, after = (adaptation.step(believed(reported(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY))
+        before, after = (adaptation.step(estimated(reported(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY))
         assert after.depth_m < before.depth_m
 
     @pytest.mark.parametrize("k_e", [1.1e6, 1.3e6, 1.6e6])
     def test_where_deeper_is_faster_it_goes_as_deep_as_it_comes_out_of(self, k_e: float) -> None:
-        depth_m = chosen(believed(reported(0.1e6), reported(k_e)), both(nan)).depth_m
-        assert k_e * lift_m4(depth_m) < BEARABLE_NM <= k_e * lift_m4(depth_m + GRID_M)
+        depth_m = chosen(estimated(reported(0.1e6), reported(k_e)), both(nan)).depth_m
+        assert k_e * lift_m4(depth_m) < ALLOWED_NM <= k_e * lift_m4(depth_m + GRID_M)
 
     def test_where_nothing_comes_out_the_shallowest_is_taken(self) -> None:
-        soft, firm = chosen(believed(SOFT, reported(20e6))), chosen(believed(reported(1.5e6), reported(20e6)))
+        soft, firm = chosen(estimated(SOFT, reported(20e6))), chosen(estimated(reported(1.5e6), reported(20e6)))
         assert soft == DepthChoice(0.015, True, "extraction")
         assert firm.depth_m == 0.015
 
@@ -144,37 +146,37 @@ class TestTheFastestDepth:
     def test_where_no_depth_predicts_a_step_the_deepest_that_comes_out_is_taken(
         self, k_e: Coefficient, expected_m: float
     ) -> None:
-        assert k_e.value * lift_m4(expected_m) < BEARABLE_NM
-        assert expected_m == 0.05 or k_e.value * lift_m4(expected_m + GRID_M) >= BEARABLE_NM
-        assert chosen(believed(BOTTOMLESS, k_e), both(nan))[:3] == (same_depth(expected_m), True, "thrust")
+        assert k_e.value * lift_m4(expected_m) < ALLOWED_NM
+        assert expected_m == 0.05 or k_e.value * lift_m4(expected_m + GRID_M) >= ALLOWED_NM
+        assert chosen(estimated(BOTTOMLESS, k_e), both(nan))[:3] == (same_depth(expected_m), True, "thrust")
 
     def test_a_heavier_body_or_more_drag_is_carried_deeper(self) -> None:
-        plain = chosen(believed(SOFT, LOOSE)).depth_m
+        plain = chosen(estimated(SOFT, LOOSE)).depth_m
         for burden in (
             AdaptationParameters(body_drag_n=4.0),
             AdaptationParameters(body_mass_kg=2.5),
             AdaptationParameters(body_damping_n_s_m=20.0),
             AdaptationParameters(pad_width_m=0.1),
         ):
-            assert adapted(burden).step(believed(SOFT, LOOSE), both(), 0.03).depth_m > plain
+            assert adapted(burden).step(estimated(SOFT, LOOSE), both(), 0.03).depth_m > plain
 
     def test_a_surface_that_lies_deeper_needs_a_deeper_stride(self) -> None:
-        level, sunk = (chosen(believed(SOFT, LOOSE), both(surface_m=surface_m)) for surface_m in (0.0, 0.0075))
+        level, sunk = (chosen(estimated(SOFT, LOOSE), both(surface_m=surface_m)) for surface_m in (0.0, 0.0075))
         assert 0.0 < sunk.depth_m - level.depth_m <= 0.0075 + 1e-9
 
 
-class TestWhatIsNotKnown:
+class TestUnknownMud:
     def test_without_an_estimate_of_the_thrust_the_depth_stays(self) -> None:
         adaptation = adapted()
         adaptation.reset(0.0375)
         kept = DepthChoice(0.0375, False, "nothing known of the thrust, depth kept")
-        assert adaptation.step(believed(None, STICKY), both(), adaptation.choice.depth_m) == kept
+        assert adaptation.step(estimated(None, STICKY), both(), adaptation.choice.depth_m) == kept
         assert adaptation.step(NOTHING_KNOWN, both(), adaptation.choice.depth_m) == kept
-        assert adaptation.step(believed(FIRM, LOOSE), [], adaptation.choice.depth_m) == kept
+        assert adaptation.step(estimated(FIRM, LOOSE), [], adaptation.choice.depth_m) == kept
 
     def test_a_reset_starts_at_its_depth(self) -> None:
         adaptation = adapted()
-        adaptation.step(believed(BOTTOMLESS, LOOSE), both(), adaptation.choice.depth_m)
+        adaptation.step(estimated(BOTTOMLESS, LOOSE), both(), adaptation.choice.depth_m)
         adaptation.reset(0.02)
         assert adaptation.choice == DepthChoice(0.02, False, "start")
 
@@ -182,21 +184,23 @@ class TestWhatIsNotKnown:
         assert adapted(AdaptationParameters(initial_depth_m=0.04)).choice.depth_m == 0.04
 
     def test_the_insertion_alone_is_enough_to_choose(self) -> None:
-        """By k_s of 0.55 times k_p, less a fifth."""
-        reported_by_insertion = chosen(believed(None, LOOSE, reported(0.3e6 / 0.44)))
-        assert reported_by_insertion == chosen(believed(SOFT, LOOSE))
+        """The thrust uses a k_s of 0.55 times k_p, less a fifth."""
+        reported_by_insertion = chosen(estimated(None, LOOSE, reported(0.3e6 / 0.44)))
+        assert reported_by_insertion == chosen(estimated(SOFT, LOOSE))
 
     def test_an_extraction_without_any_k_e_allows_one_step_deeper_than_it_was(self) -> None:
-        assert chosen(believed(BOTTOMLESS), both(0.03)).depth_m == same_depth(0.0325)
+        assert chosen(estimated(BOTTOMLESS), both(0.03)).depth_m == same_depth(0.0325)
 
     def test_a_stride_of_which_nothing_is_known_is_survived(self) -> None:
         lost = stride(depth_m=nan, surface_m=nan)
-        assert chosen(believed(FIRM), [lost, stride("right")]).depth_m == 0.015
+        assert chosen(estimated(FIRM), [lost, stride("right")]).depth_m == 0.015
         assert chosen(NOTHING_KNOWN, [lost]).depth_m == PARAMETERS.initial_depth_m
 
 
 class TestUncertainty:
-    """Within muds through which the motors can pull the pad: beyond 1.5 N/cm³ its own drag outgrows them."""
+    """The muds are those through which the motors can pull the pad: beyond 1.5 N/cm³ its own drag exceeds their
+    force.
+    """
 
     fractions = st.tuples(*[st.floats(0.0, 1.0)] * 2)
 
@@ -204,52 +208,52 @@ class TestUncertainty:
     def test_uncertainty_about_thrust_never_chooses_a_depth_with_less_thrust(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
     ) -> None:
-        sure, doubtful = (
-            chosen(believed(reported(k_s, fraction * k_s, exponent=exponent), reported(k_e)))
+        sure, uncertain = (
+            chosen(estimated(reported(k_s, fraction * k_s, exponent=exponent), reported(k_e)))
             for fraction in sorted(pair)
         )
-        assert doubtful.depth_m >= sure.depth_m
-        assert doubtful.slips >= sure.slips
+        assert uncertain.depth_m >= sure.depth_m
+        assert uncertain.slips >= sure.slips
 
     @given(shears, suctions, exponents, fractions)
     def test_uncertainty_about_suction_never_chooses_a_deeper_one(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float]
     ) -> None:
-        sure, doubtful = (
-            chosen(believed(reported(k_s), reported(k_e, fraction * k_e, exponent=exponent)))
+        sure, uncertain = (
+            chosen(estimated(reported(k_s), reported(k_e, fraction * k_e, exponent=exponent)))
             for fraction in sorted(pair)
         )
-        assert doubtful.depth_m <= sure.depth_m
+        assert uncertain.depth_m <= sure.depth_m
 
     @given(shears, suctions, exponents, st.tuples(*[st.floats(0.0, 1.0)] * 2), st.floats(0.02, 0.05))
     def test_suction_at_another_depth_is_as_uncertain_as_its_depth_law(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float], depth_m: float
     ) -> None:
-        sure, doubtful = (
-            chosen(believed(reported(k_s), reported(k_e, 0.0, depth_m, exponent, m))) for m in sorted(pair)
+        sure, uncertain = (
+            chosen(estimated(reported(k_s), reported(k_e, 0.0, depth_m, exponent, m))) for m in sorted(pair)
         )
-        assert doubtful.depth_m <= sure.depth_m
+        assert uncertain.depth_m <= sure.depth_m
 
     def test_one_standard_error_of_thrust_and_two_of_suction_count(self) -> None:
-        assert chosen(believed(reported(0.4e6, 0.1e6), LOOSE)) == chosen(believed(SOFT, LOOSE))
-        assert chosen(believed(reported(0.1e6), reported(0.5e6, 0.4e6))) == chosen(
-            believed(reported(0.1e6), reported(1.3e6))
+        assert chosen(estimated(reported(0.4e6, 0.1e6), LOOSE)) == chosen(estimated(SOFT, LOOSE))
+        assert chosen(estimated(reported(0.1e6), reported(0.5e6, 0.4e6))) == chosen(
+            estimated(reported(0.1e6), reported(1.3e6))
         )
-        assert chosen(believed(SOFT, LOOSE)).depth_m > chosen(believed(reported(0.4e6), LOOSE)).depth_m
+        assert chosen(estimated(SOFT, LOOSE)).depth_m > chosen(estimated(reported(0.4e6), LOOSE)).depth_m
 
     def test_mud_that_reads_softer_in_deeper_strides_is_walked_deeper(self) -> None:
-        depths_m = [chosen(believed(reported(0.25e6, exponent=m), LOOSE)).depth_m for m in (0.0, -0.4, -0.8)]
+        depths_m = [chosen(estimated(reported(0.25e6, exponent=m), LOOSE)).depth_m for m in (0.0, -0.4, -0.8)]
         assert depths_m == sorted(depths_m)
         assert depths_m[0] < depths_m[-1]
 
 
 class TestStuck:
-    SINKING = believed(reported(0.08e6), LOOSE)  # the deeper, the faster
+    SINKING = estimated(reported(0.08e6), LOOSE)  # the deeper, the faster
 
     @pytest.mark.parametrize("depth_m", [0.0225, 0.0325, 0.04, 0.05])
     @pytest.mark.parametrize("k_s", [FIRM, SOFT, BOTTOMLESS, None])
     def test_a_stuck_flipper_goes_shallower_than_where_it_stuck(self, depth_m: float, k_s: Coefficient | None) -> None:
-        choice = chosen(believed(k_s, reported(1.0)), both(depth_m, released=False), depth_m)
+        choice = chosen(estimated(k_s, reported(1.0)), both(depth_m, released=False), depth_m)
         assert choice.depth_m < 0.95 * depth_m
         assert choice.reason == "a flipper was stuck"
 
@@ -259,15 +263,15 @@ class TestStuck:
         assert chosen(self.SINKING, strides, 0.04).depth_m == same_depth(0.0375)
 
     def test_it_goes_no_shallower_than_the_torque_asks_for(self) -> None:
-        """In proportion to depth, 95 % of it pull out of 4.66 cm where a flipper stuck at 4.9 cm."""
+        """The torque is in proportion to depth: 95 % of it pull out of 4.66 cm where a flipper stuck at 4.9 cm."""
         assert chosen(self.SINKING, both(0.049, released=False), 0.049).depth_m == same_depth(0.045)
 
     def test_without_any_thrust_known_it_takes_the_deepest_that_comes_out(self) -> None:
-        assert chosen(believed(None, LOOSE), both(0.04, released=False), 0.04).depth_m == same_depth(0.0375)
+        assert chosen(estimated(None, LOOSE), both(0.04, released=False), 0.04).depth_m == same_depth(0.0375)
 
     def test_a_flipper_that_stuck_at_the_shallowest_depth_stays_there(self) -> None:
         for k_s in (SOFT, None):
-            assert chosen(believed(k_s), both(0.015, released=False)).depth_m == 0.015
+            assert chosen(estimated(k_s), both(0.015, released=False)).depth_m == 0.015
 
     @pytest.mark.parametrize("reached_m", [nan, inf, -inf])
     def test_a_stride_stuck_at_an_unknown_depth_leads_to_the_shallowest(self, reached_m: float) -> None:
@@ -296,12 +300,12 @@ class TestStuck:
         assert other_walk.step(self.SINKING, both(), other_walk.choice.depth_m).depth_m == same_depth(0.05)
 
     def test_a_lower_bound_of_suction_never_proves_that_a_flipper_comes_out(self) -> None:
-        unknown, at_least = (chosen(believed(BOTTOMLESS, k_e), both(0.03)) for k_e in (None, bound(0.1e6)))
+        unknown, at_least = (chosen(estimated(BOTTOMLESS, k_e), both(0.03)) for k_e in (None, bound(0.1e6)))
         assert at_least == unknown
 
 
 class TestTwoMuds:
-    """Of one thrust and one suction."""
+    """The two flippers stand in muds that differ in suction or in thrust."""
 
     @given(shears, suctions, suctions)
     def test_the_flipper_that_the_mud_holds_harder_decides(self, k_s: float, one: float, other: float) -> None:
@@ -312,15 +316,17 @@ class TestTwoMuds:
 
     @given(st.floats(0.05e6, 0.3e6), st.floats(0.05e6, 0.3e6))
     def test_their_thrusts_add_up(self, one: float, other: float) -> None:
-        """Below the motors' limit at every depth: 6.25 N bear 0.15 N/cm³ at 5 cm."""
+        """The thrust is below the motors' limit at every depth: at 5 cm, 6.25 N shear mud of 0.15 N/cm³."""
         one, other = one / 2.0, other / 2.0
-        mean = believed(reported((one + other) / 2.0), LOOSE)
+        mean = estimated(reported((one + other) / 2.0), LOOSE)
         two = apart(FlipperEstimate(None, reported(one), LOOSE), FlipperEstimate(None, reported(other), LOOSE))
         assert chosen(two).depth_m == chosen(mean).depth_m
 
 
 class Clay(NamedTuple):
-    """Undrained: pressure min(3 + γ ζ/s_u + ζ/2w, 9) s_u across the plate, adhesion s_u/4 along it, 9 s_u beneath."""
+    """Undrained clay: pressure min(3 + γ ζ/s_u + ζ/2w, 9) s_u across the plate, adhesion s_u/4 along it, 9 s_u
+    beneath.
+    """
 
     strength_pa: float
 
@@ -334,19 +340,19 @@ class Clay(NamedTuple):
         return self.strength_pa * (9.0 * edge_m2 + 0.25 * around_m * depth_m)
 
     def k_s(self, depth_m: float) -> float:
-        """With which a plate straight out bears the same."""
+        """Return the k_s with which a plate straight out has the same thrust."""
         return self.thrust_n(depth_m) / thrust_m3(depth_m)
 
     def k_e(self, depth_m: float) -> float:
         return self.suction_n(depth_m) / (0.025 * 0.004 * depth_m)
 
     def mud_estimate(self) -> MudEstimate:
-        """As it would be learned from strides between 3 and 4 cm."""
+        """Return the estimate that strides between 3 and 4 cm give."""
         k_s, k_e = (
             reported(k(0.035), depth_m=0.035, exponent=log(k(0.04) / k(0.03)) / log(4.0 / 3.0))
             for k in (self.k_s, self.k_e)
         )
-        return believed(k_s, k_e)
+        return estimated(k_s, k_e)
 
 
 class TestMuds:
@@ -360,8 +366,8 @@ class TestMuds:
         assert len(set(depths_m)) > 8
 
     def test_the_depth_is_nearly_the_best_by_the_clay_itself(self) -> None:
-        """Its law is no power of depth: strides of 3 to 4 cm tell 4 % too much thrust of 2 cm, and a step that just
-        carries the body loses up to 6 % by that. Left out is clay in which every depth slips or sticks.
+        """The clay's law is no power of depth: strides of 3 to 4 cm predict 4 % too much thrust at 2 cm, and a step
+        that just carries the body loses up to 6 % by that. Clay in which every depth slips or sticks is left out.
         """
         for clay in self.CLAYS:
             choice = chosen(clay.mud_estimate())
@@ -370,8 +376,8 @@ class TestMuds:
             speeds = {}
             for z in DEPTHS_M:
                 thrust_n = 2.0 * min(clay.thrust_n(z), MOTOR_FORCE_N)
-                comes_out = clay.k_e(z) * lift_m4(z) < BEARABLE_NM
-                speeds[z] = promised_m(thrust_n, clay.k_s(0.02), z) / duration_s(z) if comes_out else 0.0
+                comes_out = clay.k_e(z) * lift_m4(z) < ALLOWED_NM
+                speeds[z] = predicted_m(thrust_n, clay.k_s(0.02), z) / duration_s(z) if comes_out else 0.0
             taken = next(speed for z, speed in speeds.items() if abs(z - choice.depth_m) < 1e-9)
             assert taken > 0.94 * max(speeds.values())
 
@@ -401,7 +407,7 @@ plausible = st.builds(
     st.floats(0.0, 0.5),
 )
 coefficients = plausible | anything | st.none()
-beliefs = st.builds(MudEstimate, *[coefficients] * 3, *[st.builds(FlipperEstimate, *[coefficients] * 3)] * 2)
+mud_estimates = st.builds(MudEstimate, *[coefficients] * 3, *[st.builds(FlipperEstimate, *[coefficients] * 3)] * 2)
 strides = st.builds(
     stride,
     st.sampled_from(["left", "right"]),
@@ -413,7 +419,7 @@ pairs = st.lists(strides, min_size=1, max_size=2)
 
 
 class TestRange:
-    @given(st.lists(st.tuples(beliefs, pairs), max_size=5))
+    @given(st.lists(st.tuples(mud_estimates, pairs), max_size=5))
     def test_the_depth_stays_within_its_bounds_and_within_reach(
         self, walk: list[tuple[MudEstimate, list[StrideEstimate]]]
     ) -> None:
@@ -423,7 +429,7 @@ class TestRange:
             assert PARAMETERS.min_depth_m <= choice.depth_m <= PARAMETERS.max_depth_m
             assert GEOMETRY.is_reachable(radians(GAIT.sweep_angle_deg), choice.depth_m)
 
-    @given(st.floats(5.0, 45.0), st.floats(0.02, 0.2), beliefs, pairs)
+    @given(st.floats(5.0, 45.0), st.floats(0.02, 0.2), mud_estimates, pairs)
     def test_a_greatest_depth_out_of_reach_is_never_chosen(
         self, sweep_deg: float, max_depth_m: float, mud_estimate: MudEstimate, pair: list[StrideEstimate]
     ) -> None:
@@ -439,7 +445,7 @@ class TestRange:
 
     def test_a_least_depth_out_of_reach_raises_nothing(self) -> None:
         parameters = AdaptationParameters(min_depth_m=0.15, max_depth_m=0.2)
-        assert adapted(parameters).step(believed(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
+        assert adapted(parameters).step(estimated(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
 
     def test_the_grid_contains_both_ends_of_its_range(self) -> None:
         assert adapted()._depths_m == pytest.approx(DEPTHS_M, abs=1e-12)

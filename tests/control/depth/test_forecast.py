@@ -1,6 +1,6 @@
-"""What another depth would bear and hold, forecast from made-up muds.
+"""Thrust and extraction torque at other depths, forecast in synthetic muds.
 
-The plate's sums over pieces of 0.25 by 0.05 mm are right to a thousandth (PIECES).
+The plate's sums over pieces of 0.25 by 0.05 mm are accurate to a thousandth (PIECES).
 """
 
 from math import log, nan, radians, sqrt
@@ -18,9 +18,9 @@ from tests.control.synthetic_muds import (
     LIFTING_NM,
     MOTOR_FORCE_N,
     apart,
-    believed,
     both,
     bound,
+    estimated,
     lift_m4,
     measured,
     reported,
@@ -36,7 +36,7 @@ SOFT, FIRM = reported(0.2e6), reported(0.6e6)
 def forecast(
     mud_estimate: MudEstimate, strides: list[StrideEstimate] | None = None, commanded_m: float | None = None
 ) -> DepthForecast:
-    """After one stride, which went as deep as it was told unless that is given."""
+    """Return the forecast after one stride, which reached its commanded depth unless `commanded_m` is given."""
     forecast = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
     strides = both() if strides is None else strides
     reached_m = [stride.depth_m + stride.surface_m for stride in strides]
@@ -48,76 +48,76 @@ class TestThrust:
     @pytest.mark.parametrize("depth_m", DEPTHS_M)
     def test_a_mud_that_yielded_withstands_its_k_s_times_the_depth_moment_of_both_plates(self, depth_m: float) -> None:
         expected_n = 2.0 * 0.12e6 * thrust_m3(depth_m)
-        assert forecast(believed(reported(0.12e6))).thrust_n(depth_m) == pytest.approx(expected_n, rel=PIECES)
+        assert forecast(estimated(reported(0.12e6))).thrust_n(depth_m) == pytest.approx(expected_n, rel=PIECES)
 
     @pytest.mark.parametrize("depth_m", DEPTHS_M)
-    def test_what_was_learned_of_the_depth_law_carries_it_to_other_depths(self, depth_m: float) -> None:
+    def test_the_learned_depth_law_gives_the_thrust_at_other_depths(self, depth_m: float) -> None:
         k_s = 0.12e6 * (depth_m / 0.025) ** -0.8
-        learned = believed(reported(0.12e6, depth_m=0.025, exponent=-0.8))
+        learned = estimated(reported(0.12e6, depth_m=0.025, exponent=-0.8))
         assert forecast(learned).thrust_n(depth_m) == pytest.approx(2.0 * k_s * thrust_m3(depth_m), rel=PIECES)
 
     def test_no_flipper_pushes_harder_than_its_motor(self) -> None:
-        assert forecast(believed(reported(3e6))).thrust_n(0.05) == 2.0 * MOTOR_FORCE_N
+        assert forecast(estimated(reported(3e6))).thrust_n(0.05) == 2.0 * MOTOR_FORCE_N
         two_muds = apart(FlipperEstimate(None, reported(3e6)), FlipperEstimate(None, reported(0.1e6)))
         expected_n = MOTOR_FORCE_N + 0.1e6 * thrust_m3(0.05)
         assert forecast(two_muds).thrust_n(0.05) == pytest.approx(expected_n, rel=PIECES)
 
     def test_it_is_less_by_one_standard_error(self) -> None:
-        assert forecast(believed(reported(0.3e6, 0.1e6))).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
+        assert forecast(estimated(reported(0.3e6, 0.1e6))).thrust_n(0.03) == forecast(estimated(SOFT)).thrust_n(0.03)
 
     def test_the_error_of_the_depth_law_counts_at_other_depths(self) -> None:
-        doubtful, sure = (
-            forecast(believed(reported(0.1e6, exponent_uncertainty=uncertainty))) for uncertainty in (0.3, 0.0)
+        uncertain, sure = (
+            forecast(estimated(reported(0.1e6, exponent_uncertainty=uncertainty))) for uncertainty in (0.3, 0.0)
         )
         fraction = 1.0 - 0.3 * log(0.05 / 0.03)
         for depth_m, expected in ((0.03, 1.0), (0.05, fraction)):
-            assert doubtful.thrust_n(depth_m) == pytest.approx(expected * (sure.thrust_n(depth_m) or nan))
+            assert uncertain.thrust_n(depth_m) == pytest.approx(expected * (sure.thrust_n(depth_m) or nan))
 
     def test_an_error_above_the_value_gives_no_thrust(self) -> None:
-        assert forecast(believed(reported(0.1e6, 0.2e6))).thrust_n(0.03) == 0.0
+        assert forecast(estimated(reported(0.1e6, 0.2e6))).thrust_n(0.03) == 0.0
 
     def test_the_mean_of_the_flippers_counts_for_each(self) -> None:
         two_muds = apart(FlipperEstimate(None, SOFT), FlipperEstimate(None, reported(0.4e6)))
-        expected_n = forecast(believed(reported(0.3e6))).thrust_n(0.03)
+        expected_n = forecast(estimated(reported(0.3e6))).thrust_n(0.03)
         assert forecast(two_muds).thrust_n(0.03) == pytest.approx(expected_n)
 
-    def test_the_flipper_that_knows_speaks_for_the_one_that_does_not(self) -> None:
-        knows, knows_not = FlipperEstimate(None, SOFT), FlipperEstimate()
-        for mud_estimate in (apart(knows, knows_not), apart(knows_not, knows)):
-            assert forecast(mud_estimate).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
+    def test_a_known_flipper_counts_for_an_unknown_one(self) -> None:
+        known, unknown = FlipperEstimate(None, SOFT), FlipperEstimate()
+        for mud_estimate in (apart(known, unknown), apart(unknown, known)):
+            assert forecast(mud_estimate).thrust_n(0.03) == forecast(estimated(SOFT)).thrust_n(0.03)
 
     def test_nothing_is_forecast_where_nothing_is_known(self) -> None:
         assert forecast(NOTHING_KNOWN).thrust_n(0.03) is None
-        assert forecast(believed(None, SOFT)).thrust_n(0.03) is None
-        assert forecast(believed(SOFT), []).thrust_n(0.03) is None
+        assert forecast(estimated(None, SOFT)).thrust_n(0.03) is None
+        assert forecast(estimated(SOFT), []).thrust_n(0.03) is None
         assert DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N).thrust_n(0.03) is None
 
 
 class TestMudThatHeld:
-    """Its k_s is only a lower bound; k_p of the insertion is told by value."""
+    """The mud's k_s is only a lower bound; the k_p of the insertion is a value."""
 
     def test_the_insertion_gives_the_thrust_of_a_mud_that_never_yielded(self) -> None:
-        """By the ratio 0.55, less its doubt of a fifth."""
-        alone, derived = believed(None, None, reported(0.5e6)), believed(reported(0.8 * 0.55 * 0.5e6))
+        """The thrust follows from the ratio 0.55, less its uncertainty of a fifth."""
+        alone, derived = estimated(None, None, reported(0.5e6)), estimated(reported(0.8 * 0.55 * 0.5e6))
         assert forecast(alone).thrust_n(0.03) == pytest.approx(forecast(derived).thrust_n(0.03))
 
-    @pytest.mark.parametrize(("least", "k_p", "bears"), [(0.3e6, 0.5e6, 0.3e6), (0.1e6, 0.5e6, 0.22e6)])
-    def test_the_larger_of_bound_and_insertion_counts(self, least: float, k_p: float, bears: float) -> None:
-        mud_estimate = believed(bound(least), None, reported(k_p))
+    @pytest.mark.parametrize(("least", "k_p", "counted"), [(0.3e6, 0.5e6, 0.3e6), (0.1e6, 0.5e6, 0.22e6)])
+    def test_the_larger_of_bound_and_insertion_counts(self, least: float, k_p: float, counted: float) -> None:
+        mud_estimate = estimated(bound(least), None, reported(k_p))
         assert forecast(mud_estimate).thrust_n(0.03) == pytest.approx(
-            forecast(believed(reported(bears))).thrust_n(0.03)
+            forecast(estimated(reported(counted))).thrust_n(0.03)
         )
 
     def test_a_bound_alone_gives_its_own_thrust(self) -> None:
-        assert forecast(believed(bound(0.2e6))).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
+        assert forecast(estimated(bound(0.2e6))).thrust_n(0.03) == forecast(estimated(SOFT)).thrust_n(0.03)
 
     def test_a_k_s_that_was_set_by_value_needs_no_insertion(self) -> None:
-        mud_estimate = believed(SOFT, None, reported(9e6))
-        assert forecast(mud_estimate).thrust_n(0.03) == forecast(believed(SOFT)).thrust_n(0.03)
+        mud_estimate = estimated(SOFT, None, reported(9e6))
+        assert forecast(mud_estimate).thrust_n(0.03) == forecast(estimated(SOFT)).thrust_n(0.03)
 
     def test_the_uncertainty_about_the_insertion_counts(self) -> None:
-        doubtful, sure = believed(None, None, reported(0.5e6, 0.2e6)), believed(None, None, reported(0.3e6))
-        assert forecast(doubtful).thrust_n(0.03) == pytest.approx(forecast(sure).thrust_n(0.03))
+        uncertain, sure = estimated(None, None, reported(0.5e6, 0.2e6)), estimated(None, None, reported(0.3e6))
+        assert forecast(uncertain).thrust_n(0.03) == pytest.approx(forecast(sure).thrust_n(0.03))
 
 
 class TestRatio:
@@ -125,28 +125,28 @@ class TestRatio:
     def test_each_stride_with_both_coefficients_moves_the_ratio_a_quarter_towards_the_truth(self, truth: float) -> None:
         learning = forecast(NOTHING_KNOWN)
         for strides in range(1, 30):
-            learning.update(believed(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
+            learning.update(estimated(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
             left = log(0.55 / truth) * 0.75**strides
             assert log(learning.shear_ratio / truth) == pytest.approx(left, abs=1e-12)
 
     def test_both_are_compared_at_the_same_depth(self) -> None:
         shallow = reported(1.0e6, depth_m=0.02, exponent=-0.5)
-        learning = forecast(believed(reported(0.55e6 * (0.04 / 0.02) ** -0.5, depth_m=0.04), None, shallow))
+        learning = forecast(estimated(reported(0.55e6 * (0.04 / 0.02) ** -0.5, depth_m=0.04), None, shallow))
         assert learning.shear_ratio == pytest.approx(0.55)
 
     @pytest.mark.parametrize(("truth", "nearest"), [(30.0, 1.5), (0.001, 0.2)])
     def test_nonsense_is_trusted_only_so_far(self, truth: float, nearest: float) -> None:
         learning = forecast(NOTHING_KNOWN)
         for _ in range(30):
-            learning.update(believed(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
+            learning.update(estimated(reported(truth * 0.7e6), None, reported(0.7e6)), both(), 0.03)
         assert learning.shear_ratio == nearest
 
     @pytest.mark.parametrize("k_s", [bound(0.7e6), None, reported(nan), reported(0.0)])
     @pytest.mark.parametrize("k_p", [bound(0.7e6), None, reported(nan), reported(0.0)])
     def test_bounds_and_gaps_teach_nothing(self, k_s: Coefficient | None, k_p: Coefficient | None) -> None:
-        assert forecast(believed(k_s, None, k_p)).shear_ratio == 0.55
-        assert forecast(believed(k_s, None, reported(0.7e6))).shear_ratio == 0.55
-        assert forecast(believed(reported(0.7e6), None, k_p)).shear_ratio == 0.55
+        assert forecast(estimated(k_s, None, k_p)).shear_ratio == 0.55
+        assert forecast(estimated(k_s, None, reported(0.7e6))).shear_ratio == 0.55
+        assert forecast(estimated(reported(0.7e6), None, k_p)).shear_ratio == 0.55
 
 
 class TestFeltFraction:
@@ -156,11 +156,11 @@ class TestFeltFraction:
         learning = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
         for fraction in fractions:
             extraction = stride(k_e=measured(0.6e6), extraction_nm=fraction * self.WHOLE_NM)
-            learning.update(believed(None, reported(0.6e6)), [extraction], 0.03)
+            learning.update(estimated(None, reported(0.6e6)), [extraction], 0.03)
         return learning
 
     def test_before_any_extraction_the_whole_torque_is_expected(self) -> None:
-        assert forecast(believed(None, reported(0.6e6))).felt_fraction == 1.0
+        assert forecast(estimated(None, reported(0.6e6))).felt_fraction == 1.0
 
     def test_the_first_extraction_is_trusted_fully(self) -> None:
         assert self.reported_by(0.6).felt_fraction == pytest.approx(0.6, rel=PIECES)
@@ -211,12 +211,12 @@ class TestExtraction:
     @pytest.mark.parametrize("depth_m", DEPTHS_M)
     def test_the_torque_is_k_e_times_the_lift_moment_and_two_standard_errors(self, depth_m: float) -> None:
         for k_e, uncertainty in ((0.4e6, 0.0), (0.2e6, 0.1e6)):
-            found = forecast(believed(None, reported(k_e, uncertainty)), both(nan)).extraction_nm(depth_m)
+            found = forecast(estimated(None, reported(k_e, uncertainty)), both(nan)).extraction_nm(depth_m)
             assert found == pytest.approx(0.4e6 * lift_m4(depth_m), rel=PIECES)
 
     def test_the_learned_fraction_counts(self) -> None:
         felt = [stride(k_e=measured(0.6e6), extraction_nm=0.5 * 0.6e6 * lift_m4(0.03))]
-        found = forecast(believed(None, reported(0.6e6)), felt).extraction_nm(0.05)
+        found = forecast(estimated(None, reported(0.6e6)), felt).extraction_nm(0.05)
         assert found == pytest.approx(0.5 * 0.6e6 * lift_m4(0.05), rel=2.0 * PIECES)
 
     def test_the_flipper_that_the_mud_holds_harder_decides(self) -> None:
@@ -225,59 +225,61 @@ class TestExtraction:
             assert forecast(mud_estimate).extraction_nm(0.03) == forecast(apart(sticky, sticky)).extraction_nm(0.03)
 
     def test_a_flipper_that_came_out_proves_every_shallower_depth(self) -> None:
-        proven = forecast(believed(None, reported(2e6)), both(0.035, extraction_nm=0.3))
+        proven = forecast(estimated(None, reported(2e6)), both(0.035, extraction_nm=0.3))
         assert proven.extraction_nm(0.03) == proven.extraction_nm(0.035) == 0.3
 
     def test_deeper_it_proves_a_torque_in_proportion_to_the_lift_moment(self) -> None:
-        """For k_e falls with depth; a belief of less than that holds."""
+        """k_e falls with depth, so it is at most that torque; a smaller estimate counts instead."""
         for k_e, expected_nm in ((2e6, 0.3 * lift_m4(0.045) / lift_m4(0.035)), (0.1e6, 0.1e6 * lift_m4(0.045))):
-            proven = forecast(believed(None, reported(k_e)), both(0.035, extraction_nm=0.3))
+            proven = forecast(estimated(None, reported(k_e)), both(0.035, extraction_nm=0.3))
             assert proven.extraction_nm(0.045) == pytest.approx(expected_nm, rel=2.0 * PIECES)
 
     def test_where_k_e_is_not_known_k_p_stands_for_it(self) -> None:
         for k_e in (None, bound(0.1e6)):
-            mud_estimate = believed(None, k_e)._replace(k_p=reported(0.5e6, 0.1e6))
+            mud_estimate = estimated(None, k_e)._replace(k_p=reported(0.5e6, 0.1e6))
             found = forecast(mud_estimate, both(0.02)).extraction_nm(0.04)
             assert found == pytest.approx(0.7e6 * lift_m4(0.04), rel=PIECES)
 
     def test_a_proof_never_makes_an_extraction_harder_than_the_mud(self) -> None:
-        proven = forecast(believed(None, reported(0.2e6)), both(0.05, extraction_nm=0.5))
+        proven = forecast(estimated(None, reported(0.2e6)), both(0.05, extraction_nm=0.5))
         assert proven.extraction_nm(0.02) == pytest.approx(0.2e6 * lift_m4(0.02), rel=PIECES)
 
     def test_a_flipper_that_stuck_proves_nothing_by_its_torque(self) -> None:
-        """At half the depth it is held by half of all the torque, and by what is believed where that is more."""
+        """At half the depth the mud holds with half of the full torque, or with its estimated torque where that is
+        more.
+        """
         stuck = both(0.04, released=False, extraction_nm=0.1)
         for k_e, expected_nm in ((2e6, 2e6 * lift_m4(0.02)), (0.5e6, LIFTING_NM / 2.0)):
-            found = forecast(believed(None, reported(k_e)), stuck).extraction_nm(0.02)
+            found = forecast(estimated(None, reported(k_e)), stuck).extraction_nm(0.02)
             assert found == pytest.approx(expected_nm, rel=PIECES)
 
     def test_a_k_e_below_zero_is_none_but_keeps_its_uncertainty(self) -> None:
-        found = forecast(believed(None, reported(-0.4e6, 0.2e6)), both(nan)).extraction_nm(0.03)
+        found = forecast(estimated(None, reported(-0.4e6, 0.2e6)), both(nan)).extraction_nm(0.03)
         assert found == pytest.approx(0.4e6 * lift_m4(0.03), rel=PIECES)
 
     @pytest.mark.parametrize("k_e", [None, bound(0.1e6)])
     def test_without_a_value_it_comes_out_of_where_it_was_and_a_step_of_the_grid_deeper(
         self, k_e: Coefficient | None
     ) -> None:
-        unsure = forecast(believed(None, k_e), both(0.03))
+        unsure = forecast(estimated(None, k_e), both(0.03))
         assert unsure.extraction_nm(0.0325) < 0.2 * LIFTING_NM
         assert unsure.extraction_nm(0.0326) == LIFTING_NM
 
     def test_a_lower_bound_gives_the_least_torque(self) -> None:
-        assert forecast(believed(None, bound(2.5e6)), both(0.03)).extraction_nm(0.03) == pytest.approx(
+        assert forecast(estimated(None, bound(2.5e6)), both(0.03)).extraction_nm(0.03) == pytest.approx(
             2.5e6 * lift_m4(0.03), rel=PIECES
         )
 
     def test_a_stride_that_ended_at_an_unknown_depth_proves_nothing(self) -> None:
-        assert forecast(believed(None), both(nan, extraction_nm=0.1)).extraction_nm(0.015) == LIFTING_NM
+        assert forecast(estimated(None), both(nan, extraction_nm=0.1)).extraction_nm(0.015) == LIFTING_NM
 
     def test_above_the_surface_no_mud_holds_the_flipper(self) -> None:
-        sunk = forecast(believed(None, reported(9e6)), both(surface_m=0.03))
+        sunk = forecast(estimated(None, reported(9e6)), both(surface_m=0.03))
         assert sunk.extraction_nm(0.03) == sunk.extraction_nm(0.02) == 0.0
 
 
 class TestStuck:
-    LOOSE = believed(None, reported(1.0))  # whatever holds is the memory
+    LOOSE = estimated(None, reported(1.0))  # all that holds is the memory
 
     def after(self, *strides: list[StrideEstimate]) -> DepthForecast:
         remembering = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)
@@ -296,7 +298,7 @@ class TestStuck:
 
     @pytest.mark.parametrize(("reached_m", "forgotten"), [(0.0386, False), (0.0389, True), (0.05, True)])
     def test_coming_out_of_there_forgets_it(self, reached_m: float, forgotten: bool) -> None:
-        """Half a step of the grid, 1.25 mm, is the same depth."""
+        """Within half a step of the grid, 1.25 mm, the depth counts as the same."""
         after = self.after(both(0.04, released=False), both(reached_m))
         assert (after.extraction_nm(0.03) < 0.01) == forgotten
 
@@ -330,30 +332,30 @@ class TestStuck:
 
 class TestHowDeepTheFlippersGo:
     def test_a_quarter_of_the_sag_of_the_flipper_that_sagged_less_is_added(self) -> None:
-        sagged = forecast(believed(SOFT), [stride("left", 0.034), stride("right", 0.038)], 0.03)
+        sagged = forecast(estimated(SOFT), [stride("left", 0.034), stride("right", 0.038)], 0.03)
         assert sagged.reached_m(0.02) == pytest.approx(0.021)
         expected_n = 2.0 * 0.2e6 * thrust_m3(0.021)
         assert sagged.thrust_n(0.02) == pytest.approx(expected_n, rel=PIECES)
 
     def test_the_sag_also_has_to_come_out(self) -> None:
-        sagged = forecast(believed(None, reported(0.4e6)), both(0.038), 0.03)
+        sagged = forecast(estimated(None, reported(0.4e6)), both(0.038), 0.03)
         assert sagged.extraction_nm(0.03) == pytest.approx(0.4e6 * lift_m4(0.032), rel=PIECES)
 
     def test_sag_is_measured_from_the_nominal_surface(self) -> None:
-        assert forecast(believed(SOFT), both(0.024, surface_m=0.01), 0.03).reached_m(0.02) == pytest.approx(0.021)
+        assert forecast(estimated(SOFT), both(0.024, surface_m=0.01), 0.03).reached_m(0.02) == pytest.approx(0.021)
 
     def test_flippers_that_did_not_reach_their_depth_do_not_sag(self) -> None:
-        assert forecast(believed(SOFT), [stride("left", 0.025), stride("right", 0.04)], 0.03).reached_m(0.02) == 0.02
+        assert forecast(estimated(SOFT), [stride("left", 0.025), stride("right", 0.04)], 0.03).reached_m(0.02) == 0.02
 
     def test_an_unknown_depth_gives_no_sag(self) -> None:
         pair = [stride("left", nan), stride("right", 0.034)]
-        assert forecast(believed(SOFT), pair, 0.03).reached_m(0.02) == pytest.approx(0.021)
-        assert forecast(believed(SOFT), both(nan), 0.03).reached_m(0.02) == 0.02
+        assert forecast(estimated(SOFT), pair, 0.03).reached_m(0.02) == pytest.approx(0.021)
+        assert forecast(estimated(SOFT), both(nan), 0.03).reached_m(0.02) == 0.02
 
     def test_they_go_no_deeper_than_the_arm_reaches_at_the_ends_of_the_sweep(self) -> None:
-        """Where its vertical lever is still 1 cm: √((l cos α)² + h² - 1 cm²) - H."""
+        """The deepest pose has a vertical lever of 1 cm: √((l cos α)² + h² - 1 cm²) - H."""
         deepest_m = sqrt((0.12**2) * 0.75 + 0.05**2 - 0.01**2) - 0.0645
-        far = forecast(believed(reported(0.1e6), reported(0.4e6)), both(0.09), 0.03)
+        far = forecast(estimated(reported(0.1e6), reported(0.4e6)), both(0.09), 0.03)
         assert far.reached_m(0.04) == far.reached_m(0.3) == pytest.approx(deepest_m)
         assert far.thrust_n(0.3) == pytest.approx(2.0 * 0.1e6 * thrust_m3(deepest_m), rel=PIECES)
         assert far.extraction_nm(0.3) == pytest.approx(0.4e6 * lift_m4(deepest_m), rel=PIECES)
@@ -362,7 +364,7 @@ class TestHowDeepTheFlippersGo:
 class TestSurface:
     @pytest.mark.parametrize("surface_m", [-0.01, 0.0075])
     def test_thrust_and_suction_are_those_of_the_plate_under_the_surface(self, surface_m: float) -> None:
-        learned = believed(reported(0.12e6, exponent=-0.8), reported(0.4e6, exponent=-0.4))
+        learned = estimated(reported(0.12e6, exponent=-0.8), reported(0.4e6, exponent=-0.4))
         found = forecast(learned, both(0.02, surface_m=surface_m))
         submerged_m = 0.035 - surface_m
         k_s, k_e = 0.12e6 * (submerged_m / 0.03) ** -0.8, 0.4e6 * (submerged_m / 0.03) ** -0.4
@@ -370,15 +372,15 @@ class TestSurface:
         assert found.extraction_nm(0.035) == pytest.approx(k_e * lift_m4(0.035, surface_m), rel=PIECES)
 
     def test_flippers_that_do_not_reach_the_mud_push_nothing(self) -> None:
-        assert forecast(believed(SOFT), both(surface_m=0.03)).thrust_n(0.03) == 0.0
+        assert forecast(estimated(SOFT), both(surface_m=0.03)).thrust_n(0.03) == 0.0
 
     def test_each_flipper_has_its_own_surface(self) -> None:
         pair = [stride("left", surface_m=0.01), stride("right", 0.02)]
         expected_n = 0.2e6 * (thrust_m3(0.03, 0.01) + thrust_m3(0.03))
-        assert forecast(believed(SOFT), pair).thrust_n(0.03) == pytest.approx(expected_n, rel=PIECES)
+        assert forecast(estimated(SOFT), pair).thrust_n(0.03) == pytest.approx(expected_n, rel=PIECES)
 
     def test_a_surface_that_is_not_known_is_the_nominal_one(self) -> None:
-        mud_estimate = believed(SOFT, reported(0.4e6))
+        mud_estimate = estimated(SOFT, reported(0.4e6))
         unknown, nominal = forecast(mud_estimate, both(surface_m=nan)), forecast(mud_estimate, both())
         assert unknown.thrust_n(0.04) == nominal.thrust_n(0.04)
         assert unknown.extraction_nm(0.04) == nominal.extraction_nm(0.04)
@@ -390,12 +392,12 @@ class TestPad:
         assert forecast(two_muds).shear_at(0.02) == pytest.approx((0.15e6 + 0.4e6) / 2.0)
 
     def test_it_follows_the_depth_law(self) -> None:
-        learned = believed(reported(0.2e6, exponent=-1.0))
+        learned = estimated(reported(0.2e6, exponent=-1.0))
         assert forecast(learned).shear_at(0.02) == pytest.approx(0.3e6)
 
     def test_it_is_none_where_there_is_no_pad_or_nothing_is_known(self) -> None:
-        assert forecast(believed(FIRM)).shear_at(0.0) == 0.0
-        assert forecast(NOTHING_KNOWN).shear_at(0.02) == forecast(believed(FIRM), []).shear_at(0.02) == 0.0
+        assert forecast(estimated(FIRM)).shear_at(0.0) == 0.0
+        assert forecast(NOTHING_KNOWN).shear_at(0.02) == forecast(estimated(FIRM), []).shear_at(0.02) == 0.0
 
 
 numbers = st.floats(allow_infinity=False) | st.floats(-0.5, 0.5) | st.sampled_from([0.0, 0.03, 1e6])
@@ -403,18 +405,18 @@ estimates = st.builds(measured, numbers) | st.builds(
     Estimate, numbers, numbers, st.just(9), st.booleans(), st.just(""), st.booleans()
 )
 coefficients = st.none() | st.builds(Coefficient, *[numbers] * 5, st.just(3), st.booleans())
-flipper_beliefs = st.builds(FlipperEstimate, *[coefficients] * 3)
-beliefs = st.builds(MudEstimate, *[coefficients] * 3, flipper_beliefs, flipper_beliefs, st.booleans())
+flipper_estimates = st.builds(FlipperEstimate, *[coefficients] * 3)
+mud_estimates = st.builds(MudEstimate, *[coefficients] * 3, flipper_estimates, flipper_estimates, st.booleans())
 flippers = st.sampled_from(["left", "right"])
 strides = st.builds(stride, flippers, numbers, st.booleans(), numbers, estimates, estimates, numbers)
 
 
 @settings(max_examples=400)
 @given(
-    st.lists(st.tuples(beliefs, st.lists(strides, min_size=1, max_size=2)), min_size=1, max_size=2),
+    st.lists(st.tuples(mud_estimates, st.lists(strides, min_size=1, max_size=2)), min_size=1, max_size=2),
     st.floats(0.005, 0.2),
 )
-def test_nothing_that_is_trusted_or_measured_raises(
+def test_no_estimate_or_measurement_makes_it_raise(
     walk: list[tuple[MudEstimate, list[StrideEstimate]]], depth_m: float
 ) -> None:
     survivor = DepthForecast(GEOMETRY, GAIT, MOTOR_FORCE_N)

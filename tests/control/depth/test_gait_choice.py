@@ -1,4 +1,4 @@
-"""The choice of depth and sweep together, from beliefs made up of muds, against a search that looks at every pair."""
+"""The choice of depth and sweep together in synthetic muds, against a search of every pair."""
 
 from dataclasses import replace
 from math import nan, radians
@@ -22,20 +22,20 @@ from tests.control.synthetic_muds import both
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 PARAMETERS = AdaptationParameters(method="gait")
 LIFTING_NM = PARAMETERS.motor_force_n * GEOMETRY.flipper_length_m
-NOT_REPORTED = Estimate(nan, nan, 0, False, "not told")
+NOT_REPORTED = Estimate(nan, nan, 0, False, "not reported")
 
 
 def reported(value: float, at_least: bool = False) -> Coefficient:
     return Coefficient(value, 0.05 * value, 0.03, 0.0, 0.1, 8, at_least)
 
 
-def believed(k_s: float, k_e: float, boundary: bool = False) -> MudEstimate:
-    """By both flippers alike; a mud that never yielded has a k_s of this or more."""
+def estimated(k_s: float, k_e: float, boundary: bool = False) -> MudEstimate:
+    """Return the same estimate for both flippers."""
     flipper = FlipperEstimate(None, reported(k_s), reported(k_e))
     return MudEstimate(None, reported(k_s), reported(k_e), flipper, flipper, boundary)
 
 
-FIRM, SOFT, STICKY = believed(2.0e6, 0.5e6), believed(0.2e6, 0.1e6), believed(2.0e6, 2.5e6)
+FIRM, SOFT, STICKY = estimated(2.0e6, 0.5e6), estimated(0.2e6, 0.1e6), estimated(2.0e6, 2.5e6)
 
 
 def strides(
@@ -63,7 +63,7 @@ def settled(mud_estimate: MudEstimate, count: int = 5) -> DepthChoice:
 def brute_force(
     mud_estimate: MudEstimate, closed: list[StrideEstimate], walked: GaitParameters, widest_deg: float
 ) -> list[tuple[float, float, float]]:
-    """(speed, depth, sweep) of every pair that comes out, the fastest first."""
+    """Return (speed, depth, sweep) of every pair that comes out, the fastest first."""
     found = []
     for i in range(round((PARAMETERS.gait.max_sweep_deg - PARAMETERS.gait.min_sweep_deg) / SWEEP_STEP_DEG) + 1):
         deg = PARAMETERS.gait.min_sweep_deg + i * SWEEP_STEP_DEG
@@ -95,10 +95,10 @@ def brute_force(
 def test_it_takes_the_fastest_of_all_pairs_that_come_out(
     walked_deg: float, k_s: float, k_e: float, torque_nm: float, surface_m: float
 ) -> None:
-    """A stride of 1.5 cm came out and told its k_e, which the last one felt with some share of it."""
+    """A stride of 1.5 cm came out and gave its k_e, with any torque of its extraction."""
     felt = Estimate(k_e, 0.05 * k_e, 50, True)
     closed = [replace(each, k_e=felt) for each in strides(torque_nm=torque_nm, depth_m=0.015, surface_m=surface_m)]
-    walked, mud_estimate = replace(GAIT, sweep_angle_deg=walked_deg), believed(k_s, k_e)
+    walked, mud_estimate = replace(GAIT, sweep_angle_deg=walked_deg), estimated(k_s, k_e)
     choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(mud_estimate, closed, 0.03)
     easily = torque_nm < 0.7 * LIFTING_NM
     pairs = brute_force(mud_estimate, closed, walked, walked_deg + (WIDENING_DEG if easily else 0.0))
@@ -112,7 +112,7 @@ def test_it_takes_the_fastest_of_all_pairs_that_come_out(
 
 @pytest.mark.parametrize("deg", [30.0, 40.0, 50.0])
 def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: float) -> None:
-    """Over the wider sweep Φ of 2 cm is smaller: what just sticks at ±30° comes out at ±50°."""
+    """Over a wider sweep Φ at 2 cm is smaller: a flipper that just sticks at ±30° comes out at ±50°."""
     parameters = replace(PARAMETERS, min_depth_m=0.02, max_depth_m=0.02, initial_depth_m=0.02)
     rear_rad = -radians(deg)
     plate = submerged_plate(GEOMETRY, rear_rad, GEOMETRY.adduction_rad(rear_rad, 0.02))
@@ -194,8 +194,8 @@ class TestStuck:
         assert sweep_deg(stuck) == 50.0
         assert sweep_deg(adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m), 0.03)) == 30.0
 
-    def test_not_even_where_the_flipper_was_pressed_much_deeper_than_commanded(self) -> None:
-        """By the depth that it reached alone, the commanded one would be safe."""
+    def test_the_commanded_depth_is_excluded_where_the_flipper_was_pressed_deeper(self) -> None:
+        """By the depth that the flipper reached, the commanded depth would be safe."""
         adaptation, stuck = self.walked()
         choice = adaptation.step(FIRM, strides(released=False, depth_m=0.05), adaptation.choice.depth_m)
         assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
@@ -241,12 +241,12 @@ def test_where_nothing_is_known_of_the_thrust_depth_and_gait_stay() -> None:
 
 
 def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None:
-    choice = adapted().step(believed(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01), 0.03)
+    choice = adapted().step(estimated(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01), 0.03)
     assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "extraction")
 
 
 def test_where_none_predicts_a_step_the_deepest_is_taken() -> None:
-    choice = adapted().step(believed(0.005e6, 0.001e6), strides(), 0.03)
+    choice = adapted().step(estimated(0.005e6, 0.001e6), strides(), 0.03)
     assert (choice.reason, choice.slips) == ("thrust", True)
     assert choice.depth_m == pytest.approx(0.05)
 
@@ -256,7 +256,7 @@ def test_where_none_predicts_a_step_the_deepest_is_taken() -> None:
 def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
     adaptation = adapted()
     for i in range(4):
-        choice = adaptation.step(believed(k_s, k_e), strides(released=bool(seed >> i & 1)), adaptation.choice.depth_m)
+        choice = adaptation.step(estimated(k_s, k_e), strides(released=bool(seed >> i & 1)), adaptation.choice.depth_m)
         assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
         assert 30.0 <= sweep_deg(choice) <= 50.0
 
@@ -280,7 +280,7 @@ def test_only_this_method_has_a_shorter_swing() -> None:
         assert quickest(replace(PARAMETERS, method=method), GEOMETRY, GAIT) is GAIT
 
 
-def test_what_stuck_is_not_forgotten_by_a_stride_that_ended_its_insertion_above_it() -> None:
+def test_a_stuck_stride_is_not_forgotten_after_a_shallower_one() -> None:
     adaptation = adapted()
     held = adaptation.step(STICKY, strides(released=False, depth_m=0.04), 0.04)
     adaptation.step(STICKY, strides(depth_m=0.02), 0.02)

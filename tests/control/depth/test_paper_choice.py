@@ -1,6 +1,6 @@
-"""The paper's own choice, with forces worked out by hand for the authors' plate of 2.5 cm by 4 mm.
+"""The paper's own choice, with forces computed by hand for the authors' plate of 2.5 cm by 4 mm.
 
-Its edge has 1 cm², so f_e = k_e · 1 cm² · z and f_m = 6.25 N: at 1 N/cm³ that would be 6.25 cm, at 2 N/cm³ 3.125 cm.
+Its edge has 1 cm², so f_e = k_e · 1 cm² · z and f_m = 6.25 N: the limit is 6.25 cm at 1 N/cm³ and 3.125 cm at 2 N/cm³.
 """
 
 from math import nan, radians
@@ -19,7 +19,7 @@ from tests.control.synthetic_muds import (
     GEOMETRY,
     NOT_REPORTED,
     PARAMETERS,
-    believed,
+    estimated,
     measured,
     reported,
     stride,
@@ -57,14 +57,16 @@ class TestDepth:
         assert choice.reason == OUT
 
     def test_a_force_equal_to_the_motors_does_not_pull_it_out(self) -> None:
-        """In round numbers: 2 N/cm³ · 1 cm² · 3 cm = 6 N."""
+        """In round numbers the force is 2 N/cm³ · 1 cm² · 3 cm = 6 N."""
         for motor_force_n, depth_m in ((6.0 + 1e-9, 0.03), (6.0 - 1e-9, 0.0275)):
             parameters = AdaptationParameters(motor_force_n=motor_force_n)
             choice = adapted(parameters).step(NOTHING_KNOWN, alike(NOT_REPORTED, measured(2.0e6)), 0.03)
             assert choice.depth_m == pytest.approx(depth_m)
 
     def test_where_nothing_comes_out_it_is_the_shallowest(self) -> None:
-        """1.5 cm hold 7.5 N, where 2 · 1 N/cm³ · 2.5 cm · 1.5² cm² / 2 = 5.6 N face 8 N: it slips as well."""
+        """A depth of 1.5 cm holds with 7.5 N. It slips as well, since 2 · 1 N/cm³ · 2.5 cm · 1.5² cm² / 2 = 5.6 N face
+        8 N.
+        """
         assert chosen(measured(1e6), measured(5e6)) == DepthChoice(0.015, True, "extraction")
 
     def test_a_weak_mud_is_not_walked_deeper_than_allowed(self) -> None:
@@ -72,13 +74,14 @@ class TestDepth:
 
     @given(st.floats(1e4, 1e7), st.floats(0.0, 5e6))
     def test_uncertainty_and_the_memory_of_many_strides_are_ignored(self, k_e: float, uncertainty: float) -> None:
-        doubtful = measured(k_e)._replace(std_error=uncertainty)
-        choice = adapted().step(believed(reported(3e6), reported(9e6)), alike(NOT_REPORTED, doubtful), 0.03)
+        uncertain = measured(k_e)._replace(std_error=uncertainty)
+        choice = adapted().step(estimated(reported(3e6), reported(9e6)), alike(NOT_REPORTED, uncertain), 0.03)
         assert choice == chosen(NOT_REPORTED, measured(k_e))
 
 
 class TestSlip:
-    """2 f_x = k_s · 2.5 cm · z² against f_r + f_a = 2.5 N + k_s · 3 cm³ + 2.5 N (1 kg, 0.5 m/s, 0.1 s).
+    """The condition is 2 f_x = k_s · 2.5 cm · z² against f_r + f_a = 2.5 N + k_s · 3 cm³ + 2.5 N (1 kg, 0.5 m/s, 0.1
+    s).
 
     At 5 cm that is k_s · 62.5 cm³ against 5 N + k_s · 3 cm³, so it slips up to 5 N / 59.5 cm³ = 0.0840 N/cm³; at 3 cm
     up to 5 N / 19.5 cm³ = 0.2564 N/cm³.
@@ -100,7 +103,7 @@ class TestSlip:
         assert chosen(NOT_REPORTED, measured(1e6)).slips is False
 
     def test_inertia_is_mass_times_arc_over_acceleration_and_stance_time(self) -> None:
-        """Of 2 kg at 0.2 m/s within 0.2 s: 2 kg · α l / (0.2 s · t_s) = 1 N, so up to 3.5 N / 59.5 cm³ it slips."""
+        """For 2 kg at 0.2 m/s within 0.2 s, 2 kg · α l / (0.2 s · t_s) = 1 N, so it slips up to 3.5 N / 59.5 cm³."""
         stance_s = 2.0 * radians(30.0) * 0.12 / 0.2
         assert 2.0 * radians(30.0) * 0.12 / (0.2 * stance_s) == pytest.approx(1.0)
         parameters, gait = (
@@ -112,7 +115,7 @@ class TestSlip:
             assert choice.slips == slips
 
     def test_a_larger_pad_slips_sooner(self) -> None:
-        """4 cm wide and 3 cm deep, 18 cm³: up to 5 N / 44.5 cm³ = 0.1124 N/cm³."""
+        """The pad is 4 cm wide and 3 cm deep, 18 cm³, so it slips up to 5 N / 44.5 cm³ = 0.1124 N/cm³."""
         parameters = AdaptationParameters(pad_width_m=0.04, pad_depth_m=0.03)
         for k_s, slips in ((0.1122e6, True), (0.1125e6, False)):
             choice = adapted(parameters).step(NOTHING_KNOWN, alike(measured(k_s), measured(1e6)), 0.03)
@@ -125,7 +128,7 @@ class TestMemory:
         strides = [stride("left", k_e=measured(1e6)), stride("right", k_e=measured(2e6))]
         assert adapted().step(NOTHING_KNOWN, strides[first:] + strides[:first], 0.03).depth_m == pytest.approx(0.03)
 
-    def test_the_left_one_speaks_where_the_right_one_does_not_know(self) -> None:
+    def test_the_left_flipper_decides_where_the_right_one_is_unknown(self) -> None:
         strides = [stride("left", k_e=measured(2e6)), stride("right")]
         assert adapted().step(NOTHING_KNOWN, strides, 0.03).depth_m == pytest.approx(0.03)
 
@@ -146,7 +149,7 @@ class TestMemory:
         adaptation.reset(0.04)
         kept = DepthChoice(0.04, False, "no k_e known, depth kept")
         assert adaptation.step(NOTHING_KNOWN, alike(measured(1e6), NOT_REPORTED), adaptation.choice.depth_m) == kept
-        assert adaptation.step(believed(reported(1e6), reported(1e6)), [], adaptation.choice.depth_m) == kept
+        assert adaptation.step(estimated(reported(1e6), reported(1e6)), [], adaptation.choice.depth_m) == kept
 
     def test_a_reset_forgets_and_starts_at_its_depth(self) -> None:
         adaptation = adapted()
@@ -157,7 +160,7 @@ class TestMemory:
         assert adaptation.step(NOTHING_KNOWN, [], adaptation.choice.depth_m).depth_m == 0.02
 
     def test_a_stuck_flipper_does_not_decide(self) -> None:
-        """As in the paper, whose conditions know nothing of it."""
+        """The paper's conditions do not include it."""
         stuck = [stride("right", released=False, depth_m=nan, k_e=measured(1e6))]
         assert adapted().step(NOTHING_KNOWN, stuck, 0.03).depth_m == pytest.approx(0.05)
 

@@ -1,7 +1,7 @@
-"""The promised step against the same equation of motion, integrated a thousand times as finely by numpy.
+"""The predicted step against the same equation of motion, integrated a thousand times as finely by numpy.
 
-The oracle has the grip's force itself as its state: it grows with k times the speed between arms and body and never
-passes what the mud bears. Where it would, the plates shear through.
+The reference has the traction force as its state: it grows with k times the speed between arms and body, up to what the
+mud withstands. There the plates shear through.
 """
 
 from functools import cache
@@ -38,7 +38,7 @@ def stance_duration_s(gait: GaitParameters) -> float:
 
 
 def top_speed_m_s(gait: GaitParameters) -> float:
-    """Of the arms' ends: the way of the sweep less a ramp of half a cosine at either end."""
+    """Return the top speed of the arms' ends over the path of the sweep, with a ramp of half a cosine at either end."""
     return 2.0 * LENGTH_M * sin(radians(gait.sweep_angle_deg)) / (stance_duration_s(gait) - RAMP_S)
 
 
@@ -51,34 +51,34 @@ def arm_speed_m_s(gait: GaitParameters, time_s: float) -> float:
 
 @cache
 def finely_m(gait: GaitParameters) -> Array:
-    """The steps of all CASES at once."""
+    """Return the steps of all CASES at once."""
     flat = [(thrust, stiffness, *drag, depth) for thrust, stiffness, drag, depth in CASES]
-    bears, stiffness, dry, damping, mass, depth = np.array(flat).T
+    withstands, stiffness, dry, damping, mass, depth = np.array(flat).T
     stance_s, leaving_s = stance_duration_s(gait), depth / gait.extraction_speed_m_s
-    force, speed, way = np.zeros((3, len(flat)))
+    force, speed, path = np.zeros((3, len(flat)))
     for i in range(int((stance_s + leaving_s.max()) / FINE_S) + 1):
         time_s = (i + 0.5) * FINE_S
         fades = np.minimum(np.maximum(1.0 - (time_s - stance_s) / leaving_s, 0.0), 1.0)
         force += FINE_S * stiffness * (arm_speed_m_s(gait, time_s) - speed)
-        force = np.minimum(np.maximum(force, -bears * fades), bears * fades)
+        force = np.minimum(np.maximum(force, -withstands * fades), withstands * fades)
         speed = np.maximum(speed + FINE_S * (force - dry - damping * speed) / mass, 0.0)
-        way += FINE_S * speed
+        path += FINE_S * speed
     while speed.any():
         speed = np.maximum(speed - 10.0 * FINE_S * (dry + damping * speed) / mass, 0.0)
-        way += 10.0 * FINE_S * speed
-    return way
+        path += 10.0 * FINE_S * speed
+    return path
 
 
 def coarsely_m(gait: GaitParameters) -> Array:
     return np.array([step_m(gait, LENGTH_M, drag, Traction(*traction), depth_m) for *traction, drag, depth_m in CASES])
 
 
-def promised_m(thrust_n: float, stiffness_n_m: float = 500.0, drag: BodyDrag = RAIL, depth_m: float = 0.03) -> float:
+def predicted_m(thrust_n: float, stiffness_n_m: float = 500.0, drag: BodyDrag = RAIL, depth_m: float = 0.03) -> float:
     return step_m(WALKING, LENGTH_M, drag, Traction(thrust_n, stiffness_n_m), depth_m)
 
 
 class TestAgainstFineSteps:
-    """Steps of 10 ms shift what happens by less than one of them: at the arms' top speed, that is the tolerance."""
+    """Steps of 10 ms shift an event by less than one of them: the tolerance is that time at the arms' top speed."""
 
     @pytest.mark.parametrize("gait", [WALKING, CAREFUL])
     def test_the_step_is_that_of_the_equation_of_motion(self, gait: GaitParameters) -> None:
@@ -90,7 +90,7 @@ class TestAgainstFineSteps:
         self, gait: GaitParameters, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(step_model, "STEP_S", 0.001)
-        monkeypatch.setattr(step_model, "motion_of", step_model.motion_of.__wrapped__)  # which remembers coarse steps
+        monkeypatch.setattr(step_model, "motion_of", step_model.motion_of.__wrapped__)  # its cache has the coarse steps
         off_m = np.abs(coarsely_m(gait) - finely_m(gait))
         assert off_m.max() < 0.001 * top_speed_m_s(gait)
 
@@ -104,35 +104,35 @@ class TestLimits:
     def test_thrust_below_dry_drag_moves_nothing(
         self, dry_n: float, fraction: float, damping_n_s_m: float, stiffness_n_m: float
     ) -> None:
-        assert promised_m(fraction * dry_n, stiffness_n_m, BodyDrag(dry_n, damping_n_s_m, 1.0)) == 0.0
+        assert predicted_m(fraction * dry_n, stiffness_n_m, BodyDrag(dry_n, damping_n_s_m, 1.0)) == 0.0
 
     @given(st.floats(0.5, 8.0), st.floats(0.0, 20.0), st.tuples(*[st.floats(0.5, 12.5)] * 2), st.floats(200.0, 1000.0))
-    def test_more_thrust_never_shortens_a_step_that_stays_behind_the_arms(
+    def test_more_thrust_never_shortens_a_step_within_the_sweep(
         self, dry_n: float, damping_n_s_m: float, pair: tuple[float, float], stiffness_n_m: float
     ) -> None:
-        """A body that was thrown ahead of them is braked by the plates, and the harder the more they bear."""
+        """The plates brake a body that was thrown ahead of the arms, the harder the more they withstand."""
         drag = BodyDrag(dry_n, damping_n_s_m, 1.0)
-        weak_m, strong_m = (promised_m(thrust_n, stiffness_n_m, drag) for thrust_n in sorted(pair))
+        weak_m, strong_m = (predicted_m(thrust_n, stiffness_n_m, drag) for thrust_n in sorted(pair))
         assume(weak_m < 2.0 * LENGTH_M * sin(radians(WALKING.sweep_angle_deg)))
         assert strong_m >= weak_m
 
     def test_on_the_papers_rail_more_thrust_is_a_longer_step_up_to_what_the_motors_push(self) -> None:
-        steps_m = [promised_m(thrust_n) for thrust_n in np.arange(2.6, 12.5, 0.1)]
+        steps_m = [predicted_m(thrust_n) for thrust_n in np.arange(2.6, 12.5, 0.1)]
         assert all(shorter < longer for shorter, longer in zip(steps_m[:-1], steps_m[1:], strict=True))
 
     def test_firm_mud_and_stiff_traction_carry_the_body_as_far_as_the_arms_sweep(self) -> None:
-        """The spring gives by what drag and start take, m a + f_r + b v, and swings through by no more."""
+        """The spring yields by what drag and start take, m a + f_r + b v, and overshoots by no more."""
         top_m_s, stiffness_n_m = top_speed_m_s(WALKING), 10000.0
         acceleration_m_s2 = top_m_s * pi / (2.0 * RAMP_S)
         give_m = (1.0 * acceleration_m_s2 + 2.5 + 6.0 * top_m_s) / stiffness_n_m
-        step = promised_m(1e4, stiffness_n_m)
+        step = predicted_m(1e4, stiffness_n_m)
         assert step == pytest.approx(2.0 * LENGTH_M * sin(radians(30.0)), abs=2.0 * give_m)
 
-    def test_a_soft_grip_in_firm_mud_throws_the_body_ahead_of_the_arms(self) -> None:
-        assert promised_m(50.0, 500.0) > 1.1 * promised_m(50.0, 10000.0)
+    def test_soft_traction_in_firm_mud_throws_the_body_ahead_of_the_arms(self) -> None:
+        assert predicted_m(50.0, 500.0) > 1.1 * predicted_m(50.0, 10000.0)
 
     def test_a_heavier_drag_never_makes_the_step_longer(self) -> None:
-        steps_m = [promised_m(8.0, drag=RAIL._replace(dry_n=dry_n)) for dry_n in np.arange(0.5, 9.0, 0.5)]
+        steps_m = [predicted_m(8.0, drag=RAIL._replace(dry_n=dry_n)) for dry_n in np.arange(0.5, 9.0, 0.5)]
         assert steps_m == sorted(steps_m, reverse=True)
         assert steps_m[-1] == 0.0 < steps_m[0]
 
@@ -142,7 +142,9 @@ class TestCoast:
     def test_it_is_the_integral_of_speed_over_deceleration(
         self, dry_n: float, damping_n_s_m: float, mass_kg: float, speed_m_s: float
     ) -> None:
-        """∫ m v / (f_r + b v) dv. Simpson's rule on squared nodes, which are dense where the integrand bends."""
+        """The coast is ∫ m v / (f_r + b v) dv, by Simpson's rule on squared nodes, which are dense where the integrand
+        bends.
+        """
         nodes = np.linspace(0.0, 1.0, 20001)
         v = speed_m_s * nodes**2
         integrand = mass_kg * v / (dry_n + damping_n_s_m * v) * 2.0 * speed_m_s * nodes
@@ -150,14 +152,14 @@ class TestCoast:
         weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
         expected_m = float(integrand @ weights) / 3.0 / 20000.0
         drag = BodyDrag(dry_n, damping_n_s_m, mass_kg)
-        assert coast_m(drag, speed_m_s) == pytest.approx(expected_m, rel=1e-8)  # Simpson's own error is below
+        assert coast_m(drag, speed_m_s) == pytest.approx(expected_m, rel=1e-8)  # Simpson's own error is smaller
 
     def test_without_viscous_drag_it_is_the_kinetic_energy_over_friction(self) -> None:
         assert coast_m(BodyDrag(2.5, 0.0, 2.0), 0.6) == pytest.approx(2.0 * 0.6**2 / 2.0 / 2.5)
 
     @pytest.mark.parametrize("damping_n_s_m", [1e-3, 1e-5, 1e-7, 1e-9, 5e-324])
     def test_it_goes_over_into_dry_friction_alone(self, damping_n_s_m: float) -> None:
-        """To first order it is shorter by the share 2 b v / 3 f_r; 1e-9 is for rounding."""
+        """To first order it is shorter by the fraction 2 b v / 3 f_r; 1e-9 covers the rounding."""
         drag = BodyDrag(2.5, damping_n_s_m, 2.0)
         short = 2.0 * damping_n_s_m * 0.6 / (3.0 * 2.5)
         assert coast_m(drag, 0.6) == pytest.approx(coast_m(drag._replace(damping_n_s_m=0.0), 0.6), rel=short + 1e-9)

@@ -215,7 +215,7 @@ def test_the_phase_depends_on_the_time_and_not_on_the_number_of_ticks(steps: lis
 
 
 def gait_fraction(target: GaitTarget) -> float:
-    """A number from 0 to 1 that grows through the stride: paths covered, each phase a quarter."""
+    """Return a number from 0 to 1 that grows through the stride with the paths covered, each phase a quarter."""
     sweep = (radians(30.0) - target.sweep_rad) / radians(60.0)
     depth = (target.depth_m + 0.0145) / (0.04 + 0.0145)
     within = {Phase.INSERTION: depth, Phase.STANCE: sweep, Phase.EXTRACTION: 1.0 - depth, Phase.SWING: 1.0 - sweep}
@@ -288,7 +288,9 @@ NARROW = replace(WALKING, sweep_angle_deg=20.0)
 
 
 def swept(changes: dict[float, GaitParameters], duration_s: float, dt_s: float = 0.0005) -> list[GaitTarget]:
-    """Targets of a walk whose next gait is set at the first tick in swing at or after each share of the swing."""
+    """Return the targets of a walk whose next gait is set at the first tick at or after each given fraction of the
+    swing.
+    """
     gait, seen, waiting = Gait(WALKING, GEOMETRY), list[GaitTarget](), dict(changes)
     gait.reset(0.03)
     swing_ticks = 0
@@ -341,7 +343,7 @@ def test_a_gait_set_late_in_the_swing_is_that_of_the_stride_after_the_next() -> 
     assert fronts == pytest.approx([radians(30.0), radians(45.0)])
 
 
-def test_a_gait_whose_next_stride_is_never_set_walks_bit_for_bit_the_same() -> None:
+def test_an_equal_next_gait_changes_no_bit_of_the_walk() -> None:
     free, reported = Gait(WALKING, GEOMETRY), Gait(WALKING, GEOMETRY)
     free.reset(0.03)
     reported.reset(0.03)

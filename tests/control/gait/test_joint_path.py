@@ -52,8 +52,8 @@ def test_no_joint_is_faster_than_twice_the_mean_speed(
 def test_a_path_lasts_its_longest_legs_over_the_speed(
     start: JointAngles, way_points: list[JointAngles], speed: float
 ) -> None:
-    ways = [max(abs(b - a) for a, b in zip(p, q, strict=True)) for p, q in pairwise([start, *way_points])]
-    duration = sum(max(SHORTEST_LEG_S, way / speed) for way in ways)
+    legs_rad = [max(abs(b - a) for a, b in zip(p, q, strict=True)) for p, q in pairwise([start, *way_points])]
+    duration = sum(max(SHORTEST_LEG_S, leg_rad / speed) for leg_rad in legs_rad)
     assert len(walked(JointPath(start, way_points, speed))) * PERIOD_S == pytest.approx(duration, abs=1.01 * PERIOD_S)
 
 

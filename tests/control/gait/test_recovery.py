@@ -1,4 +1,4 @@
-"""Recoveries of made-up flippers, which follow their targets exactly but while the mud holds them still."""
+"""Recoveries of synthetic flippers, which follow their targets exactly unless the mud holds them still."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Moment(NamedTuple):
 
 
 class SeenRecovery(Recovery):
-    """Keeps the targets that it gave last."""
+    """A recovery that stores the targets that it gave last."""
 
     def step(self, dt_s: float, stuck: Sequence[str], states: DriveStates, wanted: JointTargets) -> JointTargets:
         self.given = super().step(dt_s, stuck, states, wanted)
@@ -63,7 +63,7 @@ Hold = Callable[["SyntheticRobot"], Sequence[str]]
 
 
 class SyntheticRobot:
-    """`hold` tells which flippers the mud holds where they are; it begins to with the extraction."""
+    """A robot of which the mud holds the flippers of `hold` where they are, from the extraction on."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class SyntheticRobot:
         self.angles_rad = same_for_all(0.0)
         self.moments: list[Moment] = []
         self.waited_s = 0.0  # since the extraction began
-        self.attempt_s = 0.0  # since the attempt under way began
+        self.attempt_s = 0.0  # since the attempt under direction began
 
     @property
     def states(self) -> DriveStates:
@@ -93,9 +93,9 @@ class SyntheticRobot:
         wanted_rad = [angle + torque for angle, torque in zip(before_rad, torques_nm, strict=True)]
         target = self.controller.target
         self._time(target.phase, self.recovery.events)
-        for place, flipper in enumerate(BOTH):
+        for index, flipper in enumerate(BOTH):
             if self.waited_s and flipper in self.hold(self):
-                wanted_rad[2 * place : 2 * place + 2] = before_rad[2 * place : 2 * place + 2]
+                wanted_rad[2 * index : 2 * index + 2] = before_rad[2 * index : 2 * index + 2]
         self.angles_rad = Joints(*wanted_rad)
         if target.stride >= 0:
             events, attempt = self.recovery.events, self.recovery.attempt
@@ -123,16 +123,16 @@ class SyntheticRobot:
         return [moment for moment in self.moments if moment.attempt == attempt]
 
 
-def nobody(robot: SyntheticRobot) -> Sequence[str]:
+def no_flipper(robot: SyntheticRobot) -> Sequence[str]:
     return ()
 
 
-def everybody(robot: SyntheticRobot) -> Sequence[str]:
+def both_flippers(robot: SyntheticRobot) -> Sequence[str]:
     return BOTH
 
 
 def until_attempt(attempt: int, flippers: Sequence[str] = BOTH, after_s: float = 1.0) -> Hold:
-    """Held until that attempt has lasted so long."""
+    """Hold the flippers until that attempt has lasted `after_s`."""
 
     def hold(robot: SyntheticRobot) -> Sequence[str]:
         return () if robot.recovery.attempt == attempt and robot.attempt_s > after_s else flippers
@@ -144,15 +144,18 @@ def until_attempt(attempt: int, flippers: Sequence[str] = BOTH, after_s: float =
 
 
 def test_flippers_that_follow_are_never_recovered_and_walk_without_a_wait() -> None:
-    waiting, other = SyntheticRobot(nobody).walk(6.0), SyntheticRobot(nobody, RecoveryParameters(attempts=0)).walk(6.0)
+    waiting, other = (
+        SyntheticRobot(no_flipper).walk(6.0),
+        SyntheticRobot(no_flipper, RecoveryParameters(attempts=0)).walk(6.0),
+    )
     assert Phase.RECOVERY not in waiting.phases
     assert waiting.moments == other.moments
     assert waiting.moments[-1].target.stride >= 2
 
 
 def test_with_no_attempts_the_gaits_clock_does_not_wait() -> None:
-    held = SyntheticRobot(everybody, RecoveryParameters(attempts=0)).walk(6.0)
-    free = SyntheticRobot(nobody).walk(6.0)
+    held = SyntheticRobot(both_flippers, RecoveryParameters(attempts=0)).walk(6.0)
+    free = SyntheticRobot(no_flipper).walk(6.0)
     assert [moment.target for moment in held.moments] == [moment.target for moment in free.moments]
     assert [moment.joints for moment in held.moments] == [moment.joints for moment in free.moments]
     assert not held.recovery.given_up
@@ -213,7 +216,7 @@ def test_swing_begins_in_the_tick_after_the_last_flipper_is_out() -> None:
 
 
 def test_the_gait_does_not_wait_for_an_unknown_angle() -> None:
-    """Its silence is a fault of its own."""
+    """The silence of a joint is a fault of its own."""
     lost, inside = DriveState(angle_rad=nan), DriveState(angle_rad=-0.6)
     level = DriveState(angle_rad=0.0)
     recovery = Recovery(PARAMETERS, GEOMETRY, GAIT, RANGES)
@@ -222,7 +225,7 @@ def test_the_gait_does_not_wait_for_an_unknown_angle() -> None:
 
 
 def test_stopping_ends_a_recovery_and_forgets_it() -> None:
-    robot = SyntheticRobot(everybody).walk(3.0)
+    robot = SyntheticRobot(both_flippers).walk(3.0)
     assert robot.recovery.attempt == 1
     robot.step(Mode.STOPPING)
     assert (robot.recovery.attempt, robot.recovery.events, robot.recovery.given_up) == (0, "", ())
@@ -233,7 +236,7 @@ def test_stopping_ends_a_recovery_and_forgets_it() -> None:
 
 
 def attempts_at(sweep_deg: float, lead_deg: float = PARAMETERS.lead_deg) -> list[list[JointTargets]]:
-    """The targets of each attempt at a left flipper that nothing moves."""
+    """Return the targets of each attempt at a left flipper that nothing moves."""
     recovery = Recovery(replace(PARAMETERS, lead_deg=lead_deg), GEOMETRY, GAIT, RANGES)
     free, given = DriveState(angle_rad=0.0), list[list[JointTargets]]()
     states = Joints(DriveState(angle_rad=radians(sweep_deg)), DriveState(angle_rad=-0.6), free, free)
@@ -248,12 +251,14 @@ def attempts_at(sweep_deg: float, lead_deg: float = PARAMETERS.lead_deg) -> list
 
 @pytest.mark.parametrize("sweep_deg", [-55.0, -30.0, -10.0, 5.0, 14.0])
 def test_the_first_attempt_pulls_to_the_rear_and_the_others_away_from_the_middle(sweep_deg: float) -> None:
-    """Most of the time: the rest of it, the targets are as far on the other side of the flipper or on their way."""
-    ways = [-1.0, *[copysign(1.0, sweep_deg)] * (PARAMETERS.attempts - 1)]
-    for way, targets in zip(ways, attempts_at(sweep_deg), strict=True):
-        leads_deg = [way * (degrees(each[0].angle_rad) - sweep_deg) for each in targets]
+    """For AWAY_FRACTION of the time the targets lead in that direction; otherwise they lead in the other or change
+    sides.
+    """
+    directions = [-1.0, *[copysign(1.0, sweep_deg)] * (PARAMETERS.attempts - 1)]
+    for direction, targets in zip(directions, attempts_at(sweep_deg), strict=True):
+        leads_deg = [direction * (degrees(each[0].angle_rad) - sweep_deg) for each in targets]
         pulled = leads_deg[round(PARAMETERS.pause_s / PERIOD_S) :]
-        reached = max(way * (way * 60.0 - sweep_deg), 0.0)  # the joint's limit
+        reached = max(direction * (direction * 60.0 - sweep_deg), 0.0)  # the joint's limit
         assert max(pulled) == pytest.approx(min(PARAMETERS.lead_deg, reached))
         assert min(pulled) == pytest.approx(-PARAMETERS.lead_deg)
         assert sum(lead_deg > 0.0 for lead_deg in pulled) / len(pulled) == pytest.approx(AWAY_FRACTION, abs=0.1)
@@ -267,7 +272,7 @@ def test_the_sweep_rocks_with_the_configured_period() -> None:
 
 
 def test_every_attempt_lifts() -> None:
-    for targets in attempts_at(10.0, lead_deg=45.0):  # which lets the target arrive
+    for targets in attempts_at(10.0, lead_deg=45.0):  # the large lead lets the target arrive
         lifts = [each[1] for each in targets]
         assert lifts[0].angle_rad == pytest.approx(-0.6)
         assert all(lift.velocity_rad_s >= 0.0 for lift in lifts)
@@ -291,14 +296,14 @@ def test_both_flippers_rock_in_the_same_direction_from_both_sides_of_the_middle(
 
 
 def test_every_attempt_lifts_at_the_same_speed() -> None:
-    robot = SyntheticRobot(everybody).walk(LONGEST_S + 1.5)
+    robot = SyntheticRobot(both_flippers).walk(LONGEST_S + 1.5)
     for attempt in (1, 2, 3):
-        speeds = [abs(moment.joints[place].velocity_rad_s) for moment in robot.in_attempt(attempt) for place in (1, 3)]
+        speeds = [abs(moment.joints[index].velocity_rad_s) for moment in robot.in_attempt(attempt) for index in (1, 3)]
         assert max(speeds) == pytest.approx(PARAMETERS.lift_rad_s)
 
 
 def test_each_attempt_begins_with_a_pause_where_the_flippers_are() -> None:
-    robot = SyntheticRobot(everybody).walk(LONGEST_S + 1.5)
+    robot = SyntheticRobot(both_flippers).walk(LONGEST_S + 1.5)
     for attempt in (1, 2, 3):
         moments = robot.in_attempt(attempt)
         for moment in moments[: round(PARAMETERS.pause_s / PERIOD_S) - 1]:
@@ -308,7 +313,7 @@ def test_each_attempt_begins_with_a_pause_where_the_flippers_are() -> None:
 
 
 def test_targets_lead_their_joints_by_no_more_than_the_lead() -> None:
-    robot = SyntheticRobot(everybody).walk(LONGEST_S + 1.5)
+    robot = SyntheticRobot(both_flippers).walk(LONGEST_S + 1.5)
     leads = [
         abs(joint.angle_rad - angle_rad)
         for moment in robot.moments
@@ -336,7 +341,7 @@ def test_targets_stay_within_the_joints_limits(margin_deg: float) -> None:
 @pytest.mark.parametrize("attempt", [1, 2, 3])
 @pytest.mark.parametrize("after_s", [0.5, 1.0, 2.0])
 def test_targets_and_their_velocities_are_continuous_from_recovery_through_swing(attempt: int, after_s: float) -> None:
-    """Gap and swing ask for 130 rad/s² at most, so an angle is the mean velocity's way to 0.1 mrad."""
+    """Gap and swing take 130 rad/s² at most, so the mean velocity gives the angle to 0.1 mrad."""
     robot = SyntheticRobot(until_attempt(attempt, after_s=after_s)).walk(LONGEST_S + 3.0)
     begin = next(i for i, moment in enumerate(robot.moments) if moment.events.startswith("the flippers came out"))
     end = next(i for i, moment in enumerate(robot.moments) if moment.target.stride == 1)
@@ -384,12 +389,12 @@ def test_the_velocity_of_a_gap_is_its_derivative(
     assert gap.after(fraction * duration_s).velocity_rad_s == pytest.approx(slope, abs=1e-4)
 
 
-# what is out
+# when a flipper is out
 
 
 @given(st.floats(-1.0, 1.0), st.floats(-1.2, 0.5))
 def test_the_lowest_point_is_the_deeper_corner(sweep_rad: float, adduction_rad: float) -> None:
-    """The edge's ends stand at l ± w/2 along the arm."""
+    """The ends of the edge are at l ± w/2 along the arm."""
     ends_m = [
         GEOMETRY.drop_m * cos(adduction_rad) - length_m * cos(sweep_rad) * sin(adduction_rad) - GEOMETRY.axis_height_m
         for length_m in (GEOMETRY.flipper_length_m - 0.0125, GEOMETRY.flipper_length_m + 0.0125)

@@ -1,4 +1,4 @@
-"""The bounds of an encoder's faults, pinned from both sides with figures and not with the module's own constants."""
+"""The bounds of an encoder's faults, pinned from both sides with figures instead of the module's own constants."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Sample = tuple[float, float, float]  # stamp in s, angle in rad, velocity in rad
 
 
 def found(samples: Iterable[Sample], encoder: EncoderMonitor | None = None) -> list[str]:
-    """The fault of each sample, or an empty text."""
+    """Return the name of each sample's fault, or an empty text."""
     encoder = encoder or EncoderMonitor("left_sweep", JUMP_RAD)
     names = []
     for stamp_s, angle_rad, velocity_rad_s in samples:
@@ -25,19 +25,19 @@ def found(samples: Iterable[Sample], encoder: EncoderMonitor | None = None) -> l
 
 
 def frozen(gap_s: float, velocities_rad_s: Iterable[float]) -> list[str]:
-    """What is found of an angle that stays the same, after its first sample."""
+    """Return the faults of samples with an unchanging angle, after the first sample."""
     return found((number * gap_s, 0.3, velocity) for number, velocity in enumerate(velocities_rad_s))[1:]
 
 
 def noisy(velocity_rad_s: float, count: int) -> list[float]:
-    """A velocity whose last bits live."""
+    """Return a velocity whose last bits change."""
     return [velocity_rad_s * (1.0 + 1e-9 * (number % 2)) for number in range(count)]
 
 
 def test_an_angle_may_stay_while_the_velocity_moves_thirty_milliradians() -> None:
     for velocity_rad_s, expected in ((1.4, ""), (1.6, "encoder_stuck"), (-1.4, ""), (-1.6, "encoder_stuck")):
         assert frozen(0.021, noisy(velocity_rad_s, 2)) == [expected if abs(velocity_rad_s) * 0.021 > 0.03 else ""]
-    assert frozen(0.0625, [0.5, 0.48]) == [""]  # exactly its path
+    assert frozen(0.0625, [0.5, 0.48]) == [""]  # exactly the bound of the path
     assert frozen(0.01, noisy(0.99, 4)) == ["", "", ""]
     assert frozen(0.01, noisy(1.01, 4)) == ["", "", "encoder_stuck"]
 
@@ -45,7 +45,7 @@ def test_an_angle_may_stay_while_the_velocity_moves_thirty_milliradians() -> Non
 def test_a_fast_angle_may_be_repeated_for_twenty_milliseconds() -> None:
     assert frozen(0.0099, noisy(20.0, 4)) == ["", "", "encoder_stuck"]
     assert frozen(0.0101, noisy(20.0, 3)) == ["", "encoder_stuck"]
-    assert frozen(0.02, noisy(20.0, 2)) == [""]  # exactly its time
+    assert frozen(0.02, noisy(20.0, 2)) == [""]  # exactly the bound of the time
 
 
 def test_motion_to_and_fro_is_no_travel() -> None:
@@ -55,7 +55,7 @@ def test_motion_to_and_fro_is_no_travel() -> None:
 def test_a_velocity_may_repeat_to_the_last_bit_for_a_tenth_of_a_second() -> None:
     assert frozen(0.0249, [0.01] * 6) == ["", "", "", "", "encoder_stuck"]
     assert frozen(0.0251, [0.01] * 5) == ["", "", "", "encoder_stuck"]
-    assert frozen(0.1, [0.01] * 2) == [""]  # exactly its time
+    assert frozen(0.1, [0.01] * 2) == [""]  # exactly the bound of the time
 
 
 def test_a_velocity_that_changes_in_its_last_bit_begins_the_wait_again() -> None:
@@ -78,7 +78,7 @@ def test_rest_is_slower_than_a_nanoradian_per_second() -> None:
 
 
 def pushed(gap_s: float, torques_nm: Iterable[float], velocity_rad_s: float = 0.0) -> list[bool]:
-    """Whether each sample of an angle that never changes, under these torques, is a fault."""
+    """Return whether each sample of an unchanging angle is a fault under these torques."""
     encoder = EncoderMonitor("left_sweep", JUMP_RAD)
     return [
         encoder.update(DriveState(0.3, velocity_rad_s, number * gap_s), PERIOD_S, torque_nm) is not None
@@ -90,17 +90,17 @@ def test_a_resting_joint_yields_within_fifty_milliseconds_to_a_torque_that_chang
     for sign in (-1.0, 1.0):
         assert pushed(0.0249, [0.0, 0.0, sign * 0.41, 0.0, 0.0]) == [False, False, False, True, True]
         assert pushed(0.0251, [0.0, 0.0, sign * 0.41, 0.0]) == [False, False, True, True]
-        assert not any(pushed(0.025, [0.0, 0.0, sign * 0.41]))  # exactly its time
+        assert not any(pushed(0.025, [0.0, 0.0, sign * 0.41]))  # exactly the bound of the time
         assert not any(pushed(0.02, [0.0] * 3 + [sign * 0.4] * 100))
 
 
 def test_the_torque_counts_from_the_first_repeated_sample_on() -> None:
-    """That of the sample before may have moved the joint to where it is."""
+    """The torque of the sample before may have moved the joint to where it is."""
     assert not any(pushed(0.02, [0.7] + [0.0] * 100))
     assert any(pushed(0.02, [0.7, 0.7] + [0.0] * 100))
 
 
-def test_a_velocity_that_lives_begins_the_wait_for_a_torque_again() -> None:
+def test_a_velocity_that_changes_begins_the_wait_for_a_torque_again() -> None:
     encoder = EncoderMonitor("left_sweep", JUMP_RAD)
     torques_nm = {0: 0.7, 1: 0.0}
     for number in range(400):
@@ -116,7 +116,7 @@ def test_the_torque_of_a_message_that_is_seen_again_is_not_counted() -> None:
             assert encoder.update(DriveState(0.3, 0.0, 0.02 * number), PERIOD_S, torque_nm) is None
 
 
-def test_two_velocities_tell_the_path_over_thirty_milliseconds_and_no_longer() -> None:
+def test_two_velocities_give_the_path_over_thirty_milliseconds_and_no_longer() -> None:
     assert found([(0.0, 0.0, 0.0), (0.03, 1.0, 0.0)]) == ["", "encoder_jump"]
     assert found([(0.0, 0.0, 0.0), (nextafter(0.03, 1.0), 1.0, 0.0)]) == ["", ""]
 
@@ -127,7 +127,9 @@ def test_a_jump_is_more_than_the_noise_of_an_encoder() -> None:
 
 
 def test_the_path_is_that_of_the_mean_of_the_two_velocities() -> None:
-    """0.02 s from 10 to 20 rad/s are 0.3 rad; a stamp that is a tick late explains 20 rad/s times a tick more."""
+    """From 10 to 20 rad/s in 0.02 s the path is 0.3 rad; a stamp that is a tick late explains 20 rad/s times a tick
+    more.
+    """
     slack_rad = JUMP_RAD + 20.0 * PERIOD_S
     for sign in (-1.0, 1.0):
         for beyond_rad, expected in ((-1e-9, ""), (1e-9, "encoder_jump")):

@@ -1,4 +1,4 @@
-"""Encoders that jump and that stand still, told from joints that are quick, at rest, or held by the mud."""
+"""Encoders that jump or stand still, distinguished from joints that are fast, at rest, or held by the mud."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Messages = Iterable[tuple[float, float]]
 
 
 def reported(messages: Messages, encoder: EncoderMonitor | None = None) -> list[tuple[int, str]]:
-    """(number of the message, fault) of all that were found."""
+    """Return (number of the message, fault) of every fault."""
     encoder, found = encoder or EncoderMonitor("left_sweep", JUMP_RAD), []
     for number, (angle_rad, velocity_rad_s) in enumerate(messages):
         state = DriveState(angle_rad=angle_rad, velocity_rad_s=velocity_rad_s, angle_stamp_s=number * MESSAGE_S)
@@ -95,7 +95,7 @@ def test_a_frozen_angle_shows_in_the_integral_of_the_velocity_or_in_a_velocity_w
 
 
 def test_a_joint_at_rest_without_a_velocity_is_not_stuck() -> None:
-    """ODrive tells 0 below a bound."""
+    """An ODrive reports 0 below a threshold."""
     assert reported(hanging(0.0, 30000)) == []
 
 

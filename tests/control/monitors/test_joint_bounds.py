@@ -1,4 +1,6 @@
-"""The bounds of a joint's faults, pinned from both sides, and what an old or an absurd current does to the winding."""
+"""The bounds of a joint's faults, pinned from both sides, and the effect of an old or an absurd current on the
+winding.
+"""
 
 from __future__ import annotations
 
@@ -32,13 +34,13 @@ def found(monitor: JointMonitor, measured: DriveState, **changes: Any) -> set[st
 
 
 def ticks_until(name: str, measured: DriveState, monitor: JointMonitor | None = None, **changes: Any) -> int:
-    """The number of ticks with this sample up to the first with the fault."""
+    """Return the number of ticks with this sample up to the first with the fault."""
     monitor = monitor or make_monitor()
     return next(tick for tick in range(1, 2000) if name in found(monitor, measured, **changes))
 
 
 def test_the_default_bounds_are_those_that_the_reference_publishes() -> None:
-    """In periods of the loop: 2, 3, 10, 3, 5 and 4; and what a machine of this size may do."""
+    """The times of a few ticks are 2, 3, 10, 3, 5 and 4 periods of the loop; the others suit a machine of this size."""
     assert FaultBounds() == FaultBounds(
         late_s=0.0053,
         quiet_s=0.0079,
@@ -171,7 +173,7 @@ def test_a_joint_counts_as_at_rest_a_tenth_of_a_second_after_its_last_step_of_th
 
 
 def test_the_time_of_a_fast_joint_is_rounded_to_whole_ticks() -> None:
-    """A tick of 2/3 of the bound is nearer to it than to nothing, and is the first with the fault."""
+    """At 2/3 of the bound per tick, one tick and two ticks are equally far from the bound."""
     fast, nearer_s = state(velocity_rad_s=30.0), BOUNDS.fast_s * 2.0 / 3.0
     assert ticks_until("joint_velocity", fast, dt_s=nearer_s + 1e-9) == 1
     assert ticks_until("joint_velocity", fast, dt_s=nearer_s - 1e-9) == 2
@@ -194,7 +196,7 @@ def test_one_tick_counts_for_thirty_milliseconds_at_most() -> None:
 
 
 def winding_c(measured: DriveState, torque_nm: float = 0.0, bounds: FaultBounds = BOUNDS) -> float:
-    """The winding's temperature after a minute."""
+    """Return the winding's temperature after a minute."""
     monitor = make_monitor(bounds)
     for _ in range(60):
         monitor.update(facts(dt_s=1.0, torque_nm=torque_nm), measured._replace(temperature_c=0.0))
@@ -203,7 +205,7 @@ def winding_c(measured: DriveState, torque_nm: float = 0.0, bounds: FaultBounds 
 
 def test_an_old_current_heats_no_longer_and_the_commanded_torque_does_instead() -> None:
     """A drive that is gone keeps its last current for ever."""
-    bounds = FaultBounds(silence_s=0.03125)  # without a rounding
+    bounds = FaultBounds(silence_s=0.03125)  # exact in binary
     old_s = NOW_S - bounds.silence_s
     for stamp_s, heats in ((old_s, True), (nextafter(old_s, -inf), False)):
         current = state(current_a=10.0, current_stamp_s=stamp_s)
@@ -222,7 +224,9 @@ def test_a_current_beyond_twice_the_largest_is_no_measurement() -> None:
 
 
 def test_a_winding_heats_for_the_whole_time_that_a_gap_lasted() -> None:
-    """Heat is not a matter of samples: ten seconds of stall heat as much as ten seconds of ticks, nearly."""
+    """Heat does not depend on the number of samples: one tick of a second heats nearly as much as a hundred short
+    ticks.
+    """
     long, short = make_monitor(), make_monitor()
     hot = state(current_a=10.0, temperature_c=0.0)
     long.update(facts(dt_s=1.0), hot)
@@ -247,7 +251,7 @@ def test_a_current_that_is_gone_is_reported_next_to_a_milder_fault_only() -> Non
 
 
 def test_a_heat_fault_reports_the_temperature_of_the_sensor_or_of_the_winding_that_shows_it() -> None:
-    """A sensor that is nearly too hot does not hide a winding that is."""
+    """A sensor that is nearly too hot does not hide a winding that is too hot."""
     for measured_c, name, expected_c in (
         (25.0, "winding_hot", 99.0),
         (85.0, "winding_hot", 99.0),
@@ -285,7 +289,7 @@ def test_every_fault_reports_the_values_that_it_was_found_by() -> None:
 
 
 def test_the_energy_of_a_joint_begins_again_once_torque_is_on() -> None:
-    """A joint that was turned by hand without torque stands elsewhere when the torque comes back."""
+    """A joint that was turned by hand without torque has another angle when the torque comes back."""
     monitor = make_monitor()
     now_s, angle_rad, turned_s = NOW_S, 0.1, 30 * PERIOD_S
 

@@ -1,4 +1,4 @@
-"""The exact value of each bound of a joint is allowed, its monitor forgets all when it is reset, and names what it saw.
+"""The exact value of each bound of a joint is allowed, a reset makes its monitor forget all, and faults carry values.
 
 Ages are exact here: a stamp of zero at the time of the bound.
 """
@@ -20,7 +20,7 @@ BOTH = ("angle_stamp_s", "current_stamp_s")
 
 
 def reported(monitor: JointMonitor, now_s: float = NOW_S, changed: Any = None, **state: Any) -> dict[str, Any]:
-    """Returns the values of each fault by its name, of one sample whose other signals are new."""
+    """Return the values of each fault by its name, for one sample whose other signals are new."""
     stamps: dict[str, Any] = dict.fromkeys(STAMPS, now_s)
     found = monitor.update(facts(now_s, **(changed or {})), HEALTHY._replace(**(stamps | state)))
     return {fault.name: dict(fault.values) for fault in found}

@@ -1,4 +1,4 @@
-"""Each watch of a joint on both sides of its bound, in ticks from the cause, and what does not set it off."""
+"""Each check of a joint on both sides of its bound, in ticks from the cause, and what does not trigger it."""
 
 from collections.abc import Callable, Iterable
 from math import inf, isfinite, nan, radians
@@ -48,28 +48,28 @@ SEVERITY = [
 ]
 
 
-def seen(watch: JointMonitor, state: DriveState, now_s: float = NOW_S, **changes: Any) -> dict[str, str]:
-    """Sentences by name."""
-    found = watch.update(facts(now_s, **changes), state)
+def seen(monitor: JointMonitor, state: DriveState, now_s: float = NOW_S, **changes: Any) -> dict[str, str]:
+    """Return the messages of the faults by name."""
+    found = monitor.update(facts(now_s, **changes), state)
     assert all(fault.subject == JOINT for fault in found)
     return {fault.name: exact_message(fault) for fault in found}
 
 
 def names(state: DriveState, **changes: Any) -> set[str]:
-    """What a fresh watch says of one sample."""
+    """Return the faults that a new monitor finds in one sample."""
     return set(seen(make_monitor(), state, **changes))
 
 
-def lasting(state: DriveState, watch: JointMonitor | None = None) -> set[str]:
-    """What is said of one that stays so for two slow messages; before that nothing is."""
-    watch = watch or make_monitor()
-    before = [seen(watch, state) for _ in range(TWO_MESSAGES)]
+def lasting(state: DriveState, monitor: JointMonitor | None = None) -> set[str]:
+    """Return the faults of a sample that lasts for two slow messages, before which there must be none."""
+    monitor = monitor or make_monitor()
+    before = [seen(monitor, state) for _ in range(TWO_MESSAGES)]
     assert not any(before[:-1])
-    return set(seen(watch, state)) | set(seen(watch, state))
+    return set(seen(monitor, state)) | set(seen(monitor, state))
 
 
 def fresh(now_s: float, **changes: Any) -> DriveState:
-    """A drive that has just sent everything."""
+    """Return the state of a drive that has just sent everything."""
     stamps: dict[str, Any] = dict.fromkeys(
         ("angle_stamp_s", "current_stamp_s", "heartbeat_stamp_s", "temperature_stamp_s"), now_s
     )
@@ -77,18 +77,18 @@ def fresh(now_s: float, **changes: Any) -> DriveState:
 
 
 def ticks_until(name: str, state_at: Callable[[float], DriveState], longest: int = 1000, **changes: Any) -> int:
-    """From the first tick after NOW_S, at which the cause began, to the first with the fault."""
-    watch = make_monitor()
+    """Return the ticks from the first one after NOW_S, at which the cause begins, to the first with the fault."""
+    monitor = make_monitor()
     for tick in range(-20, longest):
         now_s = NOW_S + tick * PERIOD_S
         state = state_at(now_s) if tick > 0 else fresh(now_s)
-        if name in seen(watch, state, now_s, **changes):
+        if name in seen(monitor, state, now_s, **changes):
             return tick
     raise AssertionError(f"{name} never came")
 
 
 def last_message_s(now_s: float, ended_s: float, period_s: float, offset_s: float) -> float:
-    """The stamp of a cyclic message that ended."""
+    """Return the stamp of the last cyclic message before the messages ended."""
     until_s = min(now_s, ended_s)
     return NOW_S + offset_s + (until_s - NOW_S - offset_s) // period_s * period_s
 
@@ -138,8 +138,8 @@ def test_the_more_severe_of_two_silences_is_reported_and_more_silence_is_never_m
         assert len(found - {"current_silent"}) <= 1
         return max((SEVERITY.index(name) for name in found), default=-1)
 
-    def reaction(place: int) -> Reaction:
-        return FAULT_KINDS[SEVERITY[place]].reaction if place >= 0 else Reaction.NONE
+    def reaction(index: int) -> Reaction:
+        return FAULT_KINDS[SEVERITY[index]].reaction if index >= 0 else Reaction.NONE
 
     here = reaction(reported(position_s, current_s))
     assert reaction(reported(position_s + 0.003, current_s)) >= here
@@ -182,32 +182,33 @@ def test_slow_signals_that_end_are_noticed_within_their_ticks(name: str, stamp: 
 
 def test_messages_every_two_milliseconds_are_never_late_at_any_phase_to_the_ticks() -> None:
     for offset in range(20):
-        watch = make_monitor()
+        monitor = make_monitor()
         for tick in range(1, 400):
             now_s = NOW_S + tick * PERIOD_S
             stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
-            assert not seen(watch, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s)
+            assert not seen(monitor, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s)
 
 
 def test_one_message_that_is_lost_is_at_most_late() -> None:
     for offset in range(20):
-        watch = make_monitor()
+        monitor = make_monitor()
         found: set[str] = set()
         for tick in range(1, 40):
             now_s = NOW_S + tick * PERIOD_S
             stamp_s = last_message_s(now_s, inf, MESSAGE_S, 1e-4 * offset)
             if NOW_S + 0.05 <= stamp_s < NOW_S + 0.05 + MESSAGE_S:
                 stamp_s -= MESSAGE_S
-            found |= set(seen(watch, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s))
+            found |= set(seen(monitor, fresh(now_s, angle_stamp_s=stamp_s, current_stamp_s=stamp_s), now_s))
         assert found <= {"drive_late"}
 
 
 def silences(answers_only: bool, missed: int, lost_after: int) -> list[set[str]]:
-    """Faults of each tick around a gap of the loop; every tick asks, and its answer has the time of the question.
+    """Return the faults of each tick around a gap of the loop; every tick asks, and its answer has the time of the
+    question.
 
-    The answer to the last question before the gap is read after it; later ones are lost from `lost_after` on.
+    The answer to the last question before the gap is read after it; answers from tick `lost_after` on are lost.
     """
-    watch, asked_s, now_s = make_monitor(answers_only=answers_only), NOW_S, NOW_S
+    monitor, asked_s, now_s = make_monitor(answers_only=answers_only), NOW_S, NOW_S
     found = []
     for tick in range(12):
         dt_s = PERIOD_S * (1 + (missed if tick == 3 else 0))
@@ -215,7 +216,7 @@ def silences(answers_only: bool, missed: int, lost_after: int) -> list[set[str]]
         state = HEALTHY._replace(
             angle_stamp_s=asked_s, current_stamp_s=asked_s, heartbeat_stamp_s=asked_s, temperature_stamp_s=asked_s
         )
-        found.append(set(seen(watch, state, now_s, dt_s=dt_s)) & set(SEVERITY))
+        found.append(set(seen(monitor, state, now_s, dt_s=dt_s)) & set(SEVERITY))
         if tick < lost_after:
             asked_s = now_s
     return found
@@ -247,7 +248,7 @@ def test_silence_is_reported_with_signal_joint_and_time() -> None:
     assert tick == {"heartbeat_silent": "No heartbeat came from the left_sweep drive at all."}
 
 
-def test_what_is_late_is_named_by_the_older_of_the_two() -> None:
+def test_the_older_of_two_late_signals_is_named() -> None:
     message = seen(make_monitor(), HEALTHY._replace(angle_stamp_s=NOW_S - 0.006, current_stamp_s=NOW_S - 0.007))
     assert message == {"drive_late": "No current came from the left_sweep drive for 7 ms."}
 
@@ -268,16 +269,18 @@ def test_a_drive_out_of_closed_loop_is_a_fault_only_where_it_is_expected_there()
 
 
 def test_an_unrequested_closed_loop_is_a_fault_after_the_time_to_obey() -> None:
-    watch = make_monitor()
-    unasked = [tick for tick in range(200) if "drive_energised" in seen(watch, HEALTHY, energised=False, moving=False)]
+    monitor = make_monitor()
+    unasked = [
+        tick for tick in range(200) if "drive_energised" in seen(monitor, HEALTHY, energised=False, moving=False)
+    ]
     assert unasked[0] == pytest.approx(0.2 / PERIOD_S, abs=1)
-    assert unasked[0] + 38 + 2 <= FaultKind.DRIVE_ENERGISED.bound_ticks  # a heartbeat tells of it
+    assert unasked[0] + 38 + 2 <= FaultKind.DRIVE_ENERGISED.bound_ticks  # a heartbeat reports it
 
 
 def test_the_time_to_obey_begins_again_with_every_obedience() -> None:
-    watch = make_monitor()
+    monitor = make_monitor()
     for tick in range(400):
-        reported = seen(watch, HEALTHY._replace(closed_loop=tick % 70 > 0), energised=False, moving=False)
+        reported = seen(monitor, HEALTHY._replace(closed_loop=tick % 70 > 0), energised=False, moving=False)
         assert "drive_energised" not in reported
 
 
@@ -313,8 +316,8 @@ def test_a_joint_is_too_fast_from_a_quarter_over_its_limit_on(sign: float) -> No
     bound = 1.25 * LIMITS.velocity_rad_s
 
     def ticks_at(velocity_rad_s: float) -> list[set[str]]:
-        watch = make_monitor()
-        return [set(seen(watch, HEALTHY._replace(velocity_rad_s=sign * velocity_rad_s))) for _ in range(10)]
+        monitor = make_monitor()
+        return [set(seen(monitor, HEALTHY._replace(velocity_rad_s=sign * velocity_rad_s))) for _ in range(10)]
 
     assert ticks_at(bound) == [set()] * 10
     fast = [{"joint_velocity"}] * (10 - FAST_TICKS + 1)
@@ -323,23 +326,23 @@ def test_a_joint_is_too_fast_from_a_quarter_over_its_limit_on(sign: float) -> No
 
 
 def test_two_fast_samples_again_and_again_are_no_fault() -> None:
-    watch = make_monitor()
+    monitor = make_monitor()
     for tick in range(100):
-        assert not seen(watch, HEALTHY._replace(velocity_rad_s=100.0 if tick % 3 else 0.0))
+        assert not seen(monitor, HEALTHY._replace(velocity_rad_s=100.0 if tick % 3 else 0.0))
 
 
 def moving_ticks(speed_rad_s: float, noise_rad_s: float = 0.0, energised: bool = False) -> int:
-    """Of 200, in which a joint with this speed is told to move."""
-    watch, random, count = make_monitor(), Random(1), 0
+    """Return how many of 200 ticks report a joint with this speed as moving."""
+    monitor, random, count = make_monitor(), Random(1), 0
     for tick in range(200):
         now_s = NOW_S + tick * PERIOD_S
         reported_rad_s = speed_rad_s + random.gauss(0.0, noise_rad_s)
         state = fresh(now_s, angle_rad=speed_rad_s * tick * PERIOD_S, velocity_rad_s=reported_rad_s, closed_loop=False)
-        count += "joint_moving" in seen(watch, state, now_s, energised=energised, moving=False)
+        count += "joint_moving" in seen(monitor, state, now_s, energised=energised, moving=False)
     return count
 
 
-def test_a_joint_that_moves_without_torque_stands_against_arming_and_only_then() -> None:
+def test_a_moving_joint_is_reported_only_while_the_torque_is_off() -> None:
     assert moving_ticks(0.5) > 150
     assert moving_ticks(-0.5) > 150
     assert moving_ticks(0.5, energised=True) == 0
@@ -349,9 +352,9 @@ def test_a_joint_at_rest_whose_speed_is_noise_may_be_armed() -> None:
     assert moving_ticks(0.0, noise_rad_s=0.5) == 0
 
 
-def samples(watch: JointMonitor, steps: Iterable[tuple[float, float]]) -> list[set[str]]:
-    """Of angles that arrive at times after NOW_S, one in each tick."""
-    return [set(seen(watch, fresh(NOW_S + time_s, angle_rad=angle), NOW_S + time_s)) for time_s, angle in steps]
+def samples(monitor: JointMonitor, steps: Iterable[tuple[float, float]]) -> list[set[str]]:
+    """Return the faults of angles that arrive at times after NOW_S, one in each tick."""
+    return [set(seen(monitor, fresh(NOW_S + time_s, angle_rad=angle), NOW_S + time_s)) for time_s, angle in steps]
 
 
 def test_an_encoder_jumps_beyond_what_its_speed_explains() -> None:
@@ -366,40 +369,40 @@ def test_a_jump_is_reported_once_and_the_new_angle_then_counts() -> None:
 
 
 def test_the_first_sample_is_never_a_jump() -> None:
-    watch = make_monitor()
-    assert samples(watch, [(0.0, 1.0)]) == [set()]
-    watch.reset()
-    assert samples(watch, [(0.0, -1.0)]) == [set()]
+    monitor = make_monitor()
+    assert samples(monitor, [(0.0, 1.0)]) == [set()]
+    monitor.reset()
+    assert samples(monitor, [(0.0, -1.0)]) == [set()]
 
 
 def test_the_same_message_seen_twice_is_no_jump_and_no_step() -> None:
-    watch = make_monitor()
-    samples(watch, [(0.0, 0.0)])
+    monitor = make_monitor()
+    samples(monitor, [(0.0, 0.0)])
     for tick in range(1, 3):
-        assert not seen(watch, HEALTHY._replace(angle_rad=0.0), NOW_S + tick * 0.002)
+        assert not seen(monitor, HEALTHY._replace(angle_rad=0.0), NOW_S + tick * 0.002)
 
 
 def test_a_stamp_before_the_one_before_makes_no_jump() -> None:
-    """A frame that came without a time is stamped when it is read, which may be after the next one's own time."""
+    """A frame without a time is stamped when it is read, which may be after the time of the next frame."""
     assert samples(make_monitor(), [(0.05, 0.1), (0.01, 0.1), (0.012, 0.11)]) == [set(), set(), set()]
 
 
 def test_a_joint_at_the_velocity_limit_never_jumps() -> None:
-    watch, speed_rad_s = make_monitor(), LIMITS.velocity_rad_s
+    monitor, speed_rad_s = make_monitor(), LIMITS.velocity_rad_s
     for tick in range(30):
         now_s = NOW_S + tick * PERIOD_S
         angle_rad = -0.9 + speed_rad_s * tick * PERIOD_S
-        assert not seen(watch, fresh(now_s, angle_rad=angle_rad, velocity_rad_s=speed_rad_s), now_s)
+        assert not seen(monitor, fresh(now_s, angle_rad=angle_rad, velocity_rad_s=speed_rad_s), now_s)
 
 
 # load
 
 
 def stalled_ticks(torque_nm: float, velocity_rad_s: float, excused: bool = False, ticks: int = 900) -> int | None:
-    watch = make_monitor()
+    monitor = make_monitor()
     for tick in range(1, ticks):
         state = HEALTHY._replace(velocity_rad_s=velocity_rad_s, angle_rad=0.1 + velocity_rad_s * tick * PERIOD_S)
-        if "joint_not_following" in seen(watch, state, torque_nm=torque_nm, may_stand_still=excused):
+        if "joint_not_following" in seen(monitor, state, torque_nm=torque_nm, may_stand_still=excused):
             return tick
     return None
 
@@ -417,7 +420,7 @@ def test_a_joint_that_stands_still_at_full_torque_does_not_follow() -> None:
         (0.94 * LIMITS.torque_nm, 0.0, False),  # not saturated
         (LIMITS.torque_nm, 0.11, False),  # it moves
         (LIMITS.torque_nm, -0.11, False),
-        (LIMITS.torque_nm, 0.0, True),  # a recovery means to
+        (LIMITS.torque_nm, 0.0, True),  # in a recovery
         (0.0, 0.0, False),
     ],
 )
@@ -426,29 +429,29 @@ def test_everything_else_follows_or_is_excused(torque_nm: float, velocity_rad_s:
 
 
 def test_a_move_begins_the_wait_again_and_the_noise_of_a_speed_does_not() -> None:
-    watch, random = make_monitor(), Random(1)
+    monitor, random = make_monitor(), Random(1)
     for tick in range(2000):
         state = HEALTHY._replace(angle_rad=0.05 * (tick // 700))
-        assert "joint_not_following" not in seen(watch, state, torque_nm=LIMITS.torque_nm)
-    watch = make_monitor()
+        assert "joint_not_following" not in seen(monitor, state, torque_nm=LIMITS.torque_nm)
+    monitor = make_monitor()
     noisy = [HEALTHY._replace(velocity_rad_s=random.gauss(0.0, 0.3)) for _ in range(800)]
-    assert any("joint_not_following" in seen(watch, state, torque_nm=LIMITS.torque_nm) for state in noisy)
+    assert any("joint_not_following" in seen(monitor, state, torque_nm=LIMITS.torque_nm) for state in noisy)
 
 
 def test_missed_ticks_count_for_as_long_as_they_lasted() -> None:
-    watch = make_monitor()
+    monitor = make_monitor()
     found = [
         tick
         for tick in range(1, 200)
-        if "joint_not_following" in seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * PERIOD_S)
+        if "joint_not_following" in seen(monitor, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=10.0 * PERIOD_S)
     ]
     assert found[0] == pytest.approx(76, abs=1)
 
 
 def test_one_sample_after_a_long_stall_is_no_proof_of_what_lasted() -> None:
-    """A daemon that hung for seconds looks once."""
-    watch = make_monitor()
-    stalled = seen(watch, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=3.0)
+    """A daemon that hung for seconds gets one sample."""
+    monitor = make_monitor()
+    stalled = seen(monitor, HEALTHY, torque_nm=LIMITS.torque_nm, dt_s=3.0)
     assert set(stalled).isdisjoint({"joint_not_following", "torque_missing", "joint_velocity"})
 
 
@@ -460,9 +463,9 @@ def test_a_joint_at_rest_is_not_too_fast_after_missed_ticks(missed: int) -> None
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_motor_takes_too_much_from_a_quarter_over_its_limit_on(sign: float) -> None:
     def ticks_at(current_a: float) -> list[bool]:
-        watch = make_monitor()
+        monitor = make_monitor()
         state = HEALTHY._replace(current_a=sign * current_a)
-        return ["joint_current" in seen(watch, state) for _ in range(6)]
+        return ["joint_current" in seen(monitor, state) for _ in range(6)]
 
     assert ticks_at(1.25 * CURRENT_LIMIT_A) == [False] * 6
     assert ticks_at(1.25 * CURRENT_LIMIT_A + BEYOND) == [False] * (CURRENT_TICKS - 1) + [True] * (7 - CURRENT_TICKS)
@@ -492,10 +495,10 @@ def test_a_sensor_is_nearly_too_hot_half_way_to_its_bound_and_then_too_hot(
     assert lasting(HEALTHY._replace(temperature_c=temperature_c)) == ({expected} - {None})
 
 
-def warm_watch(winding_c: float) -> JointMonitor:
-    watch = make_monitor()
-    watch.winding.temperature_c = winding_c
-    return watch
+def warm_monitor(winding_c: float) -> JointMonitor:
+    monitor = make_monitor()
+    monitor.winding.temperature_c = winding_c
+    return monitor
 
 
 @pytest.mark.parametrize("measured_c", [nan, 0.0, 25.0, 79.0])
@@ -505,40 +508,40 @@ def warm_watch(winding_c: float) -> JointMonitor:
 def test_currents_guard_a_motor_whose_sensor_sees_nothing(
     measured_c: float, winding_c: float, expected: str | None
 ) -> None:
-    reported = seen(warm_watch(winding_c), HEALTHY._replace(temperature_c=measured_c))
+    reported = seen(warm_monitor(winding_c), HEALTHY._replace(temperature_c=measured_c))
     assert set(reported) == ({expected} - {None})
 
 
 def test_a_winding_that_is_too_hot_is_not_hidden_by_a_sensor_that_is_nearly_so() -> None:
-    assert set(seen(warm_watch(95.0), HEALTHY._replace(temperature_c=85.0))) == {"winding_hot"}
+    assert set(seen(warm_monitor(95.0), HEALTHY._replace(temperature_c=85.0))) == {"winding_hot"}
 
 
 def test_where_both_are_as_hot_the_sensor_is_trusted() -> None:
-    watch = warm_watch(95.0)
+    monitor = warm_monitor(95.0)
     for _ in range(TWO_MESSAGES + 2):
-        reported = seen(watch, HEALTHY._replace(temperature_c=96.0))
+        reported = seen(monitor, HEALTHY._replace(temperature_c=96.0))
     assert reported == {"motor_hot": "The left_sweep motor has 96 degrees C."}
 
 
 def test_one_absurd_temperature_is_over_in_minutes() -> None:
     for absurd in (inf, 1e38):
-        watch = make_monitor()
+        monitor = make_monitor()
         for _ in range(TWO_MESSAGES + 2):
-            reported = seen(watch, HEALTHY._replace(temperature_c=absurd))
+            reported = seen(monitor, HEALTHY._replace(temperature_c=absurd))
         assert set(reported) == {"motor_hot"}
         ticks = 0
-        while seen(watch, HEALTHY, dt_s=1.0):
+        while seen(monitor, HEALTHY, dt_s=1.0):
             ticks += 1
             assert ticks < 180
 
 
 def test_a_reset_does_not_cool_a_winding() -> None:
-    watch = warm_watch(95.0)
-    watch.reset()
-    assert set(seen(watch, HEALTHY)) == {"winding_hot"}
+    monitor = warm_monitor(95.0)
+    monitor.reset()
+    assert set(seen(monitor, HEALTHY)) == {"winding_hot"}
 
 
-# whatever comes
+# any input
 
 anything = st.floats(allow_nan=True, allow_infinity=True)
 drive_states = st.builds(
@@ -548,28 +551,30 @@ drive_states = st.builds(
 
 
 @given(st.lists(drive_states, min_size=1, max_size=6), st.booleans(), st.booleans(), anything)
-def test_no_value_makes_it_fail_and_every_fault_has_a_sentence(
+def test_no_value_makes_it_fail_and_every_fault_has_a_message(
     states: list[DriveState], energised: bool, moving: bool, torque_nm: float
 ) -> None:
-    watch = make_monitor()
+    monitor = make_monitor()
     for tick, state in enumerate(states):
         now_s = NOW_S + tick * PERIOD_S
-        for name, message in seen(watch, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm).items():
+        for name, message in seen(
+            monitor, state, now_s, energised=energised, moving=moving, torque_nm=torque_nm
+        ).items():
             assert name in FAULT_KINDS
             assert message.startswith(("The left_sweep ", "No ")) and message.endswith((".", "C", "s."))
-        assert isfinite(watch.winding.temperature_c)
+        assert isfinite(monitor.winding.temperature_c)
 
 
 @given(st.lists(drive_states, min_size=1, max_size=4))
-def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[DriveState]) -> None:
-    """All but heat and the jump back."""
-    watch = make_monitor()
+def test_a_monitor_forgets_garbage_once_the_signals_are_good_again(states: list[DriveState]) -> None:
+    """Only heat and, for one tick, the jump back are left."""
+    monitor = make_monitor()
     for tick, state in enumerate(states):
-        seen(watch, state, NOW_S + tick * PERIOD_S)
+        seen(monitor, state, NOW_S + tick * PERIOD_S)
     found: set[str] = set()
     for tick in range(len(states), len(states) + 5):
         now_s = NOW_S + tick * PERIOD_S
-        found = set(seen(watch, fresh(now_s), now_s))
+        found = set(seen(monitor, fresh(now_s), now_s))
     assert found <= {"winding_hot", "winding_overheating"}
 
 
@@ -577,10 +582,10 @@ def test_a_watch_forgets_garbage_once_the_signals_are_good_again(states: list[Dr
 
 
 def missing_ticks(sent_nm: float, current_a: float, moving: bool = True) -> int | None:
-    watch = make_monitor()
+    monitor = make_monitor()
     for tick in range(1, 200):
         state = fresh(NOW_S + tick * PERIOD_S, current_a=current_a)
-        if "torque_missing" in seen(watch, state, NOW_S + tick * PERIOD_S, torque_nm=sent_nm, moving=moving):
+        if "torque_missing" in seen(monitor, state, NOW_S + tick * PERIOD_S, torque_nm=sent_nm, moving=moving):
             return tick
     return None
 
@@ -604,22 +609,22 @@ def test_no_torque_is_missed_of_a_drive_that_is_not_in_closed_loop() -> None:
 
 
 def test_a_current_that_follows_within_ticks_is_not_missed() -> None:
-    """The current told in a tick answers the torque of the tick before."""
-    watch, before_nm = make_monitor(), 0.0
+    """The current reported in a tick answers the torque of the tick before."""
+    monitor, before_nm = make_monitor(), 0.0
     for tick in range(400):
         now_s, sent_nm = NOW_S + tick * PERIOD_S, 0.7 if tick // 30 % 2 else -0.7
         state = fresh(now_s, current_a=before_nm / 0.083, velocity_rad_s=1.0, angle_rad=0.1 + 1e-3 * (tick % 2))
-        assert "torque_missing" not in seen(watch, state, now_s, torque_nm=sent_nm)
+        assert "torque_missing" not in seen(monitor, state, now_s, torque_nm=sent_nm)
         before_nm = sent_nm
 
 
 def test_a_joint_that_rests_exactly_where_its_torque_left_it_has_a_sound_encoder() -> None:
-    """Its torque fell while it was at rest; without torque nothing has to move any more."""
-    watch = make_monitor()
+    """The torque fell while the joint was at rest; without torque nothing has to move any more."""
+    monitor = make_monitor()
 
     def stuck(tick: int, torque_nm: float, energised: bool) -> bool:
         now_s = NOW_S + tick * PERIOD_S
-        return "encoder_stuck" in seen(watch, fresh(now_s), now_s, torque_nm=torque_nm, energised=energised)
+        return "encoder_stuck" in seen(monitor, fresh(now_s), now_s, torque_nm=torque_nm, energised=energised)
 
     assert not any(stuck(tick, 0.7 if tick < 10 else 0.0, energised=True) for tick in range(12))
     assert not any(stuck(tick, 0.0, energised=False) for tick in range(12, 200))

@@ -13,7 +13,7 @@ TICK_S = 0.002
 
 
 class Samples:
-    """A monitor, the time, and the names of the faults of each sample that it gets."""
+    """A motion monitor with a clock; `add` returns the names of the faults of one sample."""
 
     def __init__(self, torque_limit_nm: float = 0.75, inertia_kg_m2: float = 0.0004) -> None:
         self.monitor = MotionMonitor("left_sweep", JointDynamics(inertia_kg_m2, 8.0), torque_limit_nm)
@@ -85,7 +85,7 @@ def test_a_sample_at_or_beyond_the_fastest_speed_is_no_measurement(side: float) 
 def test_a_joint_may_move_away_by_exactly_the_bound() -> None:
     samples = Samples()
     samples.add(target_rad=0.0)
-    assert samples.add(0.25, target_rad=0.0) == set()  # its path, and as much of error
+    assert samples.add(0.25, target_rad=0.0) == set()  # the path plus the growth of the error
     assert samples.monitor.away_rad == 0.5
 
 
@@ -100,7 +100,7 @@ def test_the_path_away_is_that_of_the_joint_less_that_of_its_target_and_the_grow
     assert samples.monitor.away_rad == pytest.approx(0.1 - 0.05 + 0.05)
 
 
-def test_a_target_that_comes_towards_a_joint_earns_it_nothing() -> None:
+def test_a_target_that_comes_towards_a_joint_does_not_reduce_its_path_away() -> None:
     samples = Samples()
     samples.add(0.0, target_rad=0.25)
     samples.add(0.0, target_rad=0.0)

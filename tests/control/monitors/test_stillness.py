@@ -1,4 +1,4 @@
-"""Rest is judged by the angle."""
+"""Rest is evaluated by the angle."""
 
 from math import inf
 from random import Random

@@ -1,4 +1,4 @@
-"""The winding's temperature against the closed form, against scipy's integrator, and what a sensor makes of it."""
+"""The winding's temperature against the closed form, against scipy's integrator, and under the reading of a sensor."""
 
 from math import exp, inf, isfinite, nan, sin
 
@@ -23,7 +23,7 @@ def heated(current_a: float, ticks: int, dt_s: float = PERIOD_S, parameters: Win
 
 
 def closed_form_c(current_a: float, time_s: float) -> float:
-    """With R growing by 0.39 % a kelvin the equation stays linear: τ dT/dt = a - b T, from the room's temperature."""
+    """Return the closed form: as R grows by 0.39 % per kelvin, the equation τ dT/dt = a - b T stays linear."""
     p = PARAMETERS
     watts_per_ohm = p.thermal_resistance_k_w * 1.5 * p.resistance_ohm * current_a**2
     b = 1.0 - 0.0039 * watts_per_ohm
@@ -60,7 +60,9 @@ def test_a_changing_current_heats_it_like_an_integrator() -> None:
 
 
 def test_copper_that_is_hotter_heats_more() -> None:
-    """By 0.39 % a kelvin: the first step from 85 °C against that from 35 °C, less what the room takes."""
+    """The heat grows by 0.39 % per kelvin: the first step from 85 °C is compared with that from 25 °C, less what the
+    room takes.
+    """
 
     def watts(temperature_c: float) -> float:
         winding = Winding(PARAMETERS)
@@ -112,7 +114,7 @@ def test_for_any_input_the_temperature_stays_between_room_and_burning(
 
 
 def test_full_torque_by_the_limits_is_a_matter_of_a_minute_and_of_an_hour_at_a_third() -> None:
-    """0.75 N·m at 0.083 N·m/A are 9 A: more than a motor bears for long, and far less is no matter at all."""
+    """0.75 N·m at 0.083 N·m/A are 9 A, more than a motor withstands for long; a third of that is harmless."""
     limits = JointLimits()
     full_a = limits.torque_nm / 0.083
     winding, seconds = Winding(PARAMETERS), 0

@@ -45,7 +45,7 @@ ARROW = ((-0.02, 0.0), (0.0, 0.03), (0.02, 0.0), (0.0, 0.07))  # its lower edge 
 
 @st.composite
 def polygons(draw: st.DrawFn) -> tuple[tuple[float, float], ...]:
-    """Corners around a middle at any radius, so that plates have notches, in either order."""
+    """Draw corners around a centre at any radius, so that plates have notches, in either order."""
     corners = draw(st.integers(3, 9))
     turns = sorted(draw(st.lists(st.integers(0, 71), min_size=corners, max_size=corners, unique=True)))
     radii_m = draw(st.lists(st.floats(0.005, 0.05), min_size=corners, max_size=corners))
@@ -63,7 +63,7 @@ adductions = st.floats(-1.2, 1.2)  # the plate stands up: cos β > 0
 
 
 class Pose(NamedTuple):
-    """Of a plate whose edge's middle is `share` of its own extent in depth below the surface (above: negative)."""
+    """A pose whose edge's middle is `fraction` of the plate's extent in depth below the surface (above: negative)."""
 
     geometry: FlipperGeometry
     sweep_rad: float
@@ -93,7 +93,7 @@ LEVEL = Pose(AUTHORS, 0.3, 0.0, 0.4)
 
 
 def grid_points(pose: Pose, u: Array, s: Array) -> Array:
-    """Depths of the plate's points below the surface, by rotation matrices."""
+    """Return the depths of the plate's points below the surface, by rotation matrices."""
     g, ca, sa = pose.geometry, cos(pose.sweep_rad), sin(pose.sweep_rad)
     cb, sb = cos(pose.adduction_rad), sin(pose.adduction_rad)
     sweep_about_z = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
@@ -105,16 +105,16 @@ def grid_points(pose: Pose, u: Array, s: Array) -> Array:
 
 
 def corner_depths(pose: Pose) -> list[float]:
-    """Inner and outer end of the edge, inner and outer end of the top."""
+    """Return the depths of the edge's inner and outer end and of the top's inner and outer end."""
     half, top = pose.geometry.plate_width_m / 2.0, pose.geometry.plate_height_m
     ends = np.array([-half, half, -half, half]), np.array([0.0, 0.0, top, top])
     return [float(depth) for depth in grid_points(pose, *ends)]
 
 
 def grid_integrals(pose: Pose, cells: int = 150) -> tuple[Array, Array]:
-    """By the midpoint rule, and a bound of its error.
+    """Integrate by the midpoint rule, and bound the error.
 
-    A cell that the waterline cuts may be wrong by all that it can hold; in the others the rule is exact but for the
+    A cell that the waterline cuts may be wrong by all that it can hold; in the others the rule is exact except for the
     curvature of ζu and ζs, which are quadratic with second derivatives below 2.
     """
     g = pose.geometry
@@ -165,7 +165,7 @@ Point = tuple[Fraction, Fraction]
 
 
 def clipped(corners: Sequence[Point], height: Callable[[Point], Fraction]) -> list[Point]:
-    """The part of a polygon where a linear function is not negative (Sutherland and Hodgman)."""
+    """Return the part of a polygon where a linear function is not negative (Sutherland and Hodgman)."""
     kept: list[Point] = []
     for before, here in zip([corners[-1], *corners[:-1]], corners, strict=True):
         a, b = height(before), height(here)
@@ -180,8 +180,8 @@ def clipped(corners: Sequence[Point], height: Callable[[Point], Fraction]) -> li
 def exact_integrals(
     geometry: FlipperGeometry, depth_m: float, per_outward: float, per_upward: float
 ) -> tuple[Fraction, ...]:
-    """Of 1, u, s, ζ, ζu, ζs, without rounding: a fan of signed triangles, on each the rule of its edges' middles, which
-    is exact for quadratics.
+    """Return the integrals of 1, u, s, ζ, ζu, ζs without rounding: a fan of signed triangles, each with the rule of its
+    edges' midpoints, which is exact for quadratics.
     """
     corners = [(Fraction(u), Fraction(s)) for u, s in geometry.plate.corners]
 
@@ -202,9 +202,9 @@ def exact_integrals(
 
 
 def rounding_scale(geometry: FlipperGeometry, depth_m: float, per_outward: float, q: float) -> Array:
-    """The size of what the closed forms add up, of which each rounding is a share of 1e-16.
+    """Return the size of the terms of the closed forms, each of which is rounded by a fraction of 1e-16.
 
-    They reckon with the plate reaching up to the waterline, and take off what lies above its top.
+    The forms let the plate reach up to the waterline and subtract the part above its top.
     """
     half = max(abs(u) for u, _ in geometry.plate.corners)
     deep = abs(depth_m) + abs(per_outward) * half + geometry.plate.height_m * q
@@ -268,18 +268,18 @@ def test_the_path_within_the_plates_plane_per_radian_is_the_docstrings_root() ->
 
 
 WIDTH, NEAR, FAR, MIDDLE, Q = sympy.symbols("w D_1 D_2 m q", positive=True)
-PLACE = sympy.Symbol("t", real=True)  # outward from the middle of the wet part
-COLUMN = (NEAR + FAR) / 2 + (FAR - NEAR) * PLACE / WIDTH  # depth of the edge there
+OUTWARD = sympy.Symbol("t", real=True)  # outward from the middle of the wet part
+COLUMN = (NEAR + FAR) / 2 + (FAR - NEAR) * OUTWARD / WIDTH  # depth of the edge there
 
 
 def column_integral(integrand: sympy.Expr) -> sympy.Expr:
-    """Over the columns of a wet part whose edge's ends are NEAR and FAR deep, MIDDLE outward."""
+    """Integrate over the columns of a wet part whose edge's ends are NEAR and FAR deep, MIDDLE outward."""
     in_column = sympy.integrate(sympy.expand(integrand), (S, 0, COLUMN / Q))
-    return sympy.integrate(sympy.expand(in_column), (PLACE, -WIDTH / 2, WIDTH / 2))
+    return sympy.integrate(sympy.expand(in_column), (OUTWARD, -WIDTH / 2, WIDTH / 2))
 
 
 def test_the_docstrings_integrals_are_those_of_columns_up_to_the_waterline() -> None:
-    zeta, u = COLUMN - Q * S, MIDDLE + PLACE
+    zeta, u = COLUMN - Q * S, MIDDLE + OUTWARD
     area, moment = column_integral(sympy.Integer(1)), column_integral(zeta)
     mean_square = NEAR**2 + NEAR * FAR + FAR**2
     assert is_zero(area - WIDTH * (NEAR + FAR) / (2 * Q))
@@ -293,8 +293,8 @@ def test_the_docstrings_integrals_are_those_of_columns_up_to_the_waterline() -> 
 @given(poses)
 @example(CORNER)
 @example(TOP_CORNER_DRY)
-def test_crossing_is_the_ratio_of_the_torques_of_the_triangles_pressure(pose: Pose) -> None:
-    """Element by element over the grid; the weighted sums are divided, so their errors add."""
+def test_cross_coupling_is_the_ratio_of_the_torques_of_the_triangles_pressure(pose: Pose) -> None:
+    """The sums run element by element over the grid; the weighted sums are divided, so their errors add."""
     values, error = grid_integrals(pose)
     g, plate, sine = pose.geometry, pose.plate(), sin(pose.sweep_rad)
     sweep = g.flipper_length_m * values[3] + values[4]
@@ -377,7 +377,7 @@ def test_the_moments_grow_with_depth_by_the_wet_area(pose: Pose, deeper_m: float
 
 
 @given(geometries, sweeps, adductions, st.floats(-0.8, 1.5))
-def test_a_mirrored_sweep_has_the_same_moments_and_the_opposite_crossing(
+def test_a_mirrored_sweep_has_the_same_moments_and_the_opposite_cross_coupling(
     geometry: FlipperGeometry, sweep: float, adduction: float, fraction: float
 ) -> None:
     front, back = (Pose(geometry, side * sweep, adduction, fraction) for side in (1.0, -1.0))
@@ -387,13 +387,13 @@ def test_a_mirrored_sweep_has_the_same_moments_and_the_opposite_crossing(
 
 
 def vanishes(value: float) -> bool:
-    """So small that its powers round."""
+    """Return whether a value is so small that its powers round."""
     return 0.0 < abs(value) < 1e-6
 
 
 @given(poses, st.sampled_from([0.25, 2.0, 16.0]))
 def test_moments_scale_with_the_fourth_power_of_length(pose: Pose, times: float) -> None:
-    """By powers of two, which do not round."""
+    """The factors are powers of two, which do not round."""
     lengths_m = {name: value for name, value in asdict(pose.geometry).items() if isinstance(value, float)}
     assume(not any(vanishes(value) for value in (*pose[1:], *lengths_m.values())))
     larger = FlipperGeometry(plate_corners_m=(), **{name: times * length_m for name, length_m in lengths_m.items()})

@@ -27,7 +27,7 @@ def test_a_plate_of_three_or_more_corners_around_it_is_accepted(corners: tuple[C
         ((SQUARE[0], SQUARE[1], SQUARE[1], SQUARE[2]), "crosses or touches"),  # one corner twice
         ((*SQUARE[:3], (0.01, 0.01)), "crosses or touches"),  # folds back on its side
         ((*SQUARE[:3], (0.01, 0.005), (-0.01, 0.02)), "crosses or touches"),
-        (((0.0, 0.0), (0.02, 0.02), (0.01, 0.01)), "crosses or touches"),  # of no width
+        (((0.0, 0.0), (0.02, 0.02), (0.01, 0.01)), "crosses or touches"),  # without width
         (tuple((0.01, s) for _, s in SQUARE), "0 m wide"),
         (tuple((u, 0.0) for u, _ in SQUARE), "0 m high"),
         (tuple((1000.0 * u, 1000.0 * s) for u, s in SQUARE), "in m"),  # in mm
