@@ -15,7 +15,7 @@ from control.gait.gait import Gait, GaitParameters
 from control.gait.joint_path import JointPath, still
 from control.gait.recovery import Recovery
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass, JointGains, damping_torques_nm, joint_torques_nm
+from control.joint_pd import ArmMass, Extrapolation, JointGains, damping_torques_nm, joint_torques_nm
 from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
 from control.records import (
@@ -82,6 +82,8 @@ RESTING = GaitTarget(
 
 
 class Controller:
+    present: DriveStates | None = None  # the states of the last step, as they should be now
+
     def __init__(
         self,
         gait: GaitParameters,
@@ -91,8 +93,11 @@ class Controller:
         motion: MotionParameters,
         recovery: Recovery,
         rig: Rig = TWO_FLIPPERS,
+        asked: Sequence[bool] = (),
     ) -> None:
+        """`asked`: for each joint, whether its drive answers only when asked; empty: none does."""
         self.rig = rig
+        self._asked = asked
         self._flippers = len(rig.flippers)
         self.gait = Gait(gait, geometry)
         self.geometry = geometry
@@ -108,6 +113,7 @@ class Controller:
     def reset(self) -> None:
         self.recovery.reset()
         self._mode = Mode.IDLE
+        self._extrapolation = Extrapolation(self._asked) if any(self._asked) else None
         self._path: JointPath | None = None
         self._move: JointPath | None = None  # to another pose, in hold
         self._pose: JointTargets = still(same_for_all(0.0, self.rig))
@@ -119,6 +125,7 @@ class Controller:
         self._since_s = self._resting_s = 0.0  # the mode began, all joints rest
         self.target = RESTING
         self.joint_targets: JointTargets | None = None  # of the last step with stiffness
+        self.present = None
         self._follows = True  # the torques of the last step, those targets: a hold law did not replace them
 
     @property
@@ -196,27 +203,29 @@ class Controller:
         if mode is not self._mode:
             self._enter(mode, states)
         self.target = RESTING
+        self.present = present = self._extrapolation.update(states) if self._extrapolation else states
         elapsed_s = max(elapsed_s, dt_s)
         self._since_s += elapsed_s
         if mode not in MOVING:
             return self._no_torque
         if mode is Mode.DAMPING:
-            return self._damp(elapsed_s, states, trusted or same_for_all(True, self.rig))
+            trusted = trusted or same_for_all(True, self.rig)
+            self._watch_rest(elapsed_s, states, trusted)
+            return damping_torques_nm(present, self.gains, trusted, DAMPING_NM)
         self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
             self._up = self.is_up(states)
             self._waited_s += elapsed_s
         self.joint_targets = self._targets(dt_s, mode, states)
-        torques_nm = joint_torques_nm(self.joint_targets, states, self.gains, self.mass, self._fade)
+        torques_nm = joint_torques_nm(self.joint_targets, present, self.gains, self.mass, self._fade)
         law = self.hold_law if mode is Mode.HOLD else None
         self._follows = law is None
         return law(torques_nm, states) if law else torques_nm
 
-    def _damp(self, elapsed_s: float, states: DriveStates, trusted: Joints[bool]) -> Torques:
+    def _watch_rest(self, elapsed_s: float, states: DriveStates, trusted: Joints[bool]) -> None:
         still = [each.update(state.angle_rad, elapsed_s) for each, state in zip(self._stillness, states, strict=True)]
         rests = all(quiet or not trust for quiet, trust in zip(still, trusted, strict=True))
         self._resting_s = self._resting_s + elapsed_s if rests else 0.0
-        return damping_torques_nm(states, self.gains, trusted, DAMPING_NM)
 
     def _enter(self, mode: Mode, states: DriveStates) -> None:
         self.recovery.reset()

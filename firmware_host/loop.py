@@ -212,7 +212,8 @@ class Loop:
         """Limit the torques; their slew to that of one tick, even after missed ticks."""
         if self.mode not in MOVING:
             return self.nothing_sent
-        states, limits = self.fault_monitor.with_winding_heat(self.states), self.configuration.limits
+        present, limits = self.controller.present or self.states, self.configuration.limits
+        states = self.fault_monitor.with_winding_heat(present)
         return apply_limits(wanted, self.sent.torques_nm, states, limits, self._joint_ranges, self.period_s)
 
     def _command(self, now_s: float) -> None:
@@ -299,4 +300,5 @@ def _make_controller(configuration: Configuration) -> Controller:
         configuration.motion,
         recovery,
         configuration.rig,
+        [configuration.drive[joint].answers_only for joint in configuration.rig.joints],
     )
