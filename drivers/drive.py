@@ -198,6 +198,9 @@ class DriveType(Protocol):
     def kind(self) -> FrameKind:
         """The kind of the frames that this program sends. All drives of a bus need the same."""
 
+    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
+        """Returns every arbitration id that this drive sends or obeys; with the bit FD for CAN FD frames."""
+
     def gate_table(self, parameters: DriveParameters) -> GateTable:
         """Lists everything that may leave for one drive."""
 

@@ -3,7 +3,8 @@
 The joints of a robot may have drives of different types, as long as those on one bus send frames of the same kind.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 
 from control.limits import JointLimits
 from control.records import JOINTS
@@ -74,6 +75,18 @@ def _other_types(parameters: Mapping[str, DriveParameters], bus: str) -> dict[in
         if name != drive.type
         for announced in [other.announces(drive.node_id)]
     }
+
+
+def collisions(parameters: Mapping[str, DriveParameters]) -> Iterator[tuple[str, str, int]]:
+    """Yields two joints and an arbitration id that their drives, of different types on one bus, both use.
+
+    Drives of one type never collide while their node ids differ: what they share, they address by the payload.
+    """
+    for (first, one), (second, other) in combinations(parameters.items(), 2):
+        if one.bus == other.bus and one.type != other.type:
+            shared = type_of(one).identifiers(one) & type_of(other).identifiers(other)
+            if shared:
+                yield first, second, min(shared)
 
 
 def read_frame(frame: Frame, drives: Iterable[DriveParameters]) -> FrameContent | None:

@@ -8,7 +8,7 @@ from drivers.can.bus_load import FrameRate
 from drivers.can.frames import Frame
 from drivers.drive import DriveParameters, FrameContent, Outlet, Span, WatchdogEndpoints
 from drivers.mit import codec
-from drivers.mit.axis import MitAxis
+from drivers.mit.axis import MASTER_ID, MitAxis
 from drivers.mit.gate_tables import gate_table
 from drivers.mit.models import MODELS
 from drivers.mit.parameters import LARGEST_ID, MitParameters
@@ -31,6 +31,11 @@ class Mit:
     example_error = OVERCURRENT
     command = FrameRate(codec.ANSWER_BYTES, RATE_HZ)
     reports = (FrameRate(codec.ANSWER_BYTES, RATE_HZ),)
+
+    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
+        """Also those of the other maker's drives, which differ in the model alone."""
+        node_id = parameters.node_id
+        return frozenset({MASTER_ID, node_id, node_id + DAMIAO_OFFSET, codec.REGISTER_ID})
 
     def gate_table(self, parameters: DriveParameters) -> GateTable:
         return gate_table(cast(MitParameters, parameters))

@@ -7,7 +7,7 @@ from typing import cast
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
 from drivers.can.frames import Frame, MalformedMessageError
-from drivers.drive import DriveParameters, FrameContent, Outlet, Span, WatchdogEndpoints
+from drivers.drive import FD, DriveParameters, FrameContent, Outlet, Span, WatchdogEndpoints
 from drivers.moteus import codec
 from drivers.moteus.axis import MoteusAxis
 from drivers.moteus.codec import Mode, Reply
@@ -36,6 +36,12 @@ class Moteus:
     example_error = MOTOR_DRIVER_FAULT
     command = FrameRate(codec.TORQUE_BYTES, RATE_HZ, KIND.is_extended, KIND.is_fd)
     reports = (FrameRate(codec.REPLY_BYTES, RATE_HZ, KIND.is_extended, KIND.is_fd),)
+
+    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
+        node_id = parameters.node_id
+        return frozenset(
+            identifier | FD for identifier in (codec.reply_id(node_id), codec.command_id(node_id), node_id)
+        )
 
     def gate_table(self, parameters: DriveParameters) -> GateTable:
         return gate_table(cast(MoteusParameters, parameters))

@@ -52,6 +52,10 @@ class Odrive:
         *(FrameRate(REPORT_BYTES, SLOW_HZ),) * 4,  # heartbeat, errors, temperature, voltage
     )
 
+    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
+        first = parameters.node_id << 5
+        return frozenset(range(first, first + 32))
+
     def gate_table(self, parameters: DriveParameters) -> GateTable:
         return gate_table(cast(OdriveParameters, parameters))
 

@@ -23,7 +23,7 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.drive import DriveParameters
-from drivers.drive_types import make_drives, type_of
+from drivers.drive_types import collisions, make_drives, type_of
 from drivers.pose.pose_port import NoPose
 from experiments.robot.bench_robot import BenchError
 from firmware_host.buses import BusError, lock_buses, open_ports
@@ -206,6 +206,9 @@ def on_channels(configuration: Configuration, given: Sequence[str]) -> Configura
             raise BenchError(
                 f"{count} drives have the node id {node_id} on {channel}: give each bus its own --can NAME=channel."
             )
+    for first, second, identifier in collisions(drives):
+        channel, both = buses[drives[first].bus].channel, f"{first} and {second} both use"
+        raise BenchError(f"{both} the id 0x{identifier:03x} on {channel}: give each bus its own --can NAME=channel.")
     return replace(configuration, bus=buses, drive=drives)
 
 

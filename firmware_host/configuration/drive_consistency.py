@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from control.records import FLIPPERS
 from drivers.can.can_fd import CLASSIC_INTERFACES
-from drivers.drive_types import type_of
+from drivers.drive_types import collisions, type_of
 from firmware_host.configuration.configuration import Configuration
 
 
@@ -47,6 +47,14 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
             yield f"drive.{joint}.serial_number = {drive.serial_number!r}: {must}"
         for value, problem in drive.torque_problems(configuration.limits.torque_nm):  # it would clamp without a report
             yield f"drive.{joint}.{value}: {problem}"
+    for first, second, identifier in collisions(configuration.drive):
+        one, other = configuration.drive[first], configuration.drive[second]
+        if one.node_id != other.node_id:
+            yield (
+                f"drive.{second}.node_id = {other.node_id}: as {other.type} it uses the arbitration id"
+                f" 0x{identifier:03x} on bus {one.bus!r}, and so does drive.{first}.node_id = {one.node_id} as"
+                f" {one.type}; give one of them another id, or put them on two buses"
+            )
 
 
 def bus_problems(configuration: Configuration) -> Iterator[str]:

@@ -89,6 +89,13 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("node_id = 0", 'node_id = 5\ntype = "mit"\ntorque_range_nm = 0.5', [
         "drive.left_sweep.torque_range_nm = 0.5: its codes end at 0.5 N·m, and limits.torque_nm = 0.75"
     ]),
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nserial_number = "0badcafe"', [
+        "drive.left_sweep.serial_number = '0badcafe': must be empty: that of an AK80-9 cannot be read"
+    ]),
+    ("node_id = 1", 'node_id = 2\ntype = "mit"', [
+        "drive.left_adduction.node_id = 2: as mit it uses the arbitration id 0x000 on bus 'left', and so does"
+        " drive.left_sweep.node_id = 0 as odrive; give one of them another id, or put them on two buses"
+    ]),
     ("[drive.right_sweep]", "[drive.right_swep]", [
         "drive.right_sweep is missing: ", "drive.right_swep: there is no such joint"
     ]),
