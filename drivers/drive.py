@@ -44,6 +44,7 @@ class DriveParameters:
         str, Meaning("of the drive; the robot is not armed with another one; empty: not compared")
     ] = ""
 
+    models: ClassVar[tuple[str, ...]] = ()  # of motors that its protocol distinguishes by a key `model`
     serial_digits: ClassVar[int] = 12  # hexadecimal ones, of a serial number of this type of drive; 0: it reports none
     answers_only: ClassVar[bool] = False  # it sends nothing unless it is asked, which each tick does once
     unreported: ClassVar[frozenset[str]] = frozenset()  # signals that this type of drive does not have

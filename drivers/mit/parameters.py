@@ -22,6 +22,7 @@ class MitParameters(DriveParameters):
         float, Bounds(0.001, 10.0), Meaning("by which its answers state torque: current is that torque divided by it")
     ] = 0.083
 
+    models: ClassVar[tuple[str, ...]] = tuple(MODELS)
     serial_digits: ClassVar[int] = 8
     answers_only: ClassVar[bool] = True
 

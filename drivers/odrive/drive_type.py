@@ -107,6 +107,10 @@ class Odrive05:
         *(FrameRate(REPORT_BYTES, SLOW_HZ),) * 5,  # heartbeat, errors of motor, encoder and controller, voltage
     )
 
+    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
+        first = parameters.node_id << 5
+        return frozenset(range(first, first + 32))
+
     def gate_table(self, parameters: DriveParameters) -> GateTable:
         return gate_table_05(cast(Odrive05Parameters, parameters))
 

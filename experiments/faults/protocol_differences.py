@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from drivers.drive_types import DRIVE_TYPES
-from drivers.mit.models import MODELS
 from experiments.faults.failure_modes import ABSENT_DRIVE, BY_NAME, FailureMode
 from experiments.faults.injectors import failing, unheard, watchdog_tripped
 
@@ -143,7 +142,9 @@ def differences(drive: str) -> Table:
     """Returns the differences of a type of drive by the name of the failure mode; `drive` as in `with_drive_type`."""
     name, _, model = drive.partition(":")
     asked = ASKED if DRIVE_TYPES[name].query(1) is not None else {}
-    of_model = WITHOUT_REGISTERS if model and not MODELS[model].has_registers else {}
+    given: dict[str, Any] = {"model": model} if model else {}
+    unreadable = not DRIVE_TYPES[name].parameters(bus="", node_id=1, **given).reports_settings
+    of_model = WITHOUT_REGISTERS if unreadable else {}
     return {**asked, **BY_TYPE.get(name, {}), **of_model}
 
 

@@ -12,9 +12,11 @@ import tomlkit
 
 from control.bounds import Bounds
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
-from drivers.mit.models import MODELS
 
-DRIVES = (*DRIVE_TYPES, *(f"mit:{model}" for model in MODELS))  # types of drive, and models of motor
+DRIVES = (  # types of drive, and models of motor
+    *DRIVE_TYPES,
+    *(f"{name}:{model}" for name, each in DRIVE_TYPES.items() for model in each.parameters.models),
+)
 DATA_BIT_RATE_KBIT_S = 5000
 # Answers to questions are a whole tick old, so the loop's delay is 1.5 ticks, 3.9 ms. The default gains (8 and 0.06, 10
 # and 0.08) then have phase margins of 12 and 15 degrees, and joints oscillate after a flipper has broken free at full
