@@ -2,7 +2,8 @@
 
 There is no question that is no command. Leaving the mode is the only one that cannot exert torque, and every drive
 answers it. To an ODrive of id 0 these frames are its commands 1 to 15 (an emergency stop among them), and the id of
-the registers, 0x7FF, is that by which all ODrives enter their boot loader: they must not be sent where one listens.
+the registers, 0x7FF, is the command to node 63 to enter the boot loader, and node 63 may mean all ODrives (their tools
+reboot all by it): they must not be sent where one listens.
 Sources: see codec.py; ODrive's CANSimple documentation.
 """
 
