@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from control.controller import SOFT_STOP_S
 from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode
+from control.monitors.encoder_monitor import YIELDING_NM
 from control.records import JOINTS, NEVER_S, Torques
 from experiments.faults.energy_bounds import energy_bounds
 from tests.dst.operated_robot import OperatedRobot
@@ -180,7 +181,11 @@ class ArmedByRequest(Promise):
 
 
 class WithinStops(Promise):
-    """Our torque does not press a joint against its mechanical stop."""
+    """Our torque does not press a joint against its mechanical stop.
+
+    An encoder that freezes at zero speed shows only in a torque that changes by more than YIELDING_NM: until then the
+    robot cannot distinguish it from a joint that mud holds, and less torque than that may press the joint.
+    """
 
     LONGEST_S = 0.5  # a stuck encoder is detected within 120 ticks, then braking takes as long as the slew
 
@@ -192,10 +197,14 @@ class WithinStops(Promise):
     def update(self) -> Iterator[str]:
         for index, joint in enumerate(self.robot.work.joints):
             newly_s, self._before_s[index] = joint.pushed_s - self._before_s[index], joint.pushed_s
-            ours = newly_s > 0.0 and not self.reach.is_foreign(index)
+            ours = newly_s > 0.0 and not self.reach.is_foreign(index) and not self._is_hidden(index)
             self._pressed_s[index] = self._pressed_s[index] + newly_s if ours else 0.0
             if self._pressed_s[index] > self.LONGEST_S:
                 yield f"{JOINTS[index]} is pressed against its stop for {self._pressed_s[index]:.2f} s"
+
+    def _is_hidden(self, index: int) -> bool:
+        is_frozen = self.robot.lockstep.robot.drives[index].parameters.encoder_frozen
+        return is_frozen and abs(self.loop.sent.torques_nm[index]) < YIELDING_NM
 
 
 class EnergyRise:

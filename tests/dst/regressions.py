@@ -129,4 +129,47 @@ REGRESSIONS = (
             for_s=0.245,
         ),
     ),
+    Regression(
+        "joints that a disarm lets coast in a fast swing were put back before they lay against their stops",
+        Scenario(
+            seed=10855,
+            surroundings=Surroundings(
+                seed=0,
+                strength_pa=676,
+                stone_m=0.058,
+                configuration=(
+                    ("motion.path_speed_rad_s", 2.1),
+                    ("motion.fade_in_s", 0.3),
+                    ("gait.insertion_speed_m_s", 0.2),
+                ),
+            ),
+            start="hold",
+            events=(Call(at_s=0.0, client="pilot", method="walk"),),
+            for_s=0.805,
+        ),
+    ),
+    Regression(
+        "an encoder that freezes in a held pose, at zero speed and steady torque, was expected to be detected",
+        Scenario(
+            seed=13745,
+            surroundings=Surroundings(
+                seed=0,
+                stone_m=0.003,
+                configuration=(
+                    ("motion.path_speed_rad_s", 2.4),
+                    ("motion.fade_in_s", 0.1),
+                    ("gait.swing_duration_s", 0.6),
+                    ("gait.insertion_speed_m_s", 0.1),
+                    ("gains.sweep_stiffness_nm_rad", 7.9),
+                    ("gains.adduction_stiffness_nm_rad", 9.8),
+                ),
+            ),
+            start="stance",
+            events=(
+                Call(at_s=0.058, client="pilot", method="stop"),
+                Harm(at_s=0.168, name="frozen encoder", joint="right_adduction", for_s=0.805),
+            ),
+            for_s=1.023,
+        ),
+    ),
 )

@@ -25,6 +25,8 @@ LONGEST_CLEARING_S = 3.5  # a drive that restarts is silent for 1 s, then report
 CLEARING_TICKS = 120  # between two requests to clear, or to arm
 LONGEST_ARMING_S = 1.5
 RESTING_TICKS = 50  # after the torque is off
+LONGEST_COASTING_S = 3.0  # of a joint that was disarmed in a fast swing, until it lies against its stop
+STILL_RAD_S = 0.05
 HELD_TICKS = 20
 DISARMED_TICKS = 4
 COOLING = (FaultKind.WINDING_HOT, FaultKind.WINDING_OVERHEATING)  # a winding cools for minutes
@@ -99,6 +101,7 @@ class Run:
     def _come_to_rest(self) -> None:
         """Lets the joints come to rest, moves them back by hand where they are out of range, and clears the faults."""
         self._run(RESTING_TICKS)
+        self._wait_until(self._is_still, LONGEST_COASTING_S)
         if self._is_out_of_range():
             self._robot.lockstep.robot.request_put_back()
             self._run(RESTING_TICKS)
@@ -110,6 +113,9 @@ class Run:
             self._step()
         names = ", ".join(sorted({str(fault.kind) for fault in self._loop.faults.present})) or "no fault"
         self._break("BackToIdle", f"after a clear the robot is {self._loop.mode.name.lower()} with {names}")
+
+    def _is_still(self) -> bool:
+        return all(abs(speed_rad_s) < STILL_RAD_S for speed_rad_s in self._robot.lockstep.robot.plant.velocities_rad_s)
 
     def _is_out_of_range(self) -> bool:
         ranges, angles_rad = self._loop.configuration.joint_ranges, self._robot.lockstep.robot.plant.angles_rad
