@@ -1,4 +1,4 @@
-"""A drive's set-point against the last commands: other programs, late commands, and everything that is no fault."""
+"""A drive's set-point against the last commands: other programs, late commands, and differences that are no fault."""
 
 from math import nan, pi
 from random import Random
@@ -38,7 +38,7 @@ def reports_until_found(monitor: SetpointMonitor, setpoints_nm: list[float], vel
 
 
 @pytest.mark.parametrize(("every", "longest"), [(1, 6), (2, 12), (4, 30), (10, 100), (20, 600)])
-def test_a_foreign_torque_behind_every_nth_command_is_found(every: int, longest: int) -> None:
+def test_a_foreign_torque_after_every_nth_command_is_found(every: int, longest: int) -> None:
     monitor = commanded(0.3, 0.3, 0.3)
     found = reports_until_found(monitor, [1.0 if number % every == 0 else 0.3 for number in range(1000)])
     assert found is not None and found <= longest

@@ -60,7 +60,7 @@ class Bench:
         return self.far.receive()
 
     def torque(self, torque_nm: float, identifier: int = MOTOR) -> float:
-        """What leaves for it."""
+        """Send a torque and return the torque that leaves."""
         (frame,) = self.send(Frame(identifier, pack("<f", torque_nm)))
         assert frame.arbitration_id == identifier
         sent: float = unpack("<f", frame.data)[0]
@@ -81,7 +81,7 @@ def armed() -> Bench:
 
 @pytest.mark.parametrize("is_open", [False, True])
 @pytest.mark.parametrize("frame", HARMLESS)
-def test_what_we_use_passes_unchanged_open_or_closed(bench: Bench, frame: Frame, is_open: bool) -> None:
+def test_our_own_frames_pass_unchanged_open_or_closed(bench: Bench, frame: Frame, is_open: bool) -> None:
     if is_open:
         bench.gate.open()
     assert bench.send(frame) == [frame]
@@ -174,7 +174,7 @@ def test_closed_loop_is_asked_for_through_an_open_gate_only(bench: Bench) -> Non
 
 
 def test_only_the_message_for_the_axis_state_asks_for_closed_loop(armed: Bench) -> None:
-    """The same bytes as a torque are 1e-44 N·m."""
+    """As a torque the same bytes are 1e-44 N·m."""
     for command in range(32):
         passed = armed.send(Frame(2 << 5 | command, CLOSED_LOOP))
         assert [frame.data for frame in passed] == ([CLOSED_LOOP] if command in (7, 14) else [])
@@ -196,7 +196,7 @@ def test_a_gate_is_closed_until_it_is_opened_and_lets_zero_pass_only(bench: Benc
 
 
 @pytest.mark.parametrize("torque_nm", [nan, inf, -inf, 0.7501, -0.7501, 3.4e38])
-def test_what_is_no_number_or_beyond_the_limit_becomes_zero(torque_nm: float) -> None:
+def test_a_value_that_is_no_number_or_beyond_the_limit_becomes_zero(torque_nm: float) -> None:
     bench = Bench(JointLimits(torque_nm=0.75, torque_rate_nm_s=1e9))
     bench.gate.open()
     assert bench.torque(torque_nm) == 0.0
@@ -429,14 +429,14 @@ def modules_of(*packages: str) -> list[Path]:
 
 
 def calls_of(path: Path, name: str) -> list[str]:
-    """The text before `.name(` of every such call."""
+    """Return the text before `.name(` of every such call."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
     return [ast.unparse(call.value) for call in calls if isinstance(call, ast.Attribute) and call.attr == name]
 
 
 def test_nothing_but_the_gate_sends_on_a_port() -> None:
-    """In drivers, all that is called `.send(` is known; above them only sockets and the drives themselves send."""
+    """In drivers every call of `.send(` is listed here; above them only sockets and the drives themselves send."""
     senders = {f"{path.parent.name}/{path.name}": set(calls_of(path, "send")) for path in modules_of("drivers")}
     allowed = {
         "drivers/transmit_gate.py": {"self._port"},
@@ -474,7 +474,7 @@ def test_no_frame_is_repeated_by_the_kernel() -> None:
 
 
 def test_every_branch_of_the_gate_is_run_by_these_tests(tmp_path: Path) -> None:
-    """In a process of its own, by the named cases alone: without random frames, and without this test."""
+    """The named cases run in a process of their own, without random frames and without this test."""
     data, report = tmp_path / "coverage", tmp_path / "coverage.json"
     include = "--include=*/transmit_gate.py,*/gate_tables.py"
     measure = [sys.executable, "-m", "coverage"]

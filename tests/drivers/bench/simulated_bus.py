@@ -21,7 +21,7 @@ def simulated(type_name: str, node_id: int, serial: str = "", **changes: Any) ->
 
 
 class SimulatedBus:
-    """Owns simulated time, which passes only while the bench sleeps. `sent` are the frames of the bench."""
+    """Owns simulated time, which passes only while the bench sleeps; `sent` has the frames of the bench."""
 
     def __init__(self, *drives: SimulatedDrive) -> None:
         self.drives = list(drives)
@@ -30,11 +30,11 @@ class SimulatedBus:
         self.port.close = lambda: None  # type: ignore[method-assign]  # one command follows the other
         self.now_s = 0.0
         self.sent: list[Frame] = []
-        self.energised = False  # a drive was, at any time
-        self.unplugged_after = 10**9  # frames of the bench, from which on nothing passes the cable
+        self.energised = False  # whether a drive was energised at any time
+        self.unplugged_after = 10**9  # frames of the bench, after which nothing passes the cable
         self.restart_after = 10**9  # frames of the bench, after which the drives lose their supply for a moment
 
-        self.at_frame: tuple[int, Callable[[], None]] = (10**9, lambda: None)  # of the bench, and what happens then
+        self.at_frame: tuple[int, Callable[[], None]] = (10**9, lambda: None)  # number of a frame, and a call after it
 
         self.each_step: Callable[[], None] = lambda: None
 

@@ -54,7 +54,7 @@ class Bench:
         return len(self.bus.sent) - self.begin
 
     def state(self) -> str:
-        """Which settings the drive has now."""
+        """Return which settings the drive has now."""
         found = self.read()
         fitting = [
             name
@@ -94,7 +94,7 @@ def test_written_settings_that_were_not_stored_are_lost_in_a_restart(name: str) 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_interrupted_change_leaves_the_old_settings(name: str) -> None:
-    """Ctrl-C before any setting, or before the storing."""
+    """Ctrl-C comes before any setting, or before the storing."""
     for calls in range(len(Bench(name).new) + 1):
         bench = Bench(name)
         assert bench.change(interrupt_after=calls).outcome is Outcome.OLD
@@ -177,13 +177,13 @@ def test_an_odrive_without_the_numbers_of_its_build_says_which_file_is_missing()
         drive.read("axis0.config.watchdog_timeout")
 
 
-def test_firmware_0_5_says_that_it_cannot() -> None:
+def test_firmware_0_5_reports_that_its_settings_cannot_be_changed() -> None:
     parameters = DRIVE_TYPES["odrive05"].parameters(bus="can", node_id=ID, type="odrive05")
     drive = DRIVE_BENCHES["odrive05"].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
     assert "odrivetool" in drive.cannot and not drive.settings()
 
 
-def test_a_cubemars_says_that_it_cannot() -> None:
+def test_a_cubemars_reports_that_its_settings_cannot_be_changed() -> None:
     parameters = DRIVE_TYPES["mit"].parameters(bus="can", node_id=ID, type="mit", model="AK80-9")  # type: ignore[call-arg]
     drive = DRIVE_BENCHES["mit"].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
     assert "neither read nor written" in drive.cannot and not drive.settings()
@@ -200,7 +200,9 @@ def test_a_cubemars_says_that_it_cannot() -> None:
     ],
 )
 def test_the_frames_that_write_and_store(name: str, identifier: int, data: str) -> None:
-    """Bytes of examples/can_param_access.py of ODrive, docs/protocol of moteus, and damiao-motor 1.0.6."""
+    """The bytes are those of examples/can_param_access.py of ODrive, docs/protocol of moteus, and damiao-motor
+    1.0.6.
+    """
     bench = Bench(name)
     bench.change()
     assert (identifier, bytes.fromhex(data)) in {(frame.arbitration_id, frame.data) for frame in bench.bus.sent}

@@ -28,7 +28,7 @@ def encode_line(frame: Frame) -> bytes:
 
 
 def decode_line(line: bytes) -> Frame | None:
-    """Returns None for a line that is not a frame."""
+    """Return the frame of a line, or None for a line that is not a frame."""
     match = FRAME_LINE.fullmatch(line)
     if match is None:
         return None
@@ -53,7 +53,7 @@ class SlcanAdapter:
         self._partial_line = b""  # received without its end so far
 
     def step(self) -> None:
-        """Executes the lines that the computer has written, then writes the frames of the bus to it."""
+        """Execute the lines that the computer has written, then write the frames of the bus to it."""
         self._partial_line += self._terminal.read()
         *lines, self._partial_line = self._partial_line.split(END)
         self._partial_line = self._partial_line[-LONGEST_LINE_BYTES:]
@@ -65,7 +65,7 @@ class SlcanAdapter:
                 self.write(encode_line(frame))
 
     def write(self, line: bytes) -> None:
-        """Writes a line to the computer."""
+        """Write a line to the computer."""
         written = self._terminal.write(line)
         self.written_bytes += written
         self.lost_lines += written == 0
@@ -85,7 +85,7 @@ class SlcanAdapter:
         return (b"Z" if frame.is_extended else b"z") + END
 
     def _executes(self, line: bytes) -> bool:
-        """Accepts S while closed, O and L once a bit rate is chosen, and C while open."""
+        """Execute S while closed, O and L once a bit rate is chosen, and C while open; return whether it was valid."""
         if line == b"C":
             was_open, self.is_open = self.is_open, False
             return was_open
@@ -99,7 +99,9 @@ class SlcanAdapter:
 
     @property
     def unread_bytes(self) -> int:
-        """The number of written bytes that the computer can read; a pseudo-terminal delivers a moment later."""
+        """Return the number of written bytes that the computer can read; a pseudo-terminal delivers them after a
+        moment.
+        """
         return self._terminal.unread_bytes
 
     def unplug(self) -> None:

@@ -20,7 +20,7 @@ def bus_load(drives: int, bit_rate_bit_s: float) -> BusLoad:
 
 
 def bits_on_the_wire(identifier: int, data: bytes) -> int:
-    """Of one frame up to the next: written from the standard, not from the formula."""
+    """Return the bits of one frame up to the next, written from the standard and not from the formula."""
     bits = [0, *number(identifier, 11), 0, 0, 0, *number(len(data), 4)]
     for byte in data:
         bits += number(byte, 8)
@@ -39,7 +39,7 @@ def bits_on_the_wire(identifier: int, data: bytes) -> int:
 
 
 def number(value: int, width: int) -> list[int]:
-    return [value >> place & 1 for place in reversed(range(width))]
+    return [value >> shift & 1 for shift in reversed(range(width))]
 
 
 def test_real_frames_lie_between_the_bounds() -> None:
@@ -55,7 +55,7 @@ def test_two_drives_on_a_megabit_leave_room_and_four_are_close() -> None:
     assert 0.6 < bus_load(4, 1e6).most < 0.8
 
 
-def test_what_odrives_are_delivered_with_cannot_carry_two_drives() -> None:
+def test_the_bit_rate_of_odrives_as_delivered_cannot_carry_two_drives() -> None:
     assert bus_load(2, 250e3).least > 1.0
 
 

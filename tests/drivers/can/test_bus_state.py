@@ -1,7 +1,7 @@
 """The state of a port: over python-can's socketcan bus on a pair of sockets, by both paths, and over mock ports.
 
-This machine need not have CAN: the socket that python-can would open is replaced by one end of a datagram pair, and
-the kernel's frames are written into the other end as the 16 bytes of `struct can_frame`.
+These tests need no CAN: the socket that python-can would open is replaced by one end of a datagram pair, and the
+kernel's frames are written into the other end as the 16 bytes of `struct can_frame`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ RESTARTED = Frame(0x100, bytes(8), is_error=True)
 
 @pytest.fixture
 def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
-    """The far end of the socket of the next bus that python-can opens."""
+    """Return the far end of the socket of the next bus that python-can opens."""
     far, near = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     monkeypatch.setattr(socketcan, "create_socket", lambda: near)
     monkeypatch.setattr(socketcan, "bind_socket", lambda *arguments: None)
@@ -101,7 +101,7 @@ def test_a_frame_of_another_local_process_does_not_end_bus_off() -> None:
 
 
 class Gone(can.BusABC):
-    """An interface that went away, and is asked how often."""
+    """An interface that went away, which counts how often it is read."""
 
     def __init__(self, problem: Exception) -> None:
         super().__init__(channel="gone")

@@ -1,4 +1,4 @@
-"""CAN FD on the kinds of ports that there are, and its refusal where an interface carries none."""
+"""CAN FD on every kind of port, and its refusal where an interface does not carry it."""
 
 from pathlib import Path
 
@@ -48,15 +48,13 @@ def test_a_frame_is_not_sent_on_a_bus_without_can_fd_and_counted() -> None:
 
 
 @pytest.mark.parametrize("interface", sorted(CLASSIC_INTERFACES))
-def test_an_adapter_that_carries_none_is_refused_by_name(interface: str) -> None:
+def test_an_adapter_without_can_fd_is_refused_by_name(interface: str) -> None:
     with pytest.raises(ValueError, match=f"^{interface} carries no CAN FD"):
         open_port(interface, "/dev/ttyACM0", {}, fd=True)
 
 
 @pytest.mark.parametrize(("mtu", "carries"), [("16\n", False), (f"{FD_MTU}\n", True), ("nonsense", None)])
-def test_the_kernel_tells_by_the_mtu_whether_an_interface_carries_it(
-    mtu: str, carries: bool | None, tmp_path: Path
-) -> None:
+def test_the_mtu_shows_whether_an_interface_carries_can_fd(mtu: str, carries: bool | None, tmp_path: Path) -> None:
     assert carries_fd(interface_of(tmp_path, mtu)) is carries
     if carries is False:
         with pytest.raises(ValueError, match="can0 is set up without CAN FD"):

@@ -1,4 +1,4 @@
-"""A port over python-can: what passes, what is counted, and that nothing waits or raises."""
+"""A port over python-can: frames pass, failures are counted, and no call waits or raises."""
 
 import time
 from collections.abc import Iterator
@@ -101,7 +101,7 @@ def test_a_frame_says_when_it_was_on_the_bus(port: CanPort, other: can.BusABC) -
     after_s = time.monotonic()
     time.sleep(0.02)
     (frame,) = port.receive()
-    assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the clock on the wall is read a moment later
+    assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the wall clock is read a moment later
 
 
 def test_frames_pass_unchanged_and_in_order_in_both_directions(port: CanPort, other: can.BusABC) -> None:
@@ -123,7 +123,7 @@ def test_nothing_is_waited_for() -> None:
     assert bus.timeouts == [0.0, 0.0]
 
 
-def test_what_one_read_leaves_the_next_one_takes(port: CanPort, other: can.BusABC) -> None:
+def test_the_next_read_takes_the_rest(port: CanPort, other: can.BusABC) -> None:
     for number in range(MOST_FRAMES_PER_READ + 5):
         other.send(as_message(Frame(number % 1000)))
     assert len(port.receive()) == MOST_FRAMES_PER_READ
@@ -165,7 +165,7 @@ def test_options_reach_the_interface() -> None:
 
 @pytest.mark.parametrize(("interface", "options"), [("virtual", {"receive_own_messages": True}), ("udp_multicast", {})])
 def test_a_bus_that_returns_own_frames_is_refused(interface: str, options: dict[str, bool]) -> None:
-    """They would look like the commands of another program."""
+    """Such frames would look like the commands of another program."""
     with pytest.raises(ValueError, match="its own frames"):
         open_port(interface, "own-messages", dict(options))
 

@@ -57,8 +57,8 @@ def test_python_can_builds_the_same_bytes(frame: Frame) -> None:
         bitrate_switch=frame.bit_rate_switch,
     )
     theirs = bytearray(build_can_frame(message))
-    theirs[7] = 0  # they set len8_dlc, which says something of frames with 8 bytes only
-    theirs[5] |= 4 * frame.is_fd  # they leave out CANFD_FDF, which the kernel sets
+    theirs[7] = 0  # python-can sets len8_dlc, which matters only for frames with 8 bytes
+    theirs[5] |= 4 * frame.is_fd  # python-can leaves out CANFD_FDF, which the kernel sets
     assert encode_frame(frame) == theirs
 
 

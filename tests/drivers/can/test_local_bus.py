@@ -1,4 +1,4 @@
-"""The local bus as a bus: who hears whom, while nodes come, go, stop and die."""
+"""The local bus: which node hears which, while nodes join, leave, stop and die."""
 
 import os
 import select
@@ -76,7 +76,7 @@ def kill(process: subprocess.Popen[str]) -> None:
 
 
 def fill(bus: LocalBus) -> int:
-    """Send until a frame is lost; the number of those that were not."""
+    """Send until a frame is lost, and return the number of frames before it."""
     for number in range(100_000):
         bus.send(make_message(number))
         if bus.lost_frames:
@@ -114,7 +114,7 @@ def test_nodes_that_join_at_once_are_all_connected(short_folder: Path) -> None:
         bus.shutdown()
 
 
-def test_what_a_node_sent_before_it_left_still_arrives(open_bus: Open) -> None:
+def test_frames_that_a_node_sent_before_it_left_still_arrive(open_bus: Open) -> None:
     stayer, leaver = open_bus(), open_bus()
     stayer.send(make_message(7))  # never read: the kernel answers its sender with a reset
     leaver.send(make_message(8))
@@ -190,7 +190,7 @@ def test_a_first_receive_hears_a_newcomer_that_sent_before(open_bus: Open) -> No
     assert message.data[0] == 1
 
 
-def test_a_stopped_node_may_be_joined_and_hears_all_of_it_later(open_bus: Open, start_node: Start) -> None:
+def test_a_stopped_node_may_be_joined_and_hears_the_frames_later(open_bus: Open, start_node: Start) -> None:
     process = start_node(
         """print("ready", flush=True)
 sys.stdin.readline()
@@ -290,7 +290,7 @@ def test_select_sees_frames_that_were_read_but_not_yet_taken(open_bus: Open) -> 
 
 
 def test_shutting_down_twice_is_fine_and_leaves_no_descriptor_open(short_folder: Path) -> None:
-    with LocalBus(short_folder) as bus:  # python-can itself opens a few things at first
+    with LocalBus(short_folder) as bus:  # python-can itself opens a few files at first
         pass
     before = sorted(os.listdir("/proc/self/fd"))
     first, second = LocalBus(short_folder), LocalBus(short_folder)

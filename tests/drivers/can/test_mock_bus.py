@@ -1,4 +1,4 @@
-"""The bus within one process: who hears what, and in which order."""
+"""The bus within one process: which port receives which frames, and in which order."""
 
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import LONGEST_QUEUE, MockBus

@@ -1,4 +1,4 @@
-"""Error frames as linux/can/error.h lays them out, byte by byte, and what they make of a bus's state."""
+"""Error frames as linux/can/error.h defines them, byte by byte, and the state of the bus that follows from them."""
 
 import pytest
 from hypothesis import given

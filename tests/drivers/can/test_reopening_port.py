@@ -1,4 +1,4 @@
-"""A port that vanishes and comes back, over mock ports, with a clock that the test turns."""
+"""A port that vanishes and comes back, over mock ports, with a clock that the test advances."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BUS_OFF = 0x040
 
 
 class ListeningPort(MockPort):
-    """Remembers which ids it was asked to listen to."""
+    """Stores the ids that it was asked to listen to."""
 
     ids: frozenset[int] | None = None
 
@@ -25,7 +25,7 @@ class ListeningPort(MockPort):
 
 
 class Adapter:
-    """Plugged in or not; every port that it was opened as."""
+    """An adapter that is plugged in or not, with every port that was opened on it."""
 
     def __init__(self, plugged: bool = True) -> None:
         self.plugged = plugged
@@ -50,7 +50,7 @@ class Adapter:
 
 
 def run(port: ReopeningPort, since_s: float, for_s: float, done: Callable[[], bool] = lambda: False) -> float:
-    """Ticks of 1/10 s."""
+    """Run ticks of 0.1 s until `done` or the end, and return the time."""
     now_s = since_s
     while now_s < since_s + for_s and not done():
         port.receive()

@@ -1,4 +1,4 @@
-"""The folder of a simulated robot is private: nothing that another user prepared is used or followed."""
+"""The folder of a simulated robot is private: files that another user prepared are neither used nor followed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import pytest
 from drivers.can import run_folder as module
 from drivers.can.run_folder import LINK, NAME, find_run_folder, make_own_folder, run_folder, write_private_file
 
-STRANGER = 54321
+OTHER_USER = 54321
 as_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are another user's")
 
 
 @pytest.fixture(autouse=True)
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The home folder of a user without a runtime folder."""
+    """Return the home folder of a user without a runtime folder."""
     folder, temporary = tmp_path / "home", tmp_path / "tmp"
     folder.mkdir()
     temporary.mkdir()
@@ -64,7 +64,7 @@ def test_a_runtime_folder_below_one_of_another_user_is_not_used(
 ) -> None:
     above = tmp_path / "above"
     (above / "runtime").mkdir(parents=True)
-    os.chown(above if level == "above" else above / "runtime", STRANGER, STRANGER)
+    os.chown(above if level == "above" else above / "runtime", OTHER_USER, OTHER_USER)
     monkeypatch.setattr(module, "_runtime_parents", lambda: [above / "runtime"])
     assert not run_folder().is_relative_to(above)
 
@@ -72,7 +72,7 @@ def test_a_runtime_folder_below_one_of_another_user_is_not_used(
 @as_root
 def test_a_folder_that_another_user_prepared_is_refused(runtime: Path) -> None:
     (runtime / NAME).mkdir()
-    os.chown(runtime / NAME, STRANGER, STRANGER)
+    os.chown(runtime / NAME, OTHER_USER, OTHER_USER)
     with pytest.raises(PermissionError, match="belongs to user 54321"):
         run_folder()
 

@@ -1,4 +1,4 @@
-"""A serial CAN adapter: python-can's slcan and pyserial over a pseudo-terminal, an adapter at its other end."""
+"""A serial CAN adapter: python-can's slcan and pyserial over a pseudo-terminal with an adapter at its other end."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Bench:
         self.settle()
 
     def send(self, frame: Frame) -> None:
-        """And wait until the adapter has obeyed or refused, and its answer is there."""
+        """Send a frame, and wait until the adapter has passed or refused it and its answer has arrived."""
         heard = self.adapter.heard_lines
         self.port.send(frame)
         wait_until(lambda: stepped(self.adapter).heard_lines > heard)
@@ -66,7 +66,7 @@ class Bench:
         return frames
 
     def settle(self) -> None:
-        """A pseudo-terminal delivers a moment later."""
+        """Wait until the pseudo-terminal has delivered all bytes."""
         wait_until(lambda: self.adapter.unread_bytes == self.adapter.written_bytes - self.read_bytes)
 
 
@@ -107,9 +107,9 @@ def answer(adapter: SlcanAdapter, file: int, command: bytes) -> bytes:
 def test_the_adapter_answers_as_the_protocol_says() -> None:
     adapter = SlcanAdapter(MockBus().open())
     file = os.open(adapter.device, os.O_RDWR | os.O_NOCTTY)
-    said = [answer(adapter, file, command) for command in b"C O S9 S8 t0090 O O S6 t0090 T000000090 V N F".split()]
+    answers = [answer(adapter, file, command) for command in b"C O S9 S8 t0090 O O S6 t0090 T000000090 V N F".split()]
     ok, no = b"\r", b"\a"
-    assert said == [no, no, no, ok, no, ok, no, no, b"z\r", b"Z\r", b"V1013\r", b"NA123\r", b"F00\r"]
+    assert answers == [no, no, no, ok, no, ok, no, no, b"z\r", b"Z\r", b"V1013\r", b"NA123\r", b"F00\r"]
     assert [answer(adapter, file, command) for command in (b"C", b"L", b"t0090", b"nonsense")] == [ok, ok, no, no]
     os.close(file)
     adapter.unplug()
@@ -168,7 +168,7 @@ def test_a_frame_that_the_adapter_refuses_is_a_failed_send(bench: Bench) -> None
 def test_malformed_lines_are_counted_and_hide_nothing(bench: Bench) -> None:
     bench.write(b"tG0980001020304050607\rt00\rt0093GG\r\xff\xfe\r" + LINES[1])
     assert bench.receive() == [FRAMES[1]]
-    assert bench.port.error_frames == 3  # python-can takes the one without a letter for an answer
+    assert bench.port.error_frames == 3  # python-can takes the line without a letter for an answer
     assert bench.port.state is BusState.ACTIVE
 
 
@@ -177,7 +177,7 @@ def test_malformed_lines_are_counted_and_hide_nothing(bench: Bench) -> None:
 def test_no_noise_on_the_line_raises(noise: bytes) -> None:
     bench = Bench()
     bench.write(noise + b"\r")
-    for _ in range(4):  # each ends after MOST_FAILURES_PER_READ
+    for _ in range(4):  # each read ends after MOST_FAILURES_PER_READ
         bench.receive()
     bench.report(FRAMES[0])
     assert bench.receive() == [FRAMES[0]]
@@ -196,7 +196,7 @@ def test_an_adapter_that_takes_no_more_does_not_hold_the_sender_and_gets_whole_l
     kept: list[Frame] = []
 
     def last_arrived() -> bool:
-        bench.port.send(FRAMES[1])  # takes the rest of a line along
+        bench.port.send(FRAMES[1])  # also sends the rest of a line
         bench.adapter.step()
         bench.port.receive()
         kept.extend(bench.node.receive())
@@ -219,7 +219,7 @@ def test_an_unplugged_adapter_is_reported_and_raises_nothing(bench: Bench) -> No
     other.port.close()
 
 
-def test_what_was_read_is_given_out_byte_by_byte(bench: Bench) -> None:
+def test_read_bytes_are_returned_one_by_one(bench: Bench) -> None:
     master, slave = os.openpty()
 
     class Port:

@@ -1,5 +1,5 @@
-"""The fast path to SocketCAN: over python-can's own bus on one end of a datagram pair, into whose other end the
-kernel's bytes are written. What the kernel tells beside a frame is made up here: these sockets lose none.
+"""The fast path to SocketCAN, over python-can's own bus on one end of a datagram pair, into whose other end the
+kernel's bytes are written. The kernel's ancillary data are synthetic: these sockets lose no frames.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ OFF = Frame(0x040, bytes(8), is_error=True)
 
 
 class KernelSocket(CanSocket):
-    """Returns what the test sets before the frames that have arrived; it raises an exception that the test sets."""
+    """A socket that returns what the test sets before the frames that have arrived, or raises what the test sets."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -62,7 +62,7 @@ class KernelSocket(CanSocket):
 
 
 class Bench:
-    """A port, the socket under it, and the kernel's side of that."""
+    """A port, the socket below it, and the kernel's end of that socket."""
 
     def __init__(self) -> None:
         self.kernel, near = open_pair(KernelSocket)
@@ -90,7 +90,7 @@ def bench() -> Iterator[Bench]:
 
 
 def message(frame: Frame, marks: int = 0, lost: int | None = None) -> tuple[bytes, list[Any], int, None]:
-    """The result of `recvmsg` for a frame; the kernel counts lost frames from the first one on."""
+    """Return the result of `recvmsg` for a frame; the kernel adds its count of lost frames from the first loss on."""
     ancillary = [(socket.SOL_SOCKET, SO_TIMESTAMPNS, struct.pack("@ll", 1_700_000_000, 250_000_000))]
     if lost is not None:
         ancillary.append((socket.SOL_SOCKET, SO_RXQ_OVFL, struct.pack("@I", lost)))
@@ -122,7 +122,7 @@ def test_a_frame_says_when_it_was_on_the_bus(bench: Bench) -> None:
     after_s = time.monotonic()
     time.sleep(0.02)
     (frame,) = bench.port.receive()
-    assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the clock on the wall is read a moment later
+    assert before_s - 0.005 < frame.stamp_s < after_s + 0.005  # the wall clock is read a moment later
 
 
 @pytest.mark.parametrize(
@@ -220,7 +220,7 @@ def test_a_babbling_node_does_not_hold_the_loop(bench: Bench) -> None:
 
 
 def passes(filters: bytes, word: int) -> bool:
-    """The rule of CAN_RAW_FILTER (linux/can.h): received & mask == id & mask, of any one filter."""
+    """Apply the rule of CAN_RAW_FILTER (linux/can.h): received & mask == id & mask, of any one filter."""
     pairs = struct.iter_unpack("=II", filters)
     return any(word & mask == identifier & mask for identifier, mask in pairs)
 
@@ -238,12 +238,12 @@ def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(c
             if configuration.drive[joint].bus == name
             for identifier in axis.receivers
         }
-        reports, commands = 9, 16  # of each drive; emergency stops are nobody's alone
+        reports, commands = 9, 16  # of each drive, without emergency stops
         assert len(wanted) == 2 * (reports + commands)
         nodes = [drive.node_id for drive in configuration.drive.values() if drive.bus == name]
-        wanted |= {moteus.reply_id(node_id) for node_id in nodes}  # a drive of that type would answer so
-        wanted |= {node_id + 16 for node_id in nodes}  # and a Damiao
-        wanted |= {arbitration_id(node_id, codec05.GET_ENCODER_COUNT) for node_id in nodes}  # and one of firmware 0.5
+        wanted |= {moteus.reply_id(node_id) for node_id in nodes}  # the ids of a moteus's answers
+        wanted |= {node_id + 16 for node_id in nodes}  # the ids of a Damiao's answers
+        wanted |= {arbitration_id(node_id, codec05.GET_ENCODER_COUNT) for node_id in nodes}  # of ODrive firmware 0.5
         assert {word for word in range(0x800) if passes(filters, word)} == wanted
         for identifier in wanted:
             assert not passes(filters, identifier | constants.CAN_RTR_FLAG)
@@ -252,7 +252,7 @@ def test_the_kernel_is_asked_for_what_the_drives_send_and_for_all_error_frames(c
         bench.close()
 
 
-def test_without_wishes_everything_is_heard(bench: Bench) -> None:
+def test_without_chosen_ids_every_frame_is_heard(bench: Bench) -> None:
     filters = bench.socket.can_options[constants.CAN_RAW_FILTER]
     assert all(passes(filters, word) for word in (0x7FF, 0x9FFFFFFF, 0x40000009))
 
@@ -282,8 +282,8 @@ ANY_FRAME = st.builds(struct.Struct("<IB11s").pack, WORDS, st.integers(0, 8), st
 @settings(max_examples=150)
 @given(reads=st.lists(st.lists(ANY_FRAME, max_size=8), max_size=4))
 def test_both_paths_decode_any_bytes_of_the_kernel_alike(reads: list[list[bytes]]) -> None:
-    (first, near), (second, beside) = open_pair(), open_pair()
-    own, python_can = SocketcanPort(open_bus(near)), PythonCanPort(open_bus(beside))
+    (first, near), (second, second_near) = open_pair(), open_pair()
+    own, python_can = SocketcanPort(open_bus(near)), PythonCanPort(open_bus(second_near))
     for read in reads:
         for encoded in read:
             first.send(encoded)
@@ -308,8 +308,8 @@ def health(port: CanPort) -> tuple[BusState, int, str]:
 def test_both_paths_put_the_same_frame_on_the_wire(
     identifier: int, data: bytes, is_extended: bool, is_remote: bool
 ) -> None:
-    (first, near), (second, beside) = open_pair(), open_pair()
-    own, python_can = SocketcanPort(open_bus(near)), PythonCanPort(open_bus(beside))
+    (first, near), (second, second_near) = open_pair(), open_pair()
+    own, python_can = SocketcanPort(open_bus(near)), PythonCanPort(open_bus(second_near))
     identifier = identifier if is_extended else identifier & 0x7FF
     for port in (own, python_can):
         port.send(Frame(identifier, b"" if is_remote else data, is_remote, is_extended=is_extended))

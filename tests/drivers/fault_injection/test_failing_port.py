@@ -18,7 +18,7 @@ from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
 from drivers.odrive.parameters import OdriveParameters as DriveParameters
 
-DRIVES = {joint: DriveParameters("left" if place < 2 else "right", place) for place, joint in enumerate(JOINTS)}
+DRIVES = {joint: DriveParameters("left" if node < 2 else "right", node) for node, joint in enumerate(JOINTS)}
 NODES = {joint: drive.node_id for joint, drive in DRIVES.items()}
 PERIOD_S = 0.0025
 BEGIN_S, END_S, STOP_S = 0.1, 0.5, 0.7
@@ -46,8 +46,8 @@ ON_THE_LEFT = [
 ]
 
 
-class Seen(NamedTuple):
-    """What passed a port: (tick, payload) by arbitration id, the wish and its counters."""
+class Traffic(NamedTuple):
+    """What passed a port: (tick, payload) by arbitration id, the commands before the port, and the port's counters."""
 
     received: dict[int, list[tuple[int, bytes]]]
     sent: dict[int, list[tuple[int, bytes]]]
@@ -60,7 +60,7 @@ class Seen(NamedTuple):
 
 
 def reported_payload(message: codec.Message, tick: int) -> bytes:
-    """A drive's message, another one in each tick."""
+    """Return a drive's message with another payload in each tick."""
     if message is codec.HEARTBEAT:
         return message.encode(0, AxisState.CLOSED_LOOP, tick % 256, 0)
     if message is codec.GET_ERROR:
@@ -68,7 +68,7 @@ def reported_payload(message: codec.Message, tick: int) -> bytes:
     return message.encode(0.001 * tick, 0.002 * tick)
 
 
-def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2], seed: int = 1) -> Seen:
+def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2], seed: int = 1) -> Traffic:
     failures = Failures(("left", "right"), seed)
     bus = MockBus()
     robot, inner = bus.open(), bus.open()
@@ -82,8 +82,8 @@ def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2
             assert failures.begin(component, kind, now_s, END_S - BEGIN_S) is None
         for joint in joints:
             for message in REPORTED:
-                place = arbitration_id(NODES[joint], message)
-                robot.send(Frame(place, reported_payload(message, tick), stamp_s=now_s))
+                identifier = arbitration_id(NODES[joint], message)
+                robot.send(Frame(identifier, reported_payload(message, tick), stamp_s=now_s))
         for frame in port.receive():
             received[frame.arbitration_id].append((tick, frame.data))
             stamps_s.append((now_s, frame.stamp_s))
@@ -94,18 +94,18 @@ def run(component: str = "", kind: str = "", joints: tuple[str, ...] = JOINTS[:2
             port.send(frame)
         for frame in robot.receive():
             sent[frame.arbitration_id].append((tick, frame.data))
-    return Seen(received, sent, wanted, worst, port.failed_sends, port.error_frames, port.last_send_error, stamps_s)
+    return Traffic(received, sent, wanted, worst, port.failed_sends, port.error_frames, port.last_send_error, stamps_s)
 
 
 SOUND = run()
 
 
 def differing(one: dict[int, Any], other: dict[int, Any]) -> set[int]:
-    return {place for place in one.keys() | other.keys() if one.get(place) != other.get(place)}
+    return {identifier for identifier in one.keys() | other.keys() if one.get(identifier) != other.get(identifier)}
 
 
 def ids_of(component: str) -> set[int]:
-    """Arbitration ids from the drives that a failure of `component` may touch."""
+    """Return the arbitration ids from the drives that a failure of `component` may touch."""
     name, _, part = component.partition(".")
     if name == "bus":
         return set(range(0x800))
@@ -138,7 +138,7 @@ def test_each_failure_changes_only_its_component_and_time_and_is_reproducible(co
     check_commands(seen)
 
 
-def check_component(seen: Seen, component: str, kind: str) -> None:
+def check_component(seen: Traffic, component: str, kind: str) -> None:
     touched, commanded = differing(seen.received, SOUND.received), differing(seen.sent, SOUND.sent)
     assert touched <= ids_of(component)
     assert commanded <= commands_of(component, kind)
@@ -147,7 +147,7 @@ def check_component(seen: Seen, component: str, kind: str) -> None:
     assert (seen.worst_state is not BusState.ACTIVE) is (kind in ("warning", "passive", "bus-off"))
 
 
-def check_time(seen: Seen) -> None:
+def check_time(seen: Traffic) -> None:
     begin, end = round(BEGIN_S / PERIOD_S), round(END_S / PERIOD_S)
     for mine, sound in ((seen.received, SOUND.received), (seen.sent, SOUND.sent)):
         for identifier, frames in sound.items():
@@ -155,11 +155,11 @@ def check_time(seen: Seen) -> None:
             assert [f for f in mine[identifier] if f[0] > end] == [f for f in frames if f[0] > end]
 
 
-def check_commands(seen: Seen) -> None:
-    """Asserts that every frame that leaves was sent before, and that frames leave in their order."""
+def check_commands(seen: Traffic) -> None:
+    """Assert that every frame that leaves was sent before, and that frames leave in their order."""
     for identifier, frames in seen.sent.items():
         wanted = iter(seen.wanted[identifier])
-        assert all(any(payload == wish for _, wish in wanted) for _, payload in frames)  # a subsequence
+        assert all(any(payload == command for _, command in wanted) for _, payload in frames)  # a subsequence
         when = {payload: tick for tick, payload in seen.wanted[identifier]}
         assert all(when[payload] <= tick for tick, payload in frames)
 
@@ -177,7 +177,7 @@ def during(frames: list[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
     return [frame for frame in frames if BEGIN_S <= frame[0] * PERIOD_S < END_S]
 
 
-def position(seen: Seen) -> list[tuple[int, bytes]]:
+def position(seen: Traffic) -> list[tuple[int, bytes]]:
     return during(seen.received[arbitration_id(0, codec.GET_ENCODER_ESTIMATES)])
 
 
@@ -222,7 +222,7 @@ def test_garbage_never_has_the_payload_s_length_where_it_is_of_another() -> None
 
 
 def error_reports(kind: str, message: codec.Message) -> set[tuple[int, int]]:
-    """The first two values of each message: error flags, and the axis state or the reason of the disarming."""
+    """Return the first two values of each message: error flags, and the axis state or the reason of the disarming."""
     frames = during(run("left_sweep.error", kind).received[arbitration_id(0, message)])
     return {message.decode(data)[:2] for _, data in frames}
 
@@ -287,22 +287,22 @@ def test_a_bus_full_of_garbage_adds_random_frames_and_leaves_commands_unchanged(
 
 
 def test_frames_of_unknown_ids_and_other_formats_suffer_only_from_failures_of_the_bus() -> None:
-    odd = [
+    foreign = [
         Frame(arbitration_id(9, codec.GET_IQ), b"\0" * 8),
         Frame(arbitration_id(0, codec.GET_IQ), b"\0" * 8, is_extended=True),
     ]
-    for component, passed in (("left_sweep", odd), ("bus.left", [])):
+    for component, passed in (("left_sweep", foreign), ("bus.left", [])):
         failures, bus = Failures(("left",)), MockBus()
         robot, inner = bus.open(), bus.open()
         port = FailingPort("left", inner, DRIVES, failures)
         failures.begin(component, "off", 0.0)
-        for frame in odd:
+        for frame in foreign:
             robot.send(frame)
         assert list(port.receive()) == passed
 
 
 class FullPort(MockPort):
-    """A real port that has trouble of its own."""
+    """A real port with send failures of its own."""
 
     def send(self, frame: Frame) -> None:
         self.failed_sends += 1

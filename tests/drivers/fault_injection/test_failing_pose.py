@@ -60,9 +60,9 @@ def test_a_stuck_body_stands_with_fresh_stamps() -> None:
 
 
 def test_a_corrupted_position_is_plausible_or_not_finite_or_huge() -> None:
-    places = [body.x_m for _, body in during("garbage")]
-    assert any(isnan(x_m) for x_m in places) and any(abs(x_m) > 1e30 for x_m in places)
-    assert any(isfinite(x_m) and 0.0 < abs(x_m) < 100.0 for x_m in places)
+    positions_m = [body.x_m for _, body in during("garbage")]
+    assert any(isnan(x_m) for x_m in positions_m) and any(abs(x_m) > 1e30 for x_m in positions_m)
+    assert any(isfinite(x_m) and 0.0 < abs(x_m) < 100.0 for x_m in positions_m)
 
 
 def test_a_delayed_position_is_an_earlier_one_with_a_fresh_stamp() -> None:

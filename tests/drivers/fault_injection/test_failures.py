@@ -1,4 +1,4 @@
-"""What is made to fail: refused where it makes no sense, ended by itself, the same for the same seed."""
+"""Injected failures: refused where they make no sense, ended by themselves, the same for the same seed."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_the_table_shows_every_component_with_every_kind_that_is_accepted(failur
         ("loop", "off", "it can be stuck, slow"),
     ],
 )
-def test_what_makes_no_sense_is_refused_with_what_would(
+def test_a_failure_that_makes_no_sense_is_refused_with_the_possible_ones(
     failures: Failures, component: str, kind: str, said: str
 ) -> None:
     refused = failures.begin(component, kind, 1.0)

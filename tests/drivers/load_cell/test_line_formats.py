@@ -1,4 +1,4 @@
-"""Lines as amplifiers print them, and lines that are none."""
+"""Lines as amplifiers print them, and lines that are no readings."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_a_number_beyond_all_numbers_is_malformed() -> None:
     assert LineFormat("number").decode(b"1e999") is None
 
 
-def test_the_format_of_most_lines_is_found_and_columns_are_left_to_people() -> None:
+def test_the_format_of_most_lines_is_found_and_columns_are_left_to_the_operator() -> None:
     found = find_format([b"ST,GS,+1.0kg", b"x", b"US,GS,+1.1kg"])
     assert found is not None and found.name == "indicator"
     found = find_format([b"12", b"13", b"\xff"])

@@ -1,4 +1,4 @@
-"""Stamps of lines that come in bursts: as even as they were measured."""
+"""Stamps of lines that come in bursts are as even as the measurements were."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PERIOD_S = 0.0125
 
 
 def hear(clock: LineClock, begin_s: float, lines: int, burst_s: float) -> list[float]:
-    """All stamps of lines that an adapter hands over every `burst_s`."""
+    """Return all stamps of lines that an adapter delivers every `burst_s`."""
     stamps_s, waiting, handed_s = list[float](), 0, begin_s
     for line in range(lines):
         waiting += 1
@@ -43,7 +43,7 @@ def test_a_gap_stays_a_gap_and_is_counted() -> None:
 
 
 def test_lines_that_a_busy_computer_delivered_late_do_not_falsify_the_period() -> None:
-    """Two hundred milliseconds late, then one line, then the others at once, whenever that happens."""
+    """After 200 ms without a line one line comes, then all others at once; this may happen at any time."""
     for stalled in (6, 20, 300):
         clock, stamps_s = LineClock(115200), list[float]()
         for line in range(800):

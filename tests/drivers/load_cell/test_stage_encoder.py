@@ -46,7 +46,7 @@ def rail(tmp_path: Path) -> Iterator[Rail]:
 
 def test_positions_are_stamped_with_their_times_except_for_a_constant_delay(rail: Rail) -> None:
     positions = rail.run(3.0)[100:]
-    late_s = [place.stamp_s - place.position_m / SPEED_M_S for place in positions]
+    late_s = [each.stamp_s - each.position_m / SPEED_M_S for each in positions]
     assert len(positions) > 190
     assert max(late_s) - min(late_s) < 0.002
     assert rail.encoder.line.clock.rate_hz == pytest.approx(100.0, rel=0.01)
@@ -72,7 +72,7 @@ def test_an_encoder_that_was_unplugged_reports_that_its_zero_changed(rail: Rail)
     assert positions[0].position_m < 0.5 * SPEED_M_S  # a counter begins at zero
 
 
-def test_one_that_says_nothing_is_silent(tmp_path: Path) -> None:
+def test_an_encoder_without_messages_is_silent(tmp_path: Path) -> None:
     rail = Rail(tmp_path, drop_out_rate_hz=10.0, rate_hz=10.0, drop_out_s=10.0)
     rail.run(2.0)
     assert rail.encoder.silent_for_s(rail.now_s) > 1.9

@@ -27,7 +27,7 @@ def motor(model: str) -> Any:
 
 
 def tmotor_tables() -> Mapping[str, Any]:
-    """Returns the package's MIT_Params from its source: importing is harmless, making its manager runs sudo."""
+    """Return the package's MIT_Params from its source, because creating its manager would run sudo."""
     spec = find_spec("TMotorCANControl")
     if spec is None or spec.origin is None:
         pytest.skip("the package TMotorCANControl is not installed")
@@ -39,7 +39,7 @@ def tmotor_tables() -> Mapping[str, Any]:
 
 
 def tmotor_code(x: float, limit: float, bits: int) -> int:
-    """Encodes as TMotorCANControl 1.2.6 does: by 2ⁿ, truncated, two steps short of the upper end."""
+    """Encode as TMotorCANControl 1.2.6 does: by 2ⁿ, truncated, two steps short of the upper end."""
     ratio = float((1 << bits) / (2.0 * limit))
     x = min(max(x, -limit), limit - 2.0 / ratio)
     return int((x + limit) * ratio)
@@ -88,7 +88,7 @@ def test_no_code_is_zero_torque_and_the_nearest_is_taken() -> None:
 
 
 def test_random_torques_are_the_code_nearest_to_them() -> None:
-    """The library truncates: its code is ours or the one below; TMotorCANControl's is at most one from ours."""
+    """The library truncates, so its code is ours or the one below; TMotorCANControl's is at most one from ours."""
     random, models = Random(1), list(DAMIAO)
     motors = {model: motor(model) for model in models}
     for _ in range(RANDOM_FRAMES):

@@ -42,7 +42,7 @@ class Bench:
         return [frame.data for frame in frames]
 
     def torque(self, torque_nm: float) -> float:
-        """Returns the torque that leaves; NaN where something else left."""
+        """Return the torque that leaves; NaN where another command left."""
         (data,) = self.send(codec.encode_torque(torque_nm, self.range_nm))
         return codec.decode_torque(data, self.range_nm)
 
@@ -95,15 +95,13 @@ def test_entering_passes_only_while_open(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("torque_nm", [0.0, -0.0, 0.1])
-def test_through_a_closed_gate_leaves_the_command_to_leave_in_place_of_any_torque(
-    bench: Bench, torque_nm: float
-) -> None:
+def test_a_closed_gate_replaces_any_torque_by_the_command_to_leave(bench: Bench, torque_nm: float) -> None:
     """The nearest code to zero torque is half a step of torque."""
     assert bench.send(codec.encode_torque(torque_nm, 10.0)) == [codec.LEAVE]
     assert bench.gate.refused == 1 and "not armed" in bench.gate.last_refusal and "node 5" in bench.gate.last_refusal
 
 
-def test_through_an_open_gate_torque_leaves_within_limit_and_slew(armed: Bench) -> None:
+def test_an_open_gate_passes_torque_within_limit_and_slew(armed: Bench) -> None:
     for torque_nm in (0.0, 0.2, 0.4, 0.6, 0.75):
         assert armed.torque(torque_nm) == pytest.approx(torque_nm, abs=0.5001 * CODE_NM)
     assert armed.gate.refused == 0

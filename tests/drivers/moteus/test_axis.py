@@ -1,4 +1,4 @@
-"""One moteus as a joint: what its answers mean, what is asked, and what is noticed."""
+"""One moteus as a joint: the meaning of its answers, the questions to it, and the faults that are noticed."""
 
 from dataclasses import replace
 from math import isfinite, nan, pi
@@ -24,11 +24,11 @@ NO_TORQUE, STEP = Joints(0.0, 0.0, 0.0, 0.0), Joints(0.1, 0.0, 0.0, 0.0)
 
 
 class Bench:
-    """Four simulated drives on one bus, of which node 1 is looked at; each tick reads, then asks or commands."""
+    """Four simulated drives on one bus, of which the tests examine node 1; each tick reads, then asks or commands."""
 
     def __init__(self, duplicate: bool = False, **changes: Any) -> None:
         bus = MockBus()
-        self.far, self.stranger = bus.open(), bus.open()
+        self.far, self.other_program = bus.open(), bus.open()
         self.parameters = {
             joint: MoteusParameters("one", node, current_limit_a=12.0) for node, joint in enumerate(JOINTS, 1)
         }
@@ -112,14 +112,14 @@ def test_a_drive_that_restarts_under_torque_is_not_commanded_back_into_it() -> N
 def test_a_drive_that_another_program_energises_is_stopped_at_once() -> None:
     bench = Bench()
     bench.run(0.05, NO_TORQUE)
-    bench.stranger.send(command_frame(1, codec.encode_torque(0.2)))
+    bench.other_program.send(command_frame(1, codec.encode_torque(0.2)))
     bench.run(0.02, NO_TORQUE)
     assert bench.devices[0].mode is Mode.STOPPED and bench.health.foreign_commands == 1
 
 
 @pytest.mark.parametrize("every", [1, 2, 3])
 def test_an_idle_drive_that_another_program_starts_again_and_again_is_stopped_in_every_tick(every: int) -> None:
-    """Its torque lasts one tick: this program's stop leaves before the drive's answer to the next question."""
+    """Its torque lasts one tick, since this program's stop leaves before the drive's answer to the next question."""
     bench = Bench()
     bench.run(0.05, NO_TORQUE)
     energised = []
@@ -127,12 +127,12 @@ def test_an_idle_drive_that_another_program_starts_again_and_again_is_stopped_in
         bench.tick(NO_TORQUE)
         energised.append(bench.devices[0].energised)
         if tick % every == 0:
-            bench.stranger.send(command_frame(1, codec.encode_torque(0.3)))
+            bench.other_program.send(command_frame(1, codec.encode_torque(0.3)))
     assert sum(energised[5:]) <= len(energised[5:]) / every + 1
     assert bench.health.foreign_commands >= 59 // every
     bench.run(0.11, NO_TORQUE)
-    ear = [frame.data for frame in bench.far.receive() if frame.arbitration_id == codec.command_id(1)]
-    assert ear == [codec.QUERY_ALONE] and not bench.devices[0].energised
+    heard = [frame.data for frame in bench.far.receive() if frame.arbitration_id == codec.command_id(1)]
+    assert heard == [codec.QUERY_ALONE] and not bench.devices[0].energised
 
 
 def test_a_drive_that_alternates_between_stops_and_torque_counts_as_in_closed_loop() -> None:
@@ -140,7 +140,7 @@ def test_a_drive_that_alternates_between_stops_and_torque_counts_as_in_closed_lo
     bench.run(0.05, NO_TORQUE)
     states = []
     for _ in range(30):
-        bench.stranger.send(command_frame(1, codec.encode_torque(0.0)))
+        bench.other_program.send(command_frame(1, codec.encode_torque(0.0)))
         states.append(bench.tick(NO_TORQUE)[0])
     assert all(state.closed_loop for state in states[3:])
 
@@ -151,7 +151,7 @@ def test_a_latched_watchdog_is_not_cleared_by_the_stops_of_a_disturbed_drive() -
     bench.run(0.05, NO_TORQUE)
     bench.devices[0].trip(DriveError.WATCHDOG)
     bench.run(0.01, NO_TORQUE)
-    bench.stranger.send(command_frame(1, codec.encode_torque(0.3)))
+    bench.other_program.send(command_frame(1, codec.encode_torque(0.3)))
     bench.run(0.05, NO_TORQUE)
     assert bench.devices[0].mode is Mode.TIMEOUT
 
@@ -160,7 +160,7 @@ def test_an_answer_without_a_stamp_is_as_old_as_its_question() -> None:
     bench = Bench()
     bench.run(0.05, NO_TORQUE)
     asked_s = bench.now_s
-    bench.now_s += 3.0  # of a loop that hung: the stamp of the answer is too old for this clock
+    bench.now_s += 3.0  # the loop hung: the stamp of the answer is too old for this clock
     for frame in bench.far.receive():
         for device in bench.devices:
             for answer in device.receive(frame, asked_s):
@@ -173,7 +173,7 @@ def test_an_answer_without_a_stamp_is_as_old_as_its_question() -> None:
 def test_questions_and_stops_of_others_are_no_foreign_commands(data: bytes) -> None:
     bench = Bench()
     for _ in range(50):
-        bench.stranger.send(command_frame(1, data))
+        bench.other_program.send(command_frame(1, data))
         bench.tick(NO_TORQUE)
     assert bench.health.foreign_commands == 0 and not bench.health.duplicate_id
 
@@ -236,7 +236,7 @@ def test_settings_are_read_back_and_again_after_a_change() -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "words"),
+    ("key", "value", "text"),
     [
         ("servo.max_current_A", 5.0, "servo.max_current_A is 5 and current_limit_a = 12"),
         ("motor.Kv", 300.0, "torque_constant_nm_a = 0.0719"),
@@ -245,11 +245,11 @@ def test_settings_are_read_back_and_again_after_a_change() -> None:
         ("servo.timeout_mode", 10.0, "servo.timeout_mode is 10"),
     ],
 )
-def test_a_setting_that_differs_is_named_with_what_was_found(key: str, value: float, words: str) -> None:
+def test_a_setting_that_differs_is_named_with_what_was_found(key: str, value: float, text: str) -> None:
     bench = Bench()
     bench.devices[0].console.settings[key] = value
     bench.run(1.0, NO_TORQUE, settings=True)
-    assert words in bench.health.setting_problem
+    assert text in bench.health.setting_problem
     assert bench.drives.health[1].setting_problem == ""
 
 
@@ -298,7 +298,7 @@ def test_a_sign_and_a_zero_turn_the_angle() -> None:
 def test_an_odrive_under_the_id_of_a_moteus_is_noticed() -> None:
     bench = Bench()
     bench.silent = True
-    bench.stranger.send(Odrive().announces(1))
+    bench.other_program.send(Odrive().announces(1))
     bench.tick()
     assert bench.health.other_protocol == "odrive" and not bench.drives.heard
     assert bench.drives.health[1].other_protocol == ""
@@ -311,6 +311,6 @@ def test_malformed_answers_are_counted_and_never_raise() -> None:
     for _ in range(2000):
         data = bytearray(good if random.random() < 0.5 else random.randbytes(random.choice((8, 32, 48))))
         data[random.randrange(len(data))] ^= 1 << random.randrange(8)
-        bench.stranger.send(announced._replace(data=bytes(data)))
+        bench.other_program.send(announced._replace(data=bytes(data)))
     bench.tick()
     assert bench.drives.malformed_frames > 0

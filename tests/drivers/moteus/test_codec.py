@@ -37,7 +37,7 @@ OUR_QUERY = {
 
 
 def controller(node_id: int = 1, position: dict[str, Any] | None = None) -> Any:
-    """Returns the package's own encoder; it has no bus."""
+    """Return the package's own encoder, without a bus."""
     query, resolution = moteus.QueryResolution(), moteus.PositionResolution()
     for name, value in OUR_QUERY.items():
         setattr(query, name, value)

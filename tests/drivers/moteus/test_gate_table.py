@@ -38,7 +38,7 @@ class Bench:
         return [frame.data for frame in frames]
 
     def torque(self, torque_nm: float) -> float:
-        """Returns the torque that leaves; NaN where something else left."""
+        """Return the torque that leaves; NaN where another command left."""
         (data,) = self.send(codec.encode_torque(torque_nm))
         return codec.decode_torque(data)
 
@@ -72,13 +72,13 @@ def test_stops_and_questions_pass_open_or_closed(bench: Bench, data: bytes, is_o
 
 
 @pytest.mark.parametrize("torque_nm", [0.0, -0.0, 0.1, nan])
-def test_through_a_closed_gate_leaves_a_question_in_place_of_any_torque(bench: Bench, torque_nm: float) -> None:
+def test_a_closed_gate_replaces_any_torque_by_a_question(bench: Bench, torque_nm: float) -> None:
     """A torque of zero would let the drive follow torque."""
     assert bench.send(codec.encode_torque(torque_nm)) == [codec.QUERY_ALONE]
     assert bench.gate.refused == 1 and "not armed" in bench.gate.last_refusal and "node 5" in bench.gate.last_refusal
 
 
-def test_through_an_open_gate_torque_leaves_within_limit_and_slew(armed: Bench) -> None:
+def test_an_open_gate_passes_torque_within_limit_and_slew(armed: Bench) -> None:
     assert armed.torque(0.0) == 0.0
     for torque_nm in (0.2, 0.4, 0.6, 0.75):
         assert armed.torque(torque_nm) == pytest.approx(torque_nm)
@@ -89,7 +89,7 @@ def test_through_an_open_gate_torque_leaves_within_limit_and_slew(armed: Bench) 
 
 
 @pytest.mark.parametrize("torque_nm", [nan, inf, -inf, 3e38])
-def test_what_is_no_torque_becomes_zero_torque(armed: Bench, torque_nm: float) -> None:
+def test_a_value_that_is_no_torque_becomes_zero_torque(armed: Bench, torque_nm: float) -> None:
     assert armed.torque(torque_nm) == 0.0
     assert armed.gate.refused == 1
 

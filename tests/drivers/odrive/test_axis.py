@@ -1,4 +1,4 @@
-"""What one drive reports about itself over time: restarts, a duplicate node id, the settings of its watchdog."""
+"""What one drive shows over time: restarts, a duplicate node id, the settings of its watchdog."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PRO = (2, 4, 4, 58, 0, 6, 11, 0)
 
 
 class Bench:
-    """Four drives on one bus, of which node 0 is the one to look at, and a clock."""
+    """Four drives on one bus, of which the tests examine node 0, and a clock."""
 
     def __init__(self, endpoints: tuple[WatchdogEndpoints, ...] = (BUILD,), heartbeat_period_s: float = 0.1) -> None:
         bus = MockBus()
@@ -48,7 +48,7 @@ class Bench:
         self.far.send(Frame(arbitration_id(0, message), message.encode(*values), stamp_s=stamp_s))
 
     def request_watchdogs(self, now_s: float) -> list[Frame]:
-        """The requests for parameters; versions are requested by remote frames."""
+        """Return the requests for parameters; versions are requested by remote frames."""
         self.drives.request_settings(now_s)
         return [frame for frame in self.far.receive() if not frame.is_remote]
 
@@ -60,7 +60,9 @@ class Bench:
         self.drives.read(now_s)
 
     def live(self, until_s: float, read: bool = True, drives: int = 1, turns: tuple[float, ...] = (0.0,)) -> None:
-        """Encoders every 2 ms and heartbeats every 0.1 s, of as many drives, read every tick or not at all."""
+        """Send encoders every 2 ms and heartbeats every 0.1 s from `drives` drives, and read in every tick or not at
+        all.
+        """
         start_s, reported = self.now_s, 0
         for number in range(1, round((until_s - start_s) / 0.002) + 1):
             now_s = start_s + number * 0.002
@@ -96,7 +98,7 @@ def test_a_drive_heard_again_after_a_silence_was_restarted(bench: Bench, silence
     assert (bench.axis.settings.version is None) == bool(restarts)
 
 
-def test_a_stall_of_ours_is_no_silence_of_the_drive(bench: Bench) -> None:
+def test_a_stall_of_this_program_is_no_silence_of_the_drive(bench: Bench) -> None:
     bench.live(1.0)
     bench.live(6.0, read=False)
     bench.read(6.0)
@@ -182,7 +184,7 @@ def test_a_second_drive_with_the_same_reading_shows_by_its_heartbeats_within_a_s
     assert 0.3 < seconds_until_duplicates(bench, 2, (0.1, 0.1)) < 0.85
 
 
-def test_a_second_drive_elsewhere_shows_by_the_readings_within_ten_ticks(bench: Bench) -> None:
+def test_a_second_drive_at_another_angle_shows_by_the_readings_within_ten_ticks(bench: Bench) -> None:
     bench.live(2.0)
     assert seconds_until_duplicates(bench, 2, (0.1, 0.4)) < 10 * PERIOD_S
 
@@ -209,7 +211,7 @@ def test_the_heartbeat_s_period_is_the_configured_one(period_s: float) -> None:
 
 @pytest.mark.parametrize("stall_s", [0.05, 0.3, 1.0, 3.0, 10.0])
 def test_heartbeats_that_are_read_late_in_a_burst_are_no_duplicate(bench: Bench, stall_s: float) -> None:
-    """Ten stalls one after the other, with a second of ticks between."""
+    """Ten stalls follow each other, with a second of ticks between them."""
     for _ in range(10):
         start_s = bench.now_s
         bench.live(start_s + stall_s, read=False)

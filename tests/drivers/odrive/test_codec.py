@@ -14,7 +14,7 @@ from drivers.odrive.codec import ERROR_NAMES, AxisState, MalformedMessageError, 
 
 DBC: Any = cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / "odrive-cansimple-0.6.10.dbc")
 MESSAGES = {name: value for name, value in vars(odrive_codec).items() if isinstance(value, Message)}
-WHOLE = [name for name in MESSAGES if name not in ("RX_SDO", "TX_SDO", "ADDRESS")]  # in those more may follow
+WHOLE = [name for name in MESSAGES if name not in ("RX_SDO", "TX_SDO", "ADDRESS")]  # more bytes may follow in those
 GOLDEN: list[tuple[str, tuple[float, ...], int, str]] = [  # of node 3
     ("GET_VERSION", (2, 4, 4, 58, 0, 6, 11, 0), 0x060, "02 04 04 3a 00 06 0b 00"),
     ("HEARTBEAT", (0x01020304, 8, 5, 1), 0x061, "04 03 02 01 08 05 01 00"),

@@ -1,4 +1,4 @@
-"""Four drives as joints, over buses in this process: what is understood, what is ignored, what is transmitted."""
+"""Four drives as joints, over buses in this process: which frames are understood, ignored and transmitted."""
 
 from math import inf, isfinite, nan, pi
 from struct import pack
@@ -125,9 +125,13 @@ def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
     for now_s, (message, values) in enumerate(SIGNALS, start=1):
         bench.report("left_sweep", message, *values)
         bench.drives.read(float(now_s))
-    state, untold = bench.drives.read(9.0)[:2]
+    state, unreported = bench.drives.read(9.0)[:2]
     assert (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s) == (1.0, 2.0, 3.0)
-    assert (untold.angle_stamp_s, untold.current_stamp_s, untold.heartbeat_stamp_s) == (NEVER_S, NEVER_S, NEVER_S)
+    assert (unreported.angle_stamp_s, unreported.current_stamp_s, unreported.heartbeat_stamp_s) == (
+        NEVER_S,
+        NEVER_S,
+        NEVER_S,
+    )
 
 
 @pytest.mark.parametrize(
@@ -207,9 +211,9 @@ def test_malformed_and_unknown_frames_are_counted_and_change_nothing(
 
 
 def understood(frame: Frame, node_ids: tuple[int, int]) -> bool:
-    """Whether the length is right: eight bytes, and a parameter's value of one to four bytes after its head.
+    """Return whether the length is right: eight bytes, or a parameter's value of one to four bytes after its head.
 
-    Commands for a drive come from another program and are counted, whatever they contain.
+    Commands for a drive come from another program and are counted, with any content.
     """
     shortest = {arbitration_id(node, message): 8 for node in node_ids for message in RECEIVED}
     shortest |= {arbitration_id(node, TX_SDO): 5 for node in node_ids}
@@ -296,7 +300,7 @@ def test_at_once_drives_are_prepared_and_not_yet_asked(bench: Bench) -> None:
     assert sum(frame.arbitration_id & 0x1F == 0x07 for frames in bench.sent().values() for frame in frames) == 4
 
 
-def test_no_drive_is_asked_for_closed_loop_while_what_prepares_it_is_lost(bench: Bench) -> None:
+def test_no_drive_is_asked_for_closed_loop_while_its_preparation_is_lost(bench: Bench) -> None:
     bench.report_everything(1.0, closed_loop=False)
     port = bench.drives.ports["left"]
     assert isinstance(port, MockPort)
@@ -345,7 +349,7 @@ def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> 
     assert len(bench.sent()["left"]) == 2
 
 
-def test_disarming_that_the_bus_refused_is_repeated_whatever_the_drives_report(bench: Bench) -> None:
+def test_disarming_that_the_bus_refused_is_repeated_for_any_report_of_the_drives(bench: Bench) -> None:
     bench.report_everything(1.0, closed_loop=False)
     bench.drives.read(1.0)
     bench.drives.ports["left"].full = True  # type: ignore[attr-defined]

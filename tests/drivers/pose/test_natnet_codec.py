@@ -1,4 +1,4 @@
-"""NatNet packets: bytes written down by hand, what an independent decoder makes of ours, and garbage."""
+"""NatNet packets: bytes written down by hand, ours as read by an independent decoder, and garbage."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ GOLDEN_4_1 = """
 
 
 def written(text: str) -> bytes:
-    """Reads lines of hexadecimal bytes, each with its meaning after three blanks."""
+    """Return the bytes of hexadecimal lines, each of which has its meaning after three blanks."""
     return bytes.fromhex("".join(line.strip().split("   ")[0] for line in text.strip().splitlines()))
 
 
@@ -150,7 +150,7 @@ def test_the_body_that_was_asked_for_is_found_in_any_crowd(version: NatNetVersio
 
 @each_version
 def test_an_independent_decoder_reads_the_same(version: NatNetVersion) -> None:
-    """The package natnet, which has another author. It leaves the precision time of 4.1 unread, at the very end."""
+    """The package natnet has another author. It leaves the precision time of 4.1 unread, at the very end."""
     packet = packet_of(version)
     read: Any = DataFrame.read_from_buffer(PacketBuffer(packet[4:]), Version(*version))
     ours = frame_of(version, packet, 5)
@@ -183,7 +183,9 @@ def test_bodies_are_found_by_name(version: NatNetVersion) -> None:
 
 @each_version
 def test_a_packet_that_is_cut_off_anywhere_is_malformed(version: NatNetVersion) -> None:
-    """By its header; and so it is where the header was made to fit, unless only the final zero is missing."""
+    """The header shows it, and so does the content where the header was made to fit, unless only the final zero is
+    missing.
+    """
     whole = packet_of(version)
     layout = FrameLayout(version)
     for length in range(len(whole)):
@@ -213,7 +215,7 @@ def test_garbage_raises_only_the_error_for_malformed_packets(data: bytes, versio
 
 @each_version
 def test_a_packet_of_which_bytes_were_changed_is_malformed_or_holds_numbers(version: NatNetVersion) -> None:
-    """It also ends quickly, with any count in it."""
+    """Decoding also ends quickly, with any count in the packet."""
     chance = random.Random(1)
     whole = packet_of(version)
     for _ in range(500):

@@ -36,7 +36,7 @@ NOT_SEEN = "motion capture does not see the body."
 
 
 def moving(duration_s: float, start_s: float = 0.0) -> list[RecordedPose]:
-    """A body that moves along x at SPEED_M_S."""
+    """Return the poses of a body that moves along x at SPEED_M_S."""
     return [
         RecordedPose(start_s + frame * FRAME_S, (SPEED_M_S * (start_s + frame * FRAME_S), 0.2, 1.0))
         for frame in range(round(duration_s / FRAME_S))
@@ -44,7 +44,7 @@ def moving(duration_s: float, start_s: float = 0.0) -> list[RecordedPose]:
 
 
 class Laboratory:
-    """A server and a port, ticks of the loop apart."""
+    """A server and a port that are stepped once in a tick of the loop."""
 
     def __init__(self, server: NatNetServer, port: NatNetPort) -> None:
         self.server, self.port = server, port
@@ -59,7 +59,7 @@ class Laboratory:
         return seen
 
     def send(self, *packets: bytes) -> BodyPose:
-        """And read them in the next tick."""
+        """Send packets and read them in the next tick."""
         for packet in packets:
             self.server.send_packet(packet)
         self.now_s += TICK_S
@@ -80,7 +80,7 @@ def open_laboratory() -> Iterator[Open]:
             origin_m: float = 0.0,
             **serving: Any,
         ) -> Laboratory:
-            """`listening`: changes of the port's parameters; `serving`: of the server's."""
+            """Open a laboratory; `listening` changes the port's parameters, `serving` the server's."""
             server = NatNetServer(poses, **serving)
             stack.callback(server.close)
             parameters = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
@@ -99,7 +99,7 @@ def known(seen: Sequence[tuple[float, BodyPose]]) -> list[tuple[float, BodyPose]
 def test_the_present_position_is_stamped_with_the_time_of_exposure(
     open_laboratory: Open, version: tuple[int, int]
 ) -> None:
-    """From 3.0 on a frame contains its own age; before, it has to be configured."""
+    """From 3.0 on a frame contains its own age; before, the age has to be configured."""
     configured = {"latency_s": 0.012} if version < (3, 0) else NOTHING
     lab = open_laboratory(moving(2.0), configured, version=NatNetVersion(*version), latency_s=0.012, crowded=True)
     reported = known(lab.run(2.0))[40:]
@@ -117,16 +117,16 @@ def test_x_goes_along_a_direction_from_an_origin(open_laboratory: Open) -> None:
 
 
 def test_a_body_is_found_by_name_or_by_id(open_laboratory: Open) -> None:
-    ways: list[dict[str, Any]] = [{"body": "mudskipper"}, {"body_id": 7}, {}]
-    for how in ways:
-        lab = open_laboratory(moving(0.3), how, identity=7)
-        assert known(lab.run(0.3)), how
-    wrong_ways: list[dict[str, Any]] = [{"body": "somebody"}, {"body_id": 6}]
-    for how in wrong_ways:
-        lab = open_laboratory(moving(0.3), how, identity=7)
-        assert not known(lab.run(0.29)), how
+    selections: list[dict[str, Any]] = [{"body": "mudskipper"}, {"body_id": 7}, {}]
+    for selection in selections:
+        lab = open_laboratory(moving(0.3), selection, identity=7)
+        assert known(lab.run(0.3)), selection
+    wrong_selections: list[dict[str, Any]] = [{"body": "other_body"}, {"body_id": 6}]
+    for selection in wrong_selections:
+        lab = open_laboratory(moving(0.3), selection, identity=7)
+        assert not known(lab.run(0.29)), selection
         trouble = lab.port.report().trouble
-        assert trouble == ("there is no rigid body named 'somebody'." if "body" in how else NOT_SEEN)
+        assert trouble == ("there is no rigid body named 'other_body'." if "body" in selection else NOT_SEEN)
 
 
 def test_a_body_that_is_defined_again_is_found_by_its_name(open_laboratory: Open) -> None:
@@ -139,7 +139,7 @@ def test_a_body_that_is_defined_again_is_found_by_its_name(open_laboratory: Open
 
 @pytest.mark.parametrize("interface", ["lo", LOOPBACK])
 def test_multicast_frames_are_heard_on_an_interface(open_laboratory: Open, interface: str) -> None:
-    """Without any answer, where the version is configured."""
+    """The version is configured, so that no answer of the server is needed."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind((LOOPBACK, 0))
         number = free.getsockname()[1]
@@ -148,13 +148,13 @@ def test_multicast_frames_are_heard_on_an_interface(open_laboratory: Open, inter
     assert len(known(lab.run(0.5))) > 100
 
 
-def test_frames_that_are_not_of_a_version_known_wait_for_it(open_laboratory: Open) -> None:
-    blind = open_laboratory(moving(4.0))
-    blind.server.answers = False
-    blind.run(0.0)
-    assert "no NatNet frame arrives from 127.0.0.1" in blind.port.report().trouble
-    blind.server.answers = True  # asked again a second later
-    assert known(blind.run(2.0))
+def test_frames_wait_until_their_version_is_known(open_laboratory: Open) -> None:
+    unanswered = open_laboratory(moving(4.0))
+    unanswered.server.answers = False
+    unanswered.run(0.0)
+    assert "no NatNet frame arrives from 127.0.0.1" in unanswered.port.report().trouble
+    unanswered.server.answers = True  # asked again a second later
+    assert known(unanswered.run(2.0))
 
 
 def test_a_server_with_an_unsupported_version_is_reported(open_laboratory: Open) -> None:
@@ -173,7 +173,7 @@ def test_a_body_that_is_not_tracked_is_none_and_is_counted(open_laboratory: Open
 
 
 def test_the_same_digits_again_and_again_are_no_pose(open_laboratory: Open) -> None:
-    """What some bridges repeat while the capture is lost."""
+    """Some bridges repeat them while the capture is lost."""
     poses = [pose if pose.time_s < 0.5 else pose._replace(position_m=(0.05, 0.2, 1.0)) for pose in moving(1.0)]
     lab = open_laboratory(poses)
     lab.run(0.5 + 2.0 * STALE_S)
@@ -184,7 +184,7 @@ def test_the_same_digits_again_and_again_are_no_pose(open_laboratory: Open) -> N
 def test_a_pose_after_a_gap_or_a_jump_is_accepted_when_a_second_one_follows(open_laboratory: Open) -> None:
     lab = open_laboratory([*moving(0.5), RecordedPose(0.75, (0.3, 0.2, 1.0)), *moving(0.5, 1.5)])
     lab.run(0.74)
-    assert not known(lab.run(1.5))  # the one of 0.75 s had leapt
+    assert not known(lab.run(1.5))  # the pose of 0.75 s had jumped
     reported = known(lab.run(1.9))
     assert reported and all(body.x_m == pytest.approx(SPEED_M_S * now_s, abs=1e-3) for now_s, body in reported)
     assert reported[0][0] >= 1.5 + FRAME_S
@@ -208,7 +208,7 @@ def test_malformed_and_foreign_packets_are_counted_and_cost_nothing_else(open_la
 
 
 def test_malformed_packets_are_reported(open_laboratory: Open) -> None:
-    """As with a version that is configured wrongly."""
+    """A version that is configured wrongly has this effect."""
     lab = open_laboratory(moving(0.5), {"version": "3.0"}, version=NatNetVersion(4, 1), crowded=True)
     assert not known(lab.run(0.4))
     assert lab.port.report().trouble == "all NatNet frames are malformed."

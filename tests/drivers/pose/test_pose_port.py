@@ -1,4 +1,4 @@
-"""Poses over a socket: the newest wins, old ones end, garbage is counted."""
+"""Poses over a socket: the newest wins, old ones expire, garbage is counted."""
 
 import socket
 import struct

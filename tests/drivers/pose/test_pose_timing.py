@@ -1,4 +1,4 @@
-"""Clocks that are not ours, and bodies between two frames."""
+"""The offset of another computer's clock, and the position of a body between two frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PERIOD_S = 1.0 / 120.0
 
 
 def test_the_least_delay_gives_the_offset_of_the_clocks() -> None:
-    """Delays of 1 ms and more, a clock that lags by 50 s and runs slow by 50 ppm."""
+    """The delays are 1 ms and more, and the clock lags by 50 s and runs slow by 50 ppm."""
     chance, delay = Random(2), LeastDelay()
     for frame in range(120 * 60):
         now_s = frame * PERIOD_S
@@ -28,10 +28,10 @@ def test_a_clock_that_was_set_is_noticed_in_both_directions() -> None:
     assert delay.update(10.0, 3.0) == 7.0
     assert delay.update(11.0, 4.0 - 2.0 * RESTARTED_S) == 7.0 + 2.0 * RESTARTED_S
     assert delay.update(12.0, 8.0) == 4.0
-    assert delay.update(13.0, 8.5) == 4.0  # one that was held up
+    assert delay.update(13.0, 8.5) == 4.0  # a delayed message
 
 
-def test_a_body_goes_on_as_it_went() -> None:
+def test_a_body_continues_at_its_speed() -> None:
     forecast = PoseForecast()
     assert isnan(forecast.at(0.0))
     for frame in range(10):
@@ -43,7 +43,7 @@ def test_a_body_goes_on_as_it_went() -> None:
 
 
 def test_an_extrapolated_position_is_closer_than_the_last_one() -> None:
-    """A step of the walk, as a sine, seen 10 ms late."""
+    """The motion is a step of the walk, as a sine, seen 10 ms late."""
     forecast, missed_m, old_m = PoseForecast(), 0.0, 0.0
     for frame in range(240):
         stamp_s = frame * PERIOD_S

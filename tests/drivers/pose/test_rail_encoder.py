@@ -1,4 +1,4 @@
-"""A counter on a serial line: what is a count, what is not, and what happens when it is unplugged."""
+"""A counter on a serial line: which lines are counts, and what happens when it is unplugged."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Rail:
         parameters = RailEncoderParameters(device=str(device), metres_per_count=METRES)
         self.encoder = RailEncoder(replace(parameters, **changes))  # type: ignore[arg-type]
         self.now_s = 0.0
-        self.written = self.fetched = 0  # bytes: a pseudo-terminal delivers when it likes
+        self.written = self.fetched = 0  # bytes: a pseudo-terminal delivers after a while
         self._write, self._fetch = self.counter.write, self.encoder.line._fetch
         self.counter.write = self._count_written  # type: ignore[method-assign]
         self.encoder.line._fetch = self._count_fetched  # type: ignore[method-assign]
@@ -47,7 +47,7 @@ class Rail:
         return data
 
     def write(self, data: bytes) -> float:
-        """x once all of it has been read."""
+        """Write bytes, and return x once all of them have been read."""
         if data:
             self.counter.write(data)
         return self.read_until(lambda: not self.encoder.line.is_there or self.fetched >= self.written)
@@ -127,7 +127,7 @@ def test_a_device_that_does_not_open_is_reported(tmp_path: Path) -> None:
 
 
 class Wire:
-    """A port of pyserial on a pipe, for speed."""
+    """A port of pyserial on a file, for speed."""
 
     def __init__(self, file: int) -> None:
         self.file, self.in_waiting = file, 1
@@ -139,7 +139,7 @@ class Wire:
         return
 
 
-def test_no_bytes_are_too_wild(tmp_path: Path) -> None:
+def test_any_bytes_are_survived(tmp_path: Path) -> None:
     path = tmp_path / "bytes"
     parameters = RailEncoderParameters(device="wire", metres_per_count=METRES, label="x")
 

@@ -1,4 +1,4 @@
-"""Counts that are positions, and counts that no body on a rail can have reached."""
+"""Counts that are positions, and counts that no body on a rail can reach."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def test_a_labelled_count_is_a_position(line: bytes) -> None:
 @pytest.mark.parametrize(
     "line", [b"250", b"x2.5", b"y:250", b"x", b"", b"x 2 5", b"x0x10", b"x" + b"1" * 16, b"x-", b"\xff"]
 )
-def test_what_is_no_count_is_malformed(line: bytes) -> None:
+def test_a_line_without_a_count_is_malformed(line: bytes) -> None:
     counts = EncoderCounts(1e-3, "x")
     assert counts.accept(line, 0.0) is None
     assert (counts.accepted, counts.malformed) == (0, 1)

@@ -1,4 +1,4 @@
-"""A serial line over a pseudo-terminal: what a line is, what becomes of it when the cable goes, why one is refused."""
+"""A serial line over a pseudo-terminal: how lines end, what an unplugged cable does, and why a port is refused."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Cable:
             os.close(file)
 
     def hear(self, data: bytes, lines: int) -> list[bytes]:
-        """What is read of it, until so many lines have come."""
+        """Write data, and return the lines that are read until `lines` of them have come."""
         os.write(self.files[0], data)
         heard, deadline_s = list[bytes](), time.monotonic() + LONGEST_S
         while len(heard) < lines and time.monotonic() < deadline_s:
@@ -60,7 +60,7 @@ def test_lines_end_with_either_or_both_and_blank_ones_are_none(cable: Cable) -> 
     assert list(cable.line.recent) == [b"one", b"two", b"three", b"four", b"five"]
 
 
-def test_what_never_ends_comes_in_pieces_and_its_rest_is_no_line(cable: Cable) -> None:
+def test_a_line_without_an_end_comes_in_pieces_and_its_rest_is_no_line(cable: Cable) -> None:
     assert cable.hear(b"x" * 30, 1) == [b"x" * 30]
     assert cable.hear(b"xx\nwhole\n", 1) == [b"whole"]
 
@@ -87,7 +87,7 @@ def test_a_device_that_is_gone_is_opened_again_periodically_and_starts_fresh(cab
     assert cable.hear(b"half\nwhole\n", 1) == [b"whole"]
 
 
-def test_a_port_that_there_is_not_says_which_there_are(tmp_path: Path) -> None:
+def test_the_error_of_a_missing_port_lists_the_existing_ones(tmp_path: Path) -> None:
     with pytest.raises(SerialLineError, match=r"no serial port .*/nothing: (there are|this computer sees none)"):
         open_serial(str(tmp_path / "nothing"), 9600)
 
