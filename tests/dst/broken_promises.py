@@ -1,7 +1,7 @@
-"""Robots that break a promise on purpose, to prove that the oracle sees it.
+"""Robots that break a promise on purpose, to prove that the oracle notices it.
 
-Each is a patch of the product, applied while the context lasts. `python -m tests.dst.broken_promises` reports after how
-many random seeds each is noticed.
+Each one is a patch of the product, applied while the context lasts. `python -m tests.dst.broken_promises` reports after
+how many random seeds each one is noticed.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def arms_by_itself() -> AbstractContextManager[Any]:
 
 
 def silent_without_torque() -> AbstractContextManager[Any]:
-    """Nothing is sent any more in the modes without torque, so the drives keep their last torque."""
+    """No command is sent any more in the modes without torque, so the drives keep their last torque."""
     true_command = Loop._command
 
     def command(self: Loop, now_s: float) -> None:
@@ -107,7 +107,7 @@ def fault_stays() -> AbstractContextManager[Any]:
 
 
 def joints_unwatched() -> AbstractContextManager[Any]:
-    """Nothing that a joint does is detected: one monitor alone would be replaced by another."""
+    """No monitor of a joint detects anything: if only one of them were removed, another would replace it."""
     return mock.patch("control.monitors.joint_monitor.JointMonitor.update", lambda *arguments: [])
 
 
@@ -116,8 +116,8 @@ def unwatched_and_unlimited() -> AbstractContextManager[Any]:
     return _both(no_limits(), joints_unwatched())
 
 
-def encoders_slandered() -> AbstractContextManager[Any]:
-    """A monitor reports a fault of a sound encoder."""
+def false_encoder_fault() -> AbstractContextManager[Any]:
+    """A monitor reports a fault of an encoder that has none."""
     fault = FaultKind.ENCODER_JUMP.fault("left_sweep")
     return mock.patch("control.monitors.encoder_monitor.EncoderMonitor.update", lambda *arguments: fault)
 
@@ -128,7 +128,7 @@ def tick_raises() -> AbstractContextManager[Any]:
 
 
 def rows_vanish() -> AbstractContextManager[Any]:
-    """The log's writer loses a row now and then without a word."""
+    """The log's writer sometimes loses a row without reporting it."""
     true_write = LogSegments.write
 
     def write(self: LogSegments, rows: Any) -> None:
@@ -146,7 +146,7 @@ BREAKS: dict[str, Break] = {  # by the promise that must notice
     "NoTorqueWithoutMode": silent_without_torque,
     "WithinStops": joints_unwatched,
     "BoundedEnergy": unwatched_and_unlimited,
-    "NoFalseAlarm": encoders_slandered,
+    "NoFalseAlarm": false_encoder_fault,
     "NoBug": tick_raises,
     "BackToIdle": fault_stays,
     "WholeLog": rows_vanish,

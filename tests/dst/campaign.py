@@ -4,9 +4,9 @@
     make dst SEEDS=5000:25000              from 5000 up to 24999
     make dst SEEDS=17 ARGS=--only          the seed 17 alone, with its schedule
 
-Each broken promise is shrunk to a short schedule, which is printed for people and as Python for the regression list.
-With `--progress FILE` finished blocks of seeds are noted there, and another call goes on after them; Ctrl-C and
-`--for-s` end a campaign in good order.
+Each broken promise is shrunk to a short schedule, which is printed as text and as Python for the regression list.
+With `--progress FILE` finished blocks of seeds are recorded there, and another call continues after them; Ctrl-C and
+`--for-s` end a campaign after the running blocks.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SHOWN_S, SELDOM_S = 1.0, 30.0  # between two lines of progress, on a terminal an
 
 @dataclass
 class Campaign:
-    """What a campaign found so far."""
+    """The results of a campaign so far."""
 
     first: int
     last: int  # not included
@@ -104,7 +104,7 @@ def run_campaign(first: int, last: int, workers: int, until_s: float, progress: 
 
 
 class _Interrupt:
-    """Notes Ctrl-C and SIGTERM instead of raising, so that running blocks end in good order."""
+    """Records Ctrl-C and SIGTERM instead of raising, so that running blocks end normally."""
 
     def __enter__(self) -> _Interrupt:
         self.came = False

@@ -18,7 +18,7 @@ from tests.dst.starts import STUCK_M, STUCK_PA
 SHARED = 16
 BUSES = ("left", "right")  # of the example configuration
 WEIGHTS = {"power-on": 1, "idle": 2, "hold": 3, "path": 1, "insertion": 3, "stance": 3, "extraction": 3, "release": 4}
-FAILURES = {0: 1, 1: 4, 2: 5, 3: 3}  # how many, and how often
+FAILURES = {0: 1, 1: 4, 2: 5, 3: 3}  # number of failures: weight
 FLAPPING = 0.2
 EARLIEST_S, LATEST_S, AFTER_S = 0.02, 0.4, 0.25
 TERMINATED = 0.05
@@ -119,7 +119,7 @@ def _flapping(random: Random, event: Failure | Harm) -> Iterator[Failure | Harm]
 
 
 def _draw_calls(random: Random, start: str, moments_s: list[float]) -> Iterator[Event]:
-    """Draws what operators do, at or shortly after the moments at which something begins or ends."""
+    """Draws the operators' calls, at or shortly after the times at which something begins or ends."""
 
     def moment_s() -> float:
         return round(random.choice(moments_s) + random.choice((0.0, 0.003, 0.02, 0.1)) * random.random(), 3)

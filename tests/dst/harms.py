@@ -15,7 +15,7 @@ from simulation.devices.foreign_master import ForeignMaster
 from simulation.harness.lockstep import Lockstep
 from tests.dst.scenario import Harm
 
-PUSH_NM = 0.3  # of a person's hand: half of a motor's limit
+PUSH_NM = 0.3  # of a hand: half of a motor's limit
 FOREIGN_NM = 0.6
 LATE_TICKS = 4
 
@@ -34,7 +34,7 @@ DRIVE_HARMS: Mapping[str, Mapping[str, Any]] = {  # changes of the drive's param
     "low supply": {"bus_voltage_v": 19.0},
     "lower supply": {"bus_voltage_v": 17.0},
 }
-MASTERS = {  # another program's commands: one for how many of ours, and whether they are on our bus
+MASTERS = {  # another program's commands: after how many of ours, and whether our bus carries them
     "foreign torque": (2, True),
     "seldom foreign torque": (10, True),
     "unheard foreign torque": (2, False),
@@ -53,7 +53,7 @@ class Harms:
         self.active: list[Active] = []
         self._robot = robot
         self._sound = [drive.parameters for drive in robot.robot.drives]
-        self._strangers = {name: bus.open() for name, bus in robot.buses.items()}
+        self._foreign_ports = {name: bus.open() for name, bus in robot.buses.items()}
         robot.robot.observers.append(self._push)
 
     def begin(self, harm: Harm) -> None:
@@ -62,7 +62,7 @@ class Harms:
             ONCE[harm.name](self._robot, JOINTS.index(harm.joint))
         if harm.name in FORGED:
             frame = self._robot.robot.drives[JOINTS.index(harm.joint)].forge(FORGED[harm.name])
-            self._strangers[self._robot.loop.configuration.drive[harm.joint].bus].send(frame)
+            self._foreign_ports[self._robot.loop.configuration.drive[harm.joint].bus].send(frame)
         self._apply()
 
     def update(self) -> None:
@@ -120,4 +120,4 @@ ONCE: Mapping[str, Callable[[Lockstep, int], None]] = {
 }
 FORGED = {"foreign stop": Forgery.EMERGENCY_STOP, "foreign arming": Forgery.CLOSE_LOOP}
 NAMES = (*DRIVE_HARMS, *ONCE, *FORGED, *MASTERS, "push", "blocked", "wall clock step")
-FOREIGN = (*MASTERS, "foreign arming")  # with which the drive's torque is not ours
+FOREIGN = (*MASTERS, "foreign arming")  # while they last, the drive's torque is not ours

@@ -1,7 +1,7 @@
 """A robot in lockstep with the daemon's surroundings: its operator socket, its log, its shutdown and its last resort.
 
-After each tick of the loop the socket serves its clients, as in the daemon. The clients are real connections whose
-credentials the kernel would report; a peer is chosen here in its place.
+After each tick of the loop the socket serves its clients, as in the daemon. The clients are real connections; the peer
+that the kernel would report for each is chosen here.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class OperatedRobot:
         self.harmed = False  # something has failed since the start
         self.calls: list[Executed] = []
         self.bug = ""  # the exception that ended the loop, or a report of one in the socket
-        self.ended = False  # the daemon
+        self.ended = False  # whether the daemon has ended
         self._clients: dict[str, Client] = {}
         self._coming: deque[Peer] = deque()
         self._shutdown = Shutdown()
@@ -121,7 +121,7 @@ class OperatedRobot:
         self._clients[client].call(method, params)
 
     def begin_tick(self) -> None:
-        """Ends what is over before the next tick."""
+        """Ends the harms that are over, before the next tick."""
         self.harms.update()
         self.calls.clear()
 

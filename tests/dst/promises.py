@@ -1,7 +1,7 @@
 """The promises of the robot, each checked from the simulated mechanics and the operators' calls.
 
-None asks a monitor of the robot whether something is wrong, only whether it is silent when nothing is. `update` runs
-after every tick and yields a text for what was broken.
+No promise relies on a monitor of the robot, except to check that it is silent when nothing is wrong. `update` runs
+after every tick and yields a text for each broken promise.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STOP_TICKS = 4  # from an accepted request, beyond the time of the stop itself
 
 
 class Promise:
-    """One promise, and what it remembers of a run."""
+    """One promise, and its state during a run."""
 
     def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
         self.robot = robot
@@ -70,7 +70,7 @@ class LimitedMotors(Promise):
         limits = self.loop.configuration.limits
         self._largest_nm, self._rate_nm_s = limits.torque_nm, limits.torque_rate_nm_s
         self._fast_rad_s = limits.velocity_rad_s
-        self._least_nm = WEAKEST * self._largest_nm  # less is within the limit, whatever the motor's gain is
+        self._least_nm = WEAKEST * self._largest_nm  # less is within the limit for any gain of the motor
         self._torques_nm: Torques | None = None  # one step of the mechanics ago
         drives = robot.lockstep.robot.drives
         self._before_nm = [drive.torque_nm(robot.lockstep.robot.now_s) for drive in drives]  # as commanded
@@ -80,7 +80,7 @@ class LimitedMotors(Promise):
         robot.lockstep.robot.observers.append(self._measure)
 
     def _measure(self, dt_s: float, torques_nm: Torques) -> None:
-        """Looks at the motors whose torque changed or is large."""
+        """Checks the motors whose torque changed or is large."""
         robot = self.robot.lockstep.robot
         self._torques_nm = self._torques_nm or torques_nm
         for index, torque_nm in enumerate(torques_nm):
@@ -92,7 +92,7 @@ class LimitedMotors(Promise):
         self._torques_nm = torques_nm
 
     def _check(self, index: int, torque_nm: float, speed_rad_s: float, now_s: float) -> None:
-        """Compares what a motor was commanded: its true torque over the gain of a harmed motor."""
+        """Checks what a motor was commanded: its true torque over the gain of a harmed motor."""
         gain = self.reach.gains[index]
         commanded_nm, rounding_nm = torque_nm / gain, ROUNDING_NM + self.reach.cogging_nm / abs(gain)
         if now_s - self._fast_s[index] > CLAMP_S and not self.reach.is_foreign(index):
@@ -248,7 +248,7 @@ class LittleEnergy(Promise):
 class BoundedEnergy(Promise):
     """After the first failure our torque puts no more energy into a joint than the published bounds allow.
 
-    They are those of the faults that stopped the robot, and for the time in which it followed a path that of the gait.
+    The bounds are those of the faults that stopped the robot, plus that of the gait for the time on a path.
     """
 
     def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:

@@ -1,6 +1,6 @@
-"""What no program could do better: which drives a command cannot reach, and whose torque is not ours.
+"""The limits of any program: which drives a command cannot reach, and whose torque is not ours.
 
-The bounds of the promises follow from it. It knows the schedule, not what the robot believes.
+The bounds of the promises follow from them. This module knows the schedule, not the robot's own state.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tests.dst.operated_robot import OperatedRobot
 WATCHDOG_S = 0.1
 AFTERMATH_S = 0.03  # after a failure's end: delayed frames arrive, and lost requests are repeated
 HEARTBEATS_S = 0.25  # until the loop has seen a drive in closed loop and has commanded it idle again
-LONGEST_LAG_S = 0.02  # of a motor's current behind its command (tests/dst/harms.py)
+LONGEST_LAG_S = 0.02  # of a motor's current after its command (tests/dst/harms.py)
 REPEAT_S = 0.1  # between two requests to go idle
 
 
@@ -85,13 +85,13 @@ class Reachability:
         return HEARTBEATS_S + REPEAT_S
 
     def bunched_s(self, index: int) -> float:
-        """Returns how much closer together than they were sent commands may take effect."""
+        """Returns by how much the times between commands may shrink before they take effect."""
         late = self._recently(self._disturbed_s[index], AFTERMATH_S)
         hastened = self._recently(self._hastened_s[index], AFTERMATH_S)
         return self._period_s + (MOST_DELAY_S if late else 0.0) + (LONGEST_LAG_S if hastened else 0.0)
 
     def is_foreign(self, index: int) -> bool:
-        """Returns whether others command the drive's torque."""
+        """Returns whether another program commands the drive's torque."""
         return self._recently(self._foreign_s[index], AFTERMATH_S)
 
     def is_energised_by_others(self, index: int) -> bool:

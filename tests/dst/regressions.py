@@ -1,6 +1,6 @@
-"""Schedules that broke a promise once, shrunk to what mattered, each with a sentence about what was wrong.
+"""Schedules that once broke a promise, shrunk to the essential events, each with a text about the cause.
 
-They are kept as they were printed and not as seeds alone, because a seed draws another schedule when drawing changes.
+They are stored as they were printed and not as seeds alone, because a seed draws another schedule when drawing changes.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from tests.dst.scenario import Call, Failure, Harm, Scenario, Surroundings, Term
 
 
 class Regression(NamedTuple):
-    sentence: str
+    text: str
     scenario: Scenario
 
 

@@ -1,4 +1,4 @@
-"""Runs one scenario: its schedule, then the way back to rest, with every promise checked after each tick."""
+"""Runs one scenario: its schedule, then the return to rest, with every promise checked after each tick."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Run:
         self._robot.call("guest", "disarm")
 
     def _check_end(self) -> None:
-        """A daemon that has ended leaves idle drives behind."""
+        """Checks that a daemon that has ended leaves its drives idle."""
         self._run(DISARMED_TICKS)
         if any(drive.energised for drive in self._robot.lockstep.robot.drives):
             self._break("Shutdown", "a drive is in closed loop after the end of the daemon")

@@ -35,7 +35,7 @@ class Failure(NamedTuple):
 
 
 class Harm(NamedTuple):
-    """Something physical goes wrong with one joint, its drive or the loop (harms.py)."""
+    """A physical fault of one joint, its drive or the loop (harms.py)."""
 
     at_s: float
     name: str
@@ -70,7 +70,7 @@ class Scenario(NamedTuple):
     surroundings: Surroundings
     start: str  # the state of a sound robot at which the schedule begins (starts.py)
     events: tuple[Event, ...]  # in the order of their times
-    for_s: float  # then everything that failed is whole again, and an operator clears the faults
+    for_s: float  # then every failure ends, and an operator clears the faults
 
 
 def end_s(event: Event) -> float:
@@ -79,7 +79,7 @@ def end_s(event: Event) -> float:
 
 
 def describe(scenario: Scenario) -> str:
-    """Writes a scenario as a schedule for people, one line for each event."""
+    """Writes a scenario as a readable schedule, one line for each event."""
     given = scenario.surroundings._asdict().items()
     surroundings = ", ".join(f"{name} = {value}" for name, value in given if value not in (None, (), False))
     lines = [f"seed {scenario.seed}: from {scenario.start}, for {scenario.for_s:.3f} s", f"  in {surroundings}"]

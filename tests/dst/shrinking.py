@@ -1,7 +1,7 @@
 """Shrinks a scenario that breaks a promise to a short one that breaks the same promise.
 
-Delta debugging: events are left out in ever smaller groups, then durations and the whole run become shorter, and the
-surroundings return to the defaults, as long as the promise stays broken.
+Delta debugging: events are left out in smaller and smaller groups, then durations and the whole run become shorter, and
+the surroundings return to the defaults, as long as the promise stays broken.
 """
 
 from __future__ import annotations

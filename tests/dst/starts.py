@@ -42,7 +42,7 @@ STUCK_PA, STUCK_M = 9000.0, 0.05  # mud and depth in which most extractions leav
 
 
 class Rows(NullRecorder):
-    """A Recording that owns the rows themselves, so that a copied robot has those of the walk before."""
+    """A recording that owns the rows themselves, so that a copied robot has the rows of the walk before."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[int, bytes]] = []
@@ -81,7 +81,7 @@ def _example() -> str:
 
 
 def configuration_of(surroundings: Surroundings) -> Configuration:
-    """Raises ConfigurationError where the changed keys contradict each other."""
+    """Returns the configuration; raises ConfigurationError where the changed keys contradict each other."""
     document = tomllib.loads(_example())
     for key, value in (("failures.allowed", True), *surroundings.configuration):
         section, _, name = key.rpartition(".")
@@ -122,7 +122,7 @@ def _stone(start_m: float) -> Stone:
 
 
 class SoundWalk:
-    """Owns one robot on its way from power-on into a walk, and copies of it at the starts that it has passed."""
+    """Owns one robot that goes from power-on into a walk, and copies of it at the starts that it has passed."""
 
     def __init__(self, surroundings: Surroundings) -> None:
         self._surroundings = surroundings

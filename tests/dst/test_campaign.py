@@ -1,4 +1,6 @@
-"""A campaign covers what it says, goes on where it ended, and finds no broken promise in the regression list."""
+"""A campaign draws every kind of event, continues where it ended, and finds no broken promise in the regression
+list.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ from tests.dst.scenario import Call, Failure, Harm
 CI_SEEDS = 200
 
 
-@pytest.mark.parametrize("regression", REGRESSIONS, ids=lambda regression: regression.sentence)
+@pytest.mark.parametrize("regression", REGRESSIONS, ids=lambda regression: regression.text)
 def test_a_promise_that_was_broken_is_kept(regression: Regression) -> None:
     assert run_scenario(regression.scenario).problem == ""
 

@@ -1,4 +1,4 @@
-"""The oracle notices robots that break a promise, and says the same of a seed every time."""
+"""The oracle notices robots that break a promise, and gives the same result for a seed every time."""
 
 from __future__ import annotations
 

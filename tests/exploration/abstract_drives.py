@@ -19,7 +19,7 @@ SILENT_HEARTBEATS = 3  # so many missing ones are a silence, and are not counted
 
 
 class Obedience(Enum):
-    """What becomes of the commands to a drive in one tick."""
+    """The fate of the commands to a drive in one tick."""
 
     ALL = 0
     NONE = 1  # they are lost unnoticed
@@ -34,7 +34,7 @@ class Event(Enum):
 
 
 class DriveMemory(NamedTuple):
-    """What the future of an abstract drive depends on."""
+    """The state on which the future of an abstract drive depends."""
 
     heard: bool = True
     closed: bool = False
@@ -73,7 +73,7 @@ class AbstractAxis:
         self.asked_closed = 0
         self.torque_nm = 0.0
 
-    def beat(self) -> None:
+    def send_heartbeat(self) -> None:
         """Send a heartbeat."""
         self.heard, self.closed_loop, self.missing_heartbeats = True, self.closed, 0
         self.was_closed = self.was_closed or self.closed
@@ -83,7 +83,7 @@ class AbstractAxis:
 
     @property
     def state(self) -> DriveState:
-        """The state as of the last heartbeat, which left half a tick before it was read."""
+        """Return the state as of the last heartbeat, which was sent half a tick before it was read."""
         if not self.heard:
             return DriveState()
         stamp_s = self._now_s - (self.missing_heartbeats + 0.5) * PERIOD_S
@@ -98,7 +98,7 @@ class AbstractAxis:
         return obedience is Obedience.ALL
 
     def poll(self) -> None:
-        """Does nothing: these drives report by themselves."""
+        """Do nothing: these drives report by themselves."""
 
     def prepare(self) -> None:
         if self._arrives():
@@ -147,7 +147,7 @@ class AbstractGate:
 
 
 class AbstractDrives(Drives):
-    """Two drives: one obeys, the other one does what the search wants."""
+    """Two drives: one obeys, the search decides what the other one does."""
 
     def __init__(self) -> None:
         self._port = AbstractPort()

@@ -1,4 +1,4 @@
-"""Motion and detection of faults without joints: what they report is what the search wants."""
+"""Motion and fault detection without joints: the search decides what they report."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TORQUE_NM = 0.1
 
 
 class AbstractController(Controller):
-    """Motion without joints: it is done when the world says so, and at the latest in the product's longest time."""
+    """Motion without joints: it is done when the world says so, and at the latest after the product's longest time."""
 
     def __init__(self) -> None:
         self.order, self.target = WalkOrder(0.03), RESTING
@@ -82,11 +82,11 @@ class AbstractController(Controller):
         self._since_s += elapsed_s
         if self.is_moving:
             self._since_s, self.is_moving = 0.0, not self.done
-        return same_for_all(TORQUE_NM)  # also where the mode permits none
+        return same_for_all(TORQUE_NM)  # also in modes that permit none
 
 
 class AbstractMonitor(FaultMonitor):
-    """Detects what the world says, what the drives report, and what the lease and the arming come to."""
+    """Detects the faults of the world, those that the drives report, and those of the lease and of arming."""
 
     def __init__(self) -> None:
         self.trusted = same_for_all(True)
@@ -107,7 +107,7 @@ class AbstractMonitor(FaultMonitor):
             kinds.append(FaultKind.HEARTBEAT_SILENT)
         if mode in MOVING and not all(closed):
             kinds.append(FaultKind.DRIVE_DISARMED)
-        if mode not in ENERGISED and any(closed) and self.world.beats:  # it takes a few heartbeats
+        if mode not in ENERGISED and any(closed) and self.world.heartbeat:  # it takes a few heartbeats
             kinds.append(FaultKind.DRIVE_ENERGISED)
         if mode is Mode.ARMING and tick.now_s - monitor_input.mode_since_s > ARMING_S and not all(closed):
             kinds.append(FaultKind.ARMING_FAILED)

@@ -1,7 +1,7 @@
 """The product's loop with its modes, latch, lease and requests, in a world that an exhaustive search decides.
 
-Loop, fault latch, lease, operator calls and the arming sequence are the product's own code. Abstract are only what
-feeds them: drives, motion and detection of faults.
+Loop, fault latch, lease, operator calls and the arming sequence are the product's own code. Only their inputs are
+abstract: drives, motion and fault detection.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class AbstractLoop(Loop):
 
 
 class AbstractRobot:
-    """Owns the loop; puts it into a memory, lets one thing happen, and reads the memory again."""
+    """Owns the loop; restores a memory, lets one event happen, and reads the memory again."""
 
     def __init__(self) -> None:
         self.now_s = NOW_S
@@ -79,10 +79,10 @@ class AbstractRobot:
         configuration, clock = load_configuration(EXAMPLE_CONFIGURATION), lambda: self.now_s
         return AbstractLoop(configuration, self.drives, NoPose(), NullRecorder(), clock, clock, PERIOD_S)
 
-    # what may happen
+    # events
 
     def call(self, call: Call) -> bool:
-        """Let an operator call; returns whether it is accepted."""
+        """Let an operator call, and return whether the call is accepted."""
         caller = CALLERS[call.operator]
         self.now_s = CALL_S
         if call.method == "hang_up":
@@ -105,9 +105,9 @@ class AbstractRobot:
         if world.event is not Event.NONE:
             other.closed = world.event is Event.CLOSES
         self.drives.begin_tick(self.now_s, world.obedience)
-        self.drives.obedient.beat()
-        if world.beats:
-            other.beat()
+        self.drives.obedient.send_heartbeat()
+        if world.heartbeat:
+            other.send_heartbeat()
         else:
             other.miss_heartbeat()
         self.loop.tick(Tick(self.now_s, 0.0, 1, 0))

@@ -1,6 +1,6 @@
-"""Records of the search: what the robot's future depends on, and what may happen to it.
+"""Records of the search: the state on which the robot's future depends, and the events that may happen to it.
 
-A `Memory` is read from the product's objects and put into them again, so this module knows their private fields.
+A `Memory` is read from the product's objects and restored into them, so this module knows their private fields.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class LatchedFault(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the future depends on, with all times relative to the last tick."""
+    """The state on which the future depends, with all times relative to the last tick."""
 
     mode: Mode = Mode.BOOT
     mode_ticks: int = 0  # where a duration ends the mode
@@ -76,11 +76,11 @@ class Memory(NamedTuple):
 
 
 class World(NamedTuple):
-    """What happens in one tick."""
+    """The events of one tick."""
 
     faults: tuple[FaultKind, ...] = ()
     done: bool = False  # the strides, the raising, the damping or the move
-    beats: bool = True  # the heartbeat of the other drive arrives
+    heartbeat: bool = True  # the heartbeat of the other drive arrives
     obedience: Obedience = Obedience.ALL  # of the other drive
     event: Event = Event.NONE
 

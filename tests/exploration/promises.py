@@ -1,7 +1,7 @@
-"""What the robot promises of one tick and of one call, whatever happened before.
+"""The promises of the robot for one tick and for one call, after any history.
 
-A promise is a text and a condition on one edge of the graph that the search walks. What the operators were promised
-earlier travels along as `Debts`, so that no promise rests on the code that it is about.
+A promise is a text and a condition on one edge of the graph that the search walks. Earlier events that still bind the
+robot travel along as `Debts`, so that no promise relies on the code that it checks.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ LONGEST_TICKS = {
 
 
 class Debts(NamedTuple):
-    """What happened earlier and still binds the robot."""
+    """Earlier events that still bind the robot."""
 
-    hung_up: bool = False  # the holder of the lease, since the last tick
-    bereft: bool = False  # who moved it is gone: it has to stop, and to lose its torque
-    uncleared: frozenset[FaultKind] = frozenset()  # which only an operator or a restart may end
-    ousted: frozenset[Operator] = frozenset()  # until they connect again
+    hung_up: bool = False  # the holder of the lease did so since the last tick
+    abandoned: bool = False  # the operator who moved it is gone: it has to stop, and to lose its torque
+    uncleared: frozenset[FaultKind] = frozenset()  # faults that only an operator or a restart may end
+    ousted: frozenset[Operator] = frozenset()  # operators, until they connect again
 
 
 class TickEdge(NamedTuple):
     before: Memory
     debts: Debts  # with those of this tick
     after: Memory
-    found: frozenset[FaultKind]  # in this tick
-    torque: bool  # any, in a command
+    found: frozenset[FaultKind]  # faults detected in this tick
+    torque: bool  # in any command
     gate_open: bool
-    asked_idle: bool  # every drive
-    asked_closed: bool  # any drive
+    asked_idle: bool  # of every drive
+    asked_closed: bool  # of any drive
     asked_unprepared: bool
-    was_closed: bool  # every drive, at some time since arming began
+    was_closed: bool  # whether every drive was, at some time since arming began
 
     @property
     def energises(self) -> bool:
@@ -66,7 +66,7 @@ class CallEdge(NamedTuple):
 
 
 def tick_edge(robot: AbstractRobot, before: Memory, debts: Debts, after: Memory) -> TickEdge:
-    """What the robot has just done."""
+    """Return the edge of the tick that the robot has just run."""
     both = robot.drives.both
     return TickEdge(
         before=before,
@@ -86,10 +86,10 @@ def tick_edge(robot: AbstractRobot, before: Memory, debts: Debts, after: Memory)
 
 
 def at_tick(before: Memory, debts: Debts) -> Debts:
-    """The debts by which the coming tick is measured: a lease may be over in it."""
+    """Return the debts that apply to the coming tick, in which a lease may expire."""
     lease = before.lease
     over = lease.holder is not None and (lease.lost or lease.remaining_s < PERIOD_S)
-    return debts._replace(bereft=debts.bereft or debts.hung_up or (over and _moves_or_will(before)))
+    return debts._replace(abandoned=debts.abandoned or debts.hung_up or (over and _moves_or_will(before)))
 
 
 def after_tick(edge: TickEdge) -> Debts:
@@ -98,8 +98,8 @@ def after_tick(edge: TickEdge) -> Debts:
         uncleared = frozenset(kind for kind in uncleared if kind in edge.found or kind.clears is Clears.BY_RESTART)
     lasting = (kind for kind in edge.found if kind.clears is not Clears.WHEN_GONE)
     uncleared = uncleared.union(kind for kind in lasting if kind.latches_idle or before.mode in ENERGISED)
-    bereft = edge.debts.bereft and edge.after.mode in ENERGISED
-    return Debts(bereft=bereft, uncleared=uncleared, ousted=edge.debts.ousted)
+    abandoned = edge.debts.abandoned and edge.after.mode in ENERGISED
+    return Debts(abandoned=abandoned, uncleared=uncleared, ousted=edge.debts.ousted)
 
 
 def after_call(edge: CallEdge) -> Debts:
@@ -146,7 +146,7 @@ def _moves_when_confirmed(edge: TickEdge) -> bool:
 
 
 def _reacts(edge: TickEdge) -> bool:
-    """By the hardest of all present faults, in the tick in which it is detected."""
+    """The mode reacts by the hardest of all present faults, in the tick in which it is detected."""
     if edge.after.mode is Mode.ARMING:
         return edge.reaction < Reaction.SOFT_STOP
     return edge.after.mode not in ENERGISED or HARDNESS[edge.after.mode] >= MILDEST[edge.reaction]
@@ -169,7 +169,7 @@ def _stays_stopped(edge: TickEdge) -> bool:
 
 
 def _ends_with_its_operator(edge: TickEdge) -> bool:
-    return not edge.debts.bereft or edge.after.mode not in (Mode.ARMING, Mode.HOLD, Mode.WALKING)
+    return not edge.debts.abandoned or edge.after.mode not in (Mode.ARMING, Mode.HOLD, Mode.WALKING)
 
 
 def _moves_in_hold(edge: TickEdge) -> bool:
@@ -183,7 +183,7 @@ def _ends_fault_without_fault(edge: TickEdge) -> bool:
 
 TICK_PROMISES: dict[str, Callable[[TickEdge], bool]] = {
     "torque goes on only by a request to arm": _arms_by_request,
-    "no fault that blocks arming, and none that is not cleared, is armed over": _arms_only_unblocked,
+    "the robot arms with no fault that blocks arming or is not cleared": _arms_only_unblocked,
     "a walk begins only by a request, without a fault that holds": _walks_by_request,
     "a joint moves only when every drive has confirmed this arming": _moves_when_confirmed,
     "a drive is asked for closed loop only while arming": lambda edge: (
@@ -196,7 +196,7 @@ TICK_PROMISES: dict[str, Callable[[TickEdge], bool]] = {
     "the hardest reaction counts at once": _reacts,
     "disarm, and every end of torque, asks all drives to go idle at once": _disarms,
     "a stop ends a walk at once": _stops,
-    "a stop is not walked over": _stays_stopped,
+    "a stop does not turn into a walk": _stays_stopped,
     "stopping and damping end in time": lambda edge: (
         edge.after.mode_ticks <= LONGEST_TICKS.get(edge.after.mode, edge.after.mode_ticks)
     ),
@@ -209,7 +209,7 @@ TICK_PROMISES: dict[str, Callable[[TickEdge], bool]] = {
 
 
 def _is_permitted(edge: CallEdge) -> bool:
-    """Only the holder of the lease moves the robot, if there is one that is not lost."""
+    """Return whether the call respects the lease: only the holder of a lease that is not lost moves the robot."""
     if not edge.accepted or edge.call.method not in ("arm", "walk", "move"):
         return True
     lease, caller = edge.before.lease, edge.call.operator
@@ -232,7 +232,7 @@ def _is_own_release(edge: CallEdge) -> bool:
 
 CALL_PROMISES: dict[str, Callable[[CallEdge], bool]] = {
     "stop and disarm are never refused": lambda edge: edge.accepted or edge.call.method not in ("stop", "disarm"),
-    "only who holds the robot moves it": _is_permitted,
+    "only the holder of the lease moves the robot": _is_permitted,
     "disarm is not replaced, and no refused call replaces anything": _is_pending,
     "a stop ends a move": lambda edge: edge.call.method != "stop" or not edge.after.moving,
     "nothing arms or walks while the daemon ends": lambda edge: (
@@ -253,11 +253,11 @@ def broken_by_call(edge: CallEdge) -> list[str]:
 
 
 def is_home(memory: Memory) -> bool:
-    """Whether the robot could be armed now: no torque, no fault, nothing pending."""
+    """Return whether the robot could be armed now: no torque, no fault, nothing pending."""
     idle = not any(drive.closed or drive.reported_closed for drive in (memory.obedient, memory.other))
     return memory.mode is Mode.IDLE and idle and not memory.faults and memory.pending is Request.NONE
 
 
 def is_quiet(memory: Memory) -> bool:
-    """Whether no torque is on."""
+    """Return whether no torque is on."""
     return memory.mode not in ENERGISED and not memory.obedient.closed and not memory.other.closed

@@ -1,4 +1,6 @@
-"""What the searches let happen: several operators, pairs of faults, a drive that does anything, or all at once."""
+"""The events that the searches allow: several operators, pairs of faults, a drive that does anything, or all at
+once.
+"""
 
 from __future__ import annotations
 
@@ -36,24 +38,26 @@ EVERYTHING = (*ORDERS, *LEASES)
 
 
 def _one_of_each() -> tuple[FaultKind, ...]:
-    """One fault of each combination that modes and latch tell apart."""
+    """Return one fault of each combination that modes and latch distinguish."""
     found = {(kind.reaction, kind.blocks, kind.clears, kind.latches_idle): kind for kind in reversed(FaultKind)}
     return tuple(sorted(found.values(), key=lambda kind: kind.reaction))
 
 
 ONE_OF_EACH = _one_of_each()
-THAT_ACT = tuple(kind for kind in ONE_OF_EACH if kind.reaction >= Reaction.HOLD)
+ACTING = tuple(kind for kind in ONE_OF_EACH if kind.reaction >= Reaction.HOLD)
 
 
 def quick_scopes() -> Iterator[Scope]:
-    """A few seconds."""
+    """Yield scopes that take a few seconds in all."""
     yield Scope(EVERYTHING)
     yield Scope(ORDERS, drives=True)
-    yield from (Scope(ORDERS, (kind,)) for kind in ONE_OF_EACH if kind not in THAT_ACT)
-    yield from (Scope(ORDERS, pair) for pair in pairwise(THAT_ACT))
+    yield from (Scope(ORDERS, (kind,)) for kind in ONE_OF_EACH if kind not in ACTING)
+    yield from (Scope(ORDERS, pair) for pair in pairwise(ACTING))
 
 
 def all_scopes() -> Iterator[Scope]:
-    """Every pair of faults with every operator; every fault with a drive that does anything, and every operator."""
+    """Yield every pair of faults with every operator, and every fault with a drive that does anything and every
+    operator.
+    """
     yield from (Scope(EVERYTHING, pair) for pair in combinations(ONE_OF_EACH, 2))
     yield from (Scope(EVERYTHING, (kind,), drives=True) for kind in ONE_OF_EACH)

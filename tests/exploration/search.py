@@ -35,7 +35,7 @@ Step = Call | World
 
 
 class Scope(NamedTuple):
-    """What may happen, in any order and as often as it likes."""
+    """The events that may happen, in any order and any number of times."""
 
     calls: tuple[Call, ...]  # with disarm and clear
     faults: tuple[FaultKind, ...] = ()
@@ -51,7 +51,7 @@ class Broken(NamedTuple):
 
 
 class Exploration:
-    """Owns every state that was found, and how each is left when nothing bad happens any more."""
+    """Owns every state that was found, and where each one leads by disarm, clear and benign ticks."""
 
     def __init__(self, scope: Scope, robot: AbstractRobot) -> None:
         self.scope = scope
@@ -70,7 +70,7 @@ class Exploration:
         return len({memory for memory, _ in self._came_from})
 
     def run(self) -> Broken | None:
-        """Visit everything; return the first broken promise."""
+        """Visit every state, and return the first broken promise."""
         while self._waiting and not self.broken:
             node = self._waiting.popleft()
             for call in self.scope.calls:
@@ -119,7 +119,7 @@ class Exploration:
         came = self._came_from[node]
         return [] if came is None else [*self._path(came[0]), came[1]]
 
-    # what has to be possible in the end
+    # what must always be possible in the end
 
     def _first_stuck(self) -> Broken | None:
         for node in self._came_from:
@@ -137,7 +137,9 @@ class Exploration:
         return False
 
     def _comes_home(self, node: Node) -> bool:
-        """Whether an operator who disarms and clears can arm again; after a bug, whether torque is off at least."""
+        """Return whether an operator who disarms and clears can arm again; after a bug, whether at least the torque is
+        off.
+        """
         for _ in range(MOST_TICKS_HOME):
             memory, debts = node
             bug = any(kind.clears is Clears.BY_RESTART for kind in debts.uncleared)

@@ -28,7 +28,7 @@ Patch = Callable[[pytest.MonkeyPatch], None]
 
 
 def test_every_reachable_state_keeps_every_promise(record_property: Callable[[str, object], None]) -> None:
-    """And the search takes every change of mode in the table, so it is not an empty claim."""
+    """The search also takes every change of mode in the table, so the claim is not empty."""
     robot, states, changes = AbstractRobot(), 0, set[tuple[Mode, Mode]]()
     for scope in quick_scopes():
         exploration = Exploration(scope, robot)
@@ -48,7 +48,7 @@ def test_there_is_one_fault_of_each_combination() -> None:
 
 
 def rows_without(*texts: str) -> Patch:
-    """A table of modes without these causes."""
+    """Return a patch that removes the rows with these causes from the table of modes."""
 
     def patch(monkeypatch: pytest.MonkeyPatch) -> None:
         kept = [row for row in TRANSITIONS if row.cause.text not in texts]

@@ -27,7 +27,7 @@ OWN = ("tests.folders", "tests.mutants")
 
 
 def load_libraries(subject: Subject) -> None:
-    """Import what the tests import, and forget our own modules again: every fork then has the libraries."""
+    """Import what the tests import, and forget our own modules again, so that every fork has the libraries."""
     for path in subject.tests:
         import_module(f"tests.{path.removesuffix('.py').replace('/', '.')}")
     for name in list(sys.modules):
@@ -36,7 +36,7 @@ def load_libraries(subject: Subject) -> None:
 
 
 def is_killed(subject: Subject, tree: ast.Module) -> bool:
-    """Whether the tests fail with it; a fork, so that nothing of the mutant stays."""
+    """Return whether the tests fail with the mutant; they run in a fork, so that nothing of it stays."""
     child = os.fork()
     if child == 0:
         signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
@@ -63,7 +63,7 @@ def _run_tests(subject: Subject, tree: ast.Module) -> int:
 
 
 def survivors_of(subject: Subject) -> tuple[int, list[str]]:
-    """The number of all mutants, and the texts of those that no test notices."""
+    """Return the number of all mutants, and the texts of those that no test notices."""
     total, survivors = 0, []
     for mutant in mutants_of(subject.module):
         total += 1
@@ -76,7 +76,7 @@ def survivors_of(subject: Subject) -> tuple[int, list[str]]:
 
 
 def check(subject: Subject) -> bool:
-    """Print the count of one module; whether every mutant is killed or listed as equivalent."""
+    """Print the counts of one module, and return whether every mutant is killed or listed as equivalent."""
     total, survivors = survivors_of(subject)
     unlisted = [text for text in survivors if text not in subject.equivalent]
     stale = subject.equivalent.keys() - set(survivors)

@@ -1,8 +1,8 @@
 """Mutants of a module: each changes one position of its source, and the module's tests must notice.
 
-A mutant turns a comparison round or moves its boundary, exchanges `and` with `or`, plus with minus, times with
-division, min with max; changes a constant; takes `not` or a sign away; makes a condition true or false; returns
-nothing; or leaves a statement out. Names, annotations and texts for people are left alone.
+A mutant inverts a comparison or moves its boundary, exchanges `and` with `or`, plus with minus, times with division,
+min with max; changes a constant; removes `not` or a sign; makes a condition true or false; returns nothing; or leaves a
+statement out. Names, annotations and messages are left alone.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ Change = tuple[str, Callable[[], None]]
 
 class Mutant(NamedTuple):
     line: int
-    text: str  # what was done to which source, without the line, which moves
+    text: str  # the change and its source, without the line, which moves
     tree: ast.Module
 
 
 def changes_of(node: ast.AST) -> Iterator[Change]:
-    """What may be done to one node, each as a text and a deed."""
+    """Yield the changes of one node, each as a text and a function that applies it."""
     match node:
         case ast.Compare(ops=operators):
             for position, operator in enumerate(operators):
@@ -95,7 +95,7 @@ def _other(value: object) -> object:
 
 
 def omissions_of(node: ast.AST) -> Iterator[Change]:
-    """Statements that may be left out of a body."""
+    """Yield the changes that leave a statement out of a body."""
     for body in (getattr(node, name, None) for name in ("body", "orelse")):
         if isinstance(body, list):
             for position, statement in enumerate(body):
@@ -106,7 +106,7 @@ def omissions_of(node: ast.AST) -> Iterator[Change]:
 
 
 def _ends_anyway(node: ast.AST, statement: ast.stmt) -> bool:
-    """Whether a statement returns nothing where its function ends."""
+    """Return whether a statement returns nothing at the end of its function."""
     last = isinstance(node, ast.FunctionDef) and statement is node.body[-1]
     return last and isinstance(statement, ast.Return) and (statement.value is None or _is_nothing(statement.value))
 
@@ -116,7 +116,7 @@ def _leaver(body: list[ast.stmt], position: int) -> Callable[[], None]:
 
 
 def _nodes(tree: ast.Module) -> Iterator[ast.AST]:
-    """Of code that runs: no imports, no annotations, no texts for people."""
+    """Yield the nodes of code that runs: no imports, no annotations, no messages."""
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
@@ -134,7 +134,7 @@ def _is_message(node: ast.AST) -> bool:
 
 
 def _is_nothing(value: ast.expr) -> bool:
-    """Whether a caller that asks for truth or for None cannot tell it from nothing."""
+    """Return whether a caller that tests for truth or for None cannot distinguish the value from nothing."""
     return isinstance(value, ast.Constant) and (value.value is None or value.value is False)
 
 
