@@ -38,7 +38,7 @@ def stance_duration_s(gait: GaitParameters) -> float:
 
 
 def top_speed_m_s(gait: GaitParameters) -> float:
-    """Return the top speed of the arms' ends over the path of the sweep, with a ramp of half a cosine at either end."""
+    """Return the arms' top speed, at which they cover the sweep with a ramp of half a cosine at either end."""
     return 2.0 * LENGTH_M * sin(radians(gait.sweep_angle_deg)) / (stance_duration_s(gait) - RAMP_S)
 
 

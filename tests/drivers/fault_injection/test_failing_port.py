@@ -47,7 +47,7 @@ ON_THE_LEFT = [
 
 
 class Traffic(NamedTuple):
-    """What passed a port: (tick, payload) by arbitration id, the commands before the port, and the port's counters."""
+    """The frames that passed a port, as (tick, payload) by arbitration id, the commands before it, and its counters."""
 
     received: dict[int, list[tuple[int, bytes]]]
     sent: dict[int, list[tuple[int, bytes]]]

@@ -1,4 +1,4 @@
-"""What one drive shows over time: restarts, a duplicate node id, the settings of its watchdog."""
+"""The state of one drive over time: restarts, a duplicate node id, the settings of its watchdog."""
 
 from __future__ import annotations
 

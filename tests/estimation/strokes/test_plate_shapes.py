@@ -34,7 +34,7 @@ def drawn(geometry: FlipperGeometry) -> tuple[Corner, ...]:
 
 @cache
 def pieces_of(geometry: FlipperGeometry) -> tuple[np.ndarray, np.ndarray, float]:
-    """Positions outward and upward of the pieces within the mounted plate, and the area of one."""
+    """Return the positions outward and upward of the pieces within the mounted plate, and the area of one piece."""
     turn = radians(geometry.plate_angle_deg)
     corners = [(u * cos(turn) - s * sin(turn), u * sin(turn) + s * cos(turn)) for u, s in drawn(geometry)]
     lowest_m = min(s for _, s in corners)
@@ -48,7 +48,7 @@ def pieces_of(geometry: FlipperGeometry) -> tuple[np.ndarray, np.ndarray, float]
 
 
 def moments_m4(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> tuple[float, float]:
-    """Ψ and Φ of control/plate, piece by piece."""
+    """Return Ψ and Φ of control/plate, summed piece by piece."""
     u, s, piece_m2 = pieces_of(geometry)
     edge_m = geometry.depth_m(sweep_rad, adduction_rad) - SURFACE_M
     depths_m = edge_m - u * cos(sweep_rad) * sin(adduction_rad) - s * cos(adduction_rad)
@@ -65,7 +65,7 @@ def batch(geometry: FlipperGeometry, depth_m: float, sweep_rad: float, travel_m:
 
 
 def stroke(geometry: FlipperGeometry, k_n_m3: float) -> list[Batch]:
-    """From 1 cm above the mud to a depth of 3 cm, at the front end of the sweep."""
+    """Return the batches of a stroke from 1 cm above the mud to a depth of 3 cm, at the front end of the sweep."""
     poses = [batch(geometry, depth_m, radians(30.0), depth_m) for depth_m in np.arange(-0.01, 0.03, 0.0015).tolist()]
     return [p._replace(adduction_nm=k_n_m3 * moments_m4(geometry, p.sweep_rad, p.adduction_rad)[1]) for p in poses]
 
