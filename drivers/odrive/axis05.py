@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, Outlet
-from drivers.odrive import codec05
+from drivers.odrive import codec, codec05
 from drivers.odrive.cansimple_axis import CanSimpleAxis
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.drive_settings import DriveSettings
@@ -101,7 +101,8 @@ class Odrive05Axis(CanSimpleAxis):
         if not self._absent:
             self._compare_counts(count, turns)
         elif self._proof.concluded:
-            self._receive_motion(turns, self._turns_s(turns - self._turns, now_s - self._angle_stamp_s), now_s)
+            turns_s = self._turns_s(turns - self._turns, now_s - self._angle_stamp_s)
+            super()._receive_encoder(codec.GET_ENCODER_ESTIMATES.encode(turns, turns_s), now_s)
         self._turns = turns
 
     def _turns_s(self, moved_turns: float, elapsed_s: float) -> float:

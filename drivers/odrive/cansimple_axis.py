@@ -93,9 +93,6 @@ class CanSimpleAxis:
     def _receive_encoder(self, data: bytes, now_s: float) -> None:
         turns, turns_s = codec.GET_ENCODER_ESTIMATES.decode(data)
         _require_finite(turns + turns_s)
-        self._receive_motion(turns, turns_s, now_s)
-
-    def _receive_motion(self, turns: float, turns_s: float, now_s: float) -> None:
         if now_s - self._angle_stamp_s > RESTART_SILENCE_S:
             self._on_silence()
         self._duplicates.on_reading(turns, self._read_s)
@@ -113,8 +110,10 @@ class CanSimpleAxis:
         self._current_a = self._current_sign * measured_a
         self._current_stamp_s = now_s
         if self.closed_loop:
-            velocity_rad_s = self.parameters.sign * self._velocity_rad_s
-            self.setpoints.on_report(setpoint_a * self._setpoint_nm_a, velocity_rad_s)
+            parameters = self.parameters
+            setpoint_a *= self._current_sign * parameters.sign
+            velocity_rad_s = parameters.sign * self._velocity_rad_s
+            self.setpoints.on_report(setpoint_a * parameters.torque_constant_nm_a, velocity_rad_s)
 
     def _idle_current_a(self, data: bytes, measured_a: float) -> float:
         """Returns the current of an idle drive, which reports that it measures none."""
