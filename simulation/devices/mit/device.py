@@ -52,6 +52,7 @@ class SimulatedMit:
         self.registers = first_values(self.parameters, self._model) | self.stored
         self.status = codec.DISABLED
         self._command = AT_REST
+        self._limp = False  # a CubeMars whose watchdog has expired: in the mode, without torque
         self._fed_s = self._stepped_s = now_s
         self._torque_nm = 0.0  # of the motor, by the drive's own torque constant
         self._rad = self._rad_s = self._reported_rad = 0.0
@@ -135,7 +136,7 @@ class SimulatedMit:
 
     @property
     def energised(self) -> bool:
-        return self.status == codec.ENABLED
+        return self.status == codec.ENABLED and not self._limp
 
     @energised.setter
     def energised(self, energised: bool) -> None:
@@ -163,19 +164,20 @@ class SimulatedMit:
     def torque_nm(self, now_s: float) -> float:
         """Returns the torque that the motor exerts at the joint now."""
         expired = 0.0 < self.registers[TIMEOUT] * TIMEOUT_UNIT_S < now_s - self._fed_s
-        if expired and self.energised and self._model.has_registers:
+        self._limp = expired and not self._model.has_registers
+        if expired and self.energised:
             self.trip(DriveError.WATCHDOG)
         torque_nm = 0.0
         if self.energised:
-            torque_nm = self._computed_nm(now_s, expired)
+            torque_nm = self._computed_nm(now_s)
         else:
             self._torque_nm = 0.0
         self._stepped_s = now_s
         return joint_torque_nm(self.parameters, torque_nm, self._rad / TURN_RAD)
 
-    def _computed_nm(self, now_s: float, expired: bool) -> float:
+    def _computed_nm(self, now_s: float) -> float:
         """Returns the torque by the drive's own torque constant, after its limits and the lag of the current."""
-        parameters, command = self.parameters, AT_REST if expired else self._command
+        parameters, command = self.parameters, self._command
         torque_nm = command.torque_nm + command.kp_nm_rad * (command.position_rad - self._rad)
         torque_nm += command.kd_nm_s_rad * (command.velocity_rad_s - self._rad_s)
         largest_nm = parameters.motor_current_limit_a * parameters.torque_constant_nm_a

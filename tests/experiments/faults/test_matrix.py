@@ -123,6 +123,19 @@ def test_a_failure_that_a_drive_cannot_show_is_injected_and_its_energy_bounded()
     assert Plan(drive="mit").differences["voltage_under"].startswith("any reaction, or none: ")
 
 
+@pytest.mark.parametrize(
+    ("name", "drive"),
+    [
+        ("position_silent", "mit"),
+        ("drive_error, by another program's stop", "mit:AK80-9"),
+        ("torque_missing", "mit"),
+        ("drive_silent", "mit:AK80-9"),
+    ],
+)
+def test_a_drive_in_mit_mode_shows_a_failure_as_its_protocol_can(name: str, drive: str) -> None:
+    assert run_cell(name, "hold", 1, drive).why == []
+
+
 def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     name = "none, wall clock +0.01 s"
     assert run_cell(name, "stance", 1).ok

@@ -125,7 +125,8 @@ def test_without_commands_a_cubemars_is_limp_and_reports_nothing() -> None:
     bench = Bench(model="AK80-9")
     bench.ask(codec.ENTER)
     bench.command(0.5)
-    assert abs(bench.torque_after(0.2)) < 1e-9
+    assert bench.drive.energised
+    assert abs(bench.torque_after(0.2)) < 1e-9 and not bench.drive.energised
     answer = bench.command(0.5)
     assert (answer.status, answer.fault) == (0, 0)
     assert bench.torque_after(0.001) == pytest.approx(0.5, abs=bench.model.torque_step_nm)
