@@ -59,9 +59,10 @@ def submerged_plate(
 
 def submerged_part(geometry: FlipperGeometry, depth_m: float, per_outward: float, per_upward: float) -> SubmergedPlate:
     """Return the integrals from the depth of the edge's middle, its gain outward and its loss upward."""
-    q = per_upward
+    q, plate = per_upward, geometry.plate
+    top_is_dry = depth_m + abs(per_outward) * plate.reach_m <= plate.lowest_top_m * q
     area_m2 = outward_m3 = upward_m3 = depth_m3 = depth_outward_m4 = depth_upward_m4 = 0.0
-    for inner_m, outer_m, height_m, outer_height_m, slope, sign in geometry.plate.edges:
+    for inner_m, outer_m, height_m, outer_height_m, slope, sign in plate.lower_edges if top_is_dry else plate.edges:
         low_m = depth_m - height_m * q + per_outward * inner_m
         high_m = depth_m - outer_height_m * q + per_outward * outer_m
         from_m = inner_m
@@ -114,6 +115,8 @@ def growth_exponent(geometry: FlipperGeometry, depth_m: float) -> float:
 
     d/dz ∫ζ dA = A, so z A / ∫ζ dA = n + 1.
     """
+    if geometry.has_level_rectangle:
+        return 1.0
     return 2.0 * mean_width_m(geometry, depth_m) / moment_width_m(geometry, depth_m) - 1.0
 
 

@@ -29,6 +29,9 @@ class PlateOutline(NamedTuple):
 
     corners: tuple[Corner, ...]  # counter-clockwise, seen with outward to the right
     edges: tuple[Edge, ...]
+    lower_edges: tuple[Edge, ...]  # all that count where the upper ones are dry
+    lowest_top_m: float  # least height of an upper edge
+    reach_m: float  # of the farthest corner from the origin, outward or inward
     lower_corners: tuple[Corner, ...]  # those that can be the deepest one of a plate that stands up
 
     @property
@@ -63,7 +66,15 @@ def mounted_outline(corners: Sequence[Corner], angle_deg: float = 0.0) -> PlateO
         turned = [_turned(corner, radians(angle_deg)) for corner in around]
         lowest_m = min(upward_m for _, upward_m in turned)
         around = tuple((outward_m, upward_m - lowest_m) for outward_m, upward_m in turned)
-    return PlateOutline(around, tuple(_edges(around)), tuple(lower_hull(around)))
+    edges = tuple(_edges(around))
+    return PlateOutline(
+        corners=around,
+        edges=edges,
+        lower_edges=tuple(edge for edge in edges if edge[5] > 0.0),
+        lowest_top_m=min((min(edge[2:4]) for edge in edges if edge[5] < 0.0), default=0.0),
+        reach_m=max((abs(outward_m) for outward_m, _ in around), default=0.0),
+        lower_corners=tuple(lower_hull(around)),
+    )
 
 
 def _turned(corner: Corner, angle_rad: float) -> Corner:
