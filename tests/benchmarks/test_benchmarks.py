@@ -202,7 +202,7 @@ def test_help_describes_the_benchmark(name: str, capsys: pytest.CaptureFixture[s
 
 
 def test_summary_is_of_ordered_microseconds() -> None:
-    durations_s = [place * 1e-6 for place in range(101)]
+    durations_s = [number * 1e-6 for number in range(101)]
     assert summary_us(durations_s[::-1]) == {"median": 50.0, "p99": 99.0, "max": 100.0}
     assert summary_us([]) == {"median": 0.0, "p99": 0.0, "max": 0.0}
 

@@ -74,7 +74,7 @@ def test_a_walk_reads_the_flippers_summary_as_its_truth(
         (["experiment", "walk", "--mud", "47.6", "--mud", "47.6=30"], "two muds have the same name"),
     ],
 )
-def test_what_cannot_be_is_refused_before_anything_begins(
+def test_impossible_options_are_refused_before_anything_begins(
     arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([*arguments, "--out", str(tmp_path / "none")]) == exit_codes.USAGE
@@ -82,7 +82,7 @@ def test_what_cannot_be_is_refused_before_anything_begins(
     assert not (tmp_path / "none").exists()
 
 
-def test_a_truth_that_is_none_is_refused_before_anything_begins(
+def test_an_invalid_truth_file_is_refused_before_anything_begins(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([*FLIPPER, "--truth", str(tmp_path / "none"), "--out", str(tmp_path / "out")]) == exit_codes.REFUSED

@@ -46,7 +46,7 @@ def test_a_command_that_has_answered_adds_no_error(tmp_path: Path) -> None:
     assert isinstance(json.loads(ended.stdout), list)
 
 
-def test_an_earlier_command_leaves_nothing_behind() -> None:
+def test_an_earlier_command_leaves_no_state() -> None:
     run("log", "info", "/none.mcap", "--json")
     assert len(json.loads(run("log", "info", "/other.mcap", "--json").stdout)["messages"]) == 1
 

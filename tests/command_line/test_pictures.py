@@ -196,7 +196,7 @@ def test_without_a_known_sweep_no_geometric_step_is_drawn(two_walks: Path, tmp_p
     assert panel(figure, "step").get_legend_handles_labels()[1] == ["unknown"]
 
 
-def test_without_a_pose_there_are_no_panels_of_place(two_walks: Path, tmp_path: Path) -> None:
+def test_without_a_pose_there_are_no_panels_of_position(two_walks: Path, tmp_path: Path) -> None:
     walk = read_walk(two_walks, 1)
     figure = drawn(walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)), tmp_path / "walk.png")
     labels = [axes.get_ylabel().split()[0] for axes in figure.axes if axes.get_ylabel()]
@@ -204,7 +204,7 @@ def test_without_a_pose_there_are_no_panels_of_place(two_walks: Path, tmp_path: 
 
 
 @pytest.mark.filterwarnings("error")
-def test_strides_that_say_nothing_are_no_trouble(two_walks: Path, tmp_path: Path) -> None:
+def test_strides_without_usable_estimates_are_drawn(two_walks: Path, tmp_path: Path) -> None:
     """Estimates may be NaN, infinite, negative, or missing in a walk without duration."""
     walk = read_walk(two_walks, 1)
     values = ((np.nan, np.nan), (np.inf, 1.0), (1e6, np.inf), (-1e6, 1.0))
@@ -232,7 +232,7 @@ def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_
     ]
 
 
-def test_muds_that_read_alike_are_told_apart_by_time_and_those_without_value_say_so(two_walks: Path) -> None:
+def test_muds_with_equal_values_are_distinguished_by_time_and_those_without_a_value_are_marked(two_walks: Path) -> None:
     walk = read_walk(two_walks, 1)
     second = walk.own_strides[1]
     alike = walk._replace(noticed_s=[second["stamp_s"]], strides=[s | {"k_p": 1e6} for s in walk.strides])
@@ -327,7 +327,9 @@ def test_without_matplotlib_a_sentence_says_what_to_install(log: Path) -> None:
     assert ended.stderr.count("extra 'plots'") == len(commands) and "Traceback" not in ended.stderr
 
 
-def test_another_missing_module_is_no_matter_of_pictures(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_missing_module_is_not_reported_as_missing_matplotlib(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delitem(sys.modules, "experiments.pictures.walk_plot", raising=False)
     monkeypatch.setitem(sys.modules, "experiments.pictures.mud_layout", None)
     with pytest.raises(ModuleNotFoundError):

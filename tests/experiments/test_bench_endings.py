@@ -79,11 +79,11 @@ def last_angles_rad(folder: Path) -> np.ndarray:
     return angles
 
 
-@pytest.mark.parametrize("place", [2, 17, 40, 51, 68])
+@pytest.mark.parametrize("waits", [2, 17, 40, 51, 68])
 def test_ctrl_c_wherever_an_experiment_waits_ends_it_with_raised_flippers(
-    robot: InterruptedRobot, tmp_path: Path, place: int
+    robot: InterruptedRobot, tmp_path: Path, waits: int
 ) -> None:
-    robot.waits_left = place
+    robot.waits_left = waits
     with pytest.raises(KeyboardInterrupt):
         experiment(robot)
     leave(robot, OPERATOR, tmp_path)

@@ -16,7 +16,7 @@ from firmware_host.log_reading.replay import replay_files
 from tests.folders import SHARED_DATA
 
 FOLDER = SHARED_DATA / "flipper_in_mud"
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the shared measurements are not beside the repository")
+pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the shared measurements are not next to the repository")
 
 
 @cache

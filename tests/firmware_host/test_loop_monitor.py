@@ -196,7 +196,7 @@ def test_rows_that_a_dead_writer_does_not_take_are_no_second_fault() -> None:
     assert log_faults(HEALTHY._replace(alive=False, dropped=9)) == ["recorder_dead"]
 
 
-def test_no_trouble_of_the_log_stops_a_robot_and_what_cannot_be_written_stands_against_arming() -> None:
+def test_no_fault_of_the_log_stops_a_robot_and_an_unwritable_log_blocks_arming() -> None:
     ill = LogReport(True, 3, "No space left on device.", 0.0, 0, 9.0)
     faults = LogMonitor(BOUNDS).update(ill) + LogMonitor(BOUNDS).update(HEALTHY._replace(alive=False))
     assert {fault.kind.reaction for fault in faults} == {Reaction.WARN}

@@ -52,7 +52,7 @@ def test_a_replay_is_that_of_the_command() -> None:
     assert repr(mudskipper.replay(str(LOG), method="paper").strides) != expected
 
 
-def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_log_is_refused(tmp_path: Path) -> None:
     with pytest.raises(mudskipper.LogError):
         mudskipper.open_log(tmp_path / "none.mcap")
 

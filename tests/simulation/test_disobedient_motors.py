@@ -72,7 +72,7 @@ def test_damping_with_an_inverted_motor_ends_before_the_joint_is_fast() -> None:
     assert energy.peak_speed_rad_s < 30.0 and energy.energy_j < 0.3
 
 
-def test_damping_ends_where_a_current_stands_against_it() -> None:
+def test_damping_ends_if_a_current_opposes_it() -> None:
     bench = made("hold")
     with damped_against_command(bench, "left_sweep"):
         assert bench.run_until(lambda: "damping_failed" in faults_of(bench), 0.2)
@@ -80,7 +80,7 @@ def test_damping_ends_where_a_current_stands_against_it() -> None:
 
 
 @pytest.mark.parametrize("stiffness_nm_rad", [50.0, 200.0])
-def test_a_pose_held_too_stiffly_is_let_go(stiffness_nm_rad: float) -> None:
+def test_a_pose_held_too_stiffly_ends_in_a_fault(stiffness_nm_rad: float) -> None:
     bench = made("stopping")
     controller = bench.loop.controller
     controller.gains = replace(
@@ -91,7 +91,7 @@ def test_a_pose_held_too_stiffly_is_let_go(stiffness_nm_rad: float) -> None:
     assert energy.energy_j < 1.0
 
 
-def test_a_gentle_push_and_a_stop_raise_nothing() -> None:
+def test_a_gentle_push_and_a_stop_cause_no_fault() -> None:
     """The push is 0.3 N·m for a quarter of a second in each direction."""
     bench = made("hold")
     arm = bench.robot.plant.arms[0]

@@ -38,7 +38,7 @@ FROZEN_S, JUMP_M = 0.5, 0.02
 BOUND_M = 0.003
 LATENCIES_S = (0.0, 0.008)  # from exposure to arrival: none, and a usual one
 
-pytestmark = pytest.mark.skipif(not WALKS, reason="the shared measurements are not beside the repository")
+pytestmark = pytest.mark.skipif(not WALKS, reason="the shared measurements are not next to the repository")
 each_walk = pytest.mark.parametrize("path", WALKS, ids=lambda path: path.name.removesuffix(".csv.gz"))
 each_latency = pytest.mark.parametrize("latency_s", LATENCIES_S)
 

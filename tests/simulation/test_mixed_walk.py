@@ -24,14 +24,14 @@ STRIDES = 12
 
 
 def mixed(text: str, other_type: str) -> str:
-    """A left flipper of ODrives and a right one of another type."""
+    """Return the configuration with a left flipper of ODrives and a right one of another type."""
     left, right = text.split("[bus.right]")
     other = with_drive_type(text, other_type).split("[bus.right]")[1]
     for joint in ("left_sweep", "left_adduction"):
         section = f"[drive.{joint}]"
         own = right[right.index(section) : right.index("\n\n", right.index(section))]
-        strange = other[other.index(section) : other.index("\n\n", other.index(section))]
-        other = other.replace(strange, own)
+        replaced = other[other.index(section) : other.index("\n\n", other.index(section))]
+        other = other.replace(replaced, own)
     return left + "[bus.right]" + other
 
 
@@ -62,7 +62,7 @@ def mud() -> Mapping[str, float]:
 
 
 @pytest.mark.parametrize("drives", ["odrive05", "moteus", "mit", "mixed", "both firmwares"])
-def test_the_mud_is_the_same_whatever_the_drives(drives: str, mud: Mapping[str, float]) -> None:
+def test_the_mud_is_the_same_with_any_drives(drives: str, mud: Mapping[str, float]) -> None:
     assert walked(drives) == pytest.approx(dict(mud), rel=0.02)
 
 

@@ -116,7 +116,7 @@ def test_in_the_muds_of_the_paper_nothing_is_recovered_and_nothing_is_a_fault(
     assert all(stride.estimate.released for stride in robot.loop.learning.strides)
 
 
-def test_where_flippers_come_out_in_time_no_tick_is_waited(
+def test_if_flippers_come_out_in_time_the_gait_does_not_wait(
     configuration: Configuration, two_strides: TwoStrides
 ) -> None:
     robot, _ = two_strides(2.6, 0.03)
@@ -188,7 +188,7 @@ def test_one_flipper_alone_is_named_and_its_stride_alone_was_not_released(config
     assert released == {"left": True, "right": False}
 
 
-def test_mud_that_lets_nothing_go_ends_in_a_fault_without_torque_in_bounded_time(recovering: Lockstep) -> None:
+def test_mud_that_never_releases_a_flipper_ends_in_a_fault_without_torque_in_bounded_time(recovering: Lockstep) -> None:
     robot, recorder = recovering, recovering.loop.recorder
     assert isinstance(recorder, EventRecorder)
     began_s = robot.now_s

@@ -68,7 +68,7 @@ def test_the_unit_starts_the_daemon_that_this_project_installs(unit: Settings) -
     assert (option, path) == ("--config", f"/etc/{only(unit, 'ConfigurationDirectory')}/mudskipper.toml")
 
 
-def test_a_person_who_starts_the_daemon_without_options_gets_the_same_configuration(
+def test_an_operator_who_starts_the_daemon_without_options_gets_the_same_configuration(
     unit: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[Path] = []
@@ -82,7 +82,7 @@ def test_a_person_who_starts_the_daemon_without_options_gets_the_same_configurat
     assert asked == [Path(unit["ExecStart"][-1])]
 
 
-def test_the_socket_is_in_the_unit_s_runtime_directory_which_everybody_may_enter_who_may_stop(
+def test_the_socket_is_in_the_unit_s_runtime_directory_which_every_user_may_enter_who_may_stop(
     unit: Settings, configuration: Configuration
 ) -> None:
     assert Path(configuration.status.socket).parent == Path("/run") / only(unit, "RuntimeDirectory")

@@ -70,8 +70,8 @@ def test_the_virtual_machine_is_installed_by_the_guide_s_commands() -> None:
         *("apt install", "git clone"),  # the base system has the packages, and the working tree is copied instead
         *("mudskipper doctor", "systemctl status", "mudskipper simulate"),  # need a running system
     ]
-    places = [script.index(f"\n{{ {command}") for command in commands if command not in left_out]
-    assert places == sorted(places)
+    positions = [script.index(f"\n{{ {command}") for command in commands if command not in left_out]
+    assert positions == sorted(positions)
 
 
 def test_the_virtual_machine_installs_the_locked_requirements_and_nothing_else() -> None:

@@ -19,7 +19,7 @@ def with_pose(configuration: Configuration, pose: PoseParameters) -> Configurati
     return replace(configuration, pose=pose)
 
 
-def test_a_robot_without_a_source_is_told_nothing_of_it(configuration: Configuration) -> None:
+def test_a_robot_without_a_pose_source_has_no_line_for_it(configuration: Configuration) -> None:
     assert _pose_items(configuration) == []
 
 
@@ -30,7 +30,7 @@ def test_a_source_that_does_not_open_fails(configuration: Configuration) -> None
     assert not item["ok"] and "/dev/nothing does not open" in item["text"] and item["fix"]
 
 
-def test_motion_capture_is_listened_to(configuration: Configuration) -> None:
+def test_motion_capture_is_received(configuration: Configuration) -> None:
     with NatNetServer() as server:
         natnet = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
         looked_at = with_pose(configuration, PoseParameters("natnet", natnet=natnet))

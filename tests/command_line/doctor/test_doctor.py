@@ -23,7 +23,7 @@ from tests.waiting import LONGEST_S
 LINES = {"configuration", "kernel", "governor", "processors", "interrupts", "disk", "log", "clock", "daemon"}
 
 
-def made_up_status(**changes: Any) -> dict[str, Any]:
+def synthetic_status(**changes: Any) -> dict[str, Any]:
     drives = [{"joint": joint, "watchdog_s": 0.1} for joint in JOINTS]
     return {"version": "1.0", "mode": "idle", "drives": drives} | changes
 
@@ -58,17 +58,17 @@ def test_a_wrong_configuration_fails_line_by_line(tmp_path: Path, capsys: pytest
 )
 def test_a_drive_without_a_watchdog_that_is_quick_enough_fails(watchdog_s: float | None, level: Level) -> None:
     drives = [{"joint": "left_sweep", "watchdog_s": watchdog_s}]
-    found = {finding.id: finding.level for finding in examine_daemon(made_up_status(drives=drives), "1.0", 0.3)}
+    found = {finding.id: finding.level for finding in examine_daemon(synthetic_status(drives=drives), "1.0", 0.3)}
     assert found == {"daemon": Level.OK, "watchdog.left_sweep": level}
 
 
 def test_a_daemon_of_another_version_is_warned_of() -> None:
-    found = next(iter(examine_daemon(made_up_status(), "1.1", 0.3)))
+    found = next(iter(examine_daemon(synthetic_status(), "1.1", 0.3)))
     assert found.level is Level.WARN
     assert "1.0" in found.text and "1.1" in found.text
 
 
-def test_a_running_daemon_tells_its_process_its_drives_and_its_limits(bench: Bench) -> None:
+def test_a_running_daemon_reports_its_process_its_drives_and_its_limits(bench: Bench) -> None:
     configuration = load_configuration(bench.configuration)
     found = {finding.id: finding for finding in examine_all(configuration, bench.socket, {})}
     assert found["daemon"].level is Level.OK

@@ -30,7 +30,7 @@ def make_bench(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> Benc
 
 
 @pytest.mark.parametrize("name", WATCHDOG)
-def test_what_differs_is_written_backed_up_and_restored(
+def test_different_settings_are_written_backed_up_and_restored(
     folder: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     config = ("--config", str(make_bench(folder, monkeypatch, name).config))

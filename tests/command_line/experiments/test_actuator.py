@@ -66,9 +66,9 @@ def test_one_command_calibrates_a_motor_and_changes_a_copy_of_the_configuration(
     coarse = [*SHORT, "--out", str(tmp_path), "--lever-tolerance", "10"]
     assert main(coarse) == exit_codes.OK  # all readings exist, so only the fit runs again
     assert "right_sweep" in capsys.readouterr().out
-    (doubtful,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["joints"]
-    assert doubtful["torque_constant_tolerance_nm_a"] == pytest.approx(0.048 * TRUE_CONSTANT_NM_A, rel=0.02)
-    assert doubtful["friction_error_nm"] > joint["friction_error_nm"]
+    (uncertain,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["joints"]
+    assert uncertain["torque_constant_tolerance_nm_a"] == pytest.approx(0.048 * TRUE_CONSTANT_NM_A, rel=0.02)
+    assert uncertain["friction_error_nm"] > joint["friction_error_nm"]
     assert main([*SHORT, "--out", str(tmp_path), "--lever", "10"]) == exit_codes.REFUSED
     assert "lever_m = 0.12" in capsys.readouterr().err
 
@@ -84,7 +84,7 @@ def test_weights_that_the_robot_cannot_hold_are_refused_before_anything_moves(
 @pytest.mark.parametrize(
     "options", [["--weights", "heavy"], ["--weights", "100"], ["--lever", "0"], ["--trials", "0"], ["--joint", "knee"]]
 )
-def test_what_makes_no_plan_is_bad_usage(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_without_a_valid_plan_are_wrong_usage(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["experiment", "actuator", "--simulated", *options])
     assert ended.value.code == exit_codes.USAGE
@@ -97,7 +97,7 @@ def test_a_missing_daemon_is_reported_with_how_to_start_it(tmp_path: Path, capsy
     assert "no daemon answers" in capsys.readouterr().err
 
 
-def test_an_operator_at_a_terminal_is_asked_and_may_skip_weights(
+def test_an_operator_at_a_terminal_is_prompted_and_may_skip_weights(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The robot is simulated in lockstep and no weight is ever hung on it, so only the empty arm is read."""
@@ -160,9 +160,11 @@ def test_a_file_that_may_not_be_written_is_refused_before_the_work(
 def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:
     path, plan, reported = tmp_path / "mudskipper.toml", Plan(("right_sweep",), trials=4), list[str]()
     path.write_text(example_text, encoding="utf-8")
-    doubtful, good = (fit_joint("right_sweep", plan, make_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02))
-    assert doubtful is not None and good is not None
-    assert "needs no change" in apply_fits(path, [doubtful], make_session(tmp_path, reported))[0]
+    uncertain, good = (
+        fit_joint("right_sweep", plan, make_entries(plan, noise_a=noise), 0.083) for noise in (3.0, 0.02)
+    )
+    assert uncertain is not None and good is not None
+    assert "needs no change" in apply_fits(path, [uncertain], make_session(tmp_path, reported))[0]
     assert "is not written" in reported[0] and path.read_text(encoding="utf-8") == example_text
     assert "is changed" in apply_fits(path, [good], make_session(tmp_path, reported))[0]
     assert "+torque_constant_nm_a = 0.07" in reported[-1]
@@ -172,7 +174,7 @@ def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, 
     assert written.friction["right_sweep"].viscous_nm_s == pytest.approx(good.viscous_nm_s[0], abs=1e-4)
 
 
-def test_what_cannot_be_applied_costs_no_report(tmp_path: Path, example_text: str) -> None:
+def test_a_fit_that_cannot_be_applied_is_still_reported(tmp_path: Path, example_text: str) -> None:
     plan, path = Plan(("right_sweep",), trials=4), tmp_path / "mudskipper.toml"
     path.write_text(example_text, encoding="utf-8")
     entries = {key: entry | {"current_a": 2.0 * entry["current_a"]} for key, entry in make_entries(plan).items()}

@@ -153,9 +153,7 @@ def test_measurements_remain_however_the_experiment_ends(
     assert Notebook(tmp_path, {}).entries
 
 
-def test_where_nothing_was_measured_nothing_is_said_to_be_there(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_a_measurement_no_result_is_announced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def run(session: Session) -> Finding:
         Notebook(session.folder, {})
         raise DaemonLostError("no daemon answers")

@@ -18,7 +18,7 @@ LABLOGS = ("experiment", "lablogs")
 LOGS = SHARED_DATA / "flipper_in_mud"
 NAMES = ("single_12N_trial1", "single_12N_trial4", "walk_15.6N_30mm_trial3")
 REPEATABILITY = {"first_cv", "later_cv", "chi", "n", "values", "bounds", "invalid"}
-measured = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared measurements are not beside the repository")
+measured = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared measurements are not next to the repository")
 
 
 def test_folders_patterns_and_groups_that_lead_nowhere_are_refused(

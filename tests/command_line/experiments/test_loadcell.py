@@ -87,7 +87,7 @@ def test_the_error_contains_the_part_that_all_trials_share(report: dict[str, Any
     )
 
 
-def test_another_mud_is_added_to_what_is_there(
+def test_another_mud_is_added_to_the_report(
     report: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, data, reported = run(capsys, *SHORT, "--mud", "50.3", "--out", str(folder / "out"))
@@ -122,7 +122,7 @@ def test_another_depth_in_the_same_folder_is_refused(
         (["--port", "/dev/nothing", "--position", "/dev/../dev/nothing"], "two ports"),
     ],
 )
-def test_what_cannot_be_is_refused_at_once(
+def test_impossible_options_are_refused_at_once(
     capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     status, _, reported = run(capsys, "experiment", "loadcell", *arguments)
@@ -153,7 +153,7 @@ def test_a_file_that_is_no_summary_is_refused_by_its_name(tmp_path: Path, text: 
         load_flipper(tmp_path)
 
 
-def test_muds_are_compared_by_what_their_names_mean() -> None:
+def test_muds_are_compared_by_the_meaning_of_their_names() -> None:
     reported = MudCoefficient(1.0e6, 1e4, (1.0e6,), 0.0)
     muds = {"48.6": dict.fromkeys(("k_p", "k_s", "k_e"), reported), "Pond": {"k_p": reported}}
     flipper = {

@@ -168,7 +168,7 @@ def test_depths_and_force_follow_the_geometry(length_m: float) -> None:
         (("--node", "left_sweep=1", "--node", "right_sweep=1"), exit_codes.CONFIGURATION, "has the same on bus"),
     ],
 )
-def test_what_the_daemon_would_refuse_is_not_written(
+def test_a_file_that_the_daemon_would_refuse_is_not_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], status: int, words: str
 ) -> None:
     path = tmp_path / "robot.toml"

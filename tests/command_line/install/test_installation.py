@@ -75,12 +75,12 @@ class Machine:
         """Return this folder as a system that is running."""
         return System(self.root, PREFIX, self.run, live=True)
 
-    def text(self, place: str) -> str:
-        return (self.root / place).read_text(encoding="utf-8")
+    def text(self, location: str) -> str:
+        return (self.root / location).read_text(encoding="utf-8")
 
-    def edit(self, place: str) -> str:
-        edited = self.text(place) + "\n# mine\n"
-        (self.root / place).write_text(edited, encoding="utf-8")
+    def edit(self, location: str) -> str:
+        edited = self.text(location) + "\n# mine\n"
+        (self.root / location).write_text(edited, encoding="utf-8")
         return edited
 
     def files(self) -> dict[str, str]:
@@ -96,10 +96,10 @@ def machine(tmp_path: Path) -> Machine:
     return Machine(tmp_path)
 
 
-def release(monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+def release(monkeypatch: pytest.MonkeyPatch, location: str) -> None:
     """Simulate a new version of the project in which one file has changed."""
     texts = load_sources(PREFIX)
-    changed = texts | {place: texts[place] + "# new\n"}
+    changed = texts | {location: texts[location] + "# new\n"}
     monkeypatch.setattr(service_plan, "load_sources", lambda prefix: changed)
 
 
@@ -111,15 +111,15 @@ def commands(plan: Plan) -> list[str]:
     return [" ".join(step.words) for step in plan.steps if isinstance(step, Command)]
 
 
-def test_all_files_are_written_readable_for_everybody_and_the_service_is_enabled(machine: Machine) -> None:
+def test_all_files_are_written_readable_for_every_user_and_the_service_is_enabled(machine: Machine) -> None:
     before = os.umask(0o077)
     try:
         assert machine.install() == exit_codes.OK
     finally:
         os.umask(before)
-    for place in SOURCES:
-        assert (machine.root / place).stat().st_mode & 0o777 == 0o644
-        assert (machine.root / place).parent.stat().st_mode & 0o777 == 0o755
+    for location in SOURCES:
+        assert (machine.root / location).stat().st_mode & 0o777 == 0o644
+        assert (machine.root / location).parent.stat().st_mode & 0o777 == 0o755
     assert machine.text(NETWORK) == (service_plan.source_folder() / "80-can.network").read_text(encoding="utf-8")
     assert "mudskipper" in machine.enabled
     assert (machine.root / LINK).is_symlink()
@@ -156,12 +156,12 @@ def test_the_second_time_there_is_nothing_to_do(machine: Machine, capsys: pytest
 def test_a_dry_run_shows_everything_and_does_nothing(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
     assert machine.install("--dry-run") == exit_codes.OK
     shown = capsys.readouterr().out
-    assert all(str(machine.root / place) in shown for place in (*SOURCES, LINK, MANIFEST))
+    assert all(str(machine.root / location) in shown for location in (*SOURCES, LINK, MANIFEST))
     assert "run systemd-sysusers" in shown
     assert (machine.files(), machine.ran) == ({}, [])
 
 
-def test_an_upgrade_replaces_what_nobody_edited(
+def test_an_upgrade_replaces_unedited_files(
     machine: Machine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     machine.install()
@@ -173,23 +173,23 @@ def test_an_upgrade_replaces_what_nobody_edited(
     assert not (machine.root / f"{NETWORK}.new").exists()
 
 
-@pytest.mark.parametrize("place", [CONFIGURATION, NETWORK])
-def test_an_upgrade_keeps_what_was_edited_and_puts_the_new_one_beside_it_once(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch, place: str
+@pytest.mark.parametrize("location", [CONFIGURATION, NETWORK])
+def test_an_upgrade_keeps_an_edited_file_and_writes_the_new_one_next_to_it_once(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, location: str
 ) -> None:
     machine.install()
-    edited = machine.edit(place)
-    assert Path(place).name not in written(plan_installation(machine.system()))
-    release(monkeypatch, place)
+    edited = machine.edit(location)
+    assert Path(location).name not in written(plan_installation(machine.system()))
+    release(monkeypatch, location)
     assert machine.install() == exit_codes.OK
-    assert machine.text(place) == edited
-    assert machine.text(f"{place}.new").endswith("# new\n")
-    (machine.root / f"{place}.new").unlink()
+    assert machine.text(location) == edited
+    assert machine.text(f"{location}.new").endswith("# new\n")
+    (machine.root / f"{location}.new").unlink()
     assert machine.install() == exit_codes.OK
-    assert not (machine.root / f"{place}.new").exists()
+    assert not (machine.root / f"{location}.new").exists()
 
 
-def test_a_running_system_is_told_to_look_again(machine: Machine) -> None:
+def test_a_running_system_reloads_the_installed_files(machine: Machine) -> None:
     for name in ("net/can0", "net/lo", "misc/cpu_dma_latency"):
         (machine.root / "sys/class" / name).mkdir(parents=True)
     assert commands(plan_installation(machine.system())) == [
@@ -204,7 +204,7 @@ def test_a_running_system_is_told_to_look_again(machine: Machine) -> None:
     ]
 
 
-def test_who_has_networkd_already_keeps_its_wait_for_the_network(machine: Machine) -> None:
+def test_a_system_with_networkd_keeps_its_wait_for_the_network(machine: Machine) -> None:
     machine.enabled.add("systemd-networkd")
     assert not [line for line in commands(plan_installation(machine.system())) if "systemd-networkd" in line]
 
@@ -219,7 +219,7 @@ def test_a_service_that_runs_is_never_restarted_under_a_robot(
     assert any("systemctl restart mudskipper" in note for note in plan.notes)
 
 
-def test_a_failure_says_what_was_done_and_the_next_run_does_the_rest(
+def test_a_failure_lists_the_finished_steps_and_the_next_run_does_the_rest(
     machine: Machine, capsys: pytest.CaptureFixture[str]
 ) -> None:
     machine.failing = "systemd-sysusers"
@@ -235,7 +235,7 @@ def test_a_failure_says_what_was_done_and_the_next_run_does_the_rest(
     assert "mudskipper" in machine.enabled
 
 
-def test_a_program_that_is_missing_is_told_before_anything_is_written(
+def test_a_missing_program_is_reported_before_anything_is_written(
     machine: Machine, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = build_parser().parse_args(["install", "--root", str(machine.root)])
@@ -250,7 +250,7 @@ def test_without_root_it_is_refused_before_anything_is_written(
     command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], machine: Machine
 ) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    monkeypatch.setattr(installation, "location_problem", lambda places: "")
+    monkeypatch.setattr(installation, "location_problem", lambda locations: "")
     monkeypatch.setattr(installation, "_perform_all", None)  # would raise
     act = install if command == "install" else uninstall
     assert act(build_parser().parse_args([command]), machine.run) == exit_codes.NOT_PERMITTED
@@ -258,10 +258,10 @@ def test_without_root_it_is_refused_before_anything_is_written(
     assert machine.ran == []
 
 
-@pytest.mark.parametrize("place", ["/home/ann/venv", "/root/venv", "/tmp/venv"])
-def test_an_environment_that_the_unit_hides_from_the_service_is_refused(place: str) -> None:
-    assert "hidden from the service" in location_problem((Path(place), PREFIX))
-    assert "hidden from the service" in location_problem((PREFIX, Path(place)))  # an editable installation
+@pytest.mark.parametrize("location", ["/home/ann/venv", "/root/venv", "/tmp/venv"])
+def test_an_environment_that_the_unit_hides_from_the_service_is_refused(location: str) -> None:
+    assert "hidden from the service" in location_problem((Path(location), PREFIX))
+    assert "hidden from the service" in location_problem((PREFIX, Path(location)))  # an editable installation
 
 
 def test_an_environment_without_the_daemon_is_refused(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def test_nonsense_is_refused_by_every_command(command: tuple[str, ...], hung: Pa
     assert "degrees.csv: line" in ended.stderr and "column leftsweeping_pos" in ended.stderr
 
 
-def test_log_info_says_what_a_csv_is(hung: Path) -> None:
+def test_log_info_describes_a_csv(hung: Path) -> None:
     info = json.loads(run("log", "info", str(hung), "--json").stdout)
     log = read_lab_csv(hung)
     assert info["schema"] == "log-info/2" and info["rows"] == len(log.stamp_s)

@@ -123,7 +123,7 @@ def test_segments_of_a_run_are_drawn_and_counted_as_one_log(walk: Path, tmp_path
     assert reported["strides"] == 4
 
 
-def test_a_walk_over_a_border_is_told(walk: Path, tmp_path: Path) -> None:
+def test_a_walk_over_a_border_of_segments_is_reported(walk: Path, tmp_path: Path) -> None:
     paths = make_segments(walk, tmp_path)
     drawn = run("plot", str(paths[1]), "--out", str(tmp_path / "walk.png")).stderr
     assert "the walk may have begun before segment 1 and continued in the next segment; give those files too" in drawn
@@ -131,7 +131,7 @@ def test_a_walk_over_a_border_is_told(walk: Path, tmp_path: Path) -> None:
     assert "not given" not in run("replay", str(paths[0])).stderr
 
 
-def test_a_picture_of_a_log_that_is_being_written_does_not_stay_beside_it(
+def test_a_picture_of_a_log_that_is_being_written_is_not_left_next_to_it(
     walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for place in (ACTIVE, "here"):

@@ -61,7 +61,7 @@ def test_a_log_that_is_being_written_is_not_taken_for_one_that_was_cut_off(
     assert [entry["state"] for entry in json.loads(capsys.readouterr().out)["logs"]] == ["whole"]
 
 
-def test_what_is_not_whole_is_listed_and_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_incomplete_logs_are_listed_and_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     contents = (folder / DONE / "1.mcap").read_bytes()
     (folder / DONE / "0.mcap").write_bytes(contents[:-100])
     (folder / "00.mcap").write_bytes(contents)
@@ -84,7 +84,7 @@ def test_what_is_not_whole_is_listed_and_counted(folder: Path, capsys: pytest.Ca
     assert "broken: damaged" in capsys.readouterr().out
 
 
-def test_recovery_of_a_folder_passes_over_what_is_being_written(
+def test_recovery_of_a_folder_skips_logs_that_are_being_written(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     living = make_log(folder, "3.mcap")
@@ -96,7 +96,7 @@ def test_recovery_of_a_folder_passes_over_what_is_being_written(
     living.finish()
 
 
-def test_several_logs_are_preserved_whatever_becomes_of_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_several_logs_are_preserved_even_if_one_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     make_log(folder, "3.mcap").finish()
     names = [str(folder / place / name) for place, name in ((ACTIVE, "2.mcap"), (DONE, "1.mcap"), (DONE, "3.mcap"))]
     assert main.main(["log", "preserve", *names]) == exit_codes.REFUSED
@@ -115,7 +115,7 @@ def test_recovery_that_takes_its_time_says_how_far_it_is(
     assert "of 1 logs" in capsys.readouterr().err
 
 
-def test_recovery_of_a_folder_says_what_became_of_each(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_recovery_of_a_folder_reports_the_result_of_each_log(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["log", "recover", str(folder), "--json"]) == exit_codes.OK
     (log,) = json.loads(capsys.readouterr().out)["recovered"]
     assert (log["path"], log["rows"], log["lost"]) == (str(folder / DONE / "2.mcap"), 381, 0)
@@ -124,7 +124,7 @@ def test_recovery_of_a_folder_says_what_became_of_each(folder: Path, capsys: pyt
     assert [log["recovered"] for log in json.loads(capsys.readouterr().out)["logs"]] == [False, True]
 
 
-def test_what_cannot_be_recovered_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_that_cannot_be_recovered_is_reported(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "x.mcap").write_text("no log")
     living = make_log(folder, "3.mcap")
     for path, word in ((folder / "x.mcap", "nothing of a log"), (living.path, "is being written")):
@@ -135,7 +135,7 @@ def test_what_cannot_be_recovered_is_said(folder: Path, capsys: pytest.CaptureFi
     living.finish()
 
 
-def test_who_may_not_read_or_move_a_log_is_told_what_to_do(
+def test_a_user_who_may_not_read_or_move_a_log_gets_advice(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The refusal of the kernel is simulated because the tests may run as root."""
@@ -154,7 +154,7 @@ def test_who_may_not_read_or_move_a_log_is_told_what_to_do(
     )
 
 
-def test_a_folder_that_is_not_there_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_folder_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["log", "list", str(tmp_path / "none")]) == exit_codes.UNHEALTHY
     assert "there is no such folder" in capsys.readouterr().err
 

@@ -149,7 +149,7 @@ def record_rest(path: Path, configuration: Configuration) -> None:
     recorder.close()
 
 
-@pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not beside the project")
+@pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")
 def test_the_authors_logs_have_a_page_too_with_the_mud_of_their_name(tmp_path: Path) -> None:
     log = LAB_LOGS / "single_12.5N_trial5.csv.gz"
     assert main(["log", "report", str(log), "--out", str(tmp_path)]) == exit_codes.OK
@@ -237,7 +237,7 @@ def test_wrong_names_of_muds_are_wrong_usage(
     assert "--mud" in refusal(capsys, "log", "report", str(log), *words)
 
 
-@pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not beside the project")
+@pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")
 def test_several_muds_need_a_position(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = str(LAB_LOGS / "single_12.5N_trial5.csv.gz")
     words = ("--mud", "48.5", "--mud", "53.1", "--out", str(tmp_path))

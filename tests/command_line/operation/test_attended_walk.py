@@ -96,7 +96,7 @@ def test_an_attended_walk_does_not_arm(bench: Bench) -> None:
     assert ended.returncode == exit_codes.REFUSED and "mudskipper arm" in ended.stderr
 
 
-def test_a_walk_that_is_refused_leaves_no_lease_behind(bench: Bench) -> None:
+def test_a_refused_walk_leaves_no_lease(bench: Bench) -> None:
     bench.run("arm")
     refused = bench.run("walk", "--attended", "--depth", "6")
     assert refused.returncode == exit_codes.REFUSED

@@ -49,7 +49,7 @@ def test_a_missing_viewer_is_named(
     assert not started
 
 
-def test_a_log_without_standard_messages_is_said(
+def test_a_log_without_standard_messages_is_reported(
     monkeypatch: pytest.MonkeyPatch, started: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     install(monkeypatch, "foxglove")
@@ -58,7 +58,7 @@ def test_a_log_without_standard_messages_is_said(
 
 
 @pytest.mark.parametrize("contents", [None, b"", b"no log"])
-def test_what_viewers_cannot_open_is_one_message(
+def test_a_file_that_viewers_cannot_open_is_one_message(
     contents: bytes | None, tmp_path: Path, capsys: pytest.CaptureFixture[str], started: list[list[str]]
 ) -> None:
     path = tmp_path / "cut.mcap"

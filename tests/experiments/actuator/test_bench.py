@@ -59,7 +59,7 @@ class Holding(ScriptedOperator):
         return super().ask(question, answers, meanwhile)
 
 
-def test_what_hangs_is_taken_off_before_an_interrupted_calibration_lets_go(tmp_path: Path) -> None:
+def test_weights_are_taken_off_before_an_interrupted_calibration_disarms(tmp_path: Path) -> None:
     robot = HoldingRobot()
     operator = Holding(robot)
     RobotBench(robot).leave(tmp_path, operator)
@@ -67,7 +67,7 @@ def test_what_hangs_is_taken_off_before_an_interrupted_calibration_lets_go(tmp_p
     assert robot.mode == "idle" and robot.closed
 
 
-def test_who_presses_ctrl_c_again_has_the_torque_off_at_once(tmp_path: Path) -> None:
+def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), Impatient()
     with pytest.raises(KeyboardInterrupt):
         RobotBench(robot).leave(tmp_path, operator)

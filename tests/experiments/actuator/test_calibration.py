@@ -129,7 +129,7 @@ def test_a_robot_that_lets_go_during_a_prompt_is_reported_at_once(case: Case) ->
     def doze() -> str:
         case.robot.mode, case.robot.message = "fault", "The supply is low."
         case.hand.meanwhile()
-        raise AssertionError("nobody was told")
+        raise AssertionError("the prompt did not end")
 
     case.on(Step(1, 200.0), doze)
     entries = case.run()

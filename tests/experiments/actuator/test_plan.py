@@ -34,7 +34,7 @@ def test_the_torque_is_that_of_the_lever() -> None:
     assert Step(3, 0.0).key == "trial 3, 0 g"
 
 
-def test_the_bench_of_the_simulation_bears_the_paper_s_weights() -> None:
+def test_the_simulated_bench_can_hold_the_paper_s_weights() -> None:
     require_possible(Plan(("right_sweep", "right_adduction")), bench_configuration())
 
 
@@ -55,7 +55,7 @@ def test_a_weight_that_the_winding_does_not_bear_is_refused() -> None:
         require_possible(Plan(("left_sweep",)), hot)
 
 
-def test_a_warm_winding_bears_less_than_a_cool_one() -> None:
+def test_a_warm_winding_can_hold_less_than_a_cool_one() -> None:
     configuration = bench_configuration()
     assert stays_cool(configuration, 13.0, 35.0, 10.0)
     assert not stays_cool(configuration, 13.0, 35.0, 20.0)

@@ -18,8 +18,8 @@ def make_fit(entries: Entries) -> JointFit:
 def test_the_papers_numbers_are_below_those_of_the_same_definition() -> None:
     fit = make_fit(make_entries())
     head, ours, _, paper = constant_rows([fit])
-    place = head.index("RMSE (N·m)")
-    assert ours[place] == f"{fit.rmse_configured_nm:.4f}" and paper[place] == "0.0127"
+    column = head.index("RMSE (N·m)")
+    assert ours[column] == f"{fit.rmse_configured_nm:.4f}" and paper[column] == "0.0127"
     assert paper[head.index("RMSE fitted (N·m)")] == "-" and paper[head.index("repeatability")] == "3.2 %"
     assert {len(row) for row in constant_rows([fit])} == {len(head)}
 

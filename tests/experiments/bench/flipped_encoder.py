@@ -8,14 +8,14 @@ import pytest
 
 from experiments.bench.rig import SimulatedRig
 
-PLACE = 2  # in JOINTS
+JOINT_INDEX = 2  # in JOINTS
 _build = SimulatedRig.__init__
 _fastest_rad_s = [0.0]
 
 
 def _flip(rig: SimulatedRig, *arguments: Any, **named: Any) -> None:
     _build(rig, *arguments, **named)
-    drive = rig.robot.drives[PLACE]
+    drive = rig.robot.drives[JOINT_INDEX]
     measure = drive.measure
 
     def measure_backwards(angle_rad: float, velocity_rad_s: float) -> None:

@@ -78,7 +78,7 @@ class Asked(PromptedBenchOperator):
 
 
 @pytest.mark.parametrize("answer", [CLEAR, LEAVE])
-def test_an_earlier_fault_is_cleared_if_the_operator_says_so(rig: SimulatedRig, answer: str) -> None:
+def test_an_earlier_fault_is_cleared_if_the_operator_agrees(rig: SimulatedRig, answer: str) -> None:
     """No daemon may run during the bench, so 'mudskipper clear' is not available."""
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
     bench_operator = Asked(answer)

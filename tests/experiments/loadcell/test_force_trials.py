@@ -58,7 +58,7 @@ def test_coefficients_of_a_mud_that_obeys_the_laws_come_out_within_three_per_cen
     assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in KNOWN.items()}
 
 
-def test_an_abrupt_stage_is_not_taken_for_mud_that_bears_more_when_it_is_slower() -> None:
+def test_an_abrupt_stage_is_not_taken_for_mud_that_resists_more_at_low_speed() -> None:
     """Five trials of one mud suffice, although the stage speeds up within a single sample."""
     mud = LawfulMud(1.3e6, 0.6e6, 1.4e6)
     trials = [feel(mud, INSERTION, 4000 + i, acceleration_m_s2=8.0, noise_n=0.01) for i in range(5)]
@@ -100,7 +100,7 @@ def clay_trials() -> list[AnalysedTrial]:
 
 
 @pytest.mark.parametrize("name", ["k_p", "k_e"])
-def test_a_trial_errs_by_about_as_much_as_it_says_though_clay_does_not_follow_the_law(
+def test_the_error_of_a_trial_is_about_its_standard_error_though_clay_does_not_follow_the_law(
     clay_trials: list[AnalysedTrial], name: str
 ) -> None:
     """The start between two samples does not matter, because the first and last samples count by their distance."""
@@ -133,7 +133,7 @@ def profile_n(depths_m: Array) -> Array:
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_noises_are_those_of_the_samples_whatever_line_they_lie_on(turned: bool) -> None:
+def test_noises_are_those_of_the_samples_on_any_line(turned: bool) -> None:
     random = np.random.default_rng(2)
     depths_m = np.sort(random.uniform(0.0, 0.03, 4000))[:: -1 if turned else 1]
     reported_n = noises_n(depths_m, profile_n(depths_m) + 0.01 * random.standard_normal(4000))
@@ -295,7 +295,7 @@ def test_a_stage_that_stutters_is_remarked(insertion: Recorded) -> None:
     reported = one(insertion)
     assert isinstance(reported.motion, Insertion) and reported.remark == ""
     half_s = reported.motion.surface_s + 0.15
-    place = int(np.searchsorted(insertion.times_s, half_s))
-    forces_n = np.insert(insertion.forces_n, place, np.full(8, insertion.forces_n[place]))
+    index = int(np.searchsorted(insertion.times_s, half_s))
+    forces_n = np.insert(insertion.forces_n, index, np.full(8, insertion.forces_n[index]))
     times_s = np.concatenate([insertion.times_s, insertion.times_s[-1] + 0.0125 * np.arange(1, 9)])
     assert "one speed" in one(insertion._replace(times_s=times_s, forces_n=forces_n)).remark

@@ -21,7 +21,7 @@ def test_the_mean_of_an_even_motion_is_its_middle() -> None:
     assert even().speeds_m_s(until_s, 0.0125) == pytest.approx(0.1)
 
 
-def test_straight_lines_are_off_by_no_more_than_is_said() -> None:
+def test_straight_lines_are_off_by_no_more_than_the_stated_error() -> None:
     """The stage accelerates at 5 m/s² and its encoder sends 20 positions per second."""
     times_s = np.arange(0.0, 1.0, 0.05)
     track = StageTrack(StagePositions(times_s, 2.5 * times_s**2))

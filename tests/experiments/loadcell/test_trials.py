@@ -78,8 +78,8 @@ def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) ->
 def test_samples_are_alike_by_what_averages_them_and_not_by_a_drift_or_a_coarse_step(seed: int) -> None:
     random = Random(seed)
     single_n = [random.gauss(0.0, 0.008) for _ in range(80)]
-    assert abs(correlation([force_n + 0.001 * place for place, force_n in enumerate(single_n)])) < 0.4
-    assert 0.5 < correlation([fmean(single_n[place : place + 4]) for place in range(76)]) < 1.0
+    assert abs(correlation([force_n + 0.001 * index for index, force_n in enumerate(single_n)])) < 0.4
+    assert 0.5 < correlation([fmean(single_n[index : index + 4]) for index in range(76)]) < 1.0
     assert correlation([0.1] * 40 + [0.2] * 40) == 0.0
 
 

@@ -80,13 +80,13 @@ def test_pictures_can_have_further_forms_and_sections_further_tables(tmp_path: P
     assert "dots.svg and dots.pdf" in page
 
 
-@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize("whole_files", range(3))
 def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
-    place: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    whole_files: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The disk is full when the numbers, the picture or the page is written; half of that file fits."""
     before = {path: path.read_bytes() for path in write_report(tmp_path, {"k": 1}, "Before", [SECTION])}
-    room, write = [place], Path.write_bytes
+    room, write = [whole_files], Path.write_bytes
 
     def fill(path: Path, contents: bytes) -> int:
         room[0] -= 1
@@ -101,7 +101,7 @@ def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
         write_report(tmp_path, {"k": 2}, "After", [SECTION])
     assert sorted(tmp_path.iterdir()) == sorted(before)
     assert (tmp_path / "report.html").read_bytes() == before[tmp_path / "report.html"]
-    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")) == {"k": 1 if place == 0 else 2}
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")) == {"k": 1 if whole_files == 0 else 2}
     assert (tmp_path / "dots.png").read_bytes() == DOT
 
 
@@ -114,7 +114,7 @@ def test_text_is_shown_as_it_is(tmp_path: Path) -> None:
         assert text in elements.text
 
 
-def test_numbers_that_are_none_are_null_for_every_reader_of_json(tmp_path: Path) -> None:
+def test_numbers_that_are_not_finite_are_null_in_json(tmp_path: Path) -> None:
     report = {"experiment": "x", "k": [1.0, float("nan")], "deep": {"sd": float("inf"), "n": (2, float("nan"))}}
     _, summary, *_ = write_report(tmp_path, report, "Odd \udcff name", [])
     strict = json.loads(summary.read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name))

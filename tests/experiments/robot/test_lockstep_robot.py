@@ -117,7 +117,7 @@ def test_a_fault_that_asks_for_a_still_pose_ends_a_move(tmp_path: Path) -> None:
     robot.close()
 
 
-def test_whatever_the_robot_does_arming_leads_to_hold(robot: LockstepRobot) -> None:
+def test_arming_leads_to_hold_even_from_a_walk(robot: LockstepRobot) -> None:
     arm(robot)
     robot.call("walk", depth_m=0.03)
     robot.wait(3.0)

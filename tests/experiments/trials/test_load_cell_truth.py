@@ -110,8 +110,8 @@ def test_each_coefficient_is_of_its_own_strokes_speed(name: str) -> None:
     slow, quick = (truth(with_stroke(name, stroke(speed_m_s=speed_m_s))).upright for speed_m_s in (0.05, 0.8))
     traction = rate_factor(0.8) / rate_factor(0.05)
     ratios = [b / a for a, b in zip(slow, quick, strict=True)]
-    place = ("insertion", "stance", "extraction").index(name)
-    assert ratios.pop(place) == pytest.approx(traction, rel=0.01)  # the carrier's steps
+    position = ("insertion", "stance", "extraction").index(name)
+    assert ratios.pop(position) == pytest.approx(traction, rel=0.01)  # the carrier's steps
     assert ratios == [1.0, 1.0]
 
 
@@ -193,12 +193,12 @@ def test_in_stance_the_plate_is_square_to_its_path() -> None:
 # strokes that did not happen
 
 
-@pytest.mark.parametrize(("name", "place"), [("insertion", 0), ("stance", 1), ("extraction", 2)])
+@pytest.mark.parametrize(("name", "position"), [("insertion", 0), ("stance", 1), ("extraction", 2)])
 @pytest.mark.parametrize("gone", [NEVER, stroke(deepest_m=0.0), stroke(deepest_m=-0.01)])
-def test_a_stroke_that_did_not_happen_has_no_coefficient(name: str, place: int, gone: StrokeTruth) -> None:
+def test_a_stroke_that_did_not_happen_has_no_coefficient(name: str, position: int, gone: StrokeTruth) -> None:
     for reported in truth(with_stroke(name, gone)):
         assert isinstance(reported, TrueCoefficients)
-        assert [isfinite(k) for k in reported] == [i != place for i in range(3)]
+        assert [isfinite(k) for k in reported] == [i != position for i in range(3)]
 
 
 def test_a_plate_that_never_slipped_is_dragged_at_the_papers_speed() -> None:

@@ -217,7 +217,7 @@ def test_a_doubtful_trial_counts_as_the_operator_decides(tmp_path: Path, answer:
     assert len(session.measured) == (4 if answer == REDO else 3)
 
 
-def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> None:
+def test_a_robot_that_no_longer_answers_is_left_with_a_message(tmp_path: Path) -> None:
     session = Session(tmp_path)
     session.robot.deaf = True
     (tmp_path / "old.mcap").touch()
@@ -226,6 +226,6 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_word(tmp_path: Path) -> N
     assert session.robot.closed
 
 
-def test_an_experiment_of_which_nothing_is_left_ends_with_a_word(tmp_path: Path) -> None:
+def test_an_experiment_without_any_result_ends_with_a_message(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match="nothing was measured"):
         counted_entries(Session(tmp_path, bed=ScriptedBed(SKIP, SKIP, SKIP)).conduct().notebook)

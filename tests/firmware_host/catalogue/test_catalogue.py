@@ -152,7 +152,9 @@ def test_a_full_disk_leaves_the_catalogue_before(folder: Path) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
-def test_root_writes_into_nobody_elses_folder(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_root_writes_into_no_folder_of_another_user(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     os.chown(folder, 12345, 12345)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     updated(folder)

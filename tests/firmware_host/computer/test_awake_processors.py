@@ -33,7 +33,7 @@ def test_a_computer_without_the_device_is_a_sentence_and_no_failure(tmp_path: Pa
     processors.close()
 
 
-def test_without_the_wish_the_device_is_not_touched(tmp_path: Path) -> None:
+def test_if_it_is_not_configured_the_device_is_not_opened(tmp_path: Path) -> None:
     assert AwakeProcessors(wanted=False, device=tmp_path / "none").problem == ""
 
 

@@ -110,7 +110,7 @@ def test_an_interface_that_is_down_fails_with_the_command_that_brings_it_up() ->
         ({"txqlen": 1000}, "queue.left", Level.WARN),
     ],
 )
-def test_each_setting_is_judged(details: dict[str, Any], line: str, level: Level) -> None:
+def test_each_setting_is_evaluated(details: dict[str, Any], line: str, level: Level) -> None:
     assert levels(changed(**details))[line] is level
 
 
@@ -125,7 +125,7 @@ def test_more_drives_on_a_bus_are_warned_of_and_then_refused() -> None:
     assert [levels(links, drives)["load.left"] for drives in (2, 4, 6)] == [Level.OK, Level.WARN, Level.FAIL]
 
 
-def test_a_bus_that_is_no_interface_of_the_kernel_is_judged_by_its_load_alone() -> None:
+def test_a_bus_that_is_no_interface_of_the_kernel_is_evaluated_by_its_load_alone() -> None:
     serial = BusParameters("slcan", "/dev/ttyACM0", {}, 500)
     assert levels({}, bus=serial) == {"bus.left": Level.OK, "load.left": Level.WARN}
 

@@ -66,8 +66,8 @@ class Computer:
             self.write(f"sys/devices/system/cpu/cpu{cpu}/cpufreq/scaling_governor", "performance")
         self.thread(55, "irq/55-can0", 50)
 
-    def write(self, place: str, text: str) -> None:
-        path = self.root / place
+    def write(self, location: str, text: str) -> None:
+        path = self.root / location
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text + "\n", encoding="utf-8")
 
@@ -204,7 +204,7 @@ def test_the_priority_of_a_thread_is_read_after_any_thread_name(computer: Comput
     assert thread_priority(computer.root, 91) == 0
 
 
-def test_this_process_s_own_priority_is_what_the_system_says() -> None:
+def test_this_process_s_own_priority_is_that_of_the_system() -> None:
     assert thread_priority(Path("/"), os.getpid()) == os.sched_getparam(0).sched_priority
 
 
@@ -257,7 +257,7 @@ def test_the_file_system_of_a_folder_is_that_of_the_longest_mount(
     ("folder", "level"),
     [("/var/x", Level.OK), ("/run/x", Level.WARN), ("/var/lib/my logs", Level.WARN), ("/mnt/x", Level.FAIL)],
 )
-def test_where_logs_go_is_judged(computer: Computer, folder: str, level: Level) -> None:
+def test_the_folder_of_logs_is_evaluated(computer: Computer, folder: str, level: Level) -> None:
     computer.write("proc/self/mounts", MOUNTS)
     assert storage(computer, folder)["file_system"].level is level
 
@@ -305,7 +305,7 @@ def test_the_length_of_a_log_that_a_disk_has_room_for_is_that_of_a_walk() -> Non
 @pytest.mark.parametrize(
     ("uid", "group", "bit"), [(10, 20, 0o200), (11, 20, 0o020), (11, 21, 0o002), (10, 21, 0o200), (0, 0, 0)]
 )
-def test_who_may_write_is_what_the_kernel_would_say(mode: int, uid: int, group: int, bit: int) -> None:
+def test_write_permission_is_that_of_the_kernel(mode: int, uid: int, group: int, bit: int) -> None:
     status = os.stat_result((mode, 0, 0, 0, 10, 20, 0, 0, 0, 0))
     assert may_write(status, Account("x", uid, frozenset({group}))) is (uid == 0 or bool(mode & bit))
 

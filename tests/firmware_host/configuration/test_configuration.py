@@ -46,7 +46,7 @@ def test_the_example_states_the_defaults(configuration: Configuration) -> None:
 
 
 def minimal_text() -> str:
-    drives = "".join(f'[drive.{joint}]\nbus = "a"\nnode_id = {place}\n' for place, joint in enumerate(JOINTS))
+    drives = "".join(f'[drive.{joint}]\nbus = "a"\nnode_id = {number}\n' for number, joint in enumerate(JOINTS))
     return f'[bus.a]\ninterface = "virtual"\nchannel = "x"\n{drives}'
 
 

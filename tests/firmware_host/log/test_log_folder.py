@@ -31,9 +31,9 @@ from firmware_host.log.log_folder import (
 from tests.firmware_host.synthetic_rows import OPENING
 
 
-def make_files(folder: Path, place: str, *names: str) -> list[Path]:
-    (folder / place).mkdir(exist_ok=True)
-    paths = [folder / place / f"{name}.mcap" for name in names]
+def make_files(folder: Path, subfolder: str, *names: str) -> list[Path]:
+    (folder / subfolder).mkdir(exist_ok=True)
+    paths = [folder / subfolder / f"{name}.mcap" for name in names]
     for path in paths:
         path.write_bytes(bytes(92) + LAST_BYTES)
     return paths
@@ -110,7 +110,7 @@ def test_free_space_is_known_before_the_folder_is_made(tmp_path: Path) -> None:
     )
 
 
-def test_what_a_person_preserved_does_not_use_up_the_quota(tmp_path: Path) -> None:
+def test_preserved_logs_do_not_use_up_the_quota(tmp_path: Path) -> None:
     make_files(tmp_path, DONE, "3", "4")
     make_files(tmp_path, PRESERVED, "1", "2")
     assert list(delete_by_quota(tmp_path, 250, 0.0)) == []

@@ -40,12 +40,12 @@ CONFIGURATION = '[robot]\nname = "Ünïcode"\n'
 NUMBERS = random.Random(1)  # noise does not compress, so a file grows as rows are put
 
 MAKE: dict[str, Callable[[int], Any]] = {
-    "float64": lambda place: place * NUMBERS.random(),
-    "uint32": lambda place: 2**32 - place,
-    "int32": lambda place: -place,
-    "uint8": lambda place: place % 6,
-    "bool": lambda place: place % 2 == 0,
-    "string": lambda place: "mud, glorious mud: ü",
+    "float64": lambda index: index * NUMBERS.random(),
+    "uint32": lambda index: 2**32 - index,
+    "int32": lambda index: -index,
+    "uint8": lambda index: index % 6,
+    "bool": lambda index: index % 2 == 0,
+    "string": lambda index: "mud, glorious mud: ü",
 }
 
 
@@ -61,7 +61,7 @@ class Row(NamedTuple):
 def make_row(kind: RowKind, stamp_s: float) -> Row:
     """Return a row with a different value in every field, one of them NaN."""
     kinds = [field.kind for field in kind.fields for _ in range(field.length or 1)]
-    values = [stamp_s, *(MAKE[name](place) for place, name in enumerate(kinds) if place > 0)]
+    values = [stamp_s, *(MAKE[name](index) for index, name in enumerate(kinds) if index > 0)]
     if len(values) > 2:
         values[1] = math.nan
     return Row(kind, values)

@@ -132,7 +132,7 @@ def test_most_measured_walks_of_january_sink_further_than_they_advance() -> None
     assert all(any(finding.kind is FindingKind.POSE for finding in log.findings) for log in logs)
 
 
-def test_what_was_written_is_read_back(tmp_path: Path) -> None:
+def test_an_exported_log_is_read_back(tmp_path: Path) -> None:
     walk = make_walk()
     log = read_lab_csv(write(tmp_path / "walk.csv", export(walk)))
     assert log.gait == {"insertion_angle": 0.035, "sweep_angle_deg": 30.0}  # the settings that are numbers
@@ -198,7 +198,7 @@ def test_lost_poses_are_not_positions(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.body_x_m, [math.nan] * 10 + [0.1, 0.11, 0.12, math.nan, 0.13, 0.14])
 
 
-def test_a_body_at_rest_is_not_lost(tmp_path: Path) -> None:
+def test_a_body_at_rest_does_not_count_as_lost(tmp_path: Path) -> None:
     body_m = [0.1] * 10 + [0.101, 0.102]
     rows = [f"{number / 10},3,0,0,0,0,0,0,0,0,{x_m}" for number, x_m in enumerate(body_m)]
     log = read_lab_csv(write(tmp_path / "rest.csv", HEAD + ",OptitrackPosition_x", *rows))

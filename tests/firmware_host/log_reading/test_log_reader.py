@@ -180,7 +180,7 @@ def test_a_chunk_that_no_longer_looks_like_one_is_missed(path: Path, tmp_path: P
         read_bytes(tmp_path, bytes(damaged))
 
 
-def test_damage_is_refused_or_does_not_touch_the_rows(path: Path, whole: Log, tmp_path: Path) -> None:
+def test_damage_is_refused_or_leaves_the_rows_intact(path: Path, whole: Log, tmp_path: Path) -> None:
     """After one flipped bit in any byte, all rows are right or the file is refused."""
     chance = random.Random(2)
     contents = path.read_bytes()
@@ -211,7 +211,7 @@ def test_garbage_after_a_good_beginning_is_refused_or_a_cut(path: Path, tmp_path
 
 
 @pytest.mark.parametrize("contents", [b"", b"time,turtle_state\n", MCAP0_MAGIC[:-1]])
-def test_what_is_no_log_is_refused_at_its_first_byte(contents: bytes, tmp_path: Path) -> None:
+def test_a_file_that_is_no_log_is_refused_at_its_first_byte(contents: bytes, tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"changed\.mcap: damaged at byte 0: .* MCAP"):
         read_bytes(tmp_path, contents)
 

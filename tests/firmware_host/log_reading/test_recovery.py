@@ -56,7 +56,7 @@ def test_every_row_comes_back_and_the_file_moves_to_done(tmp_path: Path) -> None
     assert log.events[-1]["text"].startswith("recovered: 500 rows; ")
 
 
-def test_readers_of_others_open_what_was_recovered(tmp_path: Path) -> None:
+def test_readers_of_other_projects_open_a_recovered_log(tmp_path: Path) -> None:
     path = recover_log(make_cut_log(tmp_path)).path
     with AnyReader([path]) as bag:
         assert bag.message_count == sum(1 for _ in bag.messages()) == 5 * CHUNK + 1
@@ -236,7 +236,7 @@ def test_a_summary_that_looks_like_a_row_is_none(tmp_path: Path) -> None:
     assert recover_log(path).rows == 5 * CHUNK
 
 
-def test_nothing_is_said_to_be_missing_at_an_end_that_is_there(tmp_path: Path) -> None:
+def test_a_finished_log_is_not_reported_as_cut(tmp_path: Path) -> None:
     path = make_file(tmp_path / "run.mcap").finish()
     contents = bytearray(path.read_bytes())
     contents[contents.find(b"\x03\x00\x00\x00lz4") + 200] ^= 0x10

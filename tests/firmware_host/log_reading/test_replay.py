@@ -81,7 +81,7 @@ def test_a_log_that_was_thinned_and_cut_into_segments_gives_the_same_strides(
     assert all(same(one, other) for one, other in zip(live, replayed, strict=True))
 
 
-@pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not beside the repository")
+@pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not next to the repository")
 @pytest.mark.parametrize("path", LAB_LOGS, ids=lambda path: path.name.removesuffix(".csv.gz"))
 def test_the_authors_logs_replay_with_forces_of_the_right_sign(path: Path) -> None:
     replayed = replay_files([path])
@@ -101,7 +101,7 @@ MEASURED = {
 }
 
 
-@pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not beside the repository")
+@pytest.mark.skipif(not LAB_LOGS, reason="the shared measurements are not next to the repository")
 @pytest.mark.parametrize("mud", MEASURED)
 def test_first_strokes_have_the_sizes_that_were_measured(mud: str) -> None:
     insertion_n, stance_n, extraction_n = MEASURED[mud]
@@ -122,7 +122,7 @@ def test_a_file_of_another_kind_is_refused_by_name(tmp_path: Path) -> None:
 def test_estimates_of_an_absent_flipper_are_left_out() -> None:
     single = [path for path in LAB_LOGS if path.name.startswith("single")]
     if not single:
-        pytest.skip("the shared measurements are not beside the repository")
+        pytest.skip("the shared measurements are not next to the repository")
     replayed = replay_files([single[0]])
     assert replayed.flippers == ("right",)
     assert {stride.flipper for stride in replayed.strides} == {"right"}

@@ -129,14 +129,14 @@ def test_a_carried_plate_moves_by_the_differences_of_its_positions(
     twist = carried_twist(GEOMETRY, body_in(state, rates).carriages[side < 0.0], *state[4:], *rates[4:])
     plate, moved_s = turned(*state[2:4]) @ plate_in_body(state[4], state[5], side), 1e-6
     for u, s in POSITIONS_M:
-        ahead_m, behind_m = (point_in_world(state + way * moved_s * rates, side, u, s) for way in (1.0, -1.0))
-        velocity_m_s = (ahead_m - behind_m) / (2.0 * moved_s)
+        after_m, before_m = (point_in_world(state + sign * moved_s * rates, side, u, s) for sign in (1.0, -1.0))
+        velocity_m_s = (after_m - before_m) / (2.0 * moved_s)
         reported_m_s = (
             twist.normal_m_s + twist.normal_per_outward_s * u + twist.normal_per_upward_s * s,
             twist.outward_m_s + twist.outward_per_upward_s * s,
             twist.upward_m_s + twist.upward_per_outward_s * u,
         )
-        assert reported_m_s == pytest.approx([float(velocity_m_s @ plate[:, way]) for way in range(3)], abs=1e-7)
+        assert reported_m_s == pytest.approx([float(velocity_m_s @ plate[:, axis]) for axis in range(3)], abs=1e-7)
 
 
 @given(STATES, SPEEDS, SIDES, st.tuples(*[st.floats(-10.0, 10.0)] * 7))
@@ -171,15 +171,15 @@ def test_a_level_body_carries_its_flippers_as_a_rail_does(
 
 @given(TURNS, TURNS, st.tuples(*[st.floats(-0.2, 0.2)] * 3), RATES, RATES)
 def test_a_force_on_the_body_does_the_work_of_its_point(
-    roll_rad: float, pitch_rad: float, place: tuple[float, float, float], roll_rad_s: float, pitch_rad_s: float
+    roll_rad: float, pitch_rad: float, point: tuple[float, float, float], roll_rad_s: float, pitch_rad_s: float
 ) -> None:
     axes, moved_s = axes_of(roll_rad, pitch_rad), 1e-6
-    load = load_at(axes, in_world(axes, place), 3.0, -2.0)
-    ahead_m, behind_m = (
-        turned(roll_rad + way * moved_s * roll_rad_s, pitch_rad + way * moved_s * pitch_rad_s) @ np.array(place)
-        for way in (1.0, -1.0)
+    load = load_at(axes, in_world(axes, point), 3.0, -2.0)
+    after_m, before_m = (
+        turned(roll_rad + sign * moved_s * roll_rad_s, pitch_rad + sign * moved_s * pitch_rad_s) @ np.array(point)
+        for sign in (1.0, -1.0)
     )
-    velocity_m_s = (ahead_m - behind_m) / (2.0 * moved_s)
+    velocity_m_s = (after_m - before_m) / (2.0 * moved_s)
     power_w = load.roll_nm * roll_rad_s + load.pitch_nm * pitch_rad_s
     assert power_w == pytest.approx(3.0 * velocity_m_s[0] - 2.0 * velocity_m_s[2], abs=1e-8)
 
@@ -252,7 +252,7 @@ def test_where_the_mud_becomes_stiffer_the_force_stays_and_where_it_becomes_soft
 
 
 @given(st.floats(0.002, 0.02), st.floats(0.0, 0.01), st.integers(1, 3))
-def test_a_quarter_pressed_again_and_again_into_changing_mud_never_has_given_energy(
+def test_a_quarter_pressed_again_and_again_into_changing_mud_never_adds_energy(
     amplitude_m: float, middle_m: float, rounds: int
 ) -> None:
     quarter, given_j, steps = BellyQuarter(0.004, 0.25), 0.0, 2000
@@ -359,14 +359,14 @@ def test_equal_strokes_left_and_right_never_roll_it() -> None:
 
 
 def test_a_reset_brings_everything_back() -> None:
-    plant, places = Plant(FREE, Track([(9.0, MUDS["48.5"])])), []
+    plant, outcomes = Plant(FREE, Track([(9.0, MUDS["48.5"])])), []
     for _ in range(2):
         for torques_nm in ((0.0, -0.3), (-0.6, -0.1), (0.0, 0.6)):
             for _ in range(200):
                 plant.step(STEP_S, Joints(*torques_nm, 0.0, 0.0))
-        places.append((plant.body_m, plant.motion, plant.angles_rad))
+        outcomes.append((plant.body_m, plant.motion, plant.angles_rad))
         plant.reset()
-    assert places[0] == places[1]
+    assert outcomes[0] == outcomes[1]
 
 
 def test_a_body_cannot_be_fixed_and_free() -> None:

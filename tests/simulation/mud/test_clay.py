@@ -89,7 +89,7 @@ def test_wetter_mud_is_weaker() -> None:
 
 
 @pytest.mark.parametrize("name", MUDS)
-def test_the_fitted_muds_are_met(name: str) -> None:
+def test_the_fitted_muds_are_reproduced(name: str) -> None:
     clay = clay_of_water(float(name))
     assert clay.name == name
     assert clay.strength_pa == pytest.approx(MUDS[name].strength_pa)

@@ -487,7 +487,7 @@ def test_the_current_is_as_noisy_as_stated(configuration: Configuration) -> None
     assert deviations_a == pytest.approx([0.1, 0.4], rel=0.07)  # the drive's own noise is 0.1 A
 
 
-def test_seldom_messages_are_read_again_and_again(configuration: Configuration) -> None:
+def test_rare_messages_are_read_in_many_ticks(configuration: Configuration) -> None:
     counts = []
     configuration = patient(configuration)
     for period_s in (0.0, 0.010):

@@ -158,7 +158,7 @@ def test_a_relaxing_plate_at_rest_loses_the_stated_fraction() -> None:
 
 @settings(max_examples=30)
 @given(st.integers(1, 3), st.floats(0.1, 0.6), st.floats(0.0, 2.0 * pi), st.floats(0.0, 0.05), st.floats(0.0, 0.05))
-def test_a_closed_cycle_of_motion_takes_energy_and_never_has_given_any(
+def test_a_closed_cycle_of_motion_takes_energy_and_never_returns_more_than_it_took(
     rounds: int, sweep_amplitude_rad: float, shift_rad: float, body_amplitude_m: float, middle_depth_m: float
 ) -> None:
     contact, given_j, dt_s = FlipperContact(GEOMETRY), 0.0, 0.0005

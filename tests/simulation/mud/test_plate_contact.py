@@ -52,8 +52,8 @@ def yielded_n(attitude: Attitude, clay: Clay, velocity_m_s: tuple[float, float, 
     speed_m_s = sqrt(sum(part * part for part in velocity_m_s))
     normal, outward, upward = velocity_m_s
     along = (-outward / hypot(outward, upward), -upward / hypot(outward, upward))
-    places = (np.arange(pieces) + 0.5) / pieces
-    u, s = np.meshgrid(SIZE.width_m * (places - 0.5), SIZE.height_m * places, indexing="ij")
+    fractions = (np.arange(pieces) + 0.5) / pieces
+    u, s = np.meshgrid(SIZE.width_m * (fractions - 0.5), SIZE.height_m * fractions, indexing="ij")
     edge, height = u[:, 0], s[0]
     area_m2 = SIZE.width_m * SIZE.height_m / pieces**2
 
@@ -156,8 +156,8 @@ def dense_n(size: PlateSize, attitude: Attitude, velocity_m_s: tuple[float, floa
         return np.asarray(crossed % 2 == 1)
 
     lowest_m = min(u for u, _ in size.corners_m)
-    places = (np.arange(pieces) + 0.5) / pieces
-    u, s = np.meshgrid(lowest_m + size.width_m * places, size.height_m * places, indexing="ij")
+    fractions = (np.arange(pieces) + 0.5) / pieces
+    u, s = np.meshgrid(lowest_m + size.width_m * fractions, size.height_m * fractions, indexing="ij")
     du, ds = size.width_m / pieces, size.height_m / pieces
     plate, depths_m = inside(u, s), depth_m + per_outward * u - per_upward * s
     face_m2, wet = du * ds * plate, depths_m > 0.0

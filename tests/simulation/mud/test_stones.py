@@ -17,10 +17,10 @@ SPEEDS = st.floats(-3.0, 3.0)
 STONE = Stone(0.10, 0.16, 0.02)
 
 
-def pushed(*places: tuple[float, float]) -> tuple[float, float]:
+def pushed(*path: tuple[float, float]) -> tuple[float, float]:
     """Return the push at the last of these (position, depth), each held for two steps so that nothing moves."""
     contact, push = StoneContact([STONE]), NO_PUSH
-    for position_m, depth_m in places:
+    for position_m, depth_m in path:
         for _ in range(2):
             push = contact.step(DT_S, position_m, depth_m)
     return push
@@ -41,9 +41,9 @@ def test_a_stone_pushes_back_where_the_plate_came_from(
     assert pushed(*path) == pytest.approx((forward * force_n, upward * force_n))
 
 
-@pytest.mark.parametrize("place", [(0.13, 0.02), (0.13, 0.0), (0.10, 0.03), (0.16, 0.03), (0.2, 0.05)])
-def test_next_to_and_above_a_stone_there_is_no_push(place: tuple[float, float]) -> None:
-    assert pushed((0.13, 0.03), place) == (0.0, 0.0)
+@pytest.mark.parametrize("position", [(0.13, 0.02), (0.13, 0.0), (0.10, 0.03), (0.16, 0.03), (0.2, 0.05)])
+def test_next_to_and_above_a_stone_there_is_no_push(position: tuple[float, float]) -> None:
+    assert pushed((0.13, 0.03), position) == (0.0, 0.0)
 
 
 def test_a_plate_at_a_flank_slides_along_it_and_is_held_there_however_deep_it_is() -> None:
@@ -128,7 +128,7 @@ def test_a_push_works_on_the_edge_s_middle_forward_and_on_its_lower_corner_upwar
     def height_m(arm: FlipperGeometry) -> float:
         return arm.edge_position(sweep_rad, adduction_rad)[2]
 
-    corners = (replace(GEOMETRY, flipper_length_m=0.12 + way * GEOMETRY.plate_width_m / 2.0) for way in (1.0, -1.0))
+    corners = (replace(GEOMETRY, flipper_length_m=0.12 + sign * GEOMETRY.plate_width_m / 2.0) for sign in (1.0, -1.0))
     lower = min(corners, key=height_m)
     at_middle, at_corner = (arm.jacobian(sweep_rad, adduction_rad) for arm in (GEOMETRY, lower))
     forward_m_s = at_middle.x_sweep * sweep_rad_s + at_middle.x_adduction * adduction_rad_s + body_m_s

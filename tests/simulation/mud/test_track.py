@@ -72,7 +72,7 @@ def test_random_strength_is_the_same_for_a_seed_in_any_order_of_access() -> None
 def test_random_strength_has_no_outliers_beyond_three_deviations() -> None:
     variance = np.log(1.0 + 0.5**2)
     factors = strengths_pa(RandomStrength(0.5, 0.05, 2), np.arange(0.0, 400.0, 0.005)) / 1000.0
-    limits = [exp(way * 3.0 * variance**0.5 - variance / 2.0) for way in (-1.0, 1.0)]
+    limits = [exp(sign * 3.0 * variance**0.5 - variance / 2.0) for sign in (-1.0, 1.0)]
     assert [factors.min(), factors.max()] == pytest.approx(limits)  # some of the 80000 cells reach them
 
 
