@@ -37,10 +37,13 @@ class OpenedLog:
         return configuration_of(self.paths[0], self.configuration_text)
 
 
-def open_log(path: Paths) -> OpenedLog:
-    """Reads an MCAP log, or several segments of one run. Raises LogError."""
+def open_log(path: Paths, fields: Sequence[str] = ()) -> OpenedLog:
+    """Reads an MCAP log, or several segments of one run. Raises LogError.
+
+    `ticks` has all fields of a tick, or only `fields`: an hour of all takes 500 MB, of each number 11 MB.
+    """
     paths = _as_paths(path)
-    log = read_logs(paths)
+    log = read_logs(paths, fields=fields)
     arrays = {
         "ticks": Rows.of(log.ticks, tick_kind(log.rig)),
         "strides": Rows.of(stack_rows(log.strides, STRIDE), STRIDE),

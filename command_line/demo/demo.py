@@ -21,12 +21,14 @@ from control.modes import Mode
 from experiments.reports.mud_names import mud_text
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import DONE, log_files, present_path
-from firmware_host.log_reading.log_reader import Log, LogError, read_log
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.operator.counted_nouns import counted
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError
 from simulation.harness.world import load_world
 from simulation.mud.track import Track
 
+WALKED = ("mode", "stamp_s", "body_x_m")  # fields of a tick that the summary needs
 LEAD_M = 0.06  # distance of the flippers ahead of the body's middle when a stride begins
 
 
@@ -96,7 +98,7 @@ def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
 def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> dict[str, Any]:
     """Prints the summary, draws the plot, and returns the summary."""
     log_path = present_path(Path(report["log"]["path"]))
-    log = read_log(log_path)
+    log = read_log(log_path, fields=WALKED)
     plot_path = options.out / log_path.with_suffix(".png").name
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)

@@ -10,26 +10,26 @@ from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import chosen_vertical, complain_of, show_lab_log
 from command_line.logs.refusals import UsageError, explain_errors
+from command_line.logs.unfinished import complain_of_end
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
-from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of
+from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.log_reading.lab.summary import finding_reports, lab_summary
 from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_reader import LogError, log_summary, read_logs
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_summary import log_summary
 from firmware_host.log_reading.replay import Replay, replay_files
+from firmware_host.log_reading.scanned_log import scan_logs
 from firmware_host.operator.reports import known, map_report, stride_report
 
 Options = argparse.Namespace
 
 LONGEST_FILM_S = 60.0
-BEING_WRITTEN = "the log is still being written: everything up to now was read"
-CUT_OFF = "the log was cut off: everything up to there was read"
 
 
 @explain_errors
@@ -66,12 +66,7 @@ def _show_replay(files: Sequence[Path], replayed: Replay, as_json: bool) -> None
             f"the run's segments before {replayed.segment} are not given: "
             "the first strides can differ from those computed live"
         )
-    if not replayed.complete:
-        complain(_why_unfinished(files))
-
-
-def _why_unfinished(files: Sequence[Path]) -> str:
-    return BEING_WRITTEN if any(map(is_being_written, files)) else CUT_OFF
+    complain_of_end(files, replayed.complete)
 
 
 @explain_errors
@@ -93,6 +88,7 @@ def film(options: Options) -> int:
     moving = path.suffix == ".gif"
     walk = _walk_for_picture(options, path)
     strides = _chosen_strides(options, walk, moving)
+    walk = with_strides(walk, strides)
     if moving:
         _draw_film(walk, strides, path)
     else:
@@ -126,8 +122,7 @@ def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
         complain(f"not in this log: {', '.join(walk.missing)}")
     if walk.cut:
         complain(f"the walk may have {walk.cut}; give those files too")
-    if not walk.complete:
-        complain(_why_unfinished(options.files))
+    complain_of_end(options.files, walk.complete)
     return walk
 
 
@@ -166,7 +161,7 @@ def info(options: Options) -> int:
         _show_lab_info(options.files[0], vertical, options.json)
         return exit_codes.OK
     with watched() as watch:
-        summary = log_summary(read_logs(options.files, watch))
+        summary = log_summary(scan_logs(options.files, watch))
     if options.json:
         print_json("log-info", summary)
     else:

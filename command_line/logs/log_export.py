@@ -7,10 +7,12 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.logs.refusals import UsageError, explain_errors
+from command_line.logs.unfinished import complain_of_end
 from command_line.screen import watched
 from firmware_host.log.whole_files import whole_file
 from firmware_host.log_reading.lab.export import write_lab_csv
-from firmware_host.log_reading.log_reader import Log, LogError, read_logs
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.scanned_log import ScannedLog, scan_logs
 
 Options = argparse.Namespace
 
@@ -19,10 +21,11 @@ Options = argparse.Namespace
 def export(options: Options) -> int:
     _require_other_file(options)
     with watched() as watch:
-        log = read_logs(options.files, watch)
+        log = scan_logs(options.files, watch)
     write = _write_parquet if options.parquet else _write_ros if options.ros else _write_csv
     for path in write(log, options):
         print(f"written  {path}", file=sys.stderr)
+    complain_of_end(options.files, log.complete)
     return exit_codes.OK
 
 
@@ -37,16 +40,17 @@ def _stem(options: Options) -> str:
     return str(options.files[0].name).removesuffix(".mcap")
 
 
-def _write_csv(log: Log, options: Options) -> list[Path]:
+def _write_csv(log: ScannedLog, options: Options) -> list[Path]:
     if options.out is None:
-        write_lab_csv(log, sys.stdout)
+        write_lab_csv(log, sys.stdout).raise_cut()
         return []
     path = Path(options.out)
     try:
         with whole_file(path) as hidden, hidden.open("w", encoding="utf-8") as out, watched() as watch:
-            write_lab_csv(log, out, watch)
+            rows = write_lab_csv(log, out, watch)
     except OSError as problem:
         raise _not_written(path, problem) from None
+    rows.raise_cut()
     return [path]
 
 
@@ -56,7 +60,7 @@ def _not_written(path: Path, problem: OSError) -> LogError:
     return LogError(f"{path}: nothing was written: {reason}")
 
 
-def _write_ros(log: Log, options: Options) -> list[Path]:
+def _write_ros(log: ScannedLog, options: Options) -> list[Path]:
     from firmware_host.log_reading.replay import configuration_of
     from firmware_host.open_data.ros_log import write_ros_log
 
@@ -70,7 +74,7 @@ def _write_ros(log: Log, options: Options) -> list[Path]:
     return [path]
 
 
-def _write_parquet(log: Log, options: Options) -> list[Path]:
+def _write_parquet(log: ScannedLog, options: Options) -> list[Path]:
     """The present folder is the default: the user may not be permitted to write into the log folder."""
     from firmware_host.open_data.parquet import write_parquet  # pyarrow is slow to import, and an extra
 

@@ -21,7 +21,8 @@ from experiments.run_report.run import Run, read_run, read_sources
 from experiments.run_report.sections import comparison_sections, comparison_sentences, run_sections
 from firmware_host.log.whole_files import copy_whole
 from firmware_host.log_reading.lab.summary import finding_reports
-from firmware_host.log_reading.log_reader import LogError, Watch, log_summary
+from firmware_host.log_reading.log_error import LogError, Watch
+from firmware_host.log_reading.log_summary import log_summary
 from firmware_host.operator.reports import map_report, stride_report
 
 ALSO = (".svg", ".pdf")  # of every picture, for papers

@@ -14,26 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
-from control.modes import Mode
 from control.records import FLIPPERS, FlipperLoad, Rig, StrideEstimate
+from experiments.pictures.walk_trace import Rows, WalkTraces, drawn_rows
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import STRIDE, stride_row
 from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_reader import (
-    Log,
-    LogError,
-    Watch,
-    begin_s,
-    log_summary,
-    read_log,
-    read_logs,
-    segment_of,
-    unwatched,
-)
+from firmware_host.log_reading.log_error import LogError, Watch, unwatched
+from firmware_host.log_reading.log_reader import AnyLog, TickPass
+from firmware_host.log_reading.log_summary import begin_s, log_summary, segment_of
 from firmware_host.log_reading.replay import configuration_of, lab_estimator, lab_readings
-from firmware_host.log_reading.tick_array import Ticks
+from firmware_host.log_reading.scanned_log import scan_logs
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
@@ -57,8 +49,19 @@ class FlipperSeries(NamedTuple):
     force_z_n: Floats
 
 
+class TraceSource(NamedTuple):
+    """Where the rows are that a trace lacks."""
+
+    log: AnyLog
+    rows: Rows  # of the trace
+    start_s: float  # of the walk, by the log's own clock
+
+
 class RecordedWalk(NamedTuple):
-    """Times are seconds since the walk began. Arrays have a value a row; those of joints belong to `flipper`."""
+    """Times are seconds since the walk began. Arrays have a value a row; those of joints belong to `flipper`.
+
+    A long walk has those rows that a picture of the whole needs (walk_trace.py); `in_detail` reads others.
+    """
 
     title: str
     geometry: FlipperGeometry
@@ -81,6 +84,7 @@ class RecordedWalk(NamedTuple):
     cut: str = ""  # how the walk may extend beyond this log
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
     series: tuple[FlipperSeries, ...] = ()  # of every flipper that moved, the left one first
+    source: TraceSource | None = None  # of a walk that has not every row of the log
 
     @property
     def sides(self) -> list["RecordedWalk"]:
@@ -120,40 +124,74 @@ def read_walk(
 
     `more` are segments of the same run; `vertical` is the axis of a CSV's capture that points up.
     """
-    if more:
-        return numbered_walk(path, read_logs([path, *more], watch), number)
-    if is_lab_csv(path):
+    if not more and is_lab_csv(path):
         return walk_of_lab(path, read_lab_csv(path, vertical), number)
-    if path.suffix == ".mcap":
-        return numbered_walk(path, read_log(path, watch), number)
-    raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
+    if not more and path.suffix != ".mcap":
+        raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
+    return numbered_walk(path, scan_logs([path, *more], watch), number, watch)
 
 
-def all_walks(path: Path, log: Log) -> list[RecordedWalk]:
-    """Return every walk of a log that was read already, none where the robot did not walk. Raises LogError."""
-    return [numbered_walk(path, log, number + 1) for number in range(len(_walk_borders(log)) // 2)]
+def numbered_walk(path: Path, log: AnyLog, number: int = 0, watch: Watch = unwatched) -> RecordedWalk:
+    """Return a walk of a log; `path` is for messages. Raises LogError."""
+    configuration, traces = configuration_of(path, log.configuration_text), WalkTraces(number)
+    complete = TickPass(log, watch, "ticks read").feed(traces.add)
+    _refuse_number(path, number, len(traces.walks))
+    return walk_of_trace(log, configuration, traces, number or len(traces.walks), complete)
 
 
-def _walk_borders(log: Log) -> NDArray[np.int64]:
-    """Return the first row of each walk and the row after its last one, in turn."""
-    return np.flatnonzero(np.diff(log.ticks["mode"] == Mode.WALKING, prepend=False, append=False))
+def walk_of_trace(
+    log: AnyLog, configuration: Configuration, traces: WalkTraces, number: int, complete: bool
+) -> RecordedWalk:
+    """Return walk `number` of a log from its trace. Strides and events belong to it up to the next walk."""
+    summary, trace, later = log_summary(log), traces.walks[number - 1], traces.walks[number:]
+    until_s = later[0].start_s if later else np.inf
+    strides = [stride for stride in log.strides if trace.start_s <= stride["stamp_s"] < until_s]
+    events = [event for event in log.events if trace.start_s <= event["stamp_s"] < until_s]
+    return RecordedWalk(
+        title=f"{summary['robot']}  {summary['started']}",
+        geometry=configuration.geometry,
+        sweep_rad=radians(configuration.gait.sweep_angle_deg),
+        **_columns_of(trace.rows, trace.start_s, log.rig, log.rig.flippers[-1]),
+        strides=[_since(trace.start_s, stride) for stride in strides],
+        noticed_s=[event["stamp_s"] - trace.start_s for event in events if event["text"] == ANOTHER_MUD],
+        walks=len(traces.walks),
+        begun_s=trace.start_s - begin_s(log),
+        complete=complete,
+        cut=_cut_of(log, trace.first_row == 0, trace.end_row == log.rows),
+        source=TraceSource(log, trace.rows, trace.start_s) if trace.bin_ticks else None,
+    )
 
 
-def numbered_walk(path: Path, log: Log, number: int = 0) -> RecordedWalk:
-    """Return a walk of a log that was read already; `path` is for messages. Raises LogError."""
-    configuration = configuration_of(path, log.configuration_text)
-    borders = _walk_borders(log)
-    starts, ends = borders[::2], borders[1::2]
-    _refuse_number(path, number, len(starts))
-    chosen = number - 1 if number else len(starts) - 1
-    until_s = log.ticks["stamp_s"][starts[chosen + 1]] if chosen + 1 < len(starts) else np.inf
-    walk = _walk_of_log(log, configuration, slice(starts[chosen], ends[chosen]), float(until_s))
-    cut = _cut_of(log, bool(starts[chosen] == 0), bool(ends[chosen] == len(log.ticks)))
-    begun_s = float(log.ticks["stamp_s"][starts[chosen]]) - begin_s(log)
-    return walk._replace(walks=len(starts), begun_s=begun_s, complete=log.complete, cut=cut)
+def _columns_of(rows: Rows, start_s: float, rig: Rig, flipper: str) -> dict[str, Any]:
+    """Return the arrays of a walk in which `flipper` is shown."""
+    series = {name: _series_of(rows, number, name) for number, name in enumerate(rig.flippers)}
+    return series[flipper]._asdict() | {
+        "time_s": rows["stamp_s"] - start_s,
+        "phase": rows["phase"].astype(np.int64),
+        "depth_command_m": rows["depth_command_m"],
+        "body_x_m": rows["body_x_m"],
+        "series": tuple(series.values()),
+    }
 
 
-def _cut_of(log: Log, from_the_first: bool, to_the_last: bool) -> str:
+def in_detail(walk: RecordedWalk, spans_s: Sequence[tuple[float, float]]) -> RecordedWalk:
+    """Return the walk with every row between some times, of which a long walk has only a part. Raises LogError."""
+    if walk.source is None:
+        return walk
+    log, rows, start_s = walk.source
+    spans = [(start_s + from_s, start_s + to_s) for from_s, to_s in spans_s]
+    parts = [rows]
+    for ticks in log.blocks(spans=spans):
+        stamps_s, inside = ticks["stamp_s"], np.zeros(len(ticks), dtype=np.bool_)
+        for from_s, to_s in spans:
+            inside |= (stamps_s >= from_s) & (stamps_s <= to_s)
+        parts.append(drawn_rows(ticks[inside]))
+    joined = np.concatenate(parts)
+    detailed = joined[np.unique(joined["tick"], return_index=True)[1]]
+    return walk._replace(**_columns_of(detailed, start_s, log.rig, walk.flipper))
+
+
+def _cut_of(log: AnyLog, from_the_first: bool, to_the_last: bool) -> str:
     """Describe how the walk may extend beyond this segment of its run."""
     number = segment_of(log)
     before = [f"begun before segment {number}"] * (from_the_first and number > 0)
@@ -168,38 +206,14 @@ def _refuse_number(path: Path, number: int, walks: int) -> None:
         raise LogError(f"{path}: it has no walk {number}, only {walks}")
 
 
-def _walk_of_log(log: Log, configuration: Configuration, rows: slice, until_s: float) -> RecordedWalk:
-    """Return the walk in some rows. Strides and events belong to it up to the next walk at `until_s`."""
-    ticks = log.ticks[rows]
-    start_s = float(ticks["stamp_s"][0])
-    strides = [stride for stride in log.strides if start_s <= stride["stamp_s"] < until_s]
-    events = [event for event in log.events if start_s <= event["stamp_s"] < until_s]
-    summary = log_summary(log)
-    series = tuple(_series_of(ticks, log.rig, flipper) for flipper in log.rig.flippers)
-    return RecordedWalk(
-        title=f"{summary['robot']}  {summary['started']}",
-        geometry=configuration.geometry,
-        sweep_rad=radians(configuration.gait.sweep_angle_deg),
-        **series[-1]._asdict(),
-        time_s=ticks["stamp_s"] - start_s,
-        phase=ticks["phase"].astype(np.int64),
-        depth_command_m=ticks["depth_command_m"],
-        body_x_m=ticks["body_x_m"],
-        strides=[_since(start_s, stride) for stride in strides],
-        noticed_s=[event["stamp_s"] - start_s for event in events if event["text"] == ANOTHER_MUD],
-        series=series,
-    )
-
-
-def _series_of(ticks: Ticks, rig: Rig, flipper: str) -> FlipperSeries:
-    number = rig.flippers.index(flipper)
+def _series_of(rows: Rows, number: int, flipper: str) -> FlipperSeries:
     return FlipperSeries(
         flipper=flipper,
-        sweep_angle_rad=ticks["angle_rad"][:, 2 * number],
-        adduction_angle_rad=ticks["angle_rad"][:, 2 * number + 1],
-        depth_m=ticks["depth_m"][:, number],
-        force_x_n=ticks["force_x_n"][:, number],
-        force_z_n=ticks["force_z_n"][:, number],
+        sweep_angle_rad=rows["angle_rad"][:, 2 * number],
+        adduction_angle_rad=rows["angle_rad"][:, 2 * number + 1],
+        depth_m=rows["depth_m"][:, number],
+        force_x_n=rows["force_x_n"][:, number],
+        force_z_n=rows["force_z_n"][:, number],
     )
 
 

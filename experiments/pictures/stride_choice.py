@@ -4,13 +4,14 @@ A stride fails in one of the paper's two ways (section III-A): the mud yields an
 flipper does not come out of the mud.
 """
 
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from control.records import Phase
-from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.recorded_walk import RecordedWalk, in_detail
 
 Stride = dict[str, Any]  # a row of log_rows.STRIDE
 
@@ -75,6 +76,14 @@ def rows_of(walk: RecordedWalk, stride: Stride) -> range:
 def duration_s(walk: RecordedWalk, stride: Stride) -> float:
     rows = rows_of(walk, stride)
     return float(walk.time_s[rows.stop - 1] - walk.time_s[rows.start])
+
+
+def with_strides(walk: RecordedWalk, strides: Sequence[Stride]) -> RecordedWalk:
+    """Return the walk with every row of some of its strides. Raises LogError."""
+    spans = []
+    for rows in (rows_of(walk, stride) for stride in strides):
+        spans.append((float(walk.time_s[max(rows.start - 1, 0)]), float(walk.time_s[rows.stop - 1])))
+    return in_detail(walk, spans)
 
 
 def moments_of(walk: RecordedWalk, stride: Stride) -> list[Moment]:

@@ -20,7 +20,8 @@ from firmware_host.configuration.file_problems import why_not
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import run_files
-from firmware_host.log_reading.log_reader import Log, LogError, read_logs
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import Log, read_logs
 from firmware_host.operator.lease import TAKEN_OVER
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 

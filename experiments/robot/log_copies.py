@@ -12,8 +12,9 @@ import numpy as np
 
 from firmware_host.log.log_folder import present_path
 from firmware_host.log.whole_files import copy_whole
-from firmware_host.log_reading.log_reader import Log, read_log
+from firmware_host.log_reading.log_reader import Log
 from firmware_host.log_reading.recovery import recover_log
+from firmware_host.log_reading.scanned_log import scan_log
 
 
 def copy_since(segments: Sequence[Path], from_s: float, folder: Path) -> list[Path]:
@@ -24,16 +25,16 @@ def copy_since(segments: Sequence[Path], from_s: float, folder: Path) -> list[Pa
 
 def _ends_before(log: Path, from_s: float) -> bool:
     """Return whether a complete segment has all its rows before `from_s`."""
-    rows = read_log(present_path(log), from_s=from_s)
+    rows = scan_log(present_path(log), from_s=from_s)
     if not rows.complete:
         return False
-    last_s = [*rows.ticks["stamp_s"][-1:], *(row["stamp_s"] for row in (*rows.strides[-1:], *rows.events[-1:]))]
+    last_s = [*rows.ends["stamp_s"][-1:], *(row["stamp_s"] for row in (*rows.strides[-1:], *rows.events[-1:]))]
     return bool(last_s) and max(last_s) < from_s
 
 
 def _copy(log: Path, copy: Path) -> Path:
     copy_whole(present_path(log), copy)
-    if not read_log(copy).complete:
+    if not scan_log(copy).complete:
         recover_log(copy)
     return copy
 

@@ -17,15 +17,19 @@ from control.records import FLIPPERS, UNKNOWN
 from estimation.strokes.fit_samples import FitSamples, StrideFits
 from experiments.lablogs.log_choice import LABEL
 from experiments.pictures.mud_layout import MudLayout, mud_regions
-from experiments.pictures.recorded_walk import RecordedWalk, all_walks, walk_of_lab
+from experiments.pictures.recorded_walk import RecordedWalk, walk_of_lab, walk_of_trace
 from experiments.pictures.stride_choice import Outcome, Stride, outcome_of
+from experiments.pictures.walk_trace import WalkTraces
 from experiments.reports.mud_names import mud_label
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.log_reading.fault_history import LoggedCause, read_causes
 from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_reader import Log, LogError, Watch, begin_s, join_logs, log_summary, read_log
-from firmware_host.log_reading.replay import Replay, replay_lab, replay_log
+from firmware_host.log_reading.log_error import LogError, Watch
+from firmware_host.log_reading.log_reader import TickPass
+from firmware_host.log_reading.log_summary import begin_s, log_summary
+from firmware_host.log_reading.replay import Replay, RunningReplay, configuration_of, replay_lab
+from firmware_host.log_reading.scanned_log import ScannedLog, join_logs, scan_log
 
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
 AUTHORS = "the paper's authors"
@@ -74,7 +78,7 @@ class Run:
     paths: Sequence[Path]
     robot: str
     started: str
-    log: Log | None  # None for a CSV of the authors
+    log: ScannedLog | None  # None for a CSV of the authors
     replay: Replay
     layout: MudLayout | None  # None where the robot noticed the muds
     muds_from: MudsFrom
@@ -93,23 +97,23 @@ class Source:
     """The files of one run, and their log where it is one of this project."""
 
     paths: Sequence[Path]
-    log: Log | None
+    log: ScannedLog | None
 
 
 def read_sources(files: Sequence[Path], watch: Watch) -> list[Source]:
     """Read logs, and join the segments of each run. Raises LogError."""
-    runs: dict[str, list[tuple[Path, Log | None]]] = {}
+    runs: dict[str, list[tuple[Path, ScannedLog | None]]] = {}
     for path in files:
         if not (path.suffix == ".mcap" or is_lab_csv(path)):
             raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
         if any(path.absolute() == known.absolute() for run in runs.values() for known, _ in run):
             raise LogError(f"{path}: given twice")
-        log = None if is_lab_csv(path) else read_log(path, watch)
+        log = None if is_lab_csv(path) else scan_log(path, watch)
         runs.setdefault((log and log.metadata.get("run_id")) or str(path), []).append((path, log))
     return [_source(run) for run in runs.values()]
 
 
-def _source(run: Sequence[tuple[Path, Log | None]]) -> Source:
+def _source(run: Sequence[tuple[Path, ScannedLog | None]]) -> Source:
     paths, logs = [path for path, _ in run], [log for _, log in run if log]
     return Source(paths, join_logs(paths, logs) if logs else None)
 
@@ -121,7 +125,7 @@ def read_run(source: Source, layout: MudLayout | None, watch: Watch, vertical: C
         lab = read_lab_csv(path, vertical)
         replay, walks = replay_lab(lab), [walk_of_lab(path, lab)] if lab.flippers else []
     else:
-        replay, walks = replay_log(path, log, watch=watch), all_walks(path, log)
+        replay, walks = _read_ticks(path, log, watch)
     label = LABEL.search(path.name) if log is None else None
     muds_from = MudsFrom.NAMES if layout else MudsFrom.FILE if label else MudsFrom.ROBOT
     if layout is None and label:
@@ -142,6 +146,15 @@ def read_run(source: Source, layout: MudLayout | None, watch: Watch, vertical: C
         causes=read_causes(log.events, log.configuration_text) if log else [],
         flippers=replay.flippers,
     )
+
+
+def _read_ticks(path: Path, log: ScannedLog, watch: Watch) -> tuple[Replay, list[RecordedWalk]]:
+    """Return the estimates and the walks of a log. Raises LogError."""
+    configuration, traces = configuration_of(path, log.configuration_text), WalkTraces()
+    running = RunningReplay(path, log, configuration)
+    complete = TickPass(log, watch, "ticks replayed").feed(running.add, traces.add)
+    numbers = range(1, len(traces.walks) + 1)
+    return running.finish(complete), [walk_of_trace(log, configuration, traces, number, complete) for number in numbers]
 
 
 def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk]) -> MudLayout | None:

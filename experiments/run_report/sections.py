@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.pictures.mud_layout import MudLayout
 from experiments.pictures.recorded_walk import RecordedWalk
-from experiments.pictures.stride_choice import choose_strides
+from experiments.pictures.stride_choice import choose_strides, with_strides
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.shown_values import value_shown
@@ -27,7 +27,7 @@ from experiments.run_report.tables import (
     run_rows,
     stride_rows,
 )
-from firmware_host.log_reading.log_reader import log_summary
+from firmware_host.log_reading.log_summary import log_summary
 from firmware_host.operator.counted_nouns import counted
 
 SINCE = "Times count from the beginning of the log."
@@ -110,7 +110,8 @@ def _walk_section(walk: RecordedWalk, number: int, layout: MudLayout | None) -> 
 def _draw_strip(walk: RecordedWalk, path: Path) -> Any:
     from experiments.pictures.stride_strip import draw_strip
 
-    return draw_strip(walk, choose_strides(walk), path)
+    strides = choose_strides(walk)
+    return draw_strip(with_strides(walk, strides), strides, path)
 
 
 def _fits_section(run: Run) -> Section:

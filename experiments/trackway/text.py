@@ -23,7 +23,8 @@ from experiments.trials.mud_trials import open_bench, run_trials
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Finding, Session
 from firmware_host.log.log_folder import first_path, run_files
-from firmware_host.log_reading.log_reader import LogError, read_log, read_logs
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import read_log, read_logs
 from firmware_host.operator.counted_nouns import counted
 
 INSTRUCTIONS = (

@@ -15,11 +15,15 @@ from control.modes import Mode
 from firmware_host.catalogue.entry import FileStamp, LogEntry, MudEntry
 from firmware_host.log.log_file import EXPORTED
 from firmware_host.log.rows import COEFFICIENTS
-from firmware_host.log_reading.log_reader import ADVICE, Log, LogError, log_summary, read_log, segment_of
+from firmware_host.log_reading.file_pass import ADVICE
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import Log, read_log
+from firmware_host.log_reading.log_summary import log_summary, segment_of
 from firmware_host.log_reading.tick_array import Ticks
 
 ANOTHER_MUD = "another mud"  # the loop's event after a stride that did not fit what was known
 FAULT = re.compile(r"fault (\w+) \((?!none\))\w+\)")  # a reaction of none only blocks arming
+FIELDS = ("tick", "missed_ticks", "mode", "stamp_s", "body_x_m")  # of a tick, as far as an entry needs them
 Rows = Sequence[dict[str, Any]]
 
 
@@ -27,7 +31,7 @@ def read_entry(path: Path, file: str, stamp: FileStamp) -> LogEntry:
     """Never raises LogError: a log that cannot be read is an entry with the reason."""
     entry = LogEntry(file=file, state="whole", reason="", bytes=stamp.bytes, changed_ns=stamp.changed_ns)
     try:
-        log = read_log(path)
+        log = read_log(path, fields=FIELDS)
     except LogError as problem:
         return entry._replace(state="broken", reason=str(problem).removeprefix(f"{path}: "))
     if not (log.metadata or len(log.ticks) or log.strides or log.events):

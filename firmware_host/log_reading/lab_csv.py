@@ -29,7 +29,7 @@ from firmware_host.log_reading.lab.log_rows import LogRows
 from firmware_host.log_reading.lab.row_order import drop_backward_rows
 from firmware_host.log_reading.lab.signal_checks import AT_PEAK, check_ranges, check_swapped_joints, drop_stuck_signals
 from firmware_host.log_reading.lab.zero_checks import check_zero
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_error import LogError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

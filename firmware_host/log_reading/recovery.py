@@ -22,8 +22,9 @@ from mcap.writer import MCAP0_MAGIC
 from firmware_host.log.log_file import LogFile, lock_file
 from firmware_host.log.log_folder import BROKEN, PART, finished_path, move_file, unfinished_files
 from firmware_host.log.rows import EVENT_KIND
-from firmware_host.log_reading.log_reader import LogError, Watch, read_log, unwatched
+from firmware_host.log_reading.log_error import LogError, Watch, unwatched
 from firmware_host.log_reading.salvage import Salvage, count_readable_rows, salvage_rows
+from firmware_host.log_reading.scanned_log import scan_log
 
 WATCHED_ROWS = 1000  # between two reports of progress
 
@@ -80,7 +81,7 @@ def recover_log(path: Path, watch: Watch = unwatched) -> Recovered:
 
 def _is_whole(path: Path, watch: Watch = unwatched) -> bool:
     with suppress(LogError):
-        return read_log(path, watch).complete
+        return scan_log(path, watch).complete
     return False
 
 

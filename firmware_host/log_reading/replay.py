@@ -4,8 +4,10 @@ A log of this project gives the estimates that the daemon computed, to the last 
 which hold angles and currents of their own robot, are replayed with the assumptions of their method.
 """
 
+from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import nan
 from pathlib import Path
 
@@ -17,22 +19,18 @@ from estimation.joint_load import FlipperDrive
 from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
 from estimation.mud_map import MapRow
 from estimation.recorded_states import recorded_states
-from estimation.strokes.fit_samples import StrideFits
+from estimation.strokes.fit_samples import FitSamples, StrideFits
 from firmware_host.configuration.configuration import CaptureAxis, Configuration, PoseParameters
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_reader import (
-    Log,
-    LogError,
-    Watch,
-    begin_s,
-    read_logs,
-    segment_of,
-    unwatched,
-)
+from firmware_host.log_reading.log_error import LogError, Watch, unwatched
+from firmware_host.log_reading.log_reader import AnyLog, TickPass
+from firmware_host.log_reading.log_summary import begin_s, segment_of
+from firmware_host.log_reading.scanned_log import scan_logs
+from firmware_host.log_reading.tick_array import Ticks
 
 # The standard errors of the mud's height. On the bench k_s of first strokes scatters by 3.6 to 5.2 % in fifteen trials
 # of three muds, of which torque and fit explain 4.5 %; the walking robot sinks and pitches by several millimetres.
@@ -43,7 +41,6 @@ WEIGHTLESS = ArmMass(
 LAB_DRIVE = FlipperDrive(WEIGHTLESS, PAPER_CONSTANT_NM_A, PAPER_CONSTANT_NM_A)
 NO_VELOCITY = (nan,) * len(JOINTS)
 PHASES = tuple(Phase)
-WATCHED_TICKS = 1000  # between two reports of progress
 TICK_FIELDS = (
     "stamp_s", "mode", "phase",
     "body_x_m", "angle_rad", "velocity_rad_s", "current_a", "angle_age_s", "current_age_s",
@@ -85,40 +82,83 @@ def replay_files(
         raise LogError(f"{path}: only a CSV of motion capture has a vertical axis to choose")
     if len(paths) == 1 and path.suffix != ".mcap":
         raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
-    return replay_log(path, read_logs(paths, watch), configuration, method, watch)
+    return replay_log(path, scan_logs(paths, watch), configuration, method, watch)
 
 
 def replay_log(
     path: Path,
-    log: Log,
+    log: AnyLog,
     configuration: Configuration | None = None,
     method: Method | None = None,
     watch: Watch = unwatched,
 ) -> Replay:
-    """Replays with the configuration that the log carries, unless another one is given."""
-    configuration = configuration or configuration_of(path, log.configuration_text)
-    parameters = replace(configuration.estimation, method=method or configuration.estimation.method)
-    drag_n, rig = configuration.adaptation.body_drag_n, configuration.rig
-    if rig != log.rig:
-        own, given = list(log.rig.flippers), list(rig.flippers)
-        raise LogError(f"{path}: is of a robot with rig.flippers = {own}, not {given} as in the configuration")
-    estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n, rig)
-    found = list(_strides_of_log(estimator, log, watch))
-    return Replay(
-        [stride for stride, _ in found],
-        rig.flippers,
-        estimator.map.rows(),
-        log.complete,
-        segment_of(log),
-        begin_s(log),
-        fits=tuple(fits for _, fits in found),
-        chosen_depths_m=tuple(_chosen_depths(log, [stride for stride, _ in found])),
-    )
+    """Replays with the configuration that the log carries, unless another one is given. Raises LogError."""
+    running = RunningReplay(path, log, configuration, method)
+    return running.finish(TickPass(log, watch, "ticks replayed").feed(running.add))
 
 
-def _chosen_depths(log: Log, strides: Sequence[StrideEstimate]) -> Iterator[float]:
-    chosen_m = {(FLIPPERS[bool(row["flipper"])], row["t_start_s"]): row["chosen_depth_m"] for row in log.strides}
-    return (chosen_m.get((stride.flipper, stride.t_start_s), nan) for stride in strides)
+class RunningReplay:
+    """Owns an estimator and its estimates from the ticks of a log so far."""
+
+    def __init__(
+        self, path: Path, log: AnyLog, configuration: Configuration | None = None, method: Method | None = None
+    ) -> None:
+        """Raises LogError where the log has no usable configuration, or is of another robot than the given one."""
+        configuration = configuration or configuration_of(path, log.configuration_text)
+        parameters = replace(configuration.estimation, method=method or configuration.estimation.method)
+        drag_n, rig = configuration.adaptation.body_drag_n, configuration.rig
+        if rig != log.rig:
+            own, given = list(log.rig.flippers), list(rig.flippers)
+            raise LogError(f"{path}: is of a robot with rig.flippers = {own}, not {given} as in the configuration")
+        self._log, self._flippers = log, rig.flippers
+        self._estimator = MudEstimator(configuration.geometry, configuration.flipper_drives, parameters, drag_n, rig)
+        self._strides: list[StrideEstimate] = []
+        self._fits: list[StrideFits] = []
+        self._mode_before = -1
+
+    def add(self, ticks: Ticks) -> None:
+        """The order is that of the loop: the sample comes before the change of mode that resets a walk."""
+        estimator, walking = self._estimator, int(Mode.WALKING)
+        rows = zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True)
+        for now_s, mode, phase, body_x_m, *signals in rows:
+            states = recorded_states(now_s, *signals)
+            reading = estimator.update(now_s, PHASES[phase], states, BodyPose(now_s, body_x_m))
+            for stride in reading.strides:
+                self._strides.append(stride)
+                self._fits.append(_packed(estimator.fits_of(stride.flipper)))
+            if mode == walking and self._mode_before != walking:
+                estimator.reset()
+            self._mode_before = mode
+
+    def finish(self, complete: bool) -> Replay:
+        log, strides = self._log, self._strides
+        chosen_m = {(FLIPPERS[bool(row["flipper"])], row["t_start_s"]): row["chosen_depth_m"] for row in log.strides}
+        return Replay(
+            strides,
+            self._flippers,
+            self._estimator.map.rows(),
+            complete,
+            segment_of(log),
+            begin_s(log),
+            fits=tuple(self._fits),
+            chosen_depths_m=tuple(chosen_m.get((stride.flipper, stride.t_start_s), nan) for stride in strides),
+        )
+
+
+def _packed(fits: StrideFits) -> StrideFits:
+    """Computes the fits now: a stride's samples are smaller than the ticks that they are computed from."""
+    return StrideFits(*(partial(_same, _packed_samples(samples())) for samples in fits))
+
+
+def _packed_samples(samples: FitSamples | None) -> FitSamples | None:
+    if samples is None:
+        return None
+    moments, torques, weights = (array("d", values) for values in samples[:-1])
+    return FitSamples(moments, torques, weights, samples.slope)
+
+
+def _same(samples: FitSamples | None) -> FitSamples | None:
+    return samples
 
 
 def configuration_of(path: Path, text: str) -> Configuration:
@@ -127,24 +167,6 @@ def configuration_of(path: Path, text: str) -> Configuration:
         return parse_configuration(text)
     except ConfigurationError as problem:
         raise LogError(f"{path}: this version does not accept its configuration: {problem.problems[0]}") from problem
-
-
-def _strides_of_log(estimator: MudEstimator, log: Log, watch: Watch) -> Iterator[tuple[StrideEstimate, StrideFits]]:
-    """Yields the strides with their fits.
-
-    The order is that of the loop: the sample comes before the change of mode that resets a walk.
-    """
-    ticks = log.ticks
-    walking, mode_before = int(Mode.WALKING), -1
-    rows = zip(*(ticks[name].tolist() for name in TICK_FIELDS), strict=True)
-    for number, (now_s, mode, phase, body_x_m, *signals) in enumerate(rows):
-        if number % WATCHED_TICKS == 0:
-            watch("ticks replayed", number, len(ticks))
-        reading = estimator.update(now_s, PHASES[phase], recorded_states(now_s, *signals), BodyPose(now_s, body_x_m))
-        yield from ((stride, estimator.fits_of(stride.flipper)) for stride in reading.strides)
-        if mode == walking and mode_before != walking:
-            estimator.reset()
-        mode_before = mode
 
 
 def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:

@@ -20,15 +20,8 @@ from firmware_host.log.log_file import ATTACHMENT, METADATA
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS
 from firmware_host.log.schema import LayoutError
 from firmware_host.log_reading.chunks import RECORD_HEAD, Row, open_chunk, split_records
-from firmware_host.log_reading.log_reader import (
-    DAMAGE,
-    KIND_OF_TOPIC,
-    OTHER_VERSION,
-    LogError,
-    Watch,
-    described_kind,
-    unwatched,
-)
+from firmware_host.log_reading.file_pass import KIND_OF_TOPIC, OTHER_VERSION, described_kind
+from firmware_host.log_reading.log_error import DAMAGE, LogError, Watch, unwatched
 
 SIGNATURE = struct.pack("<I", 3) + b"lz4"  # in the head of each of our chunks, after CHUNK_HEAD
 FOREIGN_SIGNATURE = struct.pack("<I", 4) + b"zstd"

@@ -5,7 +5,8 @@ export adds them.
 """
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain, tee
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,14 +19,14 @@ from firmware_host.log.log_file import ATTACHMENT, EXPORTED, METADATA
 from firmware_host.log.rows import EVENT, STRIDE, TICK, row_kinds, tick_kind
 from firmware_host.log.schema import CDR_HEADER
 from firmware_host.log.whole_files import whole_file
-from firmware_host.log_reading.log_reader import Log, Watch, unwatched
-from firmware_host.log_reading.tick_array import tick_type
+from firmware_host.log_reading.log_error import Watch, unwatched
+from firmware_host.log_reading.log_reader import AnyLog, TickPass
+from firmware_host.log_reading.tick_array import Ticks, tick_type
 from firmware_host.open_data.ros_definitions import full_definition, schema_name
 from firmware_host.open_data.ros_messages import topics_of
 from firmware_host.open_data.standard_messages import StandardMessages
 
 LATEST_NS = (1 << 31) * 1_000_000_000 - 1
-WATCHED_ROWS = 5000
 
 
 class _Message(NamedTuple):
@@ -34,8 +35,8 @@ class _Message(NamedTuple):
     data: bytes
 
 
-def write_ros_log(log: Log, geometry: FlipperGeometry, path: Path, watch: Watch = unwatched) -> None:
-    """Writes the whole file or nothing. Raises OSError."""
+def write_ros_log(log: AnyLog, geometry: FlipperGeometry, path: Path, watch: Watch = unwatched) -> None:
+    """Writes the whole file or nothing. Raises OSError, and LogError: LogCutError after the rows before the cut."""
     offset_ns = int(log.metadata.get("wall_minus_monotonic_ns", "0"))
     with whole_file(path) as hidden, hidden.open("wb") as file:
         writer = Writer(file, compression=CompressionType.LZ4)
@@ -43,13 +44,16 @@ def write_ros_log(log: Log, geometry: FlipperGeometry, path: Path, watch: Watch 
         writer.add_metadata(METADATA, log.metadata | {EXPORTED: "ros"})
         writer.add_attachment(0, 0, ATTACHMENT, "application/toml", log.configuration_text.encode())
         channels = _register(writer, log.rig)
-        messages = heapq.merge(_own_rows(log), _standard(log, geometry, offset_ns), key=lambda message: message.stamp_s)
-        for number, message in enumerate(messages):
-            if number % WATCHED_ROWS == 0:
-                watch("ticks written", int(np.searchsorted(log.ticks["stamp_s"], message.stamp_s)), len(log.ticks))
+        read = TickPass(log, watch, "ticks written")
+        own, others = tee(read)
+        messages = heapq.merge(
+            _own_rows(log, own), _standard(log, others, geometry, offset_ns), key=lambda message: message.stamp_s
+        )
+        for message in messages:
             time_ns = _wall_ns(message.stamp_s, offset_ns)
             writer.add_message(channels[message.topic], time_ns, message.data, time_ns)
         writer.finish()  # type: ignore[no-untyped-call]
+    read.raise_cut()
 
 
 def _register(writer: Writer, rig: Rig) -> dict[str, int]:
@@ -70,26 +74,26 @@ def _wall_ns(stamp_s: float, offset_ns: int) -> int:
     return min(max(0, offset_ns + since_ns), LATEST_NS)
 
 
-def _own_rows(log: Log) -> Iterator[_Message]:
-    stamps_s = log.ticks["stamp_s"].tolist()
-    ticks = (_Message(stamp_s, TICK.topic, row) for stamp_s, row in zip(stamps_s, _encoded(log), strict=True))
+def _own_rows(log: AnyLog, blocks: Iterable[Ticks]) -> Iterator[_Message]:
+    ticks = (_Message(*row) for block in blocks for row in _encoded(block, log.rig))
     strides = (_Message(row["stamp_s"], STRIDE.topic, STRIDE.encode_named(**row)) for row in log.strides)
     events = (_Message(row["stamp_s"], EVENT.topic, EVENT.encode_named(**row)) for row in log.events)
     return heapq.merge(ticks, strides, events, key=lambda message: message.stamp_s)
 
 
-def _encoded(log: Log) -> Iterator[bytes]:
-    ticks, rows = log.ticks, np.zeros(len(log.ticks), tick_type(tick_kind(log.rig)))
+def _encoded(ticks: Ticks, rig: Rig) -> Iterator[tuple[float, str, bytes]]:
+    rows = np.zeros(len(ticks), tick_type(tick_kind(rig)))
     for name in rows.dtype.names or ():
         rows[name] = ticks[name]
     stored, size = rows.tobytes(), rows.dtype.itemsize
-    return (CDR_HEADER + stored[begin + len(CDR_HEADER) : begin + size] for begin in range(0, len(stored), size))
+    for begin, stamp_s in zip(range(0, len(stored), size), ticks["stamp_s"].tolist(), strict=True):
+        yield stamp_s, TICK.topic, CDR_HEADER + stored[begin + len(CDR_HEADER) : begin + size]
 
 
-def _standard(log: Log, geometry: FlipperGeometry, offset_ns: int) -> Iterator[_Message]:
+def _standard(log: AnyLog, blocks: Iterable[Ticks], geometry: FlipperGeometry, offset_ns: int) -> Iterator[_Message]:
     standard = StandardMessages(geometry, log.rig)
     coming = sorted([*log.strides, *log.events], key=lambda row: float(row["stamp_s"]), reverse=True)
-    for tick in log.ticks:
+    for tick in chain.from_iterable(blocks):
         if not standard.is_due(int(tick["tick"])):
             continue
         stamp_s = float(tick["stamp_s"])

@@ -11,7 +11,8 @@ import pytest
 from firmware_host import software_version
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading.log_reader import log_summary, read_log
+from firmware_host.log_reading.log_reader import read_log
+from firmware_host.log_reading.log_summary import log_summary
 from tests.folders import ROOT
 
 

@@ -26,7 +26,8 @@ from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log.rows import TICK, rig_of, tick_kind
 from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.lab_csv import read_lab_csv
-from firmware_host.log_reading.log_reader import Log, LogError, read_log
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.log_reading.recovery import recover_log
 from firmware_host.log_reading.replay import replay_log
 from firmware_host.open_data.flat_columns import flat_columns

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.log_reading.lab.findings import Finding, FindingKind, of_whole_log
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_error import LogError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

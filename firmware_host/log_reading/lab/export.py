@@ -2,12 +2,12 @@
 
 import math
 import tomllib
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from control.records import JOINTS, Phase
+from control.records import JOINTS, Phase, Rig
 from firmware_host.log_reading.lab.columns import (
     BODY_COLUMNS,
     DEPTH_COLUMN,
@@ -15,32 +15,54 @@ from firmware_host.log_reading.lab.columns import (
     STATE_OF_PHASE,
     WRITTEN_ORDER,
 )
-from firmware_host.log_reading.log_reader import Log, LogError, Watch, unwatched
+from firmware_host.log_reading.log_error import LogError, Watch, unwatched
+from firmware_host.log_reading.log_reader import AnyLog, TickPass
+from firmware_host.log_reading.tick_array import Ticks
 
 Floats = NDArray[np.float64]
 
-WATCHED_ROWS = 5000  # between two reports of progress
+
+class _Heading(NamedTuple):
+    """What the first lines of the file say about the rows after them."""
+
+    start_s: Floats  # of the first row; empty without any
+    depth_m: float | None  # of the first stride
+    has_position: bool
 
 
-def write_lab_csv(log: Log, out: TextIO, watch: Watch = unwatched) -> None:
-    """Writes the authors' head, columns and units. The settings are the gait and the depth of the first stride."""
-    settings = _settings(log)
+def write_lab_csv(log: AnyLog, out: TextIO, watch: Watch = unwatched) -> TickPass:
+    """Writes the authors' head, columns and units. The settings are the gait and the depth of the first stride.
+
+    Returns the pass over the rows, which knows whether the log was cut off meanwhile. Raises LogError.
+    """
+    heading = _read_heading(log)
+    settings = _settings(heading, log.configuration_text)
     out.write(f"{','.join(settings)}\n{','.join(settings.values())}\n")
-    table = _columns(log)
-    out.write(",".join(table) + "\n")
-    formats = ["%d" if name == "turtle_state" else "%.9g" for name in table]
-    rows = np.column_stack(list(table.values()))
-    for start in range(0, len(rows), WATCHED_ROWS):
-        watch("rows written", start, len(rows))
-        np.savetxt(out, rows[start : start + WATCHED_ROWS], fmt=formats, delimiter=",")
+    names = list(_columns(log.ends[:0], log.rig, heading))
+    out.write(",".join(names) + "\n")
+    formats = ["%d" if name == "turtle_state" else "%.9g" for name in names]
+    rows = TickPass(log, watch, "rows written")
+    for ticks in rows:
+        np.savetxt(out, np.column_stack([*_columns(ticks, log.rig, heading).values()]), fmt=formats, delimiter=",")
+    return rows
 
 
-def _settings(log: Log) -> dict[str, str]:
-    depths_m = log.ticks["stride_depth_m"][log.ticks["phase"] == Phase.INSERTION]
-    settings = {"scenario": "mudskipper"}
-    if len(depths_m):
-        settings["insertion_angle"] = f"{depths_m[0]:.9g}"
-    return settings | _configured_gait(log.configuration_text)
+def _read_heading(log: AnyLog) -> _Heading:
+    """Reads as far into the log as the heading needs."""
+    depth_m, has_position = None, False
+    for ticks in TickPass(log, unwatched, ""):
+        inserted = ticks["phase"] == Phase.INSERTION
+        if depth_m is None and np.any(inserted):
+            depth_m = float(ticks["stride_depth_m"][inserted][0])
+        has_position = has_position or bool(np.any(np.isfinite(ticks["body_x_m"])))
+        if has_position and depth_m is not None:
+            break
+    return _Heading(log.ends["stamp_s"][:1], depth_m, has_position)
+
+
+def _settings(heading: _Heading, configuration_text: str) -> dict[str, str]:
+    depth = {} if heading.depth_m is None else {"insertion_angle": f"{heading.depth_m:.9g}"}
+    return {"scenario": "mudskipper"} | depth | _configured_gait(configuration_text)
 
 
 def _configured_gait(configuration_text: str) -> dict[str, str]:
@@ -51,21 +73,19 @@ def _configured_gait(configuration_text: str) -> dict[str, str]:
     return {name: str(value) for name, value in gait.items() if isinstance(value, int | float)}
 
 
-def _columns(log: Log) -> dict[str, Floats]:
-    stamp_s = log.ticks["stamp_s"]
+def _columns(ticks: Ticks, rig: Rig, heading: _Heading) -> dict[str, Floats]:
     state_of = np.array([STATE_OF_PHASE[phase] for phase in Phase])
-    columns = {"time": stamp_s - stamp_s[:1], "turtle_state": state_of[log.ticks["phase"]]}
+    columns = {"time": ticks["stamp_s"] - heading.start_s, "turtle_state": state_of[ticks["phase"]]}
     for joint in WRITTEN_ORDER:
-        columns[f"{JOINT_COLUMNS[joint]}_pos"] = _of_joint(log, "angle_rad", JOINTS[joint]) / math.tau
+        columns[f"{JOINT_COLUMNS[joint]}_pos"] = _of_joint(ticks["angle_rad"], rig, JOINTS[joint]) / math.tau
     for joint in WRITTEN_ORDER:
-        columns[f"{JOINT_COLUMNS[joint]}_curr"] = _of_joint(log, "current_a", JOINTS[joint])
-    columns[DEPTH_COLUMN] = log.ticks["stride_depth_m"]
-    if np.any(np.isfinite(log.ticks["body_x_m"])):
-        columns[BODY_COLUMNS[0]] = log.ticks["body_x_m"]
+        columns[f"{JOINT_COLUMNS[joint]}_curr"] = _of_joint(ticks["current_a"], rig, JOINTS[joint])
+    columns[DEPTH_COLUMN] = ticks["stride_depth_m"]
+    if heading.has_position:
+        columns[BODY_COLUMNS[0]] = ticks["body_x_m"]
     return columns
 
 
-def _of_joint(log: Log, name: str, joint: str) -> Floats:
+def _of_joint(values: Floats, rig: Rig, joint: str) -> Floats:
     """Returns the values of one joint; zeros for an absent motor, as the authors log it."""
-    values: Floats = log.ticks[name]
-    return values[:, log.rig.joints.index(joint)] if joint in log.rig.joints else np.zeros(len(values))
+    return values[:, rig.joints.index(joint)] if joint in rig.joints else np.zeros(len(values))

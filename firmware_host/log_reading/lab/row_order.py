@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from firmware_host.log_reading.lab.csv_table import TIME, CsvTable
 from firmware_host.log_reading.lab.findings import Finding, FindingKind
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_error import LogError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 
 from command_line import exit_codes
+from command_line.logs import log_export
 from command_line.main import main
+from firmware_host.log_reading.log_reader import read_log
+from firmware_host.log_reading.scanned_log import ScannedLog, scan_logs
 from tests.command_line.command_lines import failure, refusal
 from tests.firmware_host.open_data.test_parquet import files_of_at_most
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
 LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
+FORMS = {"--csv": "walk.csv", "--parquet": "tables", "--ros": "ros.mcap"}
 
 
 def test_parquet_goes_into_the_named_folder(tmp_path: Path) -> None:
@@ -79,3 +86,63 @@ def test_without_the_extra_a_message_says_what_to_install(tmp_path: Path) -> Non
     )  # fmt: skip
     assert ended.stdout == f"{exit_codes.UNHEALTHY}\n"
     assert "extra 'data'" in ended.stderr and "Traceback" not in ended.stderr
+
+
+def rows_of(form: str, out: Path) -> int:
+    if form == "--csv":
+        return len(out.read_text(encoding="utf-8").splitlines()) - 3
+    return pq.read_metadata(out / "walk-ticks.parquet").num_rows if form == "--parquet" else read_log(out).rows
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_an_export_of_a_log_that_was_cut_off_has_everything_before_and_says_so(
+    form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, out = tmp_path / "walk.mcap", tmp_path / FORMS[form]
+    contents = Path(LOG).read_bytes()
+    log.write_bytes(contents[: len(contents) // 2])
+    assert main(["log", "export", form, str(log), "--out", str(out)]) == exit_codes.OK
+    assert capsys.readouterr().err.count("the log was cut off: everything up to there was read") == 1
+    assert rows_of(form, out) == read_log(log).rows > 1000
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_log_that_is_cut_off_during_an_export_is_one_message_after_the_rows_before(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, out = tmp_path / "walk.mcap", tmp_path / FORMS[form]
+    log.write_bytes(Path(LOG).read_bytes())
+
+    def scan_before_cut(paths: list[Path], *arguments: Any) -> ScannedLog:
+        scanned = scan_logs(paths, *arguments)
+        os.truncate(log, log.stat().st_size // 2)
+        return scanned
+
+    monkeypatch.setattr(log_export, "scan_logs", scan_before_cut)
+    message = failure(capsys, "log", "export", form, str(log), "--out", str(out))
+    assert message.count("was cut off while it was read") == 1
+    assert rows_of(form, out) == read_log(log).rows > 1000
+    if form == "--parquet":
+        assert pq.read_schema(out / "walk-ticks.parquet").metadata[b"complete"] == b"false"
+
+
+def test_a_log_that_is_cut_off_during_a_replay_is_replayed_up_to_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "walk.mcap"
+    contents = Path(LOG).read_bytes()
+    log.write_bytes(contents[: len(contents) // 2])
+    assert main(["replay", str(log)]) == exit_codes.OK
+    expected = capsys.readouterr()
+
+    def scan_before_cut(paths: list[Path], *arguments: Any) -> ScannedLog:
+        scanned = scan_logs(paths, *arguments)
+        os.truncate(log, len(contents) // 2)
+        return scanned
+
+    log.write_bytes(contents)
+    monkeypatch.setattr("firmware_host.log_reading.replay.scan_logs", scan_before_cut)
+    assert main(["replay", str(log)]) == exit_codes.OK
+    cut = capsys.readouterr()
+    assert cut.out.split("\n")[2].split()[:8] == expected.out.split("\n")[2].split()[:8]
+    assert cut.err == expected.err and "the log was cut off" in cut.err

@@ -76,7 +76,7 @@ def test_times_count_from_the_log_s_begin_however_long_the_computer_is_up(
 ) -> None:
     words = (str(two_walks), "--out", str(tmp_path))
     before = pages_of(monkeypatch, *words)
-    monkeypatch.setattr(run_module, "read_log", lambda path, *_: after(read_log(path), UPTIME_S))
+    monkeypatch.setattr(run_module, "scan_log", lambda path, *_: after(read_log(path), UPTIME_S))
     assert pages_of(monkeypatch, *words) == before
     text, _ = section(before, "Walk 2")
     assert "Its pictures count from there" in text and not text.startswith("It begins 0.")

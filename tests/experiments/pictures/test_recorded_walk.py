@@ -17,7 +17,8 @@ from firmware_host.log.recorder import Recorder
 from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.lab_csv import read_lab_csv
-from firmware_host.log_reading.log_reader import LogError, read_log
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import read_log
 from firmware_host.log_reading.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS

@@ -19,7 +19,8 @@ from experiments.run_report.run import Run, read_run, read_sources
 from experiments.run_report.tables import coefficient_cell, counts_cell, mud_rows
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.fault_history import LoggedCause
-from firmware_host.log_reading.log_reader import read_log, unwatched
+from firmware_host.log_reading.log_error import unwatched
+from firmware_host.log_reading.log_reader import read_log
 from tests.experiments.run_report.synthetic_runs import estimates, run_of, stride
 from tests.recorded_walks import record_walks
 
@@ -43,7 +44,7 @@ def test_distance_time_and_strides_are_those_of_the_simulated_robot(walked: tupl
     run, travel_m = walked
     headline = headline_of(run)
     assert run.log is not None and headline.motion.distance_m == pytest.approx(travel_m, abs=0.003)
-    walking_s = np.count_nonzero(run.log.ticks["mode"] == Mode.WALKING) / 380.0
+    walking_s = np.count_nonzero(read_log(run.path).ticks["mode"] == Mode.WALKING) / 380.0
     assert headline.motion.duration_s == pytest.approx(walking_s, rel=0.01)
     assert headline.motion.speed_m_s == pytest.approx(travel_m / walking_s, rel=0.02)
     assert (headline.strides, headline.walks, headline.stops) == (7, 1, 0)
@@ -137,7 +138,7 @@ def test_a_log_s_estimates_stand_even_if_this_version_would_estimate_otherwise(
     """The report shows the logged values, without R² and residuals, which would belong to another fit."""
     log = read_log(two_walks)
     older = log._replace(strides=[row | {"k_p": 1.01 * row["k_p"]} for row in log.strides])
-    monkeypatch.setattr("experiments.run_report.run.read_log", lambda *_: older)
+    monkeypatch.setattr("experiments.run_report.run.scan_log", lambda *_: older)
     run = read(two_walks)
     for each in run.strides:
         assert each.samples("left", "k_p") is None and each.samples("left", "k_e") is not None

@@ -14,7 +14,7 @@ from firmware_host.catalogue.catalogue import VERSION, VERSION_KEY, Catalogue, C
 from firmware_host.catalogue.entry import COLUMNS, LogEntry
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED, preserve
-from firmware_host.log_reading.log_reader import unwatched
+from firmware_host.log_reading.log_error import unwatched
 from tests.firmware_host.open_data.test_parquet import files_of_at_most
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.folders import ROOT

@@ -21,7 +21,8 @@ from firmware_host.log_reading.lab.columns import STATE_OF_PHASE
 from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.lab.findings import FindingKind
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reading.log_reader import Log, LogError
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import Log
 from firmware_host.log_reading.tick_array import tick_type
 from tests.folders import SHARED_DATA
 

@@ -17,7 +17,9 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE, STRIDE_KIND, TICK, TICK_KIND
 from firmware_host.log.schema import RowKind
-from firmware_host.log_reading.log_reader import Log, LogError, log_summary, read_log
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import Log, read_log
+from firmware_host.log_reading.log_summary import log_summary
 from tests.firmware_host.synthetic_rows import encode_row
 
 WALL_NS = 1_700_000_000_000_000_000  # 2023-11-14 22:13:20 UTC

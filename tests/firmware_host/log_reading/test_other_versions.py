@@ -13,7 +13,8 @@ from command_line import main
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import ROW_KINDS, STRIDE, TICK
 from firmware_host.log.schema import RowKind, read_definition
-from firmware_host.log_reading.log_reader import Log, log_summary, read_log, read_logs
+from firmware_host.log_reading.log_reader import Log, read_log, read_logs
+from firmware_host.log_reading.log_summary import log_summary
 from firmware_host.log_reading.recovery import recover_log
 from tests.firmware_host.synthetic_rows import OPENING, encode_row
 from tests.folders import ROOT

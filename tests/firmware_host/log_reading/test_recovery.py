@@ -18,7 +18,8 @@ from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, unfinished_files
 from firmware_host.log.rows import TICK
 from firmware_host.log_reading import salvage as log_salvage
-from firmware_host.log_reading.log_reader import LogError, read_log
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import read_log
 from firmware_host.log_reading.recovery import recover_all, recover_log
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.waiting import LONGEST_S

@@ -18,7 +18,8 @@ from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.log_reader import LogError, read_logs
+from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_reader import read_logs
 from firmware_host.log_reading.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track

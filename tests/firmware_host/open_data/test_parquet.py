@@ -15,7 +15,9 @@ from control.modes import Mode
 from control.records import FLIPPERS, JOINTS, Phase
 from firmware_host.log.rows import EVENT, STRIDE, TICK
 from firmware_host.log.schema import Field, RowKind
+from firmware_host.log_reading import log_reader
 from firmware_host.log_reading.log_reader import Log, read_log
+from firmware_host.open_data import parquet
 from firmware_host.open_data.flat_columns import flat_columns, stack_rows
 from firmware_host.open_data.parquet import write_parquet
 from tests.folders import ROOT
@@ -73,6 +75,19 @@ def test_a_field_of_a_later_version_becomes_a_column() -> None:
     columns = {column.name: column for column in flat_columns(rows, TICK)}
     assert columns["cell_v_1"].values.tolist() == [3.2]
     assert columns["mode"].coded()[1] == ["200"]
+
+
+def test_tables_that_are_written_in_groups_are_the_same(
+    log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = pq.read_table(write_parquet(log, tmp_path, "whole")[0])
+    monkeypatch.setattr(parquet, "ROWS_PER_GROUP", 500)
+    monkeypatch.setattr(log_reader.Log, "blocks", lambda self, *_: np.array_split(self.ticks, 30))
+    path = write_parquet(log, tmp_path, "groups")[0]
+    groups = pq.read_table(path)
+    assert pq.ParquetFile(path).num_row_groups > 5
+    assert groups.schema.equals(whole.schema, check_metadata=True)
+    assert groups.to_pandas().equals(whole.to_pandas())
 
 
 def test_a_full_disk_leaves_the_files_before(log: Log, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from firmware_host.log_reading.lab.csv_table import read_table
 from firmware_host.log_reading.lab.findings import FindingKind
 from firmware_host.log_reading.lab_csv import read_lab_csv
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_error import LogError
 from tests.folders import SHARED_DATA
 
 PUBLISHED = sorted(SHARED_DATA.glob("as_published/*.csv.gz"))

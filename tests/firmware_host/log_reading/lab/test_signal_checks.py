@@ -11,7 +11,7 @@ import pytest
 
 from firmware_host.log_reading.lab.findings import FindingKind
 from firmware_host.log_reading.lab_csv import read_lab_csv
-from firmware_host.log_reading.log_reader import LogError
+from firmware_host.log_reading.log_error import LogError
 from firmware_host.log_reading.replay import replay_files
 from tests.lab_logs import JOINTS, Change, Columns, lab_columns, write_lab_log
 

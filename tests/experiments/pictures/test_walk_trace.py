@@ -1,0 +1,130 @@
+"""Traces of long walks: no peak is lost, and strides begin, end and read as in the whole log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.pictures import walk_trace
+from experiments.pictures.recorded_walk import RecordedWalk, read_walk
+from experiments.pictures.stride_choice import choose_strides, duration_s, moments_of, with_strides
+from experiments.pictures.walk_trace import DRAWN, WalkTraces, drawn_rows, rows_drawn
+from experiments.run_report.headline import headline_of
+from experiments.run_report.run import read_run, read_sources
+from firmware_host.log_reading.log_error import unwatched
+from firmware_host.log_reading.log_reader import read_log
+
+BIN = 64
+
+
+@pytest.fixture(scope="module")
+def rows(two_walks: Path) -> walk_trace.Rows:
+    """Of the first walk, whose position is not known for a while."""
+    traces = WalkTraces(1)
+    traces.add(read_log(two_walks).ticks)
+    rows = traces.walks[0].rows.copy()
+    rows["body_x_m"][500:900] = np.nan
+    return rows
+
+
+def extremes(rows: walk_trace.Rows, name: str, bin_ticks: int) -> list[list[float]]:
+    """First, last, smallest and largest known value of each bin that has one."""
+    bins = rows["tick"] // bin_ticks
+    found = []
+    for values in np.atleast_2d(rows[name].T):
+        for number in np.unique(bins):
+            known = values[(bins == number) & np.isfinite(values)]
+            found.append([known[0], known[-1], known.min(), known.max()] if len(known) else [])
+    return found
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_every_bin_has_the_extremes_and_the_ends_of_every_column(rows: walk_trace.Rows, name: str) -> None:
+    once, twice = rows[rows_drawn(rows, BIN)], rows[rows_drawn(rows, BIN // 2)]
+    twice = twice[rows_drawn(twice, BIN)]
+    assert len(twice) <= len(once) < len(rows) / 2
+    for trace in (once, twice):
+        assert extremes(trace, name, BIN) == extremes(rows, name, BIN)
+
+
+def test_a_trace_has_the_rows_at_which_the_phase_changes(rows: walk_trace.Rows) -> None:
+    trace = rows[rows_drawn(rows, 4096)]
+    changes = np.flatnonzero(np.diff(rows["phase"]))
+    assert len(changes) > 5
+    assert {*rows["tick"][changes], *rows["tick"][changes + 1]} <= set(trace["tick"].tolist())
+
+
+def test_blocks_of_any_size_give_the_same_walks(two_walks: Path) -> None:
+    ticks, found = read_log(two_walks).ticks, []
+    for size in (len(ticks), 700, 1):
+        traces = WalkTraces()
+        for start in range(0, len(ticks), size):
+            traces.add(ticks[start : start + size])
+        found.append([(walk.first_row, walk.start_s) for walk in traces.walks])
+    assert len(found[0]) == 2 and found[0] == found[1] == found[2]
+
+
+def test_only_the_rows_of_the_chosen_walk_are_kept(two_walks: Path) -> None:
+    ticks = read_log(two_walks).ticks
+    lengths = {}
+    for number in (0, 1, 2, None):
+        traces = WalkTraces(number)
+        traces.add(ticks)
+        lengths[number] = [len(walk) > 0 for walk in traces.walks]
+    assert lengths == {0: [False, True], 1: [True, False], 2: [False, True], None: [True, True]}
+
+
+def test_many_walks_have_no_more_rows_than_one(two_walks: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(walk_trace, "MOST_ROWS", 4000)
+    ticks, traces = read_log(two_walks).ticks.copy(), WalkTraces()
+    for _ in range(20):
+        traces.add(ticks)
+        ticks["tick"] += len(ticks)
+    assert len(traces.walks) == 40
+    assert sum(map(len, traces.walks)) <= 4000 + len(ticks)
+    assert all(len(walk.rows) > 10 for walk in traces.walks)
+
+
+def both(path: Path, number: int, monkeypatch: pytest.MonkeyPatch) -> tuple[RecordedWalk, RecordedWalk]:
+    """A walk, whole and as a trace."""
+    whole = read_walk(path, number)
+    monkeypatch.setattr(walk_trace, "MOST_ROWS", 300)
+    trace = read_walk(path, number)
+    assert whole.source is None and trace.source is not None and len(trace.time_s) < len(whole.time_s) / 2
+    return whole, trace
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_strides_of_a_trace_are_those_of_the_walk(
+    two_walks: Path, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, trace = both(two_walks, number, monkeypatch)
+    strides = choose_strides(whole)
+    assert strides and repr(choose_strides(trace)) == repr(strides)
+    assert [duration_s(trace, stride) for stride in strides] == [duration_s(whole, stride) for stride in strides]
+    detailed = with_strides(trace, strides)
+    for stride in strides:
+        shown = [
+            [(each.caption, walk.time_s[each.row]) for each in moments_of(walk, stride)] for walk in (whole, detailed)
+        ]
+        assert shown[0] == shown[1] and len(shown[0]) > 4
+    for side, same in zip(whole.sides, detailed.sides, strict=True):
+        rows = np.isin(side.time_s, same.time_s)
+        assert side.flipper == same.flipper and side.force_z_n[rows].tobytes() == same.force_z_n.tobytes()
+
+
+def test_the_figures_of_a_report_do_not_depend_on_the_trace(two_walks: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def headline() -> object:
+        (source,) = read_sources([two_walks], unwatched)
+        return headline_of(read_run(source, None, unwatched))
+
+    whole = headline()
+    monkeypatch.setattr(walk_trace, "MOST_ROWS", 1000)
+    assert headline() == whole
+
+
+def test_a_trace_has_only_rows_of_the_log(rows: walk_trace.Rows, two_walks: Path) -> None:
+    known = {row.tobytes() for row in drawn_rows(read_log(two_walks).ticks)}
+    assert all(row.tobytes() in known for row in rows[:500])
