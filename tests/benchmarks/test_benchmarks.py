@@ -22,6 +22,8 @@ from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
 from benchmarks.stress.can_fuzz import is_forbidden
 from drivers.can.frames import Frame
+from drivers.moteus import codec as moteus
+from drivers.moteus import registers, settings
 from tests.folders import ROOT
 
 TIMEOUT_S = 240.0  # on a machine that others keep busy
@@ -122,6 +124,21 @@ def test_can_fuzz() -> None:
 )
 def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send(frame: Frame, forbidden: bool) -> None:
     assert is_forbidden(frame) == forbidden
+
+
+@pytest.mark.parametrize(
+    ("data", "forbidden"),
+    [
+        (moteus.QUERY_ALONE, False),
+        (moteus.STOP_AND_QUERY, False),
+        (settings.IDENTITY, False),
+        (settings.QUESTIONS[0], False),
+        (moteus.encode_torque(0.0), True),
+        (registers.encode_console(registers.CONSOLE_INPUT, b"conf set servo.max_current_A 3\n"), True),
+    ],
+)
+def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send_to_a_moteus(data: bytes, forbidden: bool) -> None:
+    assert is_forbidden(Frame(0x8001, data, is_extended=True, is_fd=True), "moteus") == forbidden
 
 
 def test_soak() -> None:
