@@ -287,8 +287,10 @@ CONSEQUENCES: dict[str, tuple[str, ...]] = {
     "drive_energised": ("foreign_commands",),  # by which another program closed the loop
     "drive_error": ("drive_disarmed", "torque_missing"),
     "drive_restarted": ABSENT_DRIVE,
-    # the second drive reports another angle
-    "duplicate_node_id": ("encoder_jump", "joint_moving", "drive_disarmed", "joint_position", "encoder_stuck"),
+    # the second drive reports another angle, and its own set-points
+    "duplicate_node_id": (
+        *("encoder_jump", "joint_moving", "drive_disarmed", "joint_position", "encoder_stuck", "setpoint_mismatch"),
+    ),
     "setpoint_mismatch": ("joint_runaway",),  # in that torque's direction
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version", "wrong_drive"),
     "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),

@@ -46,9 +46,9 @@ def measured(bench: FaultBench, inject: Injector, joint: str) -> Iterator[JointE
     [
         (INVERTED, "insertion", "left_sweep", "joint_runaway", 0.3),
         (INVERTED, "stance", "right_adduction", "joint_runaway", 0.3),
-        (LATE, "swing", "right_sweep", "joint_runaway", 1.0),
+        (LATE, "swing", "right_sweep", "setpoint_mismatch", 0.3),  # the set-points of older commands
         (FROZEN, "insertion", "right_adduction", "encoder_stuck", 0.6),
-        (FROZEN, "swing", "left_sweep", "encoder_stuck", 0.6),
+        (FROZEN, "swing", "left_sweep", "setpoint_mismatch", 0.6),  # clamped at a speed that is not reported
         (jammed, "swing", "left_sweep", "following_error", 0.3),
     ],
 )

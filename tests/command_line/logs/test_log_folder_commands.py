@@ -144,7 +144,7 @@ def test_a_user_who_may_not_read_or_move_a_log_gets_advice(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
 
     log = str(folder / DONE / "1.mcap")
-    for name in ("read_bytes", "rename"):
+    for name in ("open", "rename"):
         monkeypatch.setattr(Path, name, refuse)
     assert main.main(["log", "info", log]) == exit_codes.UNHEALTHY
     assert f"have root add you to the group of {log}, then log in again, or do this as root" in capsys.readouterr().err
