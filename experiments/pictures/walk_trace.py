@@ -22,6 +22,7 @@ FIELDS = (
 DRAWN = ("depth_m", "force_x_n", "force_z_n", "depth_command_m", "body_x_m")
 MOST_ROWS = 50_000  # of all walks of a log together: two minutes; matplotlib takes a kilobyte for each
 FIRST_BIN = 32  # ticks; it has up to four rows for each drawn column, so a shorter one would save nothing
+LEAST_GAIN = 0.9  # of the rows; beyond it a trace consists of the rows around changes of phase
 AROUND = 2  # rows before and after a change of phase
 
 
@@ -52,11 +53,10 @@ class WalkTrace:
         """Forgets the rows of a walk that is not drawn."""
         self._parts = []
 
-    def thin(self) -> None:
-        """Doubles the bins."""
-        self.bin_ticks = 2 * self.bin_ticks or FIRST_BIN
+    def thin(self, bin_ticks: int) -> None:
+        self.bin_ticks = bin_ticks
         rows = self.rows
-        self._parts = [rows[rows_drawn(rows, self.bin_ticks)]]
+        self._parts = [rows[rows_drawn(rows, bin_ticks)]]
 
 
 class WalkTraces:
@@ -67,6 +67,7 @@ class WalkTraces:
         self.walks: list[WalkTrace] = []
         self._number = number
         self._rows = 0
+        self._room = MOST_ROWS
         self._goes_on = False
 
     def add(self, ticks: Ticks) -> None:
@@ -90,16 +91,19 @@ class WalkTraces:
         self.walks.append(WalkTrace(row))
 
     def _thin(self) -> None:
-        """Thins the largest trace until there is room for as many rows again."""
-        rows = {walk: len(walk) for walk in self.walks if walk.bin_ticks < walk.end_row - walk.first_row}
-        if sum(rows.values()) <= MOST_ROWS:
+        """Doubles the bins of the largest trace until there is room again, or until that leaves out hardly any row."""
+        if sum(map(len, self.walks)) <= self._room:
             return
-        while rows and sum(rows.values()) > MOST_ROWS // 2:
-            largest = max(rows, key=lambda walk: rows[walk])
-            largest.thin()
-            rows[largest] = len(largest)
-            if largest.bin_ticks >= largest.end_row - largest.first_row:
-                del rows[largest]
+        thinnable = [walk for walk in self.walks if len(walk)]
+        for walk in thinnable:
+            walk.thin(walk.bin_ticks or FIRST_BIN)
+        while thinnable and sum(map(len, self.walks)) > MOST_ROWS // 2:
+            largest = max(thinnable, key=len)
+            before = len(largest)
+            largest.thin(2 * largest.bin_ticks)
+            if len(largest) > LEAST_GAIN * before:
+                thinnable.remove(largest)
+        self._room = max(MOST_ROWS, 2 * sum(map(len, self.walks)))
 
 
 def drawn_rows(ticks: Ticks) -> Rows:

@@ -164,9 +164,9 @@ def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: 
     walk = read_walk(two_walks, 1)
     reported = [s for flipper in (0, 1) for s in walk.strides if s["flipper"] == flipper and np.isfinite(s[name])]
     containers: Sequence[Any] = [bar for axes in row_of(figure, f"${name}$") for bar in axes.containers]
-    assert len(reported) == len(containers) > 1
-    for stride, container in zip(reported, containers, strict=True):
-        ((_, low), (_, high)) = container.lines[2][0].get_segments()[0]
+    bars = [segment for container in containers for segment in container.lines[2][0].get_segments()]
+    assert len(reported) == len(bars) > 1
+    for stride, ((_, low), (_, high)) in zip(reported, bars, strict=True):
         assert (high + low) / 2.0 == pytest.approx(stride[name] / 1e6)
         assert (high - low) / 4.0 == pytest.approx(stride[f"{name}_std_error"] / 1e6)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from control.modes import Mode
 from experiments.pictures import walk_trace
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides, duration_s, moments_of, with_strides
@@ -85,6 +86,22 @@ def test_many_walks_have_no_more_rows_than_one(two_walks: Path, monkeypatch: pyt
     assert len(traces.walks) == 40
     assert sum(map(len, traces.walks)) <= 4000 + len(ticks)
     assert all(len(walk.rows) > 10 for walk in traces.walks)
+
+
+def test_a_walk_of_many_strides_keeps_little_more_than_their_changes_of_phase(
+    two_walks: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One walk whose changes of phase alone are more rows than there should be."""
+    monkeypatch.setattr(walk_trace, "MOST_ROWS", 500)
+    ticks, traces = read_log(two_walks).ticks.copy(), WalkTraces()
+    ticks = ticks[ticks["mode"] == Mode.WALKING]
+    for _ in range(60):
+        traces.add(ticks)
+        ticks["tick"] += len(ticks)
+    (walk,) = traces.walks
+    changes = 60 * np.count_nonzero(np.diff(ticks["phase"]))
+    assert changes > 500 and walk.end_row == 60 * len(ticks)
+    assert len(walk) < 3 * 2 * walk_trace.AROUND * changes < walk.end_row / 2
 
 
 def both(path: Path, number: int, monkeypatch: pytest.MonkeyPatch) -> tuple[RecordedWalk, RecordedWalk]:
