@@ -109,6 +109,13 @@ class SetpointMonitor:
         self._score = min(self._score + WEIGHT * reports, 2 * FOUND)
         self.found = self.found or self._score >= FOUND
 
+    def problem(self, sign: int) -> str:
+        """Returns what was found, for people, with the joint's torques; empty while the drive follows its commands."""
+        if not self.found:
+            return ""
+        followed_nm, commanded_nm = (sign * torque_nm for torque_nm in self.example)
+        return f"{followed_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
+
     def on_heartbeat(self, closed_loop: bool) -> None:
         absent, self._absent = self._absent, 0
         if not closed_loop:

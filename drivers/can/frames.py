@@ -35,6 +35,11 @@ class Frame(NamedTuple):
     is_fd: bool = False  # CAN FD, which has no remote frames
     bit_rate_switch: bool = False  # the data of a CAN FD frame is sent at the faster bit rate
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a data frame of CAN 2.0 with a standard identifier."""
+        return not (self.is_remote or self.is_error or self.is_extended or self.is_fd)
+
 
 def encode_frame(frame: Frame) -> bytes:
     """Returns 16 bytes, or 72 of a CAN FD frame. Raises ValueError for a frame that does not exist on CAN."""

@@ -13,10 +13,11 @@ program; one that does not, such as a command on the drive's serial line, shows 
 from collections.abc import Callable
 from math import isfinite, pi
 
-from control.records import NEVER_S, UNKNOWN, DriveState
+from control.records import NEVER_S
 from drivers.answer_counter import AnswerCounter
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import DriveHealth, Outlet
+from drivers.drive_signals import DriveSignals
 from drivers.mit import codec
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import MitSettings
@@ -27,36 +28,29 @@ TURN_RAD = 2.0 * pi
 HARMLESS = frozenset({codec.LEAVE, codec.CLEAR})  # commands that any program may send
 
 
-class MitAxis:
+class MitAxis(DriveSignals):
     """Owns everything that is known about one drive, and whether it is to follow torque."""
 
+    parameters: MitParameters
+
     def __init__(self, joint: str, parameters: MitParameters, outlet: Outlet) -> None:
-        self.joint = joint
+        tolerance_nm = TOLERANCE_NM + parameters.ranges.torque_step_nm
+        setpoints = SetpointMonitor(parameters.command_delay_s, tolerance_nm=tolerance_nm, measured=True)
+        super().__init__(joint, outlet, setpoints)
         self.parameters = parameters
-        self._outlet = outlet
         self._ranges = parameters.ranges
         self._zero_rad = TURN_RAD * parameters.zero_turn
         self._amperes_per_nm = parameters.sign / parameters.reported_constant_nm_a
         self.settings = MitSettings(parameters)
-        tolerance_nm = TOLERANCE_NM + self._ranges.torque_step_nm
-        self.setpoints = SetpointMonitor(parameters.command_delay_s, tolerance_nm=tolerance_nm, measured=True)
         self._answers = AnswerCounter()
         self.reset()
 
     def reset(self) -> None:
-        self._angle_rad = self._velocity_rad_s = self._current_a = self._temperature_c = UNKNOWN
-        self._stamp_s = self._temperature_stamp_s = self._read_s = self._read_before_s = NEVER_S
-        self._status = self._error_flags = 0
-        self.closed_loop = False  # by the drive's newest answer
+        super().reset()
+        self._status = 0
         self._following = False  # commanded by this program
-        self._foreign_commands = self._restarts = 0
         self._answers.reset()
         self.settings.reset()
-        self.setpoints.reset()
-        self._health: DriveHealth | None = None
-
-    def begin_read(self, now_s: float) -> None:
-        self._read_before_s, self._read_s = self._read_s, now_s
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -95,7 +89,8 @@ class MitAxis:
             raise MalformedMessageError(f"an answer of node {answer.node_id}")
         self._count_answer()
         asked_s = self._read_before_s  # every tick asks after it has read
-        self._stamp_s = asked_s if NEVER_S < asked_s < now_s else now_s
+        stamp_s = asked_s if NEVER_S < asked_s < now_s else now_s
+        self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = stamp_s
         sign = self.parameters.sign
         self._angle_rad = sign * (answer.position_rad - self._zero_rad)
         self._velocity_rad_s = sign * answer.velocity_rad_s
@@ -103,7 +98,7 @@ class MitAxis:
         has_registers = self._ranges.has_registers
         temperature_c = float(answer.last) if has_registers else answer.temperature_c
         if temperature_c:  # zero where no sensor is connected
-            self._temperature_c, self._temperature_stamp_s = temperature_c, self._stamp_s
+            self._temperature_c, self._temperature_stamp_s = temperature_c, stamp_s
         if has_registers:
             faulty = answer.status not in (codec.DISABLED, codec.ENABLED)
             self._receive_status(answer.status, answer.status if faulty else 0)
@@ -128,74 +123,40 @@ class MitAxis:
         if data == codec.LEAVE:
             self._following = False
         if data not in HARMLESS:
-            self._foreign_commands += 1
-            self._health = None
+            self._count_foreign_command()
 
     def _receive_foreign_register(self, data: bytes, now_s: float) -> None:
         node_id, kind, _, _ = codec.decode_register(data)
         if node_id == self.parameters.node_id and kind in (codec.WRITE, codec.STORE):
-            self._foreign_commands += 1
-            self._health = None
+            self._count_foreign_command()
 
     def _count_answer(self) -> None:
-        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._stamp_s):
-            self._restarts += 1
+        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._heartbeat_stamp_s):
+            self.restarts += 1
             self._following = False
             self.settings.forget()
             self._health = None
 
     @property
-    def state(self) -> DriveState:
-        stamp_s = self._stamp_s
-        return DriveState(
-            self._angle_rad,
-            self._velocity_rad_s,
-            stamp_s,
-            self._current_a,
-            stamp_s,
-            self.closed_loop,
-            self._error_flags,
-            stamp_s,
-            self._temperature_c,
-            self._temperature_stamp_s,
-        )
-
-    @property
-    def health(self) -> DriveHealth:
-        """The drive's report about itself, built again only when it has changed."""
-        health = self._health
-        if (
-            health is None
-            or health.duplicate_id is not self._answers.duplicates(self._read_s)
-            or bool(health.setpoint_problem) is not self.setpoints.found
-        ):
-            self._health = health = self._build_health()
-        return health
+    def duplicates(self) -> bool:
+        return self._answers.duplicates(self._read_s)
 
     def _build_health(self) -> DriveHealth:
         settings = self.settings
-        return DriveHealth(
-            joint=self.joint,
+        common = super()._build_health()
+        return common._replace(
             firmware=settings.firmware,
             supported_firmware="one that answers the reading of register 14",
             firmware_supported=settings.supported,
             watchdog_s=settings.watchdog_s,
             watchdog_advice=settings.watchdog_advice,
             watchdog_expired=self._error_flags == codec.LOST_COMMANDS,
-            restarts=self._restarts,
-            duplicate_id=self._answers.duplicates(self._read_s),
-            foreign_commands=self._foreign_commands,
-            setpoint_problem=self._setpoint_text() if self.setpoints.found else "",
             setting_problem=settings.problem,
             serial_number=settings.serial_number,
             expected_serial_number=self.parameters.serial_number,
             active_errors=codec.error_text(self._error_flags),
             errors=codec.error_text(self._error_flags),
         )
-
-    def _setpoint_text(self) -> str:
-        exerted_nm, commanded_nm = (self.parameters.sign * torque_nm for torque_nm in self.setpoints.example)
-        return f"{exerted_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
 
     def poll(self) -> None:
         self._transmit(codec.LEAVE)
@@ -208,9 +169,6 @@ class MitAxis:
             self._transmit(codec.encode_torque(motor_nm, self._ranges.torque_nm))
         else:
             self._transmit(codec.LEAVE)
-
-    def forget_commands(self) -> None:
-        self.setpoints.forget_commands()
 
     def prepare(self) -> None:
         """Replaces the command that the drive remembers, which it would follow as soon as it enters the mode."""

@@ -55,7 +55,7 @@ class Mit:
     def read_frame(self, frame: Frame) -> FrameContent | None:
         """A CubeMars answers under its own id, with that id as the first byte, which no command of this program has."""
         identifier, data = frame.arbitration_id, frame.data
-        if frame.is_fd or frame.is_error or frame.is_remote or frame.is_extended:
+        if not frame.is_plain:
             return None
         if identifier == codec.REGISTER_ID and data:
             return FrameContent(data[0] & LARGEST_ID)

@@ -21,8 +21,7 @@ def node_of(frame: Frame) -> int:
 
 def is_answer(frame: Frame, node_id: int) -> bool:
     """Drives answer under their own id, under that plus 16 as the set-up page says, or under 0 as delivered."""
-    usual = not (frame.is_fd or frame.is_extended or frame.is_remote or frame.is_error)
-    known = usual and len(frame.data) == codec.ANSWER_BYTES and node_of(frame) == node_id
+    known = frame.is_plain and len(frame.data) == codec.ANSWER_BYTES and node_of(frame) == node_id
     return known and frame.arbitration_id in (0, node_id, node_id + 16)
 
 

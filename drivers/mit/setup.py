@@ -116,5 +116,4 @@ class DamiaoSetup:
 
 
 def _begins(frame: Frame, head: bytes) -> bool:
-    usual = not (frame.is_remote or frame.is_error or frame.is_extended or frame.is_fd)
-    return usual and len(frame.data) == codec.ANSWER_BYTES and frame.data[: len(head)] == head
+    return frame.is_plain and len(frame.data) == codec.ANSWER_BYTES and frame.data[: len(head)] == head

@@ -14,10 +14,11 @@ any program may send them.
 from collections.abc import Callable
 from math import isfinite, nan, pi
 
-from control.records import NEVER_S, UNKNOWN, DriveState
+from control.records import NEVER_S, UNKNOWN
 from drivers.answer_counter import AnswerCounter
 from drivers.can.frames import Frame
 from drivers.drive import FD, DriveHealth, Outlet
+from drivers.drive_signals import DriveSignals
 from drivers.moteus import codec, registers
 from drivers.moteus.codec import Mode
 from drivers.moteus.parameters import MoteusParameters
@@ -31,40 +32,29 @@ STOPPING_S = 0.1  # for which a drive that another program commanded is stopped 
 QUIET_MODES = (Mode.STOPPED, Mode.FAULT, Mode.POSITION, Mode.TIMEOUT)  # in which nothing runs by itself
 
 
-class MoteusAxis:
+class MoteusAxis(DriveSignals):
     """Owns everything that is known about one drive, and whether it is to follow torque."""
 
+    parameters: MoteusParameters
+
     def __init__(self, joint: str, parameters: MoteusParameters, outlet: Outlet) -> None:
-        self.joint = joint
+        super().__init__(joint, outlet, SetpointMonitor(parameters.command_delay_s))
         self.parameters = parameters
-        self._outlet = outlet
         self._id = codec.command_id(parameters.node_id)
         self._rad_per_turn = parameters.sign * TURN_RAD
         self.settings = MoteusSettings(parameters)
-        self.setpoints = SetpointMonitor(parameters.command_delay_s)
         self._answers = AnswerCounter()
         self.reset()
 
     def reset(self) -> None:
-        self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
-        self._temperature_c = self._bus_voltage_v = UNKNOWN
-        self._angle_stamp_s = self._current_stamp_s = self._mode_stamp_s = NEVER_S
-        self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
-        self._read_s = self._read_before_s = NEVER_S
+        super().reset()
         self._mode = int(Mode.STOPPED)
-        self._error_flags = self._reason = 0  # active, and the last one, which a stop clears in the drive
-        self.closed_loop = False  # by the drive's newest reply
+        self._reason = 0  # the last error, which a stop clears in the drive
         self._following = False  # commanded by this program
-        self._foreign_commands = self._restarts = 0
         self._followed_s = UNKNOWN  # the last read with an answer that said so
         self._disturbed_s = NEVER_S  # the last read of such an answer, or of a foreign command
         self._answers.reset()
         self.settings.reset()
-        self.setpoints.reset()
-        self._health: DriveHealth | None = None
-
-    def begin_read(self, now_s: float) -> None:
-        self._read_before_s, self._read_s = self._read_s, now_s
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -123,7 +113,7 @@ class MoteusAxis:
         if mode == Mode.POSITION:
             self._followed_s = self._disturbed_s = self._read_s
         self.closed_loop = self._followed_s == self._read_s
-        self._mode_stamp_s = now_s
+        self._heartbeat_stamp_s = now_s
         self.setpoints.on_heartbeat(self.closed_loop)
 
     def _receive_settings(self, data: bytes, now_s: float) -> None:
@@ -144,13 +134,12 @@ class MoteusAxis:
         stops = [each for each in subframes if each.register == Register.MODE and each.values == (Mode.STOPPED,)]
         commands = [each for each in subframes if each.kind in (registers.WRITE, registers.CONSOLE_INPUT)]
         if len(commands) > len(stops):
-            self._foreign_commands += 1
+            self._count_foreign_command()
             self._disturbed_s = self._read_s
-            self._health = None
 
     def _count_answer(self) -> None:
-        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._mode_stamp_s):
-            self._restarts += 1
+        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._heartbeat_stamp_s):
+            self.restarts += 1
             self.settings.forget()
             self._health = None
 
@@ -159,49 +148,16 @@ class MoteusAxis:
         """Returns whether two drives seem to share this id."""
         return self._answers.duplicates(self._read_s)
 
-    @property
-    def state(self) -> DriveState:
-        return DriveState(
-            self._angle_rad,
-            self._velocity_rad_s,
-            self._angle_stamp_s,
-            self._current_a,
-            self._current_stamp_s,
-            self.closed_loop,
-            self._error_flags,
-            self._mode_stamp_s,
-            self._temperature_c,
-            self._temperature_stamp_s,
-            self._bus_voltage_v,
-            self._bus_voltage_stamp_s,
-        )
-
-    @property
-    def health(self) -> DriveHealth:
-        """The drive's report about itself, built again only when it has changed."""
-        health = self._health
-        if (
-            health is None
-            or health.duplicate_id is not self.duplicates
-            or bool(health.setpoint_problem) is not self.setpoints.found
-        ):
-            self._health = health = self._build_health()
-        return health
-
     def _build_health(self) -> DriveHealth:
         settings = self.settings
-        return DriveHealth(
-            joint=self.joint,
+        common = super()._build_health()
+        return common._replace(
             firmware=settings.firmware,
             supported_firmware=f"one with register map {REGISTER_MAP}",
             firmware_supported=settings.supported,
             watchdog_s=settings.watchdog_s,
             watchdog_advice="the drive did not answer on its console: is another program connected to it?",
             watchdog_expired=self._reason == codec.TIMEOUT_FLAG,
-            restarts=self._restarts,
-            duplicate_id=self.duplicates,
-            foreign_commands=self._foreign_commands,
-            setpoint_problem=self._setpoint_text() if self.setpoints.found else "",
             setting_problem=settings.problem,
             serial_number=settings.serial_number,
             expected_serial_number=self.parameters.serial_number,
@@ -209,10 +165,6 @@ class MoteusAxis:
             active_errors=codec.error_text(self._error_flags),
             errors=codec.error_text(self._reason),
         )
-
-    def _setpoint_text(self) -> str:
-        followed_nm, commanded_nm = (self.parameters.sign * torque_nm for torque_nm in self.setpoints.example)
-        return f"{followed_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
 
     def poll(self) -> None:
         self._transmit(codec.QUERY_ALONE)
@@ -235,9 +187,6 @@ class MoteusAxis:
         Its next command starts the drive again between two ticks. In the other modes a drive obeys none until a stop.
         """
         return self.closed_loop or self._mode == Mode.STOPPED and self._read_s - self._disturbed_s < STOPPING_S
-
-    def forget_commands(self) -> None:
-        self.setpoints.forget_commands()
 
     def prepare(self) -> None:
         """Does nothing: every torque command states the mode and all that it depends on."""

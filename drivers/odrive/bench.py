@@ -108,8 +108,7 @@ def _request(node_id: int, message: Message) -> Frame:
 
 
 def _is_message(frame: Frame, message: Message) -> bool:
-    usual = not (frame.is_extended or frame.is_fd or frame.is_error or frame.is_remote)
-    return usual and frame.arbitration_id & codec.LAST_COMMAND == message.command
+    return frame.is_plain and frame.arbitration_id & codec.LAST_COMMAND == message.command
 
 
 def _has_version(frame: Frame) -> bool:

@@ -15,9 +15,9 @@ from collections.abc import Callable, Mapping
 from math import isfinite, isnan, nan, pi
 from typing import ClassVar
 
-from control.records import NEVER_S, UNKNOWN, DriveState
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, Outlet
+from drivers.drive_signals import DriveSignals
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
 from drivers.odrive.drive_settings import DriveSettings
@@ -31,47 +31,33 @@ TURN_RAD = 2.0 * pi
 QUIET_STATES = (AxisState.UNDEFINED, AxisState.IDLE, AxisState.CLOSED_LOOP)  # in which nothing runs by itself
 
 
-class CanSimpleAxis:
+class CanSimpleAxis(DriveSignals):
     """Owns everything that is known about one drive; each field contains the newest value that arrived."""
 
     COMMANDS: ClassVar[frozenset[int]]  # that a drive of this firmware obeys
     CLEAR_ERRORS: ClassVar[bytes]  # the payload
+    parameters: OdriveParameters
 
     def __init__(self, joint: str, parameters: OdriveParameters, outlet: Outlet, settings: DriveSettings) -> None:
-        self.joint = joint
+        setpoints = SetpointMonitor(
+            parameters.command_delay_s, parameters.velocity_limit_turn_s, parameters.velocity_gain_nm_s_turn
+        )
+        super().__init__(joint, outlet, setpoints)
         self.parameters = parameters
-        self._outlet = outlet
         self.settings = settings
         self._rad_per_turn = parameters.sign * TURN_RAD
         self._current_sign = parameters.sign * parameters.current_sign
         self._setpoint_nm_a = parameters.current_sign * parameters.torque_constant_nm_a
         self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
         self._duplicates = DuplicateNodeMonitor(parameters.heartbeat_period_s)
-        self.setpoints = SetpointMonitor(
-            parameters.command_delay_s, parameters.velocity_limit_turn_s, parameters.velocity_gain_nm_s_turn
-        )
         self.reset()
 
     def reset(self) -> None:
-        self._angle_rad = self._velocity_rad_s = self._current_a = UNKNOWN
-        self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = NEVER_S
-        self._temperature_c = self._bus_voltage_v = UNKNOWN
-        self._temperature_stamp_s = self._bus_voltage_stamp_s = NEVER_S
-        self._read_s = self._read_before_s = NEVER_S
-        self.closed_loop = False
+        super().reset()
         self.busy_state = 0  # a calibration, homing or other axis state that this program has not asked for
-        self._error_flags = 0
-        self.restarts = 0
         self._starting = True  # until the drive has reported a state; a restart meanwhile is not counted again
-        self._foreign_commands = 0
         self._duplicates.reset()
-        self.setpoints.reset()
         self.settings.reset()
-        self._health: DriveHealth | None = None
-
-    def begin_read(self, now_s: float) -> None:
-        """Begins a read: the frames that follow arrived between the previous call and `now_s`."""
-        self._read_before_s, self._read_s = self._read_s, now_s
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -110,10 +96,7 @@ class CanSimpleAxis:
         self._current_a = self._current_sign * measured_a
         self._current_stamp_s = now_s
         if self.closed_loop:
-            parameters = self.parameters
-            setpoint_a *= self._current_sign * parameters.sign
-            velocity_rad_s = parameters.sign * self._velocity_rad_s
-            self.setpoints.on_report(setpoint_a * parameters.torque_constant_nm_a, velocity_rad_s)
+            self.setpoints.on_report(setpoint_a * self._setpoint_nm_a, self.parameters.sign * self._velocity_rad_s)
 
     def _idle_current_a(self, data: bytes, measured_a: float) -> float:
         """Returns the current of an idle drive, which reports that it measures none."""
@@ -156,57 +139,16 @@ class CanSimpleAxis:
         self._health = None
 
     def _receive_foreign_command(self, data: bytes, now_s: float) -> None:
-        self._foreign_commands += 1
-        self._health = None
+        self._count_foreign_command()
 
     @property
     def duplicates(self) -> bool:
         """Returns whether two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
         return self._duplicates.found
 
-    @property
-    def state(self) -> DriveState:
-        return DriveState(
-            self._angle_rad,
-            self._velocity_rad_s,
-            self._angle_stamp_s,
-            self._current_a,
-            self._current_stamp_s,
-            self.closed_loop,
-            self._error_flags,
-            self._heartbeat_stamp_s,
-            self._temperature_c,
-            self._temperature_stamp_s,
-            self._bus_voltage_v,
-            self._bus_voltage_stamp_s,
-        )
-
-    @property
-    def health(self) -> DriveHealth:
-        """The drive's report about itself, built again only when it has changed."""
-        health = self._health
-        if (
-            health is None
-            or health.duplicate_id is not self.duplicates
-            or bool(health.setpoint_problem) is not self.setpoints.found
-        ):
-            self._health = health = self._build_health()
-        return health
-
     def _build_health(self) -> DriveHealth:
-        """Reports what both firmwares report alike; a firmware adds its version, watchdog and errors."""
-        return DriveHealth(
-            joint=self.joint,
-            restarts=self.restarts,
-            duplicate_id=self.duplicates,
-            foreign_commands=self._foreign_commands,
-            setpoint_problem=self._setpoint_text() if self.setpoints.found else "",
-            busy_state=f"axis state {self.busy_state}" if self.busy_state else "",
-        )
-
-    def _setpoint_text(self) -> str:
-        followed_nm, commanded_nm = (self.parameters.sign * torque_nm for torque_nm in self.setpoints.example)
-        return f"{followed_nm:.3g} N·m where {commanded_nm:.3g} N·m was commanded"
+        """Adds the axis state; a firmware adds its version, watchdog and errors."""
+        return super()._build_health()._replace(busy_state=f"axis state {self.busy_state}" if self.busy_state else "")
 
     def send_torque(self, torque_nm: float) -> None:
         if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
@@ -237,9 +179,6 @@ class CanSimpleAxis:
 
     def clear_errors(self) -> None:
         self._outlet.send(Frame(arbitration_id(self.parameters.node_id, codec.CLEAR_ERRORS), self.CLEAR_ERRORS))
-
-    def forget_commands(self) -> None:
-        self.setpoints.forget_commands()
 
     def poll(self) -> None:
         """Does nothing: an ODrive reports by itself."""

@@ -5,7 +5,7 @@ Firmware 0.6 and 0.5 are two types, because several of their messages have the s
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import cast
+from typing import ClassVar, cast
 
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
@@ -39,22 +39,39 @@ GATE_DRIVER_FAULT = 0x20
 UNUSED_NODE = 62  # the last one: ids are given from 0 on
 
 
-class Odrive:
+class CanSimple:
+    """Describes what both firmwares have in common."""
+
+    kind = FrameKind()
+    command = FrameRate(len(codec.SET_INPUT_TORQUE.encode(0.0)), RATE_HZ)
+    commands: ClassVar[frozenset[int]]  # that a drive obeys
+    signals: ClassVar[Mapping[int, tuple[str, ...]]]  # of what a drive sends, by command
+
+    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
+        first = parameters.node_id << 5
+        return frozenset(range(first, first + 32))
+
+    def query(self, node_id: int) -> None:
+        """An ODrive reports by itself."""
+
+    def read_frame(self, frame: Frame) -> FrameContent | None:
+        if frame.is_extended or frame.is_error or frame.is_fd:
+            return None
+        node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
+        return FrameContent(node_id, command in self.commands, self.signals.get(command, ()))
+
+
+class Odrive(CanSimple):
     """Describes the protocol of ODrive's firmware 0.6, as DriveType requires."""
 
     parameters = OdriveParameters
-    kind = FrameKind()
+    commands, signals = codec.COMMANDS, SIGNALS
     example_error = GATE_DRIVER_FAULT
-    command = FrameRate(len(codec.SET_INPUT_TORQUE.encode(0.0)), RATE_HZ)
     reports = (
         FrameRate(REPORT_BYTES, FAST_HZ),  # encoder
         FrameRate(REPORT_BYTES, FAST_HZ),  # current
         *(FrameRate(REPORT_BYTES, SLOW_HZ),) * 4,  # heartbeat, errors, temperature, voltage
     )
-
-    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
-        first = parameters.node_id << 5
-        return frozenset(range(first, first + 32))
 
     def gate_table(self, parameters: DriveParameters) -> GateTable:
         return gate_table(cast(OdriveParameters, parameters))
@@ -64,17 +81,8 @@ class Odrive:
     ) -> OdriveAxis:
         return OdriveAxis(joint, cast(OdriveParameters, parameters), outlet, endpoints)
 
-    def query(self, node_id: int) -> None:
-        """An ODrive reports by itself."""
-
     def announces(self, node_id: int) -> Frame:
         return Frame(arbitration_id(node_id, codec.HEARTBEAT), codec.HEARTBEAT.encode(0, AxisState.IDLE, 0, 0))
-
-    def read_frame(self, frame: Frame) -> FrameContent | None:
-        if frame.is_extended or frame.is_error or frame.is_fd:
-            return None
-        node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
-        return FrameContent(node_id, command in codec.COMMANDS, SIGNALS.get(command, ()))
 
     def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
         """Firmware 0.5 counts every frame to a drive as its controller's; 0.6 should not."""
@@ -94,22 +102,17 @@ class Odrive:
         return frame.data
 
 
-class Odrive05:
+class Odrive05(CanSimple):
     """Describes the protocol of ODrive's firmware 0.5.6, as DriveType requires."""
 
     parameters = Odrive05Parameters
-    kind = FrameKind()
+    commands, signals = codec05.COMMANDS, SIGNALS_05
     example_error = codec05.ERROR_MOTOR
-    command = Odrive.command
     reports = (
         FrameRate(REPORT_BYTES, FAST_HZ),  # encoder
         FrameRate(REPORT_BYTES, FAST_HZ),  # current
         *(FrameRate(REPORT_BYTES, SLOW_HZ),) * 5,  # heartbeat, errors of motor, encoder and controller, voltage
     )
-
-    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
-        first = parameters.node_id << 5
-        return frozenset(range(first, first + 32))
 
     def gate_table(self, parameters: DriveParameters) -> GateTable:
         return gate_table_05(cast(Odrive05Parameters, parameters))
@@ -119,18 +122,9 @@ class Odrive05:
     ) -> Odrive05Axis:
         return Odrive05Axis(joint, cast(Odrive05Parameters, parameters), outlet)
 
-    def query(self, node_id: int) -> None:
-        """An ODrive reports by itself."""
-
     def announces(self, node_id: int) -> Frame:
         """Returns the counts of an encoder, which firmware 0.6 does not report."""
         return Frame(arbitration_id(node_id, codec05.GET_ENCODER_COUNT), codec05.GET_ENCODER_COUNT.encode(0, 0))
-
-    def read_frame(self, frame: Frame) -> FrameContent | None:
-        if frame.is_extended or frame.is_error or frame.is_fd:
-            return None
-        node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
-        return FrameContent(node_id, command in codec05.COMMANDS, SIGNALS_05.get(command, ()))
 
     def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
         """Every frame to the drive feeds its watchdog, requests as well: only those to others are harmless."""

@@ -182,8 +182,7 @@ class OdriveSetup:
         ).data
 
     def _is_from(self, frame: Frame, message: Message) -> bool:
-        usual = not (frame.is_remote or frame.is_error or frame.is_extended or frame.is_fd)
-        return usual and frame.arbitration_id == arbitration_id(self._parameters.node_id, message)
+        return frame.is_plain and frame.arbitration_id == arbitration_id(self._parameters.node_id, message)
 
 
 def _endpoint(data: bytes) -> int:

@@ -3,7 +3,7 @@
 A picture has a few hundred columns of pixels, an hour's walk a million rows. Of every bin of ticks the trace therefore
 has the rows in which a drawn column is first known, last known, smallest and largest: lines through these rows cover
 the same pixels as lines through all (M4, Jugel et al., VLDB 2014). It also has the rows at which the phase changes, so
-that a stride begins and ends where it did. All are rows of the log, so whatever reads a walk reads a trace as well.
+that a stride begins and ends where it did. All are rows of the log, so each reader of a walk reads a trace as well.
 """
 
 from collections.abc import Iterator, Sequence

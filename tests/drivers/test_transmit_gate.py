@@ -8,7 +8,7 @@ import subprocess
 import sys
 from math import inf, isfinite, nan
 from pathlib import Path
-from struct import pack, unpack
+from struct import pack
 
 import pytest
 from hypothesis import given, settings
@@ -21,10 +21,9 @@ from drivers.can.mock_bus import MockBus
 from drivers.odrive.gate_tables import gate_table
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import FrameKind, GateTable, TransmitGate
+from tests.drivers.gate_bench import LIMITS, OdriveGateBench
 from tests.folders import ROOT
 
-LIMITS = JointLimits(torque_nm=0.75, torque_rate_nm_s=100.0)
-STEP_S = 0.002  # so that a step is 0.2 N·m
 MOTOR, OTHER = 0x04E, 0x06E  # torque of nodes 2 and 3
 ZERO = bytes(4)
 IDLE, CLOSED_LOOP = b"\1\0\0\0", b"\x08\0\0\0"
@@ -46,25 +45,13 @@ HARMLESS = [
 ]
 
 
-class Bench:
+class Bench(OdriveGateBench):
     def __init__(self, limits: JointLimits = LIMITS) -> None:
-        bus = MockBus()
-        self.far = bus.open()
-        self.gate = TransmitGate(limits)
         drives = [OdriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
-        self.port = self.gate.outlet(bus.open(), map(gate_table, drives))
-        self.gate.allow_step(STEP_S)
-
-    def send(self, frame: Frame) -> list[Frame]:
-        self.port.send(frame)
-        return self.far.receive()
+        super().__init__(map(gate_table, drives), limits)
 
     def torque(self, torque_nm: float, identifier: int = MOTOR) -> float:
-        """Send a torque and return the torque that leaves."""
-        (frame,) = self.send(Frame(identifier, pack("<f", torque_nm)))
-        assert frame.arbitration_id == identifier
-        sent: float = unpack("<f", frame.data)[0]
-        return sent
+        return super().torque(torque_nm, identifier)
 
 
 @pytest.fixture

@@ -5,18 +5,15 @@ from random import Random
 
 import pytest
 
-from control.limits import JointLimits
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus
 from drivers.mit import codec
 from drivers.mit.gate_tables import gate_table
 from drivers.mit.models import MODELS
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import REGISTERS, TMAX
-from drivers.transmit_gate import FrameKind, TransmitGate
+from drivers.transmit_gate import FrameKind
+from tests.drivers.gate_bench import GateBench
 
-LIMITS = JointLimits(torque_nm=0.75, torque_rate_nm_s=100.0)
-STEP_S = 0.002  # so that a step is 0.2 N·m
 NODE = 5
 CODE_NM = MODELS["DM4310"].torque_step_nm
 QUESTIONS = [codec.encode_read(NODE, register) for register in REGISTERS]
@@ -26,18 +23,13 @@ def drive(model: str, node_id: int = NODE) -> MitParameters:
     return MitParameters("left", node_id, model=model)
 
 
-class Bench:
+class Bench(GateBench):
     def __init__(self, model: str = "DM4310") -> None:
-        bus = MockBus()
-        self.far = bus.open()
-        self.gate = TransmitGate(LIMITS)
+        super().__init__(gate_table(drive(model, node)) for node in (NODE, 6))
         self.range_nm = MODELS[model].torque_nm
-        self.port = self.gate.outlet(bus.open(), [gate_table(drive(model, node)) for node in (NODE, 6)])
-        self.gate.allow_step(STEP_S)
 
     def send(self, data: bytes, identifier: int = NODE) -> list[bytes]:
-        self.port.send(Frame(identifier, data))
-        frames = self.far.receive()
+        frames = self.passed(Frame(identifier, data))
         assert all(frame.arbitration_id == identifier for frame in frames)
         return [frame.data for frame in frames]
 

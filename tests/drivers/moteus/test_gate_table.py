@@ -5,33 +5,25 @@ from random import Random
 
 import pytest
 
-from control.limits import JointLimits
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus
 from drivers.moteus import codec, registers
 from drivers.moteus.gate_tables import gate_table
 from drivers.moteus.parameters import MoteusParameters
 from drivers.moteus.settings import IDENTITY, POLL, QUESTIONS
-from drivers.transmit_gate import FrameKind, TransmitGate
+from drivers.transmit_gate import FrameKind
+from tests.drivers.gate_bench import GateBench
 
-LIMITS = JointLimits(torque_nm=0.75, torque_rate_nm_s=100.0)
-STEP_S = 0.002  # so that a step is 0.2 N·m
 NODE = 5
 STOP = codec.STOP_AND_QUERY
 ALWAYS = [codec.QUERY_ALONE, STOP, IDENTITY, POLL, *QUESTIONS]
 
 
-class Bench:
+class Bench(GateBench):
     def __init__(self) -> None:
-        bus = MockBus()
-        self.far = bus.open()
-        self.gate = TransmitGate(LIMITS)
-        self.port = self.gate.outlet(bus.open(), [gate_table(MoteusParameters("left", node)) for node in (NODE, 6)])
-        self.gate.allow_step(STEP_S)
+        super().__init__(gate_table(MoteusParameters("left", node)) for node in (NODE, 6))
 
     def send(self, data: bytes, node_id: int = NODE) -> list[bytes]:
-        self.port.send(Frame(0x8000 | node_id, data, is_extended=True, is_fd=True, bit_rate_switch=True))
-        frames = self.far.receive()
+        frames = self.passed(Frame(0x8000 | node_id, data, is_extended=True, is_fd=True, bit_rate_switch=True))
         for frame in frames:
             assert frame.arbitration_id == 0x8000 | node_id
             assert frame.is_extended and frame.is_fd and frame.bit_rate_switch

@@ -1,19 +1,15 @@
 """Frames to an ODrive with firmware 0.5 that pass the gate and frames that do not, byte by byte."""
 
 from math import inf, nan
-from struct import pack, unpack
 
 import pytest
 
-from control.limits import JointLimits
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus
 from drivers.odrive.gate_tables import gate_table_05
 from drivers.odrive.parameters import Odrive05Parameters
-from drivers.transmit_gate import FrameKind, TransmitGate
+from drivers.transmit_gate import FrameKind
+from tests.drivers.gate_bench import OdriveGateBench
 
-LIMITS = JointLimits(torque_nm=0.75, torque_rate_nm_s=100.0)
-STEP_S = 0.002  # so that a step is 0.2 N·m
 TORQUE = 0x04E  # of node 2
 IDLE, CLOSED_LOOP = b"\1\0\0\0", b"\x08\0\0\0"
 HARMLESS = [
@@ -52,25 +48,13 @@ REFUSED = [
 ]
 
 
-class Bench:
+class Bench(OdriveGateBench):
     def __init__(self) -> None:
-        bus = MockBus()
-        self.far = bus.open()
-        self.gate = TransmitGate(LIMITS)
         drives = [Odrive05Parameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
-        self.port = self.gate.outlet(bus.open(), map(gate_table_05, drives))
-        self.gate.allow_step(STEP_S)
+        super().__init__(map(gate_table_05, drives))
 
-    def send(self, frame: Frame) -> list[Frame]:
-        self.port.send(frame)
-        return self.far.receive()
-
-    def torque(self, torque_nm: float) -> float:
-        """Returns the torque that leaves."""
-        (frame,) = self.send(Frame(TORQUE, pack("<f", torque_nm)))
-        assert frame.arbitration_id == TORQUE
-        sent_nm: float = unpack("<f", frame.data)[0]
-        return sent_nm
+    def torque(self, torque_nm: float, identifier: int = TORQUE) -> float:
+        return super().torque(torque_nm, identifier)
 
 
 @pytest.fixture
