@@ -35,6 +35,7 @@ class Walk(NamedTuple):
     """The result of one walk."""
 
     seed: int
+    duration_s: float
     strides: int
     distance_m: float
     alarms: list[str]  # faults with a reaction, and when
@@ -62,7 +63,7 @@ def walk(seed: int) -> Walk:
     of_mud = (*BY_THE_MUD, BY_SINKING) if is_free else BY_THE_MUD
     named = [(f"{now_s:.2f} s: {fault.name}", fault.kind.value in of_mud) for now_s, fault in faults]
     held, alarms = [text for text, by_mud in named if by_mud], [text for text, by_mud in named if not by_mud]
-    return Walk(seed, strides, robot.robot.plant.body_m, [] if held else alarms, held)
+    return Walk(seed, robot.now_s, strides, robot.robot.plant.body_m, [] if held else alarms, held)
 
 
 def _operate(robot: Lockstep, chance: Random, order: WalkOrder) -> None:
@@ -91,7 +92,7 @@ def measure(folder: Path, *, walks: int = 600, first: int = 0, workers: int = os
             show_progress(len(results), walks, f"{len(results)} of {walks} walks, {dict(kinds)}")
     alarms = {result.seed: result.alarms for result in results if result.alarms}
     report = {
-        "hours": round(walks * WALK_S / 3600.0, 2),
+        "hours": round(sum(result.duration_s for result in results) / 3600.0, 3),
         "strides": sum(result.strides for result in results),
         "distance_m": round(sum(result.distance_m for result in results), 1),
         "faults": dict(kinds),

@@ -89,7 +89,7 @@ def in_order(blocks: Iterable[Ticks], farthest: int) -> Iterator[Ticks]:
 
 
 class TickTally:
-    """Counts ticks and owns the first and the last by number, and the largest distance by which a tick followed a larger number."""
+    """Counts ticks; owns the first and last by number, and how far at most a tick came after a larger number."""
 
     def __init__(self) -> None:
         self.rows = self.farthest = 0

@@ -258,7 +258,7 @@ def steady_n(depth_m: float, clay: Clay) -> float:
 
 
 def test_a_crust_acts_before_the_mud_under_it() -> None:
-    """The edge bears three times the load in the crust and the normal load below it."""
+    """The edge carries three times the load in the crust and the normal load below it."""
     crusted = CLAY._replace(layers=(Layer(0.0, 0.01, 3.0),))
     plate, plain = PlateContact(SIZE), PlateContact(SIZE)
     bearing_n = {}
