@@ -9,9 +9,9 @@ that slides at its yield force holds every piece below the mud's surface (mud_sp
     lower edge    down N_c s_u, up 9 s_u with suction fading near the surface
 
 with the strength s_u at the depth of the piece (for a strip, the mean over its height), times the rate factor of the
-plate's speed. The laws and their constants are those of the clay. A slanted edge that looks down presses with its extent
-across, one that looks up (as the top) does not. The narrow sides press, and those of a plate that is no rectangle
-stick, at the middle of each one's range outward. Adhesion does not depend on pressure (undrained), so across
+plate's speed. The laws and their constants are those of the clay. A slanted edge that looks down presses with its
+extent across, one that looks up (as the top) does not. The narrow sides press, and those of a plate that is no
+rectangle stick, at the middle of each one's range outward. Adhesion does not depend on pressure (undrained), so across
 and along are independent. Lean, cross-coupling and lateral pull follow from the sum.
 
 At rest loads relax: they fade by up to `relaxation` within half a second, and motion loads the springs again.
