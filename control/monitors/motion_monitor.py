@@ -47,13 +47,18 @@ class JointDynamics(NamedTuple):
     stiffness_nm_rad: float = 8.0
 
 
+def runaway_bound_j(torque_nm: float) -> float:
+    """Return the energy that may remain unexplained, of a joint with this torque limit."""
+    return max(RUNAWAY_RAD * torque_nm, RUNAWAY_FLOOR_J)
+
+
 class MotionMonitor:
     """Owns the unexplained energy of one joint, its path away from the target, and the sample before."""
 
     def __init__(self, joint: str, dynamics: JointDynamics, torque_nm: float) -> None:
         self._joint = joint
         self._half_inertia = 0.5 * dynamics.inertia_kg_m2
-        self._runaway_j = max(RUNAWAY_RAD * torque_nm, RUNAWAY_FLOOR_J)
+        self._runaway_j = runaway_bound_j(torque_nm)
         stiffness_nm_rad = dynamics.stiffness_nm_rad
         self._following_rad = FOLLOWING_RAD + (torque_nm / stiffness_nm_rad if stiffness_nm_rad else float("inf"))
         self.reset()

@@ -8,15 +8,23 @@ joint that runs away turns at ω for that time but not past its end stops; one t
 path of the reaction: a soft stop raises the flipper once; damping drives a joint only until the torque has changed its
 sign, and idle drives until the command has arrived. Commands that reach no drive leave its torque on until its
 watchdog ends it. No measured energy enters.
+
+`joint_runaway` watches energy itself. The work of a motor whose torque is inverted is minus that of the commanded
+torque, so all of it is unexplained to the monitor, however strong the mud is. What is unexplained leaks with the time
+constant t_l: a sum that reaches the bound E_0 within n ticks comes from at most E_0 e^(nT / t_l) of work. The delay of
+the torque and the reaction add a path at the speed ω:
+
+    E = E_0 e^(nT / t_l) + τ ω (2 + 2) T
 """
 
 from dataclasses import dataclass
-from math import ceil, radians
+from math import ceil, exp, radians
 
 from control.faults import FaultKind, Reaction
 from control.gait.gait import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.monitors.joint_monitor import FAST_FRACTION
+from control.monitors.motion_monitor import RUNAWAY_LEAK_S, runaway_bound_j
 from control.rate import PERIOD_S
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import END_STOPS_RAD
@@ -70,9 +78,15 @@ class EnergyBounds:
         """Return the bound of a fault that stops the robot within `ticks`."""
         return self.kinetic_j + self.torque_nm * (self.detection_rad(ticks) + self.reaction_rad(reaction))
 
-    def fault_j(self, kind: FaultKind) -> float:
-        """Return the published bound of a kind of fault that stops the robot."""
-        return self.stopping_j(detection_ticks(kind), kind.reaction)
+    def fault_j(self, kind: FaultKind, least_ticks: int = 0) -> float:
+        """Return the published bound of a kind of fault that stops the robot, not before `least_ticks`."""
+        ticks = max(detection_ticks(kind), least_ticks)
+        return self.runaway_j(ticks) if kind is FaultKind.JOINT_RUNAWAY else self.stopping_j(ticks, kind.reaction)
+
+    def runaway_j(self, ticks: int) -> float:
+        """Return the bound of an inverted motor whose unexplained energy is found within `ticks`."""
+        found_j = runaway_bound_j(self.torque_nm) * exp(ticks * PERIOD_S / RUNAWAY_LEAK_S)
+        return found_j + self.torque_nm * self.speed_rad_s * 2 * DELAY_TICKS * PERIOD_S
 
     def walking_j(self, duration_s: float) -> float:
         """Return the bound of a robot that walks on for this time, 0 for one that holds a pose."""

@@ -51,8 +51,7 @@ class MotorEnergy:
         if mode.ends_loop:
             return bounds.stopping_j(WATCHDOG_TICKS, Reaction.DRIVES_IDLE)
         if mode.kind and mode.kind.reaction in STOPPING and not mode.waived:
-            ticks = WATCHDOG_TICKS if mode.no_commands else 0
-            return bounds.stopping_j(max(detection_ticks(mode.kind), ticks), mode.kind.reaction)
+            return bounds.fault_j(mode.kind, WATCHDOG_TICKS if mode.no_commands else 0)
         kinds = (FAULT_KINDS[name] for name in reported)
         stopped_j = [bounds.fault_j(kind) for kind in kinds if kind.reaction in STOPPING]
         return max(bounds.walking_j(self._walked_s), *stopped_j, 0.0)

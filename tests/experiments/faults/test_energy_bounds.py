@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from control.faults import FaultKind, Reaction
+from control.faults import Fault, FaultKind, Reaction
+from control.monitors.motion_monitor import JointDynamics, MotionMonitor
 from control.rate import PERIOD_S
+from control.records import DriveState
 from experiments.faults.energy_bounds import STOPPING, WATCHDOG_TICKS, energy_bounds
 from experiments.trials.trial import WALKING, configuration_of
 
@@ -37,6 +39,23 @@ def test_later_detection_and_more_torque_never_lower_the_bound(kind: FaultKind) 
 def test_a_drive_that_hears_nothing_may_exert_torque_until_its_watchdog_ends_it() -> None:
     unheard = BOUNDS.stopping_j(WATCHDOG_TICKS, Reaction.DAMPING)
     assert BOUNDS.fault_j(FaultKind.DRIVE_QUIET) == unheard > BOUNDS.fault_j(FaultKind.POSITION_STALE)
+
+
+def test_an_inverted_motor_in_mud_of_any_strength_is_found_within_its_energy() -> None:
+    """The mud takes all work, so the joint has no speed; the motor works at constant power until it is found."""
+    dynamics, ticks = JointDynamics(BOUNDS.inertia_kg_m2, 8.0), FaultKind.JOINT_RUNAWAY.bound_ticks
+    for power_w in (1.4, 2.0, 5.0, 15.0):  # less takes longer than the fault's ticks
+        monitor, done_j = MotionMonitor("left_sweep", dynamics, BOUNDS.torque_nm), 0.0
+        found: list[Fault] = []
+        for tick in range(1, ticks):
+            step_rad = power_w * PERIOD_S / BOUNDS.torque_nm
+            state = DriveState(angle_rad=tick * step_rad, velocity_rad_s=0.0, angle_stamp_s=tick * PERIOD_S)
+            monitor.update(found, state, PERIOD_S, -BOUNDS.torque_nm, None)
+            done_j += BOUNDS.torque_nm * step_rad
+            if found:
+                assert done_j < BOUNDS.fault_j(FaultKind.JOINT_RUNAWAY)
+                break
+        assert found
 
 
 def test_the_bound_of_a_walk_grows_with_its_strides() -> None:
