@@ -77,9 +77,6 @@ class OperatorCalls:
 
     def status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
         loop, now = self._loop, take_snapshot(self._loop)
-        shown = now.fault or next(iter(now.blocking), None)
-        gravest = _gravest(now.faults, shown)
-        faults = {present.fault: _fault_report(*present) for present in gravest}
         return {
             "schema": "status/2",
             "robot": loop.configuration.robot.name,
@@ -87,22 +84,13 @@ class OperatorCalls:
             "now_s": self._clock(),  # as the log's stamps
             "mode": now.mode.name.lower(),
             "moving": now.moving,
-            "fault": faults[shown] if shown else None,
-            "faults": list(faults.values()),
-            "faults_left_out": len(now.faults) - len(faults),
-            "causes": [cause_report(cause) for cause in group_by_cause(gravest, self._bus_of)],
+            **self._fault_reports(now),
             "forced": now.forced,
             "notice": now.notice,
             "unlogged_requests": now.unlogged_requests,
             "lease": now.lease_holder,
             "lease_left_s": known(now.lease_until_s - self._clock()) if now.lease_holder else None,
-            "phase": now.phase.name.lower(),
-            "stride": now.stride,
-            "depth_m": now.depth_m,
-            "next_depth_m": now.next_depth_m,
-            "depth_reason": now.depth_reason,
-            "full_step_m": now.full_step_m,
-            "body_x_m": known(now.body.x_m),
+            **_walk_report(now),
             "pose": now.pose._asdict(),
             "drives": [
                 {"joint": joint} | _drive_report(now, index, self._clock()) | self._drive_settings[joint]
@@ -114,14 +102,19 @@ class OperatorCalls:
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
             "bus": _bus_report(now),
-            "log": {
-                "path": str(loop.recorder.path) if loop.recorder.path else None,
-                "dropped": now.log.dropped,
-                "writer_alive": now.log.alive,
-                "problem": now.log.problem,
-                "free_fraction": known(now.log.free_fraction),
-                "slowest_write_s": known(now.log.slowest_write_s),
-            },
+            "log": {"path": str(loop.recorder.path) if loop.recorder.path else None} | _log_report(now),
+        }
+
+    def _fault_reports(self, now: LoopSnapshot) -> dict[str, Any]:
+        """The fault to show first, and the gravest ones with their common causes."""
+        shown = now.fault or next(iter(now.blocking), None)
+        gravest = _gravest(now.faults, shown)
+        faults = {present.fault: _fault_report(*present) for present in gravest}
+        return {
+            "fault": faults[shown] if shown else None,
+            "faults": list(faults.values()),
+            "faults_left_out": len(now.faults) - len(faults),
+            "causes": [cause_report(cause) for cause in group_by_cause(gravest, self._bus_of)],
         }
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
@@ -258,6 +251,28 @@ def _drive_report(now: LoopSnapshot, index: int, now_s: float) -> dict[str, Any]
         "angle_age_s": known(now_s - state.angle_stamp_s),
         "current_age_s": known(now_s - state.current_stamp_s),
         "heartbeat_age_s": known(now_s - state.heartbeat_stamp_s),
+    }
+
+
+def _walk_report(now: LoopSnapshot) -> dict[str, Any]:
+    return {
+        "phase": now.phase.name.lower(),
+        "stride": now.stride,
+        "depth_m": now.depth_m,
+        "next_depth_m": now.next_depth_m,
+        "depth_reason": now.depth_reason,
+        "full_step_m": now.full_step_m,
+        "body_x_m": known(now.body.x_m),
+    }
+
+
+def _log_report(now: LoopSnapshot) -> dict[str, Any]:
+    return {
+        "dropped": now.log.dropped,
+        "writer_alive": now.log.alive,
+        "problem": now.log.problem,
+        "free_fraction": known(now.log.free_fraction),
+        "slowest_write_s": known(now.log.slowest_write_s),
     }
 
 
