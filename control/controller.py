@@ -15,7 +15,7 @@ from control.gait.gait import Gait, GaitParameters
 from control.gait.joint_path import JointPath, still
 from control.gait.recovery import Recovery
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass, Extrapolation, JointGains, damping_torques_nm, joint_torques_nm
+from control.joint_pd import ArmMass, JointGains, VelocityPrediction, damping_torques_nm, joint_torques_nm
 from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
 from control.records import (
@@ -56,7 +56,6 @@ DAMPING_S = 3.0  # longest damping, for joints that do not come to rest
 SETTLED_S = 0.3  # rest of all joints after which damping ends
 SETTLED_RAD = 0.02  # motion that still counts as rest
 DAMPING_NM = 0.4  # largest damping torque of a joint: half of the motors' limit
-
 
 HoldLaw = Callable[[Torques, DriveStates], Torques]  # from the torques that hold the pose to those wanted instead
 
@@ -113,7 +112,7 @@ class Controller:
     def reset(self) -> None:
         self.recovery.reset()
         self._mode = Mode.IDLE
-        self._extrapolation = Extrapolation(self._asked) if any(self._asked) else None
+        self._predict = VelocityPrediction(self._asked, self.mass).update if any(self._asked) else None
         self._path: JointPath | None = None
         self._move: JointPath | None = None  # to another pose, in hold
         self._pose: JointTargets = still(same_for_all(0.0, self.rig))
@@ -193,17 +192,18 @@ class Controller:
         states: DriveStates,
         trusted: Joints[bool] | None = None,
         elapsed_s: float = 0.0,
+        sent_nm: Torques | None = None,
     ) -> Torques:
         """Return the wanted torques; `target` then holds the gait's target that they belong to.
 
         Joints whose encoder is not `trusted` are not damped, because their speed may be wrong; None: all are trusted.
         `elapsed_s` is the time since the last step if that is more than `dt_s`; paths and gait do not catch up after a
-        gap.
+        gap. `sent_nm` are the torques that left in the tick before; None: none.
         """
         if mode is not self._mode:
             self._enter(mode, states)
         self.target = RESTING
-        self.present = present = self._extrapolation.update(states) if self._extrapolation else states
+        self.present = present = self._predict(states, sent_nm or self._no_torque) if self._predict else states
         elapsed_s = max(elapsed_s, dt_s)
         self._since_s += elapsed_s
         if mode not in MOVING:

@@ -206,7 +206,7 @@ class Loop:
         step_s = min(1 + missed_ticks, LONGEST_STEP_TICKS) * self.period_s
         elapsed_s = (1 + missed_ticks) * self.period_s
         trusted = self.fault_monitor.trusted if self.mode is Mode.DAMPING else None
-        return self.controller.step(step_s, self.mode, self.states, trusted, elapsed_s)
+        return self.controller.step(step_s, self.mode, self.states, trusted, elapsed_s, self.sent.torques_nm)
 
     def _limit(self, wanted: Torques) -> LimitedTorques:
         """Limit the torques; their slew to that of one tick, even after missed ticks."""

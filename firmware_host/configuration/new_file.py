@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from control.depth.depth_choice import AdaptationParameters
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
+from control.joint_pd import GAINS_OF_ASKED_DRIVES
 from control.limits import JointLimits
 from control.records import TWO_FLIPPERS, Rig
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
@@ -79,11 +80,13 @@ def _identity(robot: NewRobot, joint: str) -> dict[str, str]:
 
 def _common(robot: NewRobot) -> dict[str, dict[str, Any]]:
     alone = robot.fixed_base and len(robot.rig.flippers) == 1
+    asked = DRIVE_TYPES[robot.drive_type].parameters.answers_only
     return {
         "robot": {"name": robot.name},
         "rig": {"flippers": robot.rig.flippers},
         "geometry": _geometry(robot.geometry),
         "gait": {"protocol": "single_flipper" if alone else "walking"},
+        **({"gains": asdict(GAINS_OF_ASKED_DRIVES)} if asked else {}),
         "estimation": {"fixed_base": robot.fixed_base},
         "adaptation": _adaptation(robot.geometry),
     }

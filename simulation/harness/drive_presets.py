@@ -5,12 +5,13 @@ know are left out, buses get a data bit rate where its frames need one, and driv
 gains.
 """
 
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any, get_type_hints
 
 import tomlkit
 
 from control.bounds import Bounds
+from control.joint_pd import GAINS_OF_ASKED_DRIVES
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 
 DRIVES = (  # types of drive, and models of motor
@@ -18,15 +19,6 @@ DRIVES = (  # types of drive, and models of motor
     *(f"{name}:{model}" for name, each in DRIVE_TYPES.items() for model in each.parameters.models),
 )
 DATA_BIT_RATE_KBIT_S = 5000
-# Answers to questions are a whole tick old, so the loop's delay is 1.5 ticks, 3.9 ms. The default gains (8 and 0.06, 10
-# and 0.08) then have phase margins of 12 and 15 degrees, and joints oscillate after a flipper has broken free at full
-# torque; with these 17 and 20, nearly those of drives that report by themselves.
-GAINS = {
-    "sweep_stiffness_nm_rad": 6.4,
-    "sweep_damping_nm_s_rad": 0.054,
-    "adduction_stiffness_nm_rad": 8.0,
-    "adduction_damping_nm_s_rad": 0.072,
-}
 
 
 def with_drive_type(text: str, drive: str) -> str:
@@ -52,8 +44,8 @@ def with_drive_type(text: str, drive: str) -> str:
     if DRIVE_TYPES[name].kind.is_fd:
         for bus in document["bus"].values():
             bus["data_bit_rate_kbit_s"] = DATA_BIT_RATE_KBIT_S
-    if DRIVE_TYPES[name].query(round(bounds.minimum)) is not None:
+    if parameters.answers_only:
         gains = document.setdefault("gains", tomlkit.table())
-        for key, gain in GAINS.items():
+        for key, gain in asdict(GAINS_OF_ASKED_DRIVES).items():
             gains.setdefault(key, gain)
     return tomlkit.dumps(document)

@@ -13,7 +13,6 @@ from control.joint_pd import (
     LEAST_MARGIN_RAD,
     LOOP_DELAY_S,
     ArmMass,
-    Extrapolation,
     JointGains,
     damping_torques_nm,
     joint_torques_nm,
@@ -22,7 +21,6 @@ from control.joint_pd import (
     pd_torque_nm,
     phase_margin_rad,
 )
-from control.rate import PERIOD_S
 from control.records import DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
 from tests.control.synthetic_states import NO_TORQUE, states_at
 
@@ -171,52 +169,3 @@ def test_the_largest_gains_leave_the_least_margin(damping_nm_s_rad: float) -> No
     assert phase_margin_rad(stiffness_nm_rad, damping_nm_s_rad, 0.0004) == pytest.approx(LEAST_MARGIN_RAD)
     assert phase_margin_rad(0.0, largest_damping_nm_s_rad(0.0004), 0.0004) == pytest.approx(LEAST_MARGIN_RAD)
     assert phase_margin_rad(0.0, 0.0, 0.0004) == inf
-
-
-def test_extrapolation_is_exact_for_a_steady_acceleration_and_for_asked_drives_alone() -> None:
-    extrapolation = Extrapolation((True, False, True, False))
-
-    def moving(time_s: float) -> DriveState:
-        velocity_rad_s = 2.0 + 30.0 * time_s
-        return DriveState(2.0 * time_s + 15.0 * time_s**2, velocity_rad_s, angle_stamp_s=time_s)
-
-    for tick in range(1, 4):
-        measured = moving(tick * PERIOD_S)
-        present = extrapolation.update(Joints(measured, measured, measured, measured))
-        assert present[1] is measured is present[3]
-    assert present[0].velocity_rad_s == present[2].velocity_rad_s == pytest.approx(moving(4 * PERIOD_S).velocity_rad_s)
-    assert present[0].angle_rad == measured.angle_rad
-
-
-@pytest.mark.parametrize("gap_s", [0.0, 0.3 * PERIOD_S, 5.0 * PERIOD_S])
-def test_extrapolation_takes_no_acceleration_from_a_repeated_answer_or_over_a_gap(gap_s: float) -> None:
-    extrapolation, still = Extrapolation((True,) * 4), DriveState(0.1, 0.0, angle_stamp_s=1.0)
-    extrapolation.update(Joints(still, still, still, still))
-    fast = still._replace(velocity_rad_s=3.0, angle_stamp_s=1.0 + gap_s)
-    present = extrapolation.update(Joints(fast, fast, fast, fast))[0]
-    assert present.velocity_rad_s == 3.0
-
-
-@pytest.mark.parametrize("mud_nm_rad", [0.0, 20.0, 30.0])
-def test_answers_of_a_tick_ago_excite_a_joint_in_stiff_mud_only_without_extrapolation(mud_nm_rad: float) -> None:
-    """A joint between springs, without friction, with the default gains; torque is held for a tick."""
-    gains, inertia_kg_m2 = JointGains(), 0.0004
-
-    def amplitude_rad_s(asked: bool) -> float:
-        extrapolation = Extrapolation((asked,) * 4)
-        angle_rad, velocity_rad_s, fastest_rad_s = 0.0, 1.0, 0.0
-        answer = DriveState(angle_rad, velocity_rad_s, angle_stamp_s=0.0)
-        for tick in range(1, 200):
-            present = extrapolation.update(Joints(answer, answer, answer, answer))[0]
-            torque_nm = -gains.sweep_stiffness_nm_rad * present.angle_rad
-            torque_nm -= gains.sweep_damping_nm_s_rad * present.velocity_rad_s
-            answer = DriveState(angle_rad, velocity_rad_s, angle_stamp_s=tick * PERIOD_S)
-            for _ in range(20):
-                velocity_rad_s += PERIOD_S / 20.0 * (torque_nm - mud_nm_rad * angle_rad) / inertia_kg_m2
-                angle_rad += PERIOD_S / 20.0 * velocity_rad_s
-            if tick > 150:
-                fastest_rad_s = max(fastest_rad_s, abs(velocity_rad_s))
-        return fastest_rad_s
-
-    assert amplitude_rad_s(asked=True) < 0.01
-    assert (amplitude_rad_s(asked=False) > 1.0) is (mud_nm_rad > 0.0)

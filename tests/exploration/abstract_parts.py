@@ -75,6 +75,7 @@ class AbstractController(Controller):
         states: DriveStates,
         trusted: Joints[bool] | None = None,
         elapsed_s: float = 0.0,
+        sent_nm: Torques | None = None,
     ) -> Torques:
         if mode is not self._mode:
             self.cut_short = mode is Mode.HOLD and self._mode is Mode.WALKING

@@ -14,6 +14,7 @@ from command_line.init.plate_file import read_corners
 from command_line.main import main
 from command_line.parser import build_parser
 from control.geometry import FlipperGeometry
+from control.joint_pd import GAINS_OF_ASKED_DRIVES, JointGains
 from control.records import JOINTS
 from drivers.drive_types import DRIVE_TYPES
 from firmware_host.configuration.loading import load_configuration, parse_configuration
@@ -49,6 +50,13 @@ def test_every_rig_with_every_drive_is_accepted(tmp_path: Path, flippers: str, d
     assert tuple(configuration.drive) == configuration.rig.joints
     assert {each.type for each in configuration.drive.values()} == {drive}
     assert configuration.estimation.fixed_base is (base == "fixed")
+
+
+@pytest.mark.parametrize("drive", list(DRIVE_TYPES))
+def test_drives_that_are_asked_get_the_gains_for_answers_of_a_tick_ago(drive: str) -> None:
+    gains = parse_configuration(new_file(NewRobot(drive_type=drive))).gains
+    asked = DRIVE_TYPES[drive].parameters.answers_only
+    assert gains == (GAINS_OF_ASKED_DRIVES if asked else JointGains())
 
 
 def test_each_key_of_the_file_has_a_comment() -> None:
