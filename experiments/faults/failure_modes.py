@@ -78,6 +78,7 @@ class FailureMode:
     restarted: bool = False  # another program starts the drive again and again while it lasts
     also: tuple[str, ...] = ()  # faults that may be reported as well, because with this protocol they are true too
     waived: bool = False  # the protocol cannot show it, so any reaction will do, and none
+    pushes_until: str = ""  # the fault that ends a push against an end stop at the latest; empty: this one
     why: str = ""  # of what differs with this protocol
 
     @property

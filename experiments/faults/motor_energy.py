@@ -64,4 +64,5 @@ class MotorEnergy:
             return round(mode.lasts_s / PERIOD_S) + REACTING_TICKS
         if mode.ends_loop or mode.no_commands:
             return WATCHDOG_TICKS
-        return REACTING_TICKS + (detection_ticks(mode.kind) if mode.kind and mode.kind.reaction in STOPPING else 0)
+        kind = FAULT_KINDS[mode.pushes_until] if mode.pushes_until else mode.kind
+        return REACTING_TICKS + (detection_ticks(kind) if kind and kind.reaction in STOPPING else 0)

@@ -10,9 +10,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from control.faults import FaultKind
 from drivers.drive_types import DRIVE_TYPES
 from experiments.faults.failure_modes import ABSENT_DRIVE, BY_NAME, FailureMode
 from experiments.faults.injectors import failing, unheard, watchdog_tripped
+
+SHOWN = {"fault": "shown as", "instead": "instead", "also": "also", "pushes_until": "pushes until"}  # changed fields
 
 
 class Difference(NamedTuple):
@@ -31,8 +34,12 @@ class Difference(NamedTuple):
             return f"does not exist: {self.why}"
         if "waived" in self.changes:
             return f"any reaction, or none: {self.why}"
-        named = [f"{word} {', '.join(self.changes[word])}" for word in ("instead", "also") if word in self.changes]
+        named = [f"{word} {_listed(self.changes[key])}" for key, word in SHOWN.items() if key in self.changes]
         return f"{' and '.join(named) or 'otherwise caused'}: {self.why}"
+
+
+def _listed(names: str | tuple[str, ...]) -> str:
+    return names if isinstance(names, str) else ", ".join(names)
 
 
 def _instead(why: str, *faults: str) -> Difference:
@@ -59,6 +66,12 @@ ASKED: Table = {  # drives that answer only when asked
 }
 
 ONE_ANSWER = "one answer has all signals, so none of them is missing alone"
+NO_CLAMP = Difference(
+    "the drive limits no torque at a speed, which its set-point would show, and at a torque that stays at its limit a"
+    " frozen encoder looks like a joint that mud holds",
+    {"pushes_until": FaultKind.JOINT_NOT_FOLLOWING.value},
+)
+LEFT_AT_ONCE = _instead("an answer states that it was in the mode, and has left it", "drive_disarmed")
 HELD_FAST = "a joint that is held fast reports the same codes in every answer, as an encoder does that has failed"
 NO_VOLTAGE = "no answer states the supply's voltage; below a limit of its own the drive reports an error"
 MIT: Table = {
@@ -71,6 +84,7 @@ MIT: Table = {
         "one answer has all signals: torque and status are frozen together with the angle",
         *("drive_energised", "torque_missing", "damping_failed"),
     ),
+    "encoder_stuck, at zero speed": NO_CLAMP,
     "voltage_silent": _waived(NO_VOLTAGE),
     "voltage_low": _waived(NO_VOLTAGE),
     "voltage_under": _waived(NO_VOLTAGE),
@@ -87,7 +101,7 @@ MIT: Table = {
     "drive_version": _also(
         "a drive without a version is starting, so none of its registers is known", "watchdog_unknown", "wrong_drive"
     ),
-    "arming_failed": _instead("an answer states that it was in the mode, and has left it", "drive_disarmed"),
+    "arming_failed": LEFT_AT_ONCE,
     "joint_not_following": _instead(HELD_FAST, "encoder_stuck"),
     "following_error": _instead(HELD_FAST, "encoder_stuck"),
 }
@@ -112,6 +126,16 @@ MOTEUS: Table = {
         "a drive without commands is not asked either, so its watchdog trips while it is", {"inject": watchdog_tripped}
     ),
     "drive_error, by another program's stop": _instead("a stop is no error", "drive_disarmed"),
+    "encoder_stuck, at zero speed": NO_CLAMP,
+    "arming_failed": LEFT_AT_ONCE,
+    "watchdog_unknown": _instead(
+        "no answer says that a drive is starting: one without the version of its registers is of unknown firmware",
+        "drive_version",
+    ),
+    "watchdog_off": Difference(
+        "another program's command switches it off, which is seen at once; the setting is read back while idle",
+        {"fault": FaultKind.FOREIGN_COMMANDS.value, "also": (FaultKind.WATCHDOG_OFF.value,)},
+    ),
     **dict.fromkeys(
         (mode.name for mode in BY_NAME.values() if mode.fault in FOREIGN_TORQUES),
         RESTARTED,

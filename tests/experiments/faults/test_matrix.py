@@ -24,6 +24,7 @@ from experiments.faults.evaluation import Cell, problems
 from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
 from experiments.faults.loop_injectors import bug_in, nothing
 from experiments.faults.matrix import FAULTS, CellKey, Plan, report_of
+from experiments.faults.motor_energy import REACTING_TICKS
 from experiments.faults.phases import PHASES, bench_for
 from experiments.faults.protocol_differences import BY_TYPE, differences, mode_of
 from experiments.trials.parallel_trials import run_parallel
@@ -117,6 +118,21 @@ def test_a_failure_that_a_drive_cannot_have_is_reported_and_has_no_cell() -> Non
     assert "watchdog_off" in {key.mode_name for key in Plan(drive="mit").cells}
 
 
+def test_a_failure_that_shows_as_another_has_the_bounds_of_that_one() -> None:
+    mode = mode_of("watchdog_off", "moteus")
+    assert mode.kind is FaultKind.FOREIGN_COMMANDS and mode_of("watchdog_off", "odrive").kind is FaultKind.WATCHDOG_OFF
+    assert Plan(drive="moteus").differences["watchdog_off"].startswith("shown as foreign_commands and also ")
+
+
+def test_a_push_ends_with_the_fault_that_the_protocol_shows_at_the_latest() -> None:
+    name = "encoder_stuck, at zero speed"
+    bounds = [run_cell(name, "stance", 1, drive).pushed_bound_ticks for drive in ("odrive", "moteus")]
+    assert bounds == [
+        REACTING_TICKS + kind.bound_ticks for kind in (FaultKind.ENCODER_STUCK, FaultKind.JOINT_NOT_FOLLOWING)
+    ]
+    assert mode_of(name, "moteus").pushes_until in set(FaultKind)
+
+
 def test_a_failure_that_a_drive_cannot_show_is_injected_and_its_energy_bounded() -> None:
     cell = run_cell("voltage_under", "hold", 1, "mit")
     assert (cell.ok, cell.reported, cell.bound_ticks) == (True, [], None) and cell.energy_j <= cell.energy_bound_j
@@ -158,6 +174,12 @@ def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(mon
         ("loop_lagging", "hold"),
         ("loop_stalled", "idle"),
         ("daemon_hung", "hold"),
+        ("current_stale", "recovery"),  # in clay of 9 kPa, in which the pose is held without oscillation
+        ("arming_failed", "arming"),
+        ("watchdog_unknown", "idle"),
+        ("watchdog_off", "idle"),
+        ("watchdog_off", "stance"),
+        ("encoder_stuck, at zero speed", "stance"),
     ],
 )
 def test_moteus_react_to_what_differs_from_drives_that_report_by_themselves(name: str, phase: str) -> None:
