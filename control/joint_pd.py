@@ -142,7 +142,7 @@ def _predicted(before: DriveState, state: DriveState, pushed_rad_s: float) -> Dr
         return state
     velocity_rad_s = state.velocity_rad_s
     faster_rad_s = (velocity_rad_s - before.velocity_rad_s) * PERIOD_S / elapsed_s
-    return state._replace(velocity_rad_s=velocity_rad_s + faster_rad_s + pushed_rad_s)
+    return DriveState(state.angle_rad, velocity_rad_s + faster_rad_s + pushed_rad_s, *state[2:])
 
 
 def pd_torque_nm(target: JointTarget, state: DriveState, stiffness_nm_rad: float, damping_nm_s_rad: float) -> float:
