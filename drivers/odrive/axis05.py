@@ -17,7 +17,7 @@ from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, Outlet
 from drivers.odrive import codec, codec05
-from drivers.odrive.cansimple_axis import CanSimpleAxis
+from drivers.odrive.cansimple_axis import RESTART_SILENCE_S, CanSimpleAxis
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.drive_settings import DriveSettings
 from drivers.odrive.parameters import Odrive05Parameters
@@ -87,6 +87,8 @@ class Odrive05Axis(CanSimpleAxis):
             self._health = None
 
     def _receive_encoder(self, data: bytes, now_s: float) -> None:
+        if now_s - self._angle_stamp_s > RESTART_SILENCE_S:
+            self._on_silence()  # first: the zeros of a drive that has restarted are no position
         if self.closed_loop or data != ABSENT:
             self._absent = False
             super()._receive_encoder(data, now_s)
@@ -127,6 +129,7 @@ class Odrive05Axis(CanSimpleAxis):
 
     def _on_restart(self) -> None:
         super()._on_restart()
+        self.closed_loop = False  # what the last heartbeat said is over
         self._proof.reset()
         self._forget_counts()
         self._following = False

@@ -142,12 +142,18 @@ MOTEUS: Table = {
     ),
 }
 ODRIVE: Table = {"drive_settings": Difference("no setting but the watchdog is read back")}
+ZERO = "an idle drive that reports exactly zero is asked for its counts"
 NO_TEMPERATURE = "its messages have no temperature: the winding's is computed from the current"
 COUNTED = "before its first closed loop its position is asked for, and not while its watchdog is tried"
 LOST_COUNTS = _also(COUNTED, "drive_late", "position_stale", "position_silent")
 ODRIVE05: Table = {
     **dict.fromkeys(("drive_silent", "drive_restarted", "watchdog_unknown"), LOST_COUNTS),
     **dict.fromkeys(("bus_off", "bus_refuses", "daemon_hung"), LOST_COUNTS),
+    "drive_error, by its watchdog": _also(
+        f"{ZERO}, and no question reaches it", "drive_late", "position_stale", "position_silent"
+    ),
+    "loop_lagging, every tick too long": _also(f"{ZERO}: the answers are as late as the loop", "drive_late"),
+    "duplicate_node_id": _also("the counts of one drive are compared with the position of the other", "drive_settings"),
     "drive_energised": _instead(
         "a watchdog that has expired keeps an idle drive from closed loop, and the command is seen", "foreign_commands"
     ),

@@ -308,6 +308,22 @@ def test_a_restart_forgets_what_was_proven(bench: Bench) -> None:
     assert bench.health.watchdog_s == 0.1 and bench.health.firmware_supported
 
 
+def test_zeros_after_a_restart_are_no_position_although_the_last_heartbeat_said_closed_loop(bench: Bench) -> None:
+    bench.run()
+    bench.state_of_axis, bench.estimates = CLOSED_LOOP, (0.3, 0.0)
+    bench.run(0.5)
+    for _ in range(200):
+        bench.read()
+    bench.state_of_axis, bench.estimates, bench.counts = IDLE, (0.0, 0.0), 2458
+    for _ in range(2 * HEARTBEAT_TICKS):
+        bench.tick()
+        assert bench.state.angle_rad == pytest.approx(0.6 * pi, abs=1e-3) and not bench.state.closed_loop
+        assert bench.health.setting_problem == ""
+    bench.run()
+    assert bench.state.angle_rad == pytest.approx(0.6 * pi, abs=1e-3) and bench.health.setting_problem == ""
+    assert bench.health.restarts == 1
+
+
 def test_commands_of_another_program_are_counted_and_emergency_stops_are_not(bench: Bench) -> None:
     commands = {*codec05.COMMANDS} - {codec.ESTOP.command}
     for command in range(32):
