@@ -15,7 +15,7 @@ from control.records import NEVER_S, UNKNOWN, DriveState
 
 MOVED_RAD = 0.03  # integral of the velocity while the angle stays the same to the last bit
 MOVED_S = 0.02  # drives repeat an old value now and then
-LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path
+LONGEST_GAP_S = 0.03  # between two messages; over more, two velocities do not determine the path, nor equal angles rest
 RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed may keep its last bit
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
 UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, at any reported velocity
@@ -48,7 +48,10 @@ class EncoderMonitor:
         if state.angle_stamp_s == self._stamp_s:
             return None
         gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
-        if state.angle_rad == self._angle_rad:
+        fault = None
+        if gap_s > LONGEST_GAP_S:  # also that before the first message
+            self._reset_frozen()
+        elif state.angle_rad == self._angle_rad:
             self._repeated = True
             fault = self._check_frozen(state, gap_s, torque_nm)
         else:
@@ -62,8 +65,6 @@ class EncoderMonitor:
 
     def _check_jump(self, state: DriveState, gap_s: float, dt_s: float) -> Fault | None:
         """Return a fault if the step differs from the mean velocity's by more than a late stamp explains."""
-        if gap_s > LONGEST_GAP_S:  # also that before the first one
-            return None
         step_rad = state.angle_rad - self._angle_rad
         error_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
         late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s

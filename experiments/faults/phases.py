@@ -74,7 +74,7 @@ def _to_idle(bench: FaultBench, random: Random) -> None:
 def _to_arming(bench: FaultBench, random: Random) -> None:
     """Stop in a tick before closed loop is requested, or while drives enter it, which takes 1 to 38 ticks."""
     _to_idle(bench, random)
-    bench.loop.request(Request.ARM, bench.now_s, forced=bench.forced)
+    _reach(bench, "arming", lambda: bench.loop.request(Request.ARM, bench.now_s, forced=bench.forced) is None)
     for _ in range(random.randint(0, 8)):
         if bench.loop.mode is not Mode.HOLD:
             bench.step()

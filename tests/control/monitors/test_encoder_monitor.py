@@ -94,6 +94,23 @@ def test_a_frozen_angle_shows_in_the_integral_of_the_velocity_or_in_a_velocity_w
     assert found[0][0] * MESSAGE_S == pytest.approx(expected_s, abs=1.5 * MESSAGE_S)
 
 
+@pytest.mark.parametrize(("gap_s", "expected"), [(0.029, ["encoder_stuck"]), (0.031, [])])
+def test_a_code_that_comes_again_after_a_long_gap_is_not_stuck(gap_s: float, expected: list[str]) -> None:
+    """In 31 ms a joint that rocks in the mud comes back to an angle at which it was."""
+    encoder = EncoderMonitor("left_sweep", JUMP_RAD)
+    states = [DriveState(angle_rad=0.3, velocity_rad_s=2.0, angle_stamp_s=stamp_s) for stamp_s in (1.0, 1.0 + gap_s)]
+    faults = [encoder.update(state, PERIOD_S) for state in states]
+    assert [fault.name for fault in faults if fault] == expected
+
+
+def test_an_angle_that_stays_frozen_after_a_long_gap_is_stuck() -> None:
+    encoder, found = EncoderMonitor("left_sweep", JUMP_RAD), []
+    for number in range(30):
+        stamp_s = number * MESSAGE_S + (0.1 if number >= 5 else 0.0)
+        found.append(encoder.update(DriveState(angle_rad=0.3, velocity_rad_s=2.0, angle_stamp_s=stamp_s), PERIOD_S))
+    assert not any(found[:10]) and found[-1] and found[-1].name == "encoder_stuck"
+
+
 def test_a_joint_at_rest_without_a_velocity_is_not_stuck() -> None:
     """An ODrive reports 0 below a threshold."""
     assert reported(hanging(0.0, 30000)) == []

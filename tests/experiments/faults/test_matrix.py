@@ -25,7 +25,7 @@ from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
 from experiments.faults.loop_injectors import bug_in, nothing
 from experiments.faults.matrix import FAULTS, CellKey, Plan, report_of
 from experiments.faults.motor_energy import REACTING_TICKS
-from experiments.faults.phases import PHASES, bench_for
+from experiments.faults.phases import PHASES, bench_for, enter_phase
 from experiments.faults.protocol_differences import BY_TYPE, differences, mode_of
 from experiments.trials.parallel_trials import run_parallel
 from simulation.harness.drive_presets import DRIVES
@@ -150,6 +150,26 @@ def test_a_failure_that_a_drive_cannot_show_is_injected_and_its_energy_bounded()
 )
 def test_a_drive_in_mit_mode_shows_a_failure_as_its_protocol_can(name: str, drive: str) -> None:
     assert run_cell(name, "hold", 1, drive).why == []
+
+
+def test_damping_in_stiff_mud_gives_no_energy_to_joints_whose_drives_answer_a_tick_late() -> None:
+    """With velocities that did not know the torque sent since, 1.7 J in three seconds."""
+    cell = run_cell("encoder_jump", "recovery", 1, "mit")
+    assert cell.why == [] and cell.energy_j < 0.1
+
+
+def test_the_phase_of_arming_waits_for_joints_that_move_while_idle() -> None:
+    """A robot that is armed by force waits for no watchdog: its arms may still sink when the drives are ready."""
+    bench, random = bench_for("arming", Random(1), drive="mit:AK80-9"), Random(1)
+    request, refused = bench.loop.request, [True, False]
+
+    def refused_once(*arguments: Any, **options: Any) -> str | None:
+        return "a joint moves" if refused.pop(0) else request(*arguments, **options)
+
+    vars(bench.loop)["request"] = refused_once
+    enter_phase(bench, "arming", random)
+    bench.step()
+    assert refused == [] and bench.loop.mode in (Mode.ARMING, Mode.HOLD)
 
 
 def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
