@@ -2,8 +2,9 @@
 
 Until the drive has been in closed loop once since its supply came, it reports a position and a velocity of exactly
 zero. In an idle drive such zeros count as absent, and the program asks for the counts of the encoder in every tick. An
-idle drive repeats the last current that was measured; one that repeats to the last bit counts as none. Its currents
-have the sign of the motor's phases, which `encoder_direction` turns into that of position and torque.
+idle drive repeats the last current that was measured; one that repeats to the last bit counts as none, and with it no
+set-point, also before a heartbeat says that the drive is idle. Its currents have the sign of the motor's phases, which
+`encoder_direction` turns into that of position and torque.
 
 The watchdog cannot be read over CAN: watchdog_proof.py proves it, and the position waits for that. It also expires in
 an idle drive while no program runs. That is no error of the drive: it is reported as one only if torque was on, and is
@@ -25,6 +26,7 @@ from drivers.odrive.watchdog_proof import WatchdogProof
 
 FIRMWARE = "0.5"
 ABSENT = bytes(8)  # position and velocity of a drive that has not been in closed loop
+NO_SETPOINT = bytes(4)  # as a drive with firmware 0.6 reports as soon as it is idle
 SAME_TURNS = 0.05  # by which counts and position may differ, in a joint that is moved by hand
 JUMP_TURNS = 0.04  # in one tick: 95 rad/s
 LONGEST_GAP_S = 0.03  # between two counts, whose difference is the velocity: one count in one tick is some 0.3 rad/s
@@ -47,6 +49,7 @@ class Odrive05Axis(CanSimpleAxis):
         self._absent = False  # position and velocity
         self._turns = 0.0  # by the newest counts
         self._idle_data = b""  # of the current
+        self._measured_data = b""  # of the newest current
         self._proof.reset()
         super().reset()
         self._forget_counts()
@@ -121,6 +124,11 @@ class Odrive05Axis(CanSimpleAxis):
             problem = f"it counted {count} in {reported:.3f} turns; encoder_counts = {counts} must be the drive's"
         if problem != self._counts_problem:
             self._counts_problem, self._health = problem, None
+
+    def _receive_current(self, data: bytes, now_s: float) -> None:
+        """With a current that repeats to the last bit no set-point counts: its heartbeat will say that it is idle."""
+        repeated, self._measured_data = data[4:] == self._measured_data, data[4:]
+        super()._receive_current(NO_SETPOINT + data[4:] if repeated and self.closed_loop else data, now_s)
 
     def _idle_current_a(self, data: bytes, measured_a: float) -> float:
         """Returns the current of an idle drive: none, unless it differs from the one that was reported before."""

@@ -157,10 +157,6 @@ ODRIVE05: Table = {
     "drive_energised": _instead(
         "a watchdog that has expired keeps an idle drive from closed loop, and the command is seen", "foreign_commands"
     ),
-    "foreign_commands": _also(
-        "an idle drive repeats its last set-point, the other program's, until its heartbeat says that it is idle",
-        "setpoint_mismatch",
-    ),
     "joint_position": _also("the velocity before the first closed loop is that of two positions", "joint_velocity"),
     "drive_settings": Difference("no setting is read back"),
     "wrong_drive": Difference("no message has its serial number"),

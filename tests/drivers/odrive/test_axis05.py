@@ -235,6 +235,24 @@ def test_an_idle_drive_repeats_its_last_current_which_is_none(bench: Bench) -> N
         assert bench.state.current_a == reported_a
 
 
+def test_the_set_point_that_an_idle_drive_repeats_until_its_heartbeat_is_no_mismatch(bench: Bench) -> None:
+    """Its set-point still follows the commands, also those of another program; its current repeats."""
+    bench.run()
+    bench.state_of_axis = CLOSED_LOOP
+    bench.run(0.2)
+
+    def run(currents_a: list[float]) -> None:
+        for current_a in currents_a:
+            bench.report(codec.GET_IQ, 8.0 + current_a, current_a)
+            bench.tick()
+
+    run([8.0] * 30)
+    assert not bench.health.setpoint_problem
+    bench.run(0.1)
+    run([8.0 + 0.01 * index for index in range(30)])  # a drive that follows it
+    assert bench.health.setpoint_problem
+
+
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_the_encoder_s_direction_turns_currents_into_the_sign_of_torque_and_position(sign: int, direction: int) -> None:
@@ -242,15 +260,15 @@ def test_the_encoder_s_direction_turns_currents_into_the_sign_of_torque_and_posi
     bench.state_of_axis = CLOSED_LOOP
     bench.run(0.3)
     bench.drives.gate.open()
-    for _ in range(400):
+    for noise_a in (0.1, 0.0) * 200:
         bench.drives.send(Joints(0.2), PERIOD_S)
-        bench.report(codec.GET_IQ, sign * direction * 0.2 / 0.083, sign * direction * 2.0)
+        bench.report(codec.GET_IQ, sign * direction * 0.2 / 0.083, sign * direction * (2.0 + noise_a))
         bench.read()
     assert bench.state.current_a == 2.0
     assert bench.health.setpoint_problem == ""
-    for _ in range(400):
+    for noise_a in (0.1, 0.0) * 200:
         bench.drives.send(Joints(0.2), PERIOD_S)
-        bench.report(codec.GET_IQ, -sign * direction * 0.2 / 0.083, 0.0)
+        bench.report(codec.GET_IQ, -sign * direction * 0.2 / 0.083, noise_a)
         bench.read()
     assert "-0.2 N·m" in bench.health.setpoint_problem
 
