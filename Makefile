@@ -72,7 +72,7 @@ clean:  ## remove the environment and everything that was built
 
 .venv/test: .venv/setup
 	@echo "Installing what the tests need ..."
-	@$(PIP) --editable ".[plots,screen,serial,data,test]"
+	@$(PIP) --editable ".[plots,screen,serial,data,cluster,test]"
 	@touch $@
 
 .venv/docs: .venv/setup

@@ -12,7 +12,10 @@ from command_line.json_output import JSON, answers, print_error
 from command_line.parser import build_parser
 from command_line.screen import complain, complaints
 
-EXTRA_OF = {"matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data"}  # by module
+EXTRA_OF = {  # by module
+    "matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data",
+    "distributed": "cluster",
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -50,7 +50,7 @@ class Progress:
 
     def __init__(self, what: str, quiet_s: float = 0.0) -> None:
         self._what = what
-        self._begun = Count(time.monotonic(), 0)
+        self._begun: Count | None = None
         self._shown = sys.stderr.isatty()
         self._interval_s = REFRESH_S if quiet_s else 0.0  # rows come faster than a terminal draws
         self._due_s = time.monotonic() + quiet_s
@@ -58,11 +58,13 @@ class Progress:
     def follow(self, what: str, done: int, total: int) -> None:
         """Shows a part of the work that has its own count."""
         if what != self._what:
-            self._what, self._begun = what, Count(time.monotonic(), done)
+            self._what, self._begun = what, None
         self.show(done, total)
 
     def show(self, done: int, total: int) -> None:
+        """The first call is the beginning of the work, also of one that continues what was done before."""
         now_s = time.monotonic()
+        self._begun = self._begun or Count(now_s, done)
         if self._shown and now_s >= self._due_s:
             self._due_s = now_s + self._interval_s
             left = time_left_text(self._begun, Count(now_s, done), total)

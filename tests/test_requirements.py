@@ -16,10 +16,10 @@ from packaging.version import Version
 from tests.folders import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-FOR_DEVELOPERS = {"test", "docs"}
+NOT_ON_A_ROBOT = {"test", "docs", "cluster"}
 EXTRAS = {
     "robot.txt": {"serial", "screen"},
-    "robot_with_extras.txt": PROJECT["project"]["optional-dependencies"].keys() - FOR_DEVELOPERS,
+    "robot_with_extras.txt": PROJECT["project"]["optional-dependencies"].keys() - NOT_ON_A_ROBOT,
 }
 PYTHONS = ("3.11", "3.12", "3.13")
 ADVICE = "run 'make lock'"

@@ -21,13 +21,22 @@ from experiments.reports.report_page import SUMMARY, to_json, write_report
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
 from experiments.robot.prompt import AutomaticOperator
 from experiments.trials.notebook import Notebook, NotebookError, anything_measured
+from experiments.trials.parallel_trials import WorkersError
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.file_problems import why_not
 from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.status_client import CallRefusedError
 
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
-NOT_COMPARED = ("command", "name", "function", "json", "out")  # of the options of a computed experiment
+NOT_COMPARED = (
+    "command",
+    "name",
+    "function",
+    "json",
+    "out",
+    "workers",
+    "cluster",
+)  # of the options of a computed experiment
 Result = TypeVar("Result")
 
 
@@ -43,7 +52,11 @@ def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Findin
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
-    finding = _run(unit, lambda progress: run(progress.show))
+    try:
+        finding = _run(unit, lambda progress: run(progress.show))
+    except WorkersError as problem:
+        complain(str(problem))
+        return exit_codes.UNHEALTHY
     report = with_schema(f"experiment-{options.name}", to_json(finding.report))
     if notebook is not None:
         _print_written(write_report(options.out, report, finding.title, finding.sections))
@@ -72,7 +85,7 @@ def conduct_bench(options: argparse.Namespace, unit: str, run: Callable[[Session
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
-    except (BenchError, EndedError, CallRefusedError, KeyboardInterrupt, OSError) as problem:
+    except (BenchError, EndedError, CallRefusedError, WorkersError, KeyboardInterrupt, OSError) as problem:
         return _end_early(folder, problem)
     _print_finding(report, finding, options.json)
     _print_written(written)
@@ -130,6 +143,8 @@ def _end_early(folder: Path, problem: BaseException) -> int:
             status = exit_codes.NOT_PERMITTED
         case KeyboardInterrupt():
             message, status = "interrupted", exit_codes.INTERRUPTED
+        case WorkersError():
+            status = exit_codes.UNHEALTHY
         case OSError():  # such as a full disk
             message, status = why_not(problem, folder), exit_codes.UNHEALTHY
     complain(message)

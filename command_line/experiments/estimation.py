@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from command_line.experiments.conduct import conduct, refuse
+from command_line.experiments.workers import workers_of
 from experiments.estimation.evaluation import (
     LAYERS,
     SINGLE_WATERS,
@@ -25,7 +26,9 @@ def estimation(options: argparse.Namespace) -> int:
         plan = plan_of(options)
     except ValueError as problem:
         return refuse(str(problem))
-    return conduct(options, "trials", lambda show: estimation_finding(report_of(plan, evaluate(plan, show))))
+    return conduct(
+        options, "trials", lambda show: estimation_finding(report_of(plan, evaluate(plan, show, workers_of(options))))
+    )
 
 
 def plan_of(options: argparse.Namespace) -> Plan:

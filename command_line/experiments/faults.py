@@ -3,6 +3,7 @@
 import argparse
 
 from command_line.experiments.conduct import conduct, refuse
+from command_line.experiments.workers import workers_of
 from experiments.faults import matrix
 from experiments.faults.phases import PHASES
 from experiments.faults.text import faults_finding
@@ -22,4 +23,4 @@ def run_faults(options: argparse.Namespace) -> int:
         return refuse(str(problem))
     if not plan.cells:
         return refuse("none of these faults can occur in these phases")
-    return conduct(options, "cells", lambda show: faults_finding(matrix.run(plan, show)))
+    return conduct(options, "cells", lambda show: faults_finding(matrix.run(plan, show, workers_of(options))))

@@ -4,6 +4,7 @@ import argparse
 from dataclasses import replace
 
 from command_line.experiments.conduct import conduct, conduct_bench, refuse
+from command_line.experiments.workers import workers_of
 from experiments.mud_fit import mud_fit
 from experiments.mud_fit.mud_fit import fit_finding
 from experiments.reports.mud_names import mud_name
@@ -30,12 +31,14 @@ def run_trackway(options: argparse.Namespace) -> int:
         seeds=options.trials or simulation.Plan.seeds,
         compartment_m=options.compartment or simulation.Plan.compartment_m,
     )
-    return conduct_bench(options, "walks", lambda session: run_simulated(plan, session))
+    return conduct_bench(options, "walks", lambda session: run_simulated(plan, session, workers_of(options)))
 
 
 def _run_at_bench(options: argparse.Namespace) -> int:
     if options.method:
         return refuse("--method is for --simulated: a real robot uses the method of its configuration")
+    if options.workers or options.cluster:
+        return refuse("--workers and --cluster are for --simulated: a real robot walks alone")
     if options.compartment:
         return refuse("--compartment is for --simulated: a real mud has its length with its name, --mud 48.5=61")
     lengths_cm = options.mud or [(name, 100.0 * simulation.Plan.compartment_m) for name in PAPER_TABLE[ADAPTIVE]]
@@ -58,7 +61,7 @@ def run_sweep(options: argparse.Namespace) -> int:
         plan.method_walks()
     except ValueError as problem:
         return refuse(str(problem))
-    return conduct(options, "walks", lambda show: sweep_finding(sweep.run(plan, show)))
+    return conduct(options, "walks", lambda show: sweep_finding(sweep.run(plan, show, workers_of(options))))
 
 
 def run_mud_fit(options: argparse.Namespace) -> int:

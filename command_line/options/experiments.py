@@ -18,7 +18,7 @@ from command_line.option_types import (
 from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket, add_vertical
 from control.records import JOINTS
 
-SEEDS, TRIALS = whole(1, 1000), whole(1, 100)
+SEEDS, TRIALS, WORKERS = whole(1, 1000), whole(1, 100), whole(1, 1000)
 STRENGTH_PA = between(50.0, 50000.0, "Pa")
 STAGE_SPEED_M_S = between(0.001, 1.0, "m/s")
 GRAVITY_M_S2 = between(9.7, 9.9, "m/s²")  # anywhere on Earth
@@ -41,6 +41,7 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
         names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
     )
     _add_report(estimation, "the load cell is virtual", "write JSON and picture there")
+    _add_workers(estimation)
     estimation.add_argument(
         "--setup",
         choices=("single", "walking", "both"),
@@ -75,6 +76,16 @@ def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -
     option("--simulated", action="store_true", help=simulated)
     add_json(experiment)
     option("--out", type=folder, metavar="DIR", help=out)
+
+
+def _add_workers(experiment: argparse.ArgumentParser) -> None:
+    workers = experiment.add_mutually_exclusive_group()
+    workers.add_argument(
+        "--workers", type=WORKERS, metavar="N", help="processes here (default: one for each processor)"
+    )
+    workers.add_argument(
+        "--cluster", metavar="ADDRESS", help="of a Dask scheduler, whose workers run the trials instead"
+    )
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:
@@ -235,6 +246,7 @@ def _add_trackway(names: Commands) -> None:
         trackway, "robot and muds are simulated; without it the daemon's robot walks", "for report, pictures and log"
     )
     add_socket(trackway)
+    _add_workers(trackway)
     option = trackway.add_argument
     option("--trials", "--seeds", type=SEEDS, metavar="N", help="of each gait (default: 3, as the paper)")
     option("--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)")
@@ -251,6 +263,7 @@ def _add_trackway(names: Commands) -> None:
 def _add_sweep(names: Commands) -> None:
     sweep = add(names, "sweep", "experiments.trackway.run_sweep", "Speed against depth in muds of any strength.")
     _add_report(sweep, "robot and muds are simulated", "write JSON and picture there")
+    _add_workers(sweep)
     option = sweep.add_argument
     option("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="repeatable (default: 12)")
     option("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
@@ -262,6 +275,7 @@ def _add_faults(names: Commands) -> None:
         names, "faults", "experiments.faults.run_faults", "Every fault in every phase, with the bounds of its reaction."
     )
     _add_report(faults, "the faults happen to a simulated robot", "write JSON and picture there")
+    _add_workers(faults)
     option = faults.add_argument
     option("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
     option("--fault", action="append", metavar="NAME", help="repeatable (default: all)")

@@ -26,7 +26,7 @@ from experiments.robot.bench_robot import BenchRobot, disarm, leave
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.prompt import GO_ON, AutomaticOperator, Operator
 from experiments.trials.notebook import NAME, Notebook
-from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.parallel_trials import LocalWorkers, run_parallel
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration, parse_configuration
@@ -158,7 +158,7 @@ class SimulatedBench:
         def show_progress() -> None:
             show(sum(_readings_in(folder / joint / NAME) for joint in plan.joints), len(steps_of(plan)) * len(joints))
 
-        outcomes = run_parallel(joints, _discard, meanwhile=show_progress)
+        outcomes = run_parallel(joints, _discard, LocalWorkers(meanwhile=show_progress))
         return dict(zip(plan.joints, outcomes, strict=True))
 
     def leave(self, folder: Path, operator: Operator) -> list[Path]:

@@ -21,7 +21,7 @@ from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, 
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method
 from experiments.trials.latency import LATENCY_S
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
-from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
 from simulation.mud.clay import Clay, clay_of_water
@@ -118,9 +118,9 @@ def methods_of(setup: Setup) -> tuple[Method, ...]:
     return tuple(methods) if setup.fixed_base else (*methods, without_pose)
 
 
-def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Outcome:
+def evaluate(plan: Plan, show: Show, workers: Workers | None = None) -> Outcome:
     """Run all trials of a plan in parallel."""
-    outcomes = run_parallel([partial(run_part, part, plan) for part in plan.parts()], show, processes)
+    outcomes = run_parallel([partial(run_part, part, plan) for part in plan.parts()], show, workers)
     evaluated, transitions = zip(*outcomes, strict=True)
     return Outcome(list(chain(*evaluated)), list(chain(*transitions)))
 

@@ -16,7 +16,7 @@ from experiments.faults.evaluation import Cell
 from experiments.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
 from experiments.faults.phases import PHASES
 from experiments.faults.protocol_differences import differences
-from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.harness.drive_presets import DRIVES
 
@@ -107,10 +107,10 @@ class FaultsReport:
     settings: Settings
 
 
-def run(plan: Plan, show: Show, processes: int | None = None) -> FaultsReport:
+def run(plan: Plan, show: Show, workers: Workers | None = None) -> FaultsReport:
     """Run all cells. The longest begin first, so that the last ones end together."""
     keys = sorted(plan.cells, key=lambda key: -BY_NAME[key.mode_name].lasts_s - PHASES.index(key.phase))
-    cells = dict(zip(keys, run_parallel([partial(run_cell, *key) for key in keys], show, processes), strict=True))
+    cells = dict(zip(keys, run_parallel([partial(run_cell, *key) for key in keys], show, workers), strict=True))
     return report_of(plan, [cells[key] for key in plan.cells])
 
 

@@ -53,9 +53,9 @@ class Evaluated:
         return group_trials(self.trials)
 
 
-def evaluate(plan: Plan, show: Show, processes: int | None = None) -> Evaluated:
+def evaluate(plan: Plan, show: Show) -> Evaluated:
     """Read and replay every log in parallel."""
-    read = run_parallel([partial(read_trial, paths, vertical=plan.vertical) for paths in plan.logs], show, processes)
+    read = run_parallel([partial(read_trial, paths, vertical=plan.vertical) for paths in plan.logs], show)
     refused = [each for each in read if isinstance(each, Refusal)]
     trials = [each._replace(in_mud=plan.is_in_mud(each)) for each in read if isinstance(each, LabTrial)]
     grouped = [(trial, plan.group_of(trial.name)) for trial in trials]

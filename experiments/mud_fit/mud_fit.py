@@ -108,16 +108,16 @@ def present() -> Fit:
     return Fit(PlantParameters().rail_damping_n_s_m, strengths_pa, float("nan"))
 
 
-def run(plan: Plan, show: Show, processes: int | None = None) -> MudFitReport:
+def run(plan: Plan, show: Show) -> MudFitReport:
     today = present()
     first = [*_grounds_of(today), *plan.grounds()]
     finer = len(plan.finer_dampings_n_s_m) * len(plan.finer_ratios) * len(MUDS)
     walks_each, walks_all = plan.seeds * len(FIXED_DEPTHS_M), (len(first) + finer) * plan.seeds * len(FIXED_DEPTHS_M)
-    speeds = walk_on(first, plan, lambda done, total: show(done, walks_all), processes)
+    speeds = walk_on(first, plan, lambda done, total: show(done, walks_all))
     coarse = best_fit(speeds, TARGETS)
     walked = len(first) * walks_each
     more = [ground for ground in plan.finer_grounds(coarse) if ground not in speeds]
-    speeds |= walk_on(more, plan, lambda done, total: show(walked + done, walks_all), processes)
+    speeds |= walk_on(more, plan, lambda done, total: show(walked + done, walks_all))
     return report_of(plan, speeds, today)
 
 
@@ -125,15 +125,13 @@ def _grounds_of(fit: Fit) -> list[Ground]:
     return [Ground(fit.rail_damping_n_s_m, strength_pa) for strength_pa in fit.strength_pa.values()]
 
 
-def walk_on(
-    grounds: Iterable[Ground], plan: Plan, show: Show, processes: int | None = None
-) -> dict[Ground, dict[float, float]]:
+def walk_on(grounds: Iterable[Ground], plan: Plan, show: Show) -> dict[Ground, dict[float, float]]:
     """Return the mean speed over the seeds at each fixed depth on each ground."""
     seeds = range(1, plan.seeds + 1)
     depths = tuple(FIXED_DEPTHS_M.values())
     keys = [(ground, depth_m) for ground in dict.fromkeys(grounds) for depth_m in depths]
     walks = [partial(fixed_speed_cm_s, *key, seed, plan.strides) for key in keys for seed in seeds]
-    walked = run_parallel(walks, show, processes)
+    walked = run_parallel(walks, show)
     speeds: dict[Ground, dict[float, float]] = {}
     for i, (ground, depth_m) in enumerate(keys):
         speeds.setdefault(ground, {})[depth_m] = fmean(walked[i * plan.seeds : (i + 1) * plan.seeds])

@@ -26,7 +26,7 @@ from experiments.trackway.one_mud import (
 )
 from experiments.trackway.report import count_failures
 from experiments.trackway.walk import Walk
-from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB
@@ -104,9 +104,9 @@ class SweepReport:
 Walked = tuple[MudWalk, Walk]
 
 
-def run(plan: Plan, show: Show, processes: int | None = None) -> SweepReport:
+def run(plan: Plan, show: Show, workers: Workers | None = None) -> SweepReport:
     orders = plan.method_walks() + constant_walks(plan.clays(), plan.depths_m, plan.seeds)  # the longest first
-    walks = run_parallel([partial(run_mud_walk, order) for order in orders], show, processes)
+    walks = run_parallel([partial(run_mud_walk, order) for order in orders], show, workers)
     return report_of(plan, list(zip(orders, walks, strict=True)))
 
 

@@ -26,7 +26,7 @@ from experiments.trackway.one_mud import (
 from experiments.trackway.report import ADAPTIVE, FIXED_DEPTHS_M, Settings, TrackwayReport, table_report
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from experiments.trials.notebook import Notebook
-from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import LAB
@@ -133,7 +133,7 @@ def is_stuck(strides: Sequence[WalkedStride]) -> bool:
     return fsum(stride.duration_s for stride in strides if stride.mud == mud) >= STUCK_S
 
 
-def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None) -> SimulatedReport:
+def run(plan: Plan, notebook: Notebook, show: Show, workers: Workers | None = None) -> SimulatedReport:
     """Make every walk that is not in the notebook yet, write each down at once, and report all."""
     orders = plan.walks()
     left = [key for key in orders if key not in notebook.entries]
@@ -141,7 +141,7 @@ def run(plan: Plan, notebook: Notebook, show: Show, processes: int | None = None
     run_parallel(
         [orders[key] for key in left],
         lambda done, _: show(walked + done, len(orders)),
-        processes,
+        workers,
         keep=lambda number, walk: notebook.write(left[number], walk.entry),
     )
     walks = [walk_of(notebook.entries[key]) for key in orders]

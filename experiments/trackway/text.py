@@ -21,6 +21,7 @@ from experiments.trackway.report import PAPER_TABLE, SpeedCell, TrackwayReport
 from experiments.trackway.simulation import SimulatedReport
 from experiments.trials.mud_trials import open_bench, run_trials
 from experiments.trials.notebook import Notebook
+from experiments.trials.parallel_trials import Workers
 from experiments.trials.session import Finding, Session
 from firmware_host.log.log_folder import first_path, run_files
 from firmware_host.log_reading.log_error import LogError
@@ -41,8 +42,8 @@ AGAINST_TIME = (
 )
 
 
-def run_simulated(plan: simulation.Plan, session: Session) -> Finding:
-    return _finding(simulation.run(plan, Notebook(session.folder, plan.identity), session.show))
+def run_simulated(plan: simulation.Plan, session: Session, workers: Workers | None = None) -> Finding:
+    return _finding(simulation.run(plan, Notebook(session.folder, plan.identity), session.show, workers))
 
 
 def run_at_bench(plan: bench.Plan, session: Session) -> Finding:

@@ -40,7 +40,7 @@ def evaluated(plan: Plan) -> Outcome:
 @pytest.fixture(autouse=True)
 def one_stride(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each trial has one stride instead of two (single flipper) or eight (walk); each plan is simulated only once."""
-    monkeypatch.setattr(command_line.experiments.estimation, "evaluate", lambda plan, show: evaluated(plan))
+    monkeypatch.setattr(command_line.experiments.estimation, "evaluate", lambda plan, *_: evaluated(plan))
     monkeypatch.setattr(command_line.experiments.estimation, "Plan", partial(Plan, single_strides=1, walking_strides=1))
 
 

@@ -25,7 +25,7 @@ def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
     """Return the list of plans that the command would run; each run reports the three cells above at once."""
     seen: list[Plan] = []
 
-    def run(plan: Plan, show: object) -> FaultsReport:
+    def run(plan: Plan, *_: object) -> FaultsReport:
         seen.append(plan)
         cells = [cell for cell in (CELL, LATE, CONTROL) if cell.phase in plan.phases]
         return report_of(plan, cells)

@@ -53,6 +53,10 @@ def test_a_real_trackway_needs_a_daemon(capsys: pytest.CaptureFixture[str], tmp_
 REFUSED = {
     "trackway --method paper": "--method is for --simulated",
     "trackway --mud soft --mud soft": "--mud",
+    "trackway --workers 2": "--workers and --cluster are for --simulated",
+    "trackway --cluster tcp://127.0.0.1:8786": "--workers and --cluster are for --simulated",
+    "sweep --simulated --workers 0": "--workers",
+    "sweep --simulated --workers 2 --cluster tcp://127.0.0.1:8786": "--workers",
     "trackway --compartment 0.5": "--compartment is for --simulated",
     "trackway --simulated --mud 48.5": "--mud is for a real trackway",
     "trackway --mud 48.5=5": "its length from 20 to 10000 cm",
@@ -126,7 +130,7 @@ def stride(mud: str, step_m: float = 0.12) -> WalkedStride:
     return WalkedStride(mud, 1.8, 0.03, step_m, 2.0, 0.0)
 
 
-def run_trackway(plan: simulation.Plan, notebook: Notebook, show: Show) -> simulation.SimulatedReport:
+def run_trackway(plan: simulation.Plan, notebook: Notebook, show: Show, *_: object) -> simulation.SimulatedReport:
     """Report 6 cm/s everywhere; one trial slips in the second stride of the second mud and ends before the third."""
     whole = Walk([stride(mud) for mud in MUDS for _ in range(4)], "")
     short = Walk([stride("48.5")] * 4 + [stride("53.1"), stride("53.1", 0.02)], "")
@@ -134,7 +138,7 @@ def run_trackway(plan: simulation.Plan, notebook: Notebook, show: Show) -> simul
     return simulation.report_of(plan, walks, {mud: {0.0275: 8.0} for mud in MUDS})
 
 
-def run_sweep(plan: sweep.Plan, show: Show) -> sweep.SweepReport:
+def run_sweep(plan: sweep.Plan, show: Show, *_: object) -> sweep.SweepReport:
     plan = replace(plan, depths_m=(0.03,))
     orders = plan.method_walks() + constant_walks(plan.clays(), plan.depths_m, plan.seeds)
     return sweep.report_of(plan, [(order, Walk([stride("mud")] * 4, "")) for order in orders])

@@ -103,7 +103,7 @@ def test_a_log_without_a_capture_has_no_vertical_axis(command: tuple[str, ...], 
 
 
 def test_lablogs_takes_the_vertical_axis_of_its_logs(z_up: Path) -> None:
-    (trial,) = evaluate(Plan([(z_up,)], vertical="z"), lambda done, of: None, 1).trials
+    (trial,) = evaluate(Plan([(z_up,)], vertical="z"), lambda done, of: None).trials
     assert any("sinks by 61 mm" in finding for finding in trial[0].findings)
 
 

@@ -27,6 +27,7 @@ from experiments.estimation.evaluation import (
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, error_rows
 from experiments.reports.report_page import to_json
 from experiments.trials.latency import LATENCY_S
+from experiments.trials.parallel_trials import LocalWorkers
 from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances
@@ -40,7 +41,7 @@ SHORT = Plan(single=(STRONG,), walking=(STRONG,), seeds=1, single_strides=1, wal
 def evaluated() -> tuple[Outcome, Sequence[tuple[int, int]]]:
     """Simulate a single flipper for one stride and a walk of two strides; return the outcome and the shown progress."""
     shown: list[tuple[int, int]] = []
-    return evaluate(SHORT, lambda done, total: shown.append((done, total)), processes=1), shown
+    return evaluate(SHORT, lambda done, total: shown.append((done, total)), LocalWorkers(1)), shown
 
 
 def outcome() -> Outcome:

@@ -16,6 +16,7 @@ from experiments.trackway.report import ADAPTIVE, PAPER_TABLE, Speed
 from experiments.trackway.simulation import FIXED, Plan, SimulatedReport, end_of, is_over, report_of, rules_of, run
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.notebook import Notebook
+from experiments.trials.parallel_trials import LocalWorkers
 from simulation.mud.clay import MUDS
 from simulation.mud.track import paper_track
 
@@ -130,12 +131,12 @@ def test_a_continued_experiment_repeats_no_walk(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(plan, Notebook(tmp_path, plan.identity), interrupt, processes=1)
+        run(plan, Notebook(tmp_path, plan.identity), interrupt, LocalWorkers(1))
     again, shown = Notebook(tmp_path, plan.identity), list[tuple[int, int]]()
     assert len(again.entries) == 2
-    report = run(plan, again, lambda done, total: shown.append((done, total)), processes=1)
+    report = run(plan, again, lambda done, total: shown.append((done, total)), LocalWorkers(1))
     assert shown == [(3, 6), (4, 6), (5, 6), (6, 6)]
-    assert report == run(plan, Notebook(tmp_path / "other", plan.identity), lambda done, total: None, processes=1)
+    assert report == run(plan, Notebook(tmp_path / "other", plan.identity), lambda done, total: None, LocalWorkers(1))
 
 
 def test_every_walk_has_a_key_of_its_own() -> None:

@@ -1,12 +1,14 @@
-"""Trials in processes: their order, their progress, their problems."""
+"""Trials in processes: their order, their progress, their problems, and workers that are lost."""
 
 import os
+import signal
 import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 
-from experiments.trials.parallel_trials import run_parallel
+from experiments.trials.parallel_trials import LocalWorkers, WorkersError, run_parallel
 
 
 def late(seconds: float) -> float:
@@ -18,31 +20,56 @@ def broken() -> float:
     raise ValueError("a trial that cannot be")
 
 
+def killed_at_first(mark: Path) -> str:
+    """End this process as one that is out of memory, unless an earlier run of the trial left the mark."""
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "done"
+
+
 def ignore(done: int, total: int) -> None:
     pass
 
 
 def test_outcomes_come_in_the_order_of_the_trials_not_of_their_ends() -> None:
     waits = [0.2, 0.0, 0.05, 0.0]
-    assert run_parallel([partial(late, wait) for wait in waits], ignore, processes=2) == waits
+    assert run_parallel([partial(late, wait) for wait in waits], ignore, LocalWorkers(2)) == waits
 
 
 def test_progress_counts_every_trial() -> None:
     shown = list[tuple[int, int]]()
-    run_parallel([partial(late, 0.0)] * 3, lambda done, total: shown.append((done, total)), processes=1)
-    assert shown == [(1, 3), (2, 3), (3, 3)]
+    run_parallel([partial(late, 0.0)] * 3, lambda done, total: shown.append((done, total)), LocalWorkers(1))
+    assert shown == [(0, 3), (1, 3), (2, 3), (3, 3)]
 
 
 def test_trials_run_in_other_processes() -> None:
-    assert os.getpid() not in run_parallel([os.getpid] * 2, ignore, processes=1)
+    assert os.getpid() not in run_parallel([os.getpid] * 2, ignore, LocalWorkers(1))
 
 
 def test_an_exception_of_a_trial_reaches_the_caller() -> None:
     with pytest.raises(ValueError, match="cannot be"):
-        run_parallel([partial(broken), partial(late, 0.0)], ignore, processes=1)
+        run_parallel([partial(broken), partial(late, 0.0)], ignore, LocalWorkers(1))
 
 
 def test_a_long_trial_is_looked_at_meanwhile() -> None:
     looks: list[float] = []
-    run_parallel([partial(late, 1.2)], ignore, 1, lambda: looks.append(time.monotonic()))
+    run_parallel([partial(late, 1.2)], ignore, LocalWorkers(1, lambda: looks.append(time.monotonic())))
     assert len(looks) >= 3  # two while it ran, one at its end
+
+
+def test_the_trials_of_a_lost_worker_are_repeated(tmp_path: Path) -> None:
+    marks = [tmp_path / str(number) for number in range(4)]
+    kept: list[int] = []
+    trials = [partial(killed_at_first, mark) for mark in marks]
+    results = run_parallel(trials, ignore, LocalWorkers(2), lambda index, result: kept.append(index))
+    assert results == ["done"] * 4 and sorted(kept) == [0, 1, 2, 3]
+
+
+def test_a_trial_that_ends_every_worker_is_given_up_with_a_message() -> None:
+    with pytest.raises(WorkersError, match="3 worker processes in a row"):
+        run_parallel([os.getpid, kill_this_process], ignore, LocalWorkers(1))
+
+
+def kill_this_process() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
