@@ -15,6 +15,7 @@ answers: list[None] = []  # one for each JSON that this command has printed
 
 EXPERIMENTS = (
     "actuator",
+    "campaign",
     "estimation",
     "faults",
     "flipper",

@@ -65,10 +65,15 @@ def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Findin
     return EXIT_STATUS[finding.ending]
 
 
-def conduct_bench(options: argparse.Namespace, unit: str, run: Callable[[Session], Finding]) -> int:
-    """Run an experiment that has a folder and an operator. `run` leaves the robot at rest, however it ends."""
-    if find_spec("matplotlib") is None:  # missing plots are reported before the hours of measuring
-        raise ModuleNotFoundError(name="matplotlib")
+def conduct_bench(
+    options: argparse.Namespace, unit: str, run: Callable[[Session], Finding], needs: str = "matplotlib"
+) -> int:
+    """Run an experiment that has a folder and an operator. `run` leaves the robot at rest, however it ends.
+
+    `needs` is the module of an extra that writes the results.
+    """
+    if find_spec(needs) is None:  # it is reported before the hours of measuring
+        raise ModuleNotFoundError(name=needs)
     folder: Path = options.out or Path(f"mudskipper-{options.name}")
     folder.mkdir(parents=True, exist_ok=True)
     try:

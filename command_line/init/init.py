@@ -7,7 +7,6 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.init.bus_scan import scan, with_found, with_identities
-from command_line.init.plate_file import RECTANGLE, plate_answer, read_corners
 from command_line.init.questions import Ask, ask, number, one_of, whole_number
 from command_line.screen import complain
 from control.geometry import FlipperGeometry
@@ -18,9 +17,11 @@ from firmware_host.buses import BusError
 from firmware_host.configuration.key_reference import Key, configuration_keys
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.new_file import NewRobot, drive_keys, new_file
+from firmware_host.configuration.plate_file import read_corners
 from firmware_host.configuration.toml_records import ConfigurationError
 
 PRINTED = Path("-")
+RECTANGLE = "rectangle"
 SIDES = ("plate_width_m", "plate_height_m")
 
 
@@ -118,11 +119,18 @@ def _corners(options: argparse.Namespace, given: Mapping[str, float], read: Ask 
     if options.plate and sides:
         raise ConfigurationError([f"--set {sides[0]}: must be left out where --plate gives the plate's corners"])
     prompt = f"plate: {RECTANGLE}, or a file of its corners"
-    plate = options.plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, plate_answer, read))
+    plate = options.plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, _plate_answer, read))
     try:
         return () if plate == RECTANGLE else read_corners(Path(plate))
     except ValueError as problem:
         raise ConfigurationError([str(problem)]) from problem
+
+
+def _plate_answer(line: str) -> str:
+    """Accepts `rectangle` or a file of corners. Raises ValueError."""
+    if line != RECTANGLE:
+        read_corners(Path(line))
+    return line
 
 
 def _ask_value(key: Key, read: Ask | None) -> float:

@@ -53,6 +53,7 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
     muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
     muds.add_argument("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="instead, repeatable")
     estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
+    _add_campaign(names)
     _add_actuator(names)
     _add_trackway(names)
     _add_sweep(names)
@@ -86,6 +87,18 @@ def _add_workers(experiment: argparse.ArgumentParser) -> None:
     workers.add_argument(
         "--cluster", metavar="ADDRESS", help="of a Dask scheduler, whose workers run the trials instead"
     )
+
+
+def _add_campaign(names: Commands) -> None:
+    text = "Many simulated walks: a grid, or a random sample, of worlds, robots and configurations."
+    campaign = add(names, "campaign", "experiments.campaign.campaign", text)
+    campaign.set_defaults(simulated=True)
+    campaign.add_argument("file", type=Path, metavar="FILE", help="in TOML, such as examples/campaigns/strength.toml")
+    add_json(campaign)
+    campaign.add_argument(
+        "--out", type=folder, metavar="DIR", help="for results (default: mudskipper-NAME of the file)"
+    )
+    _add_workers(campaign)
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:

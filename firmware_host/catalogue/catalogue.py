@@ -5,6 +5,8 @@ closed, not when its writer closes it. So the writer on the robot loads no datab
 preserved or deleted by hand is noticed as well, and the catalogue can be removed at any time. A file's name, size and
 time of change decide whether it has to be read again.
 
+The results of campaigns below the folder are the table `trials`: they have the same columns and more.
+
 The file is `catalogue.parquet` in the folder, or in the user's cache where the folder is not the user's own. This
 module needs the extra `data`.
 """
@@ -23,6 +25,7 @@ import duckdb
 
 from firmware_host.catalogue.entry import (
     COLUMNS,
+    TRIALS,
     FileStamp,
     LogEntry,
     entry_of_row,
@@ -37,6 +40,7 @@ from firmware_host.log_reading.log_error import LogError, Watch
 NAME = "catalogue.parquet"
 VERSION = 1  # of COLUMNS; an older catalogue is made again
 VERSION_KEY = "mudskipper_catalogue"
+TRIALS_TABLE = "trials"
 ERROR_NUMBER = re.compile(r'"errno":"(\d+)"')  # of the operating system, in DuckDB's message
 
 
@@ -73,6 +77,7 @@ class Catalogue:
         """Raises CatalogueError for a catalogue of a newer version."""
         self._folder = folder
         self.path = catalogue_path(folder)
+        self._trials = sorted(folder.rglob(TRIALS))
         self._connection = duckdb.connect()
         self._confine()
         self._connection.execute(f"CREATE TABLE logs ({', '.join(map(' '.join, COLUMNS.items()))})")
@@ -80,8 +85,8 @@ class Catalogue:
             self._load()
 
     def _confine(self) -> None:
-        """A query reaches no file but the catalogue, and no network."""
-        own = [str(path) for path in (self.path, hidden_path(self.path))]
+        """A query reaches no file but the catalogue and the results of campaigns, and no network."""
+        own = [str(path) for path in (self.path, hidden_path(self.path), *self._trials)]
         self._connection.execute(f"SET allowed_paths = [{', '.join(map(_quoted, own))}]")
         self._connection.execute("SET enable_external_access = false")
         self._connection.execute("SET lock_configuration = true")
@@ -156,17 +161,31 @@ class Catalogue:
             raise OSError(os.strerror(int(found[1])) if found else _first_line(problem)) from None
 
     def query(self, text: str) -> Answer:
-        """Answers one SELECT on the table `logs`, which can change nothing and read no file. Raises CatalogueError."""
+        """Answers one SELECT on the tables `logs` and `trials`. It can change nothing. Raises CatalogueError."""
         try:
+            if TRIALS_TABLE in text.casefold():
+                self._load_trials()
             statements = self._connection.extract_statements(text)
             if [statement.type for statement in statements] != [duckdb.StatementType.SELECT]:
                 raise CatalogueError(
-                    'a query is one SELECT on the table logs, such as "select file, strides from logs"'
+                    'a query is one SELECT on the tables logs and trials, such as "select file, strides from logs"'
                 )
             found = self._connection.execute(statements[0])
             return Answer([column[0] for column in found.description or ()], found.fetchall())
         except duckdb.Error as problem:
             raise CatalogueError(f"the query is not understood: {_first_line(problem)}") from None
+
+    def _load_trials(self) -> None:
+        """Makes the table of the results of all campaigns below the folder; without a campaign it is empty.
+
+        Raises CatalogueError for a file that is damaged.
+        """
+        files = ", ".join(_quoted(str(path)) for path in self._trials)
+        read = f"read_parquet([{files}], union_by_name = true)" if self._trials else "logs LIMIT 0"
+        try:
+            self._connection.execute(f"CREATE OR REPLACE TEMP TABLE {TRIALS_TABLE} AS FROM {read}")
+        except duckdb.Error as problem:
+            raise CatalogueError(f"the results of the campaigns cannot be read: {_first_line(problem)}") from None
 
 
 def _stamped(paths: Iterable[Path]) -> Iterator[tuple[Path, FileStamp]]:

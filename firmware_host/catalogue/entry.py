@@ -51,6 +51,9 @@ COLUMNS = {  # name -> type in SQL
 }  # fmt: skip
 
 
+TRIALS = "trials.parquet"  # the results of a campaign, which have the same columns and more
+
+
 class FileStamp(NamedTuple):
     """A file with the same stamp has the same contents, wherever it was moved to."""
 

@@ -40,10 +40,11 @@ def read_entry(path: Path, file: str, stamp: FileStamp) -> LogEntry:
         return entry._replace(state="export", reason="'mudskipper log export' made this copy")
     if not log.complete:
         entry = entry._replace(state="broken", reason=f"its end is missing; {ADVICE}")
-    return _with_contents(entry, log)
+    return entry_of_log(entry, log)
 
 
-def _with_contents(entry: LogEntry, log: Log) -> LogEntry:
+def entry_of_log(entry: LogEntry, log: Log) -> LogEntry:
+    """Returns the entry with what the log contains."""
     summary = log_summary(log)
     walks = _walks(log.ticks)
     distance_m, speed_m_s = _travel(walks)

@@ -48,7 +48,11 @@ def load_configuration(path: Path) -> Configuration:
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:
     """Reads a text; messages name its file. Raises ConfigurationError with all problems."""
-    document = parse_document(text, file)
+    return read_configuration(parse_document(text, file), text)
+
+
+def read_configuration(document: dict[str, Any], text: str = "") -> Configuration:
+    """Reads the tables of a file, and changes them. Raises ConfigurationError with all problems."""
     warnings = rename_former_keys(document, FORMER_KEYS)
     _apply_protocol(document)
     _require_known_types(document)

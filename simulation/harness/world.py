@@ -110,7 +110,11 @@ def load_world(path: Path) -> World:
 
 def parse_world(text: str, file: Path | None = None) -> World:
     """Reads a world. Raises ConfigurationError with all problems at once."""
-    document = parse_document(text, file)
+    return read_world(parse_document(text, file))
+
+
+def read_world(document: dict[str, Any]) -> World:
+    """Reads a world from the tables of its file. Raises ConfigurationError with all problems at once."""
     warnings = tuple(rename_former_keys(document, FORMER_KEYS))
     problems = _READER.problems(document) + list(_contradictions(document))
     if problems:

@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.behaviour import differences
 from benchmarks.report import run_benchmark, show_progress, summary_us
-from benchmarks.speed import lockstep_speed, tick_time, timed_walk, viewers_cost
+from benchmarks.speed import campaign_speed, lockstep_speed, tick_time, timed_walk, viewers_cost
 from benchmarks.speed.timed_walk import STAGES
 from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
@@ -86,6 +86,12 @@ def test_viewers_cost(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
     assert report.keys() >= {*figures, *ALWAYS, "screen_cpu", "missed_ticks"}
     assert report["all_run"] is True
     assert all(set(report[name]) == {"without", "with", "ratio"} for name in figures)
+
+
+def test_campaign_speed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_benchmark(campaign_speed.measure, ["--rounds", "1", "--seeds", "1", "--strides", "1"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["walks"] == 2 and report["efficiency"] > 0.0
 
 
 def test_lockstep_speed(capsys: pytest.CaptureFixture[str]) -> None:

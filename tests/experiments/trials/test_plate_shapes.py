@@ -11,12 +11,12 @@ from statistics import median
 
 import pytest
 
-from command_line.init.plate_file import read_corners
 from control.geometry import FlipperGeometry
 from estimation.mud import EstimationParameters
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.trial import SINGLE, run_trial, strides_of
+from firmware_host.configuration.plate_file import read_corners
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from command_line.init.plate_file import read_corners
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import StrideEstimate
@@ -16,6 +15,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.key_reference import toml_value
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.log_parameters import LogParameters
+from firmware_host.configuration.plate_file import read_corners
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.recorder import Recorder
 from firmware_host.log_reading.log_error import LogError

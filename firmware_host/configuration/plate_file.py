@@ -4,7 +4,6 @@ from pathlib import Path
 
 from control.plate.outline import Corner, outline_problems
 
-RECTANGLE = "rectangle"
 LARGEST_FILE_BYTES = 100_000
 
 
@@ -31,10 +30,3 @@ def _corner(path: Path, number: int, text: str) -> Corner:
     except ValueError:
         raise ValueError(f"{path}, line {number}: {text}: must be two numbers in m, such as 0.0125, 0.07") from None
     return outward_m, upward_m
-
-
-def plate_answer(line: str) -> str:
-    """Accepts `rectangle` or a file of corners. Raises ValueError."""
-    if line != RECTANGLE:
-        read_corners(Path(line))
-    return line

@@ -1,0 +1,24 @@
+"""`mudskipper experiment campaign`: many simulated walks, which the same command continues."""
+
+import argparse
+from pathlib import Path
+
+from command_line import exit_codes
+from command_line.experiments.conduct import conduct_bench
+from command_line.experiments.workers import workers_of
+from command_line.screen import complain
+from experiments.campaign.campaign import run_campaign
+from experiments.campaign.campaign_file import load_campaign
+from firmware_host.configuration.toml_records import ConfigurationError
+
+
+def campaign(options: argparse.Namespace) -> int:
+    try:
+        loaded = load_campaign(options.file)
+    except ConfigurationError as problem:  # before a folder is made
+        complain(*problem.problems)
+        return exit_codes.CONFIGURATION
+    options.out = options.out or Path(f"mudskipper-{loaded.name}")
+    return conduct_bench(
+        options, "walks", lambda session: run_campaign(loaded, session, workers_of(options)), needs="pyarrow"
+    )

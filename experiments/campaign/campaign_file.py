@@ -1,0 +1,136 @@
+"""Reads the file of a campaign: the sections of one walk, and the points at which some of their keys differ.
+
+Every point is checked before the first trial, and both ends of every range.
+"""
+
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from control.bounds import Bounds
+from control.plate.outline import Corner
+from experiments.campaign.planned_walk import SECTIONS, one_mud, plan_walk
+from experiments.campaign.points import Tables, Values, grid_points, random_points, range_ends, with_values
+from firmware_host.configuration.plate_file import read_corners
+from firmware_host.configuration.toml_records import (
+    ConfigurationError,
+    RecordReader,
+    parse_document,
+    read_text,
+    shown,
+)
+
+MOST_TRIALS = 100_000
+SHOWN_KEYS = 6  # of a point, in a message
+
+
+@dataclass(frozen=True)
+class CampaignText:
+    """The keys and tables of the file."""
+
+    seeds: Annotated[int, Bounds(1, 10_000)] = 1  # walks at each point, by the seed of the simulated robot, from 1
+    points: Annotated[int, Bounds(1, MOST_TRIALS)] = 100  # with [random]
+    seed: Annotated[int, Bounds(0, 2**31 - 1)] = 1  # of the draws, with [random]
+    grid: dict[str, Any] = field(default_factory=dict)
+    random: dict[str, Any] = field(default_factory=dict)
+    walk: dict[str, Any] = field(default_factory=dict)
+    robot: dict[str, Any] = field(default_factory=dict)
+    world: dict[str, Any] = field(default_factory=dict)
+    configuration: dict[str, Any] = field(default_factory=dict)
+
+
+class Trial(NamedTuple):
+    point: int  # from 1
+    seed: int
+    values: Values
+    tables: Tables
+
+    @property
+    def key(self) -> str:
+        """Its key in the notebook."""
+        return f"point {self.point}, seed {self.seed}"
+
+
+class Campaign(NamedTuple):
+    name: str
+    identity: dict[str, Any]  # what must be the same when it continues
+    points: list[Values]
+    tables: list[Tables]  # of each point
+    seeds: int
+
+    @property
+    def trials(self) -> list[Trial]:
+        return [
+            Trial(point, seed, values, tables)
+            for point, (values, tables) in enumerate(zip(self.points, self.tables, strict=True), 1)
+            for seed in range(1, self.seeds + 1)
+        ]
+
+
+_READER = RecordReader(CampaignText)
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Raises ConfigurationError."""
+    document = parse_document(read_text(path), path)
+    text = CampaignText(**_READER.read(document))
+    if ("grid" in document) == ("random" in document):
+        raise ConfigurationError([f"{path}: must have either [grid] or [random]"])
+    points = list(_points(text))
+    base = {section: getattr(text, section) for section in SECTIONS}
+    base["world"] = one_mud(text.world)
+    plates = _Plates(path.parent)
+    for end in range_ends(text.random) if text.random else ():
+        _check(points[0] | end, base, plates)
+    tables = [_check(values, base, plates, number) for number, values in enumerate(points, 1)]
+    return Campaign(path.stem, document | {"plates": plates.corners}, points, tables, text.seeds)
+
+
+def _points(text: CampaignText) -> Iterator[Values]:
+    """Raises ConfigurationError where there are too many."""
+    drawn = random_points(text.random, text.points, text.seed) if text.random else grid_points(text.grid)
+    most = MOST_TRIALS // text.seeds
+    yield from islice(drawn, most)
+    if next(drawn, None) is not None:
+        raise ConfigurationError([f"seeds = {text.seeds}: must give at most {MOST_TRIALS} trials with all points"])
+
+
+def _check(values: Values, base: Tables, plates: "_Plates", number: int = 0) -> Tables:
+    """Return the tables of a walk. Raises ConfigurationError, which names the point of several."""
+    try:
+        tables = plates.in_configuration(with_values(base, values))
+        plan_walk(tables)
+    except ConfigurationError as problem:
+        point = ", ".join(f"{key} = {shown(value)}" for key, value in list(values.items())[:SHOWN_KEYS])
+        where = f"; at point {number}: {point}" if number else ""
+        raise ConfigurationError([f"{each}{where}" for each in problem.problems[:1]]) from None
+    return tables
+
+
+class _Plates:
+    """Owns the corners that were read; a worker on another computer has no such file."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.corners: dict[str, tuple[Corner, ...]] = {}
+
+    def in_configuration(self, tables: Tables) -> Tables:
+        """Return the tables with the corners in place of the file's name. Raises ConfigurationError."""
+        robot, changed = dict(tables["robot"]), deepcopy(tables["configuration"])
+        name = robot.pop("plate", "")
+        if name:
+            changed.setdefault("geometry", {})["plate_corners_m"] = [list(corner) for corner in self._read(name)]
+        return tables | {"robot": robot, "configuration": changed}
+
+    def _read(self, name: Any) -> tuple[Corner, ...]:
+        if not isinstance(name, str):
+            raise ConfigurationError([f"robot.plate = {shown(name)}: must be the name of a file of corners"])
+        try:
+            if name not in self.corners:
+                self.corners[name] = read_corners(self._folder / name)
+        except ValueError as problem:
+            raise ConfigurationError([f"robot.plate = {name!r}: {problem}"]) from None
+        return self.corners[name]

@@ -1,0 +1,45 @@
+"""Writes the trials of a campaign as one Parquet file, which the catalogue of logs reads as its table `trials`.
+
+A row has the catalogue's columns, the number of its point, its seed, and a column for each key that differs between the
+points: world_segment_strength_pa for world.segment.strength_pa. This module needs the extra `data`.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from firmware_host.catalogue.entry import COLUMNS, MUDS
+from firmware_host.log.whole_files import whole_file
+
+MUD = [("strides", pa.int32()), *((name, pa.float64()) for name in ("k_p", "k_s", "k_e", "speed_m_s"))]
+ARROW_TYPES = {
+    "VARCHAR": pa.string(), "BIGINT": pa.int64(), "INTEGER": pa.int32(), "DOUBLE": pa.float64(),
+    "TIMESTAMP": pa.timestamp("us"), "BOOLEAN": pa.bool_(), "VARCHAR[]": pa.list_(pa.string()),
+    MUDS: pa.list_(pa.struct(MUD)),
+}  # fmt: skip
+OWN = {"point": "INTEGER", "seed": "INTEGER"}
+
+
+def column_of(key: str) -> str:
+    return key.replace(".", "_")
+
+
+def write_trials(path: Path, rows: Sequence[Mapping[str, Any]], keys: Sequence[str], metadata: dict[str, str]) -> None:
+    """`rows` have the catalogue's columns, `point`, `seed` and the values by key. Raises OSError."""
+    known = [pa.field(name, ARROW_TYPES[kind]) for name, kind in (COLUMNS | OWN).items()]
+    columns = {field.name: pa.array([row[field.name] for row in rows], field.type) for field in known}
+    columns |= {column_of(key): _varied([row[key] for row in rows]) for key in keys}
+    with whole_file(path) as hidden:
+        pq.write_table(pa.table(columns).replace_schema_metadata(metadata), hidden, compression="zstd")
+
+
+def _varied(values: Sequence[Any]) -> pa.Array:
+    """Return numbers, words or truth values as they are, and any other value, or a mixture of them, as JSON."""
+    for kind in (bool, int, int | float, str):
+        if all(isinstance(value, kind) and (kind is bool or not isinstance(value, bool)) for value in values):
+            return pa.array(values, pa.float64() if kind == int | float else None)
+    return pa.array([json.dumps(value) for value in values], pa.string())
