@@ -1,4 +1,7 @@
-"""Runs the daemon and the simulated robot as processes on local buses, for benchmarks that kill or time them."""
+"""Runs the daemon and the simulated robot as processes on local buses, for benchmarks that kill or time them.
+
+Where drives cannot report their watchdogs, the robot is armed by force, as an operator has to.
+"""
 
 import os
 import signal
@@ -10,8 +13,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from drivers.drive_types import DEFAULT
+from firmware_host.configuration.loading import parse_configuration
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
+from simulation.harness.drive_presets import with_drive_type
 from simulation.harness.local_setup import write_local_setup
+from simulation.harness.peer import WATCHDOG_S
 
 LONGEST_WAIT_S = 60.0
 
@@ -37,14 +44,18 @@ def wait_for(condition: Callable[[], bool]) -> bool:
 class LocalRobot:
     """Owns the processes of a robot, which starts at once, and of its daemon. Each leads a session of its own."""
 
-    def __init__(self, folder: Path, log_lines: str = "") -> None:
-        """`log_lines`: further lines of the configuration's log section."""
+    def __init__(
+        self, folder: Path, log_lines: str = "", drive: str = DEFAULT, robot: str = "simulation.harness.peer"
+    ) -> None:
+        """`log_lines`: further lines of the configuration's log section. `robot`: the module to run as the robot."""
         self.logs, self.socket = folder / "logs", folder / "mudskipper.sock"
         self.configuration = write_local_setup(folder, self.logs)
         text = self.configuration.read_text(encoding="utf-8")
-        self.configuration.write_text(text.replace("[log]\n", f"[log]\n{log_lines}"), encoding="utf-8")
+        text = with_drive_type(text.replace("[log]\n", f"[log]\n{log_lines}"), drive, watchdog_s=WATCHDOG_S)
+        self.configuration.write_text(text, encoding="utf-8")
+        self.forced = not all(each.reports_settings for each in parse_configuration(text).drive.values())
         self._processes: list[subprocess.Popen[bytes]] = []
-        self._start("simulation.harness.peer")
+        self._start(robot)
 
     def start_daemon(self) -> subprocess.Popen[bytes]:
         return self._start("firmware_host.daemon")
@@ -67,7 +78,7 @@ class LocalRobot:
         if not self._reaches("idle"):
             return False
         with suppress(CallRefusedError):
-            self.call("arm")
+            self.call("arm", force=self.forced)
             if self._reaches("hold") and phase != "hold":
                 self.call("walk", depth_m=0.03)
         return self._reaches(phase)
@@ -77,7 +88,8 @@ class LocalRobot:
 
         def is_decided() -> bool:
             report.update(self.call("status"))
-            ready = report["mode"] != "idle" or report["fault"] is None
+            fault = report["fault"] and report["fault"]["name"]
+            ready = report["mode"] != "idle" or fault is None or self.forced and fault == "watchdog_unknown"
             return ready and bool({report["mode"], report["phase"]} & {mode_or_phase, "fault", "damping"})
 
         return wait_for(is_decided) and mode_or_phase in (report["mode"], report["phase"])

@@ -1,15 +1,14 @@
 """Malformed and unexpected CAN frames on the buses: random and mutated ones, through whole ticks of the loop.
 
-Frames are those of four drives with flipped bits, removed or added bytes, non-finite numbers, other ids, remote,
-extended or error marks; random ones; and bursts of one frame, as a babbling node sends. Half of them arrive in boot,
-where one drive's heartbeats never come, and half in idle, among the true messages of simulated drives. No exception may
-be raised, resident memory must not grow, and the only frames that may leave for a drive are zero torque, idle, and
-requests for version and settings. `--drive` takes another type of drive, whose true frames are recorded from simulated
-ones; for a moteus zero torque is forbidden too, because it lets the drive follow torque.
+Frames are those of four simulated drives with flipped bits, removed or added bytes, non-finite numbers, other ids,
+remote, extended or error marks; random ones; and bursts of one frame, as a babbling node sends. Half of them arrive in
+boot, where one drive's heartbeats or answers never come, and half in idle, among the true messages of the drives. No
+exception may be raised, resident memory must not grow, and only frames that cannot move a drive may leave for one
+(harmless_frames.py). `--drive` takes another type of drive, such as moteus or mit:AK80-9.
 """
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from random import Random
 from struct import pack
@@ -18,26 +17,24 @@ from typing import Any
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import evaluated, run_benchmark, show_progress
+from benchmarks.stress.harmless_frames import is_harmless
 from benchmarks.stress.resources import resident_kib
 from control.modes import Mode
 from drivers.can.frames import DATA_MAX_BYTES, Frame
 from drivers.can.mock_bus import MockPort
-from drivers.drive import DriveParameters
-from drivers.drive_types import DEFAULT, DRIVE_TYPES, type_of
-from drivers.moteus import registers
-from drivers.moteus.codec import Mode as MoteusMode
-from drivers.moteus.registers import Register
-from drivers.odrive import codec
-from drivers.odrive.codec import arbitration_id
+from drivers.drive import FD, DriveParameters
+from drivers.drive_types import DEFAULT, type_of
 from firmware_host.computer.realtime import freeze_garbage
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
+from simulation.harness.drive_presets import DRIVES
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
-KNOWN = (DEFAULT, "moteus")  # types of drive for which the forbidden frames are stated here
+TRACK = Track([(1.0, MUDS["48.5"])])
 FD_BYTES = 64  # of the longest CAN FD frame
-RECORDED_S = 1.0
+RECORDED_TICKS = 400  # from the start on, in which the drives' settings are read
 FRAMES_PER_TICK = 40  # three times what four drives send
 BABBLE_FRAMES = 400
 BABBLE_FRACTION = 0.001
@@ -45,46 +42,53 @@ BAR_KIB = 1024.0
 WARM_UP_FRACTION = 0.1  # of the frames, before the first reading of memory
 NUMBERS = [float("nan"), float("inf"), float("-inf"), 0.0, -0.0, 1e38, -3.4e38, 1e-45, 0.5]
 STAMPS_S = [0.0, 1e9, -1.0, float("nan")]
-REPORTED = [
-    (codec.GET_ENCODER_ESTIMATES, (0.1, 0.0)),
-    (codec.GET_IQ, (0.0, 0.5)),
-    (codec.HEARTBEAT, (0, 1, 0, 0)),
-    (codec.GET_ERROR, (0, 0)),
-    (codec.GET_TEMPERATURE, (30.0, 30.0)),
-    (codec.GET_BUS_VOLTAGE_CURRENT, (24.0, 0.0)),
-    (codec.GET_VERSION, (2, 0, 0, 0, 0, 6, 11, 0)),
-]
-ZERO_TORQUES = {bytes(4), bytes.fromhex("00000080")}
 
 
-def true_frames(drives: Mapping[str, DriveParameters]) -> list[Frame]:
-    """Returns what the drives send: as listed above, or as simulated ones do."""
-    node_ids = [drive.node_id for drive in drives.values()]
-    if any(drive.type != DEFAULT for drive in drives.values()):
-        return recorded_frames(next(drive.type for drive in drives.values()))
-    frames = [
-        Frame(arbitration_id(node, message), message.encode(*values))
-        for node in node_ids
-        for message, values in REPORTED
-    ]
-    setting = codec.TX_SDO.encode(0, 1, 0) + codec.SDO_FLOAT.pack(0.1)
-    return frames + [Frame(arbitration_id(node, codec.TX_SDO), setting) for node in node_ids]
+class ObservedRobot:
+    """Owns a third node on each bus of a robot."""
+
+    def __init__(self, walk: Lockstep) -> None:
+        self.walk = walk
+        self.nodes = [_open_third_node(walk, bus) for bus in walk.loop.configuration.bus]
+
+    def step(self, with_drives: bool = True) -> tuple[list[Frame], list[Frame]]:
+        """Steps as the lockstep does; returns the frames of the drives and those of the loop."""
+        walk = self.walk
+        walk.tick_number += 1
+        if with_drives:
+            walk.robot.advance(walk.now_s)
+        of_drives = self.receive()
+        walk.loop.tick(Tick(walk.now_s, 0.0, walk.tick_number, 0))
+        return of_drives, self.receive()
+
+    def receive(self) -> list[Frame]:
+        return [frame for node in self.nodes for frame in node.receive()]
 
 
-def recorded_frames(drive: str) -> list[Frame]:
-    """Returns the frames of simulated drives in a second of an idle robot, each payload once."""
-    walk = Lockstep(load_example(drive), Track([(1.0, MUDS["48.5"])]))
-    nodes = [open_third_node(walk, bus) for bus in walk.loop.configuration.bus]
-    walk.run_for(RECORDED_S)
-    sent = [frame for node in nodes for frame in node.receive() if not is_ours(frame, drive)]
-    return list({(frame.arbitration_id, frame.data): frame for frame in sent}.values())
+def true_frames(configuration: Configuration) -> list[list[Frame]]:
+    """Returns the frames of simulated drives from start to idle, each payload once, by id and length."""
+    robot = ObservedRobot(Lockstep(configuration, TRACK))
+    groups: dict[tuple[int, int], dict[bytes, Frame]] = {}
+    for _ in range(RECORDED_TICKS):
+        for frame in robot.step()[0]:
+            groups.setdefault((frame.arbitration_id, len(frame.data)), {})[frame.data] = frame
+    return [list(group.values()) for group in groups.values()]
 
 
-def malformed_frames(true: list[Frame], random: Random, without: int) -> Iterator[Frame]:
-    """Yields malformed frames without end, none with the id `without`; the same seed gives the same frames."""
+def announces(frame: Frame, drive: DriveParameters) -> bool:
+    """Returns whether the loop may take a frame for this drive's heartbeat, or its answer."""
+    content = type_of(drive).read_frame(frame)
+    identifier = frame.arbitration_id | FD * frame.is_fd
+    return identifier in type_of(drive).identifiers(drive) and (content is None or "heartbeat" in content.signals)
+
+
+def malformed_frames(
+    true: Sequence[Sequence[Frame]], random: Random, silent: DriveParameters | None
+) -> Iterator[Frame]:
+    """Yields malformed frames without end, none that announces the silent drive; a seed always gives the same."""
     while True:
-        frame = random.choice(CHANGES)(random.choice(true), random)
-        if frame.arbitration_id != without:
+        frame = random.choice(CHANGES)(random.choice(random.choice(true)), random)
+        if silent is None or not announces(frame, silent):
             yield from [frame] * (BABBLE_FRAMES if random.random() < BABBLE_FRACTION else 1)
 
 
@@ -127,69 +131,40 @@ def random_frame(frame: Frame, random: Random) -> Frame:
 CHANGES = (flipped, resized, no_number, readdressed, marked, random_frame)
 
 
-def is_forbidden(frame: Frame, drive: str = DEFAULT) -> bool:
-    """Returns whether a disarmed robot's frame could move a drive: any but zero torque, idle and requests."""
-    if drive == "moteus":
-        return writes_to_moteus(frame)
-    command = frame.arbitration_id & 0x1F
-    if frame.is_extended or frame.is_error:
-        return True
-    if frame.is_remote:
-        return command != codec.GET_VERSION.command
-    if command == codec.SET_INPUT_TORQUE.command:
-        return frame.data not in ZERO_TORQUES
-    if command == codec.SET_AXIS_STATE.command:
-        return frame.data != codec.SET_AXIS_STATE.encode(codec.AxisState.IDLE)
-    return command != codec.RX_SDO.command or frame.data[:1] != b"\0"
-
-
-def writes_to_moteus(frame: Frame) -> bool:
-    """Returns whether a frame writes anything but the mode STOPPED, or anything but a question to the console."""
-    for each in registers.decode_frame(frame.data):
-        if each.kind == registers.CONSOLE_INPUT and not each.text.startswith(b"conf get "):
-            return True
-        if each.kind == registers.WRITE and (each.register, *each.values) != (Register.MODE, MoteusMode.STOPPED):
-            return True
-    return False
-
-
 class Fuzzing:
-    """Owns a loop that stays in one mode: idle next to a running robot, or boot without one drive's heartbeats."""
+    """Owns a robot that stays in one mode: idle, or boot without one drive's heartbeats."""
 
     def __init__(self, mode: Mode, seed: int, drive: str = DEFAULT) -> None:
         configuration = load_example(drive)
-        self.mode, self.drive = mode, drive
-        self.walk = Lockstep(configuration, Track([(1.0, MUDS["48.5"])]), seed)
-        self.nodes = [open_third_node(self.walk, bus) for bus in configuration.bus]
+        self.mode, self.drive_type = mode, drive.partition(":")[0]
+        walk = Lockstep(configuration, TRACK, seed)
+        if mode is Mode.BOOT:
+            for bus in walk.buses.values():
+                bus.ports[0].close()  # the drives', which nothing would read: it would queue thousands of frames
+        self.robot = ObservedRobot(walk)
+        self.loop = self.robot.walk.loop
         first = configuration.drive[configuration.rig.joints[0]]
-        missing = type_of(first).announces(first.node_id).arbitration_id if mode is Mode.BOOT else -1
-        self.source = malformed_frames(true_frames(configuration.drive), Random(seed), missing)
+        silent = first if mode is Mode.BOOT else None
+        self.source = malformed_frames(true_frames(configuration), Random(seed), silent)
         if mode is Mode.IDLE:
-            self.walk.run_until(lambda: self.walk.loop.mode is Mode.IDLE, 2.0)
-        for node in self.nodes:
-            node.receive()
+            self.robot.walk.run_until(lambda: self.loop.mode is Mode.IDLE, 2.0)
+        self.robot.receive()
         self.exceptions, self.forbidden = list[str](), list[str]()
         self.sent = self.ticks_in_another_mode = 0
 
     def step(self) -> None:
+        nodes = self.robot.nodes
         for index in range(FRAMES_PER_TICK):
-            self.nodes[index % len(self.nodes)].send(next(self.source))
+            nodes[index % len(nodes)].send(next(self.source))
         try:
-            self._tick()
+            _, sent = self.robot.step(with_drives=self.mode is Mode.IDLE)
         except Exception as problem:  # noqa: BLE001  that none comes is what is measured
             self.exceptions.append(repr(problem))
-        self.ticks_in_another_mode += self.walk.loop.mode is not self.mode
-        sent = [frame for node in self.nodes for frame in node.receive() if is_ours(frame, self.drive)]
+            sent = self.robot.receive()
+        self.ticks_in_another_mode += self.loop.mode is not self.mode
         self.sent += len(sent)
-        forbidden = [frame for frame in sent if is_forbidden(frame, self.drive)]
+        forbidden = [frame for frame in sent if not is_harmless(frame, self.drive_type)]
         self.forbidden += [f"0x{each.arbitration_id:03x} {each.data.hex(' ')}" for each in forbidden]
-
-    def _tick(self) -> None:
-        if self.mode is Mode.IDLE:
-            self.walk.step()
-            return
-        self.walk.tick_number += 1
-        self.walk.loop.tick(Tick(self.walk.now_s, 0.0, self.walk.tick_number, 0))
 
 
 def fuzz(mode: Mode, frames: int, seed: int, drive: str = DEFAULT) -> dict[str, Any]:
@@ -206,32 +181,23 @@ def fuzz(mode: Mode, frames: int, seed: int, drive: str = DEFAULT) -> dict[str, 
         "first_exceptions": fuzzing.exceptions[:3],
         "forbidden": fuzzing.forbidden[:10],
         "frames_sent": fuzzing.sent,
-        "refused_by_the_gate": fuzzing.walk.loop.drives.refused_commands,
+        "refused_by_the_gate": fuzzing.loop.drives.refused_commands,
         "ticks_in_another_mode": fuzzing.ticks_in_another_mode,
         "growth_kib": round(readings_kib[-1] - readings_kib[0], 1),
         "seconds": round(perf_counter() - started_s, 1),
     }
 
 
-def open_third_node(walk: Lockstep, bus: str) -> MockPort:
+def _open_third_node(walk: Lockstep, bus: str) -> MockPort:
     """Opens a third node on a bus of the loop."""
     port = walk.loop.drives.ports[bus]
     assert isinstance(port, MockPort)
     return port.open_peer()
 
 
-def is_ours(frame: Frame, drive: str = DEFAULT) -> bool:
-    """Returns whether the loop sent a frame; the simulated drives send answers and cyclic messages on the same bus."""
-    if drive != DEFAULT:
-        content = DRIVE_TYPES[drive].read_frame(frame)
-        return content is not None and content.is_command
-    reported = {message.command for message, _ in REPORTED} | {codec.TX_SDO.command}
-    return frame.is_remote or frame.arbitration_id & 0x1F not in reported
-
-
 def measure(folder: Path, *, frames: int = 1_000_000, seed: int = 1, drive: str = DEFAULT) -> dict[str, Any]:
-    if drive not in KNOWN:
-        raise SystemExit(f"--drive {drive}: must be one of {', '.join(KNOWN)}")
+    if drive not in DRIVES:
+        raise SystemExit(f"--drive {drive}: must be one of {', '.join(DRIVES)}")
     freeze_garbage()
     parts = {mode.name.lower(): fuzz(mode, frames // 2, seed, drive) for mode in (Mode.BOOT, Mode.IDLE)}
     reached = all(

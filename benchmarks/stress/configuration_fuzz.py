@@ -18,11 +18,13 @@ from typing import Any
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import evaluated, run_benchmark, show_progress
-from benchmarks.stress.can_fuzz import is_forbidden, is_ours, open_third_node
+from benchmarks.stress.can_fuzz import ObservedRobot
+from benchmarks.stress.harmless_frames import is_harmless
 from benchmarks.stress.malformed_configurations import CandidateFile, next_file
 from benchmarks.stress.resources import peak_kib
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
+from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.configuration.toml_records import ConfigurationError
@@ -138,11 +140,10 @@ def idle(robot: Lockstep) -> list[str]:
     if robot.loop.mode in ENERGISED:
         robot.loop.request(Request.DISARM, robot.now_s)
         robot.step()
-    third_nodes = [open_third_node(robot, bus) for bus in robot.loop.configuration.bus]
-    for _ in range(IDLE_TICKS):
-        robot.step()
-    sent = [frame for port in third_nodes for frame in port.receive() if is_ours(frame) and is_forbidden(frame)]
-    problems = [f"sent 0x{frame.arbitration_id:03x} {frame.data.hex(' ')}" for frame in sent[:3]]
+    observed = ObservedRobot(robot)
+    sent = [frame for _ in range(IDLE_TICKS) for frame in observed.step()[1]]
+    harmful = [frame for frame in sent if not is_harmless(frame, DEFAULT)]
+    problems = [f"sent 0x{frame.arbitration_id:03x} {frame.data.hex(' ')}" for frame in harmful[:3]]
     if robot.loop.mode in ENERGISED or any(robot.loop.sent.torques_nm):
         problems.append(f"is in mode {robot.loop.mode.name} with torques {robot.loop.sent.torques_nm}")
     return problems

@@ -21,10 +21,10 @@ DRIVES = (  # types of drive, and models of motor
 DATA_BIT_RATE_KBIT_S = 5000
 
 
-def with_drive_type(text: str, drive: str) -> str:
+def with_drive_type(text: str, drive: str, **settings: float) -> str:
     """Returns the text of the configuration with this type for every joint: "mit", or with a model "mit:AK80-9".
 
-    The default type returns it unchanged.
+    The default type returns it unchanged. `settings` are keys of the drives, for a type that knows them.
     """
     if drive == DEFAULT:
         return text
@@ -41,6 +41,7 @@ def with_drive_type(text: str, drive: str) -> str:
         if model:
             table["model"] = model
         table["node_id"] += round(bounds.minimum)
+        table.update((key, value) for key, value in settings.items() if key in known)
     if DRIVE_TYPES[name].kind.is_fd:
         for bus in document["bus"].values():
             bus["data_bit_rate_kbit_s"] = DATA_BIT_RATE_KBIT_S

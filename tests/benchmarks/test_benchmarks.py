@@ -20,8 +20,9 @@ from benchmarks.speed import campaign_speed, lockstep_speed, tick_time, timed_wa
 from benchmarks.speed.timed_walk import STAGES
 from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
-from benchmarks.stress.can_fuzz import is_forbidden
+from benchmarks.stress.harmless_frames import is_harmless
 from drivers.can.frames import Frame
+from drivers.mit import codec as mit
 from drivers.moteus import codec as moteus
 from drivers.moteus import registers, settings
 from tests.folders import ROOT
@@ -104,47 +105,94 @@ def test_lockstep_speed(capsys: pytest.CaptureFixture[str]) -> None:
     assert walk["arrived"] is False
 
 
-def test_can_fuzz() -> None:
+@pytest.mark.parametrize("drive", ["odrive", "odrive05", "moteus", "mit", "mit:AK80-9"])
+def test_can_fuzz(drive: str) -> None:
     """Its findings depend on no clock, so they are asserted; with so few frames its memory figure is not."""
-    parts = report_of("can_fuzz", "--frames", "8000")["parts"]
-    assert {name: part["frames"] for name, part in parts.items()} == {"boot": 4000, "idle": 4000}
+    frames = 8000 if drive == "odrive" else 2400
+    parts = report_of("can_fuzz", "--frames", str(frames), "--drive", drive)["parts"]
+    assert {name: part["frames"] for name, part in parts.items()} == {"boot": frames // 2, "idle": frames // 2}
     for part in parts.values():
         assert (part["exceptions"], part["forbidden"], part["ticks_in_another_mode"]) == (0, [], 0)
     assert parts["idle"]["frames_sent"] > 100
 
 
+@pytest.mark.parametrize("name", ["can_fuzz", "daemon_kills"])
+def test_an_unknown_drive_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    measure = import_module(BENCHMARKS[name]).measure
+    with pytest.raises(SystemExit, match="mit:AK80-9"):
+        run_benchmark(measure, ["--drive", "mit:AK"])
+
+
 @pytest.mark.parametrize(
-    ("frame", "forbidden"),
+    ("frame", "harmless"),
     [
-        (Frame(0x00E, bytes(4)), False),
-        (Frame(0x00E, b"\1\0\0\0"), True),
-        (Frame(0x007, b"\1\0\0\0"), False),
-        (Frame(0x007, b"\x08\0\0\0"), True),
-        (Frame(0x000, is_remote=True), False),
-        (Frame(0x00E, is_remote=True), True),
+        (Frame(0x00E, bytes(4)), True),
+        (Frame(0x00E, b"\1\0\0\0"), False),
+        (Frame(0x007, b"\1\0\0\0"), True),
+        (Frame(0x007, b"\x08\0\0\0"), False),
+        (Frame(0x000, is_remote=True), True),
+        (Frame(0x00E, is_remote=True), False),
+        (Frame(0x004, bytes(4)), True),
+        (Frame(0x004, b"\1\2\0\0"), False),
+        (Frame(0x00C, bytes(8)), False),
+        (Frame(0x00E, bytes(4), is_extended=True), False),
+        (Frame(0x00E, bytes(4), is_error=True), False),
+    ],
+)
+def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send(frame: Frame, harmless: bool) -> None:
+    assert is_harmless(frame, "odrive") == harmless
+
+
+@pytest.mark.parametrize(
+    ("frame", "harmless"),
+    [
+        (Frame(0x00E, bytes(4)), True),
+        (Frame(0x00E, b"\1\0\0\0"), False),
+        (Frame(0x007, b"\x08\0\0\0"), False),
+        (Frame(0x00A, is_remote=True), True),
+        (Frame(0x016, is_remote=True), False),  # a restart
+        (Frame(0x006, is_remote=True), False),  # a new node id
+        (Frame(0x018), True),
+        (Frame(0x018, b"\0"), False),
         (Frame(0x004, bytes(4)), False),
-        (Frame(0x004, b"\1\2\0\0"), True),
-        (Frame(0x00C, bytes(8)), True),
-        (Frame(0x00E, bytes(4), is_extended=True), True),
     ],
 )
-def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send(frame: Frame, forbidden: bool) -> None:
-    assert is_forbidden(frame) == forbidden
+def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send_to_firmware_05(frame: Frame, harmless: bool) -> None:
+    assert is_harmless(frame, "odrive05") == harmless
 
 
 @pytest.mark.parametrize(
-    ("data", "forbidden"),
+    ("data", "harmless"),
     [
-        (moteus.QUERY_ALONE, False),
-        (moteus.STOP_AND_QUERY, False),
-        (settings.IDENTITY, False),
-        (settings.QUESTIONS[0], False),
-        (moteus.encode_torque(0.0), True),
-        (registers.encode_console(registers.CONSOLE_INPUT, b"conf set servo.max_current_A 3\n"), True),
+        (moteus.QUERY_ALONE, True),
+        (moteus.STOP_AND_QUERY, True),
+        (settings.IDENTITY, True),
+        (settings.QUESTIONS[0], True),
+        (moteus.encode_torque(0.0), False),
+        (registers.encode_console(registers.CONSOLE_INPUT, b"conf set servo.max_current_A 3\n"), False),
+        (b"\xff", False),
     ],
 )
-def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send_to_a_moteus(data: bytes, forbidden: bool) -> None:
-    assert is_forbidden(Frame(0x8001, data, is_extended=True, is_fd=True), "moteus") == forbidden
+def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send_to_a_moteus(data: bytes, harmless: bool) -> None:
+    assert is_harmless(Frame(0x8001, data, is_extended=True, is_fd=True), "moteus") == harmless
+
+
+@pytest.mark.parametrize(
+    ("frame", "harmless"),
+    [
+        (Frame(0x001, mit.LEAVE), True),
+        (Frame(0x010, mit.LEAVE), False),
+        (Frame(0x001, mit.ENTER), False),
+        (Frame(0x001, mit.SET_ZERO), False),
+        (Frame(0x001, mit.encode_torque(0.0, 10.0)), False),  # half a step of torque
+        (Frame(0x7FF, mit.encode_read(1, 9)), True),
+        (Frame(0x7FF, mit.encode_register(1, mit.WRITE, 9, bytes(4))), False),
+        (Frame(0x7FF, mit.encode_register(1, mit.STORE, 1, bytes(4))), False),
+        (Frame(0x001, mit.LEAVE, is_fd=True), False),
+    ],
+)
+def test_the_fuzz_knows_what_a_disarmed_robot_must_not_send_in_mit_mode(frame: Frame, harmless: bool) -> None:
+    assert is_harmless(frame, "mit") == harmless
 
 
 def test_soak() -> None:
@@ -158,12 +206,13 @@ def test_soak() -> None:
     assert report["garbage"]["objects"] < 1000
 
 
-def test_daemon_kills() -> None:
+@pytest.mark.parametrize("drive", ["odrive", "moteus"])
+def test_daemon_kills(drive: str) -> None:
     """The daemon is killed once and stopped once. A busy machine only lengthens waits, and no time is asserted."""
-    report = report_of("daemon_kills", "--kills", "2")
+    report = report_of("daemon_kills", "--kills", "2", "--drive", drive)
     assert [made["signal"] for made in report["rounds"]] == ["SIGKILL", "SIGSTOP"]
     for made in report["rounds"]:
-        assert (made["phase"], made["idle"], made["moved_again"]) == ("insertion", True, False)
+        assert (made["phase"], made["idle"], made["moved_again_s"]) == ("insertion", True, 0.0)
     assert report.keys() >= {"longest_s", "watchdog_s", "invalid_walks"}
 
 
