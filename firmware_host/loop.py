@@ -17,15 +17,7 @@ from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
 from control.rate import PERIOD_S
-from control.records import (
-    NEVER_S,
-    BodyPose,
-    DriveState,
-    DriveStates,
-    GaitTarget,
-    Torques,
-    same_for_all,
-)
+from control.records import NEVER_S, BodyPose, DriveState, DriveStates, GaitTarget, Torques, same_for_all
 from drivers.drives import Drives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
@@ -219,8 +211,12 @@ class Loop:
     def _command(self, now_s: float) -> None:
         """Send the axis states that the mode needs, then the torques.
 
-        Idle drives get zero torque, which feeds their watchdogs. In BOOT only disarming and requests are sent.
+        Idle drives get zero torque, which feeds their watchdogs. In BOOT only disarming and requests are sent. Nothing
+        is sent if this process stood still within the tick: watchdogs that do not latch would let old torques pass.
         """
+        if self._clock() - now_s > self.configuration.faults.silence_s:
+            self.sent = self.nothing_sent
+            return
         if self.mode is Mode.ARMING:
             self.drives.arm(now_s)
         elif self.mode not in ENERGISED:

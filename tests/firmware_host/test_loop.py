@@ -183,6 +183,19 @@ def test_a_stalled_loop_idles_the_drives(walked: dict[float, Lockstep]) -> None:
     assert robot.loop.sent.torques_nm == NO_TORQUE
 
 
+@pytest.mark.parametrize(("ticks", "leave"), [(0, True), (9, True), (11, False), (400, False)])
+def test_torques_of_a_tick_that_was_interrupted_do_not_leave(robot: Lockstep, ticks: int, leave: bool) -> None:
+    """A stopped process continues within its tick; a drive whose watchdog does not latch would follow old torques."""
+    port = open_peer(robot, "left")
+    robot.tick_number += 1
+    robot.robot.advance(robot.now_s)
+    tick = Tick(robot.now_s, 0.0, robot.tick_number, 0)
+    robot.tick_number += ticks
+    robot.loop.tick(tick)
+    assert bool(torque_frames(port)) is leave
+    assert (robot.loop.sent.torques_nm != NO_TORQUE) is leave
+
+
 def test_the_slew_limit_does_not_grow_with_missed_ticks(walked: dict[float, Lockstep]) -> None:
     robot = copy_of(walked[1.7])
     before_nm = robot.loop.sent.torques_nm
