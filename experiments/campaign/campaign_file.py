@@ -4,7 +4,6 @@ Every point is checked before the first trial, and both ends of every range.
 """
 
 from collections.abc import Iterator
-from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -24,6 +23,7 @@ from firmware_host.configuration.toml_records import (
 )
 
 MOST_TRIALS = 100_000
+PLATE_KEY = "configuration.geometry.plate_corners_m"
 SHOWN_KEYS = 6  # of a point, in a message
 
 
@@ -77,21 +77,30 @@ def load_campaign(path: Path) -> Campaign:
     """Raises ConfigurationError."""
     document = parse_document(read_text(path), path)
     text = CampaignText(**_READER.read(document))
-    if ("grid" in document) == ("random" in document):
-        raise ConfigurationError([f"{path}: must have either [grid] or [random]"])
-    points = list(_points(text))
+    _require_one_kind(document, path)
+    is_random = "random" in document
+    points = list(_points(text, is_random))
     base = {section: getattr(text, section) for section in SECTIONS}
     base["world"] = one_mud(text.world)
     plates = _Plates(path.parent)
-    for end in range_ends(text.random) if text.random else ():
+    for end in range_ends(text.random) if is_random else ():
         _check(points[0] | end, base, plates)
     tables = [_check(values, base, plates, number) for number, values in enumerate(points, 1)]
     return Campaign(path.stem, document | {"plates": plates.corners}, points, tables, text.seeds)
 
 
-def _points(text: CampaignText) -> Iterator[Values]:
+def _require_one_kind(document: Tables, path: Path) -> None:
+    """Raises ConfigurationError."""
+    if ("grid" in document) == ("random" in document):
+        raise ConfigurationError([f"{path}: must have either [grid] or [random]"])
+    for key in ("points", "seed"):
+        if "grid" in document and key in document:
+            raise ConfigurationError([f"{key} = {document[key]}: must be left out with [grid], which draws nothing"])
+
+
+def _points(text: CampaignText, is_random: bool) -> Iterator[Values]:
     """Raises ConfigurationError where there are too many."""
-    drawn = random_points(text.random, text.points, text.seed) if text.random else grid_points(text.grid)
+    drawn = random_points(text.random, text.points, text.seed) if is_random else grid_points(text.grid)
     most = MOST_TRIALS // text.seeds
     yield from islice(drawn, most)
     if next(drawn, None) is not None:
@@ -119,11 +128,10 @@ class _Plates:
 
     def in_configuration(self, tables: Tables) -> Tables:
         """Return the tables with the corners in place of the file's name. Raises ConfigurationError."""
-        robot, changed = dict(tables["robot"]), deepcopy(tables["configuration"])
-        name = robot.pop("plate", "")
-        if name:
-            changed.setdefault("geometry", {})["plate_corners_m"] = [list(corner) for corner in self._read(name)]
-        return tables | {"robot": robot, "configuration": changed}
+        name = tables["robot"].get("plate", "")
+        robot = {key: value for key, value in tables["robot"].items() if key != "plate"}
+        corners = {PLATE_KEY: [list(corner) for corner in self._read(name)]} if name else {}
+        return with_values(tables | {"robot": robot}, corners)
 
     def _read(self, name: Any) -> tuple[Corner, ...]:
         if not isinstance(name, str):

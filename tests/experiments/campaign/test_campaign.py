@@ -123,10 +123,13 @@ REFUSED = {
     f"[grid]\n{MUD} = [800.0]\nrobot.drive = ['steam']": "robot.drive = 'steam': must be one of odrive",
     f"[grid]\n{MUD} = [800.0]\nrobot.flippers = [['middle']]": "robot.flippers = ['middle']: must be one of",
     f"[grid]\n{MUD} = [800.0]\nrobot.plate = ['none.csv']": "none.csv: No such file",
+    f"[grid]\n{MUD} = [800.0]\nrobot.plate = ['p.csv']\n[configuration]\ngeometry = 3": "there is a value where",
+    "[random]": "random: must have at least one key",
     f"[grid]\n{MUD} = [800.0]\nwalk.strides = [0]": "walk.strides = 0: must be at least 1",
     f"[grid]\n{MUD}.x = [800.0]\n[world]\nsegment = [{{ strength_pa = 3.0 }}]": "would be a key of a table",
     f"seeds = 0\n[grid]\n{MUD} = [800.0]": "seeds = 0: must be at least 1",
     f"seeds = 10000\n[grid]\n{MUD} = {[800.0 + i for i in range(11)]}": "must give at most 100000 trials",
+    f"points = 3\n[grid]\n{MUD} = [800.0]": "points = 3: must be left out with [grid]",
     f"points = 0\n[random]\n{MUD} = [800.0]": "points = 0: must be at least 1",
     f"[random]\n{MUD} = []": f"random.{MUD} = []: must have at least one value",
     f"[random]\n{MUD} = 800.0": "must be an array, or { min = ..., max = ... }",
@@ -140,6 +143,7 @@ REFUSED = {
 
 
 def test_each_bad_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    written(tmp_path, (ROOT / "examples/plates/paddle.csv").read_text(encoding="utf-8"), "p.csv")
     for text, message in REFUSED.items():
         assert message in refusal(tmp_path, text), text
 
