@@ -155,7 +155,7 @@ def test_each_stride_of_each_method_is_evaluated_once() -> None:
 
 
 def test_progress_counts_all_trials() -> None:
-    assert evaluated()[1] == [(1, 2), (2, 2)]
+    assert evaluated()[1] == [(0, 2), (1, 2), (2, 2)]
 
 
 def trial_of(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:

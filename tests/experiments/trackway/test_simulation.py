@@ -135,7 +135,7 @@ def test_a_continued_experiment_repeats_no_walk(tmp_path: Path) -> None:
     again, shown = Notebook(tmp_path, plan.identity), list[tuple[int, int]]()
     assert len(again.entries) == 2
     report = run(plan, again, lambda done, total: shown.append((done, total)), LocalWorkers(1))
-    assert shown == [(3, 6), (4, 6), (5, 6), (6, 6)]
+    assert shown == [(2, 6), (3, 6), (4, 6), (5, 6), (6, 6)]
     assert report == run(plan, Notebook(tmp_path / "other", plan.identity), lambda done, total: None, LocalWorkers(1))
 
 
