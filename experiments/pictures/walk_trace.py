@@ -24,6 +24,7 @@ MOST_ROWS = 50_000  # of all walks of a log together: two minutes; matplotlib ta
 FIRST_BIN = 32  # ticks; it has up to four rows for each drawn column, so a shorter one would save nothing
 LEAST_GAIN = 0.9  # of the rows; beyond it a trace consists of the rows around changes of phase
 AROUND = 2  # rows before and after a change of phase
+CURVE_BINS = 4096  # of one curve of a long walk: several for each column of pixels
 
 
 class WalkTrace:
@@ -124,6 +125,15 @@ def rows_drawn(rows: Rows, bin_ticks: int) -> NDArray[np.bool_]:
         for chosen in _extremes(values, bins):
             wanted[chosen] = True
     return wanted
+
+
+def rows_of_curve(time_s: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Returns the rows of a trace that one of its curves needs: a trace also has those of all other curves."""
+    length_s = float(time_s[-1] - time_s[0])
+    bins = (CURVE_BINS / length_s * (time_s - time_s[0])).astype(np.int64)
+    is_known = np.isfinite(values)
+    begin_or_end = np.flatnonzero(is_known[1:] != is_known[:-1])  # of a gap
+    return np.unique(np.concatenate([begin_or_end, begin_or_end + 1, *_extremes(values, bins)]))
 
 
 def _drawn_columns(rows: Rows) -> Iterator[NDArray[np.float64]]:

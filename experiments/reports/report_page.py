@@ -4,8 +4,9 @@ The page is plain HTML with the pictures inside, so it can be sent as one file a
 """
 
 import base64
+import gc
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
 from html import escape
@@ -73,19 +74,49 @@ def write_report(
     """
     folder.mkdir(parents=True, exist_ok=True)
     summary, page = folder / SUMMARY, folder / PAGE
-    _write(summary, json.dumps(to_json(report), indent=1, allow_nan=False) + "\n")
+    _write(summary, json_pieces(report))
     figures = [figure for section in sections for figure in section.figures]
     pictures: list[Path] = []
     for done, figure in enumerate(figures):
         watch("pictures drawn", done, len(figures))
         pictures += _draw(figure, [folder / f"{figure.name}{ending}" for ending in (".png", *also)])
-    _write(page, _page(folder, title, sections, logs, also))
+        gc.collect()  # the parts of a picture refer to each other: the next one shall not stand next to them in memory
+    _write(page, [_page(folder, title, sections, logs, also)])
     return [page, summary, *pictures, *logs]
 
 
-def _write(path: Path, text: str) -> None:
-    with whole_file(path) as hidden:
-        hidden.write_text(text, encoding="utf-8", errors="replace")  # file names may be any bytes
+def _write(path: Path, pieces: Iterable[str]) -> None:
+    with whole_file(path) as hidden, hidden.open("w", encoding="utf-8", errors="replace") as file:
+        file.writelines(pieces)  # file names may be any bytes
+
+
+def json_pieces(report: Any) -> Iterator[str]:
+    """Yield the report as JSON and a line end. The lists of a mapping, which may be long, are encoded by the entry."""
+    report = report if isinstance(report, Mapping) else to_json(report)
+    if not isinstance(report, Mapping) or not report:
+        yield f"{_encoded(report)}\n"
+        return
+    before = "{\n "
+    for key, value in report.items():
+        yield f"{before}{json.dumps(str(key))}: "
+        yield from _entry_pieces(value)
+        before = ",\n "
+    yield "\n}\n"
+
+
+def _entry_pieces(value: Any) -> Iterator[str]:
+    if type(value) not in (list, tuple) or not value:
+        yield _encoded(value, 1)
+        return
+    before = "[\n  "
+    for each in value:
+        yield f"{before}{_encoded(each, 2)}"
+        before = ",\n  "
+    yield "\n ]"
+
+
+def _encoded(value: Any, level: int = 0) -> str:
+    return json.dumps(to_json(value), indent=1, allow_nan=False).replace("\n", "\n" + " " * level)
 
 
 def to_json(report: Any) -> Any:

@@ -3,6 +3,7 @@
 Moments in cm⁴ and torques in N·cm make the slope of a line the coefficient in N/cm³.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,13 +25,15 @@ from experiments.run_report.run import ReportedStride, Run
 
 CM4 = 1e8  # in m⁴
 MOST_DRAWN = 10  # strides of each mud, evenly over the run
+MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
+LEGEND_COLUMNS = 5
 INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
 SIZE_IN, DOTS_PER_INCH = (10.0, 7.2), 120
 
 
 def plot_fits(run: Run, path: Path) -> Figure:
     """Draw into a PNG, SVG or PDF file."""
-    muds = list(dict.fromkeys(stride.mud for stride in run.strides if stride.mud))
+    muds = drawn_muds(run)
     looks = looks_of(muds)
     with rc_context(STYLE):
         figure = Figure(
@@ -47,16 +50,26 @@ def plot_fits(run: Run, path: Path) -> Figure:
         for panel in axes[-1]:
             panel.set_xlabel("moment (cm⁴)")
         handles = [axes[0, 0].plot([], [], **_mark(looks[mud]), label=mud)[0] for mud in muds]
-        figure.legend(handles=handles, loc="outside upper center", ncols=max(len(muds), 1), frameon=False)
+        figure.legend(
+            handles=handles, loc="outside upper center", ncols=min(max(len(muds), 1), LEGEND_COLUMNS), frameon=False
+        )
         figure.savefig(path, dpi=DOTS_PER_INCH)
     return figure
 
 
+def drawn_muds(run: Run) -> list[str]:
+    """Return the muds with the most strides in the order of the run, at most MOST_MUDS."""
+    strides = Counter(stride.mud for stride in run.strides if stride.mud)
+    drawn = {mud for mud, _ in strides.most_common(MOST_MUDS)}
+    return [mud for mud in strides if mud in drawn]
+
+
 def drawn_samples(run: Run, flipper: str, name: str) -> Iterator[tuple[str, FitSamples]]:
-    """Yield the mud and the samples of at most MOST_DRAWN strides of each mud."""
+    """Yield the mud and the samples of at most MOST_DRAWN strides of each drawn mud."""
     by_mud: dict[str, list[ReportedStride]] = {}
+    muds = drawn_muds(run)
     for stride in run.strides:
-        if stride.mud and stride.samples(flipper, name):
+        if stride.mud in muds and stride.samples(flipper, name):
             by_mud.setdefault(stride.mud, []).append(stride)
     for mud, strides in by_mud.items():
         for position in np.unique(np.linspace(0, len(strides) - 1, MOST_DRAWN).round().astype(int)):

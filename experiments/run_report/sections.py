@@ -115,14 +115,17 @@ def _draw_strip(walk: RecordedWalk, path: Path) -> Any:
 
 
 def _fits_section(run: Run) -> Section:
-    from experiments.run_report.fit_plot import plot_fits
+    from experiments.run_report.fit_plot import drawn_muds, plot_fits
 
     rows = quality_rows(run)
     if not any(cell.isdecimal() for row in rows[1:] for cell in row[2:]):
         return Section(
             "Fits", "No estimate of this log has a fit: all are lower bounds, invalid, or of another method."
         )
-    return Section("Fits", R_SQUARED, rows=rows, figures=[Figure("fits", FITS, partial(plot_fits, run))])
+    drawn, muds = drawn_muds(run), {stride.mud for stride in run.strides if stride.mud}
+    others = f" Of {len(muds)} muds the {len(drawn)} with the most strides are drawn."
+    caption = FITS + others * (len(drawn) < len(muds))
+    return Section("Fits", R_SQUARED, rows=rows, figures=[Figure("fits", caption, partial(plot_fits, run))])
 
 
 def _strides_section(run: Run) -> Section:

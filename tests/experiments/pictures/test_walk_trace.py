@@ -11,7 +11,7 @@ from control.modes import Mode
 from experiments.pictures import walk_trace
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides, duration_s, moments_of, with_strides
-from experiments.pictures.walk_trace import DRAWN, WalkTraces, drawn_rows, rows_drawn
+from experiments.pictures.walk_trace import DRAWN, WalkTraces, drawn_rows, rows_drawn, rows_of_curve
 from experiments.run_report.headline import headline_of
 from experiments.run_report.run import read_run, read_sources
 from firmware_host.log_reading.log_error import unwatched
@@ -145,3 +145,18 @@ def test_the_figures_of_a_report_do_not_depend_on_the_trace(two_walks: Path, mon
 def test_a_trace_has_only_rows_of_the_log(rows: walk_trace.Rows, two_walks: Path) -> None:
     known = {row.tobytes() for row in drawn_rows(read_log(two_walks).ticks)}
     assert all(row.tobytes() in known for row in rows[:500])
+
+
+def test_a_curve_has_its_extremes_and_its_gaps(rows: walk_trace.Rows, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(walk_trace, "CURVE_BINS", 50)
+    time_s, values = rows["stamp_s"], rows["body_x_m"]
+    chosen = rows_of_curve(time_s, values)
+    assert len(chosen) < len(values) / 5
+    bins = (50 * (time_s - time_s[0]) / (time_s[-1] - time_s[0])).astype(int)
+    for number in np.unique(bins):
+        known = values[(bins == number) & np.isfinite(values)]
+        drawn = values[chosen[(bins[chosen] == number)]]
+        assert not len(known) or (np.nanmin(drawn), np.nanmax(drawn)) == (known.min(), known.max())
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(values[chosen])), np.searchsorted(chosen, [500, 899]))
+    assert np.isfinite(values[chosen[np.searchsorted(chosen, [499, 900])]]).all()
+    assert len(rows_of_curve(time_s, np.full(len(time_s), np.nan))) == 0

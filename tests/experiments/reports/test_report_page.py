@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import base64
-import errno
 import json
-import os
 import re
+import weakref
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from experiments.reports.report_page import Figure, Section, write_report
+from experiments.reports.report_page import Figure, Section, json_pieces, to_json, write_report
 
 DOT = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR4nGNgYGD4DwABBAEAwS2OUAAAAABJRU5ErkJggg=="
@@ -84,19 +84,19 @@ def test_pictures_can_have_further_forms_and_sections_further_tables(tmp_path: P
 def test_a_disk_that_fills_up_leaves_the_report_that_was_there_and_nothing_cut(
     whole_files: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The disk is full when the numbers, the picture or the page is written; half of that file fits."""
+    """The disk is full when the numbers, the picture or the page is written; a part of that file fits."""
     before = {path: path.read_bytes() for path in write_report(tmp_path, {"k": 1}, "Before", [SECTION])}
-    room, write = [whole_files], Path.write_bytes
+    opened, open_path = [0], Path.open
 
-    def fill(path: Path, contents: bytes) -> int:
-        room[0] -= 1
-        if room[0] >= 0:
-            return write(path, contents)
-        write(path, contents[: len(contents) // 2])
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    def fill(path: Path, mode: str = "r", *further: Any, **options: Any) -> Any:
+        opened[0] += "w" in mode
+        if "w" not in mode or opened[0] <= whole_files:
+            return open_path(path, mode, *further, **options)
+        with open_path(path, "wb") as file:
+            file.write(b"half")
+        return open_path(Path("/dev/full"), mode, *further, **options)
 
-    monkeypatch.setattr(Path, "write_bytes", fill)
-    monkeypatch.setattr(Path, "write_text", lambda path, text, **_: fill(path, text.encode()))
+    monkeypatch.setattr(Path, "open", fill)
     with pytest.raises(OSError, match="No space left"):
         write_report(tmp_path, {"k": 2}, "After", [SECTION])
     assert sorted(tmp_path.iterdir()) == sorted(before)
@@ -119,3 +119,41 @@ def test_numbers_that_are_not_finite_are_null_in_json(tmp_path: Path) -> None:
     _, summary, *_ = write_report(tmp_path, report, "Odd \udcff name", [])
     strict = json.loads(summary.read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name))
     assert strict == {"experiment": "x", "k": [1.0, None], "deep": {"sd": None, "n": [2, None]}}
+
+
+class Picture:
+    """Refers to itself, as a figure of matplotlib does through its parts."""
+
+    def __init__(self) -> None:
+        self.part = self
+
+
+def test_a_picture_has_left_the_memory_when_the_next_one_is_drawn(tmp_path: Path) -> None:
+    drawn: list[weakref.ref[Picture]] = []
+
+    def draw(path: Path) -> Picture:
+        assert [picture() for picture in drawn] == [None] * len(drawn)
+        draw_dot(path)
+        picture = Picture()
+        drawn.append(weakref.ref(picture))
+        return picture
+
+    figures = [Figure(f"dots-{number}", "Dots", draw) for number in range(3)]
+    write_report(tmp_path, {}, "Title", [Section("Dots", figures=figures)])
+    assert len(drawn) == 3
+
+
+@pytest.mark.parametrize(
+    "report",
+    [
+        {},
+        [],
+        [{"a": 1}],
+        "text",
+        {"a": [], "b": (), "c": {}, "d": None, "e": float("nan")},
+        {"strides": [{"k": 1.5, "fits": {"r": [1, [2, float("inf")]]}}, {}, [], "line\nend"], "last": ({"x": "ü"}, 2)},
+        Section("Heading", rows=[["a"], ["b"]]),
+    ],
+)
+def test_a_summary_that_is_written_by_the_entry_is_the_whole_one(report: object) -> None:
+    assert "".join(json_pieces(report)) == json.dumps(to_json(report), indent=1, allow_nan=False) + "\n"

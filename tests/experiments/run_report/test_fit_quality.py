@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from estimation.strokes.fit_samples import FitSamples, StrideFits
-from experiments.run_report.fit_plot import MOST_DRAWN, drawn_samples, plot_fits
+from experiments.run_report.fit_plot import MOST_DRAWN, MOST_MUDS, drawn_muds, drawn_samples, plot_fits
 from experiments.run_report.fit_quality import fits_report, quality_of, quality_rows
 from experiments.run_report.run import ReportedStride, Run, read_run, read_sources
 from experiments.run_report.tables import estimate_rows
@@ -96,3 +96,12 @@ def test_a_sample_far_off_is_counted_and_not_drawn(monkeypatch: pytest.MonkeyPat
     for panel in (fit, residuals):
         assert panel.get_ylim()[0] > -900.0
         assert [text.get_text() for text in panel.texts] == ["1 beyond"]
+
+
+def test_a_run_with_hundreds_of_muds_draws_those_with_the_most_strides(monkeypatch: pytest.MonkeyPatch) -> None:
+    muds = [f"mud {number}" for number in range(300)]
+    run = run_of([fitted(mud) for mud in muds] + [fitted(mud) for mud in muds[100 : 100 + MOST_MUDS]])
+    assert drawn_muds(run) == muds[100 : 100 + MOST_MUDS]
+    legend, *_ = figure_of(run, monkeypatch).legends
+    assert [text.get_text() for text in legend.get_texts()] == drawn_muds(run)
+    assert {mud for mud, _ in drawn_samples(run, "left", "k_p")} == set(drawn_muds(run))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import random
 import subprocess
 import sys
+import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,9 +21,10 @@ from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, unfinished_files
 from firmware_host.log.rows import TICK
 from firmware_host.log_reading import salvage as log_salvage
-from firmware_host.log_reading.log_error import LogError
+from firmware_host.log_reading.log_error import LogError, Watch
 from firmware_host.log_reading.log_reader import read_log
 from firmware_host.log_reading.recovery import recover_all, recover_log
+from firmware_host.log_reading.salvage import FileBytes, NumberSet, salvage_rows
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.waiting import LONGEST_S
 
@@ -268,3 +272,57 @@ def test_a_length_of_2_to_the_60_costs_no_memory(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="cannot hold 1152921504606846976"):
         read_log(path)
     assert recover_log(path).rows == 4 * CHUNK
+
+
+@pytest.mark.parametrize("block_bytes", [40, 997, 1 << 18])
+def test_blocks_of_any_size_recover_the_same_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block_bytes: int
+) -> None:
+    """A signature may lie across the end of a block."""
+    monkeypatch.setattr(log_salvage, "BLOCK_BYTES", block_bytes)
+    recovered = recover_log(make_cut_log(tmp_path))
+    assert (recovered.rows, read_log(recovered.path).ticks["tick"].tolist()) == (5 * CHUNK, list(range(5 * CHUNK)))
+
+
+def test_a_log_that_is_cut_off_during_its_recovery_stays_for_another_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, found = make_cut_log(tmp_path), log_salvage.Salvage.found_rows
+    half = path.stat().st_size // 2
+
+    def cut_before_the_second_pass(salvage: log_salvage.Salvage, *watch: Watch) -> Iterator[tuple[int, bytes]]:
+        broken = path.with_name(path.name + ".broken")
+        if broken.exists():
+            os.truncate(broken, half)
+        return found(salvage, *watch)
+
+    monkeypatch.setattr(log_salvage.Salvage, "found_rows", cut_before_the_second_pass)
+    with pytest.raises(LogError, match="was changed while it was read: nothing was recovered"):
+        recover_log(path)
+    monkeypatch.undo()
+    (broken,) = unfinished_files(tmp_path)
+    assert broken.name == path.name + ".broken"
+    assert 0 < recover_log(broken).rows < 5 * CHUNK
+
+
+def test_the_memory_of_a_recovery_does_not_grow_with_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_salvage, "BLOCK_BYTES", 4096)
+    peaks = []
+    for chunks in (10, 80):
+        path = make_file(tmp_path / f"{chunks}.mcap", chunks).path
+        tracemalloc.start()
+        with path.open("rb") as file:
+            assert salvage_rows(path, FileBytes(file)).rows == chunks * CHUNK
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]
+
+
+def test_a_set_of_ranges_is_a_set() -> None:
+    chance = random.Random(3)
+    ranges, numbers = NumberSet(), set[int]()
+    for _ in range(500):
+        number = chance.randrange(120)
+        assert ranges.add(number) == (number not in numbers)
+        numbers.add(number)
+        assert ranges.missing == max(numbers) + 1 - len(numbers)
