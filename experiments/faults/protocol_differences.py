@@ -152,7 +152,7 @@ ODRIVE05: Table = {
     "drive_error, by its watchdog": _also(
         f"{ZERO}, and no question reaches it", "drive_late", "position_stale", "position_silent"
     ),
-    "loop_lagging, every tick too long": _also(f"{ZERO}: the answers are as late as the loop", "drive_late"),
+    "loop_lagging, every tick too long": _also(f"{ZERO}, and the answers are as late as the loop", "drive_late"),
     "duplicate_node_id": _also("the counts of one drive are compared with the position of the other", "drive_settings"),
     "drive_energised": _instead(
         "a watchdog that has expired keeps an idle drive from closed loop, and the command is seen", "foreign_commands"
