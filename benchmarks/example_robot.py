@@ -7,9 +7,15 @@ from control.records import Rig
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from simulation.harness.drive_presets import with_drive_type
+from simulation.harness.drive_presets import DRIVES, with_drive_type
 
 EXAMPLE = Path(__file__).parent.parent / "systemd" / "mudskipper.toml"
+
+
+def require_drive(drive: str) -> None:
+    """Ends the benchmark where no such drive exists."""
+    if drive not in DRIVES:
+        raise SystemExit(f"--drive {drive}: must be one of {', '.join(DRIVES)}")
 
 
 def load_example(drive: str = DEFAULT) -> Configuration:

@@ -15,7 +15,7 @@ from struct import pack
 from time import perf_counter
 from typing import Any
 
-from benchmarks.example_robot import load_example
+from benchmarks.example_robot import load_example, require_drive
 from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.stress.harmless_frames import is_harmless
 from benchmarks.stress.resources import resident_kib
@@ -27,7 +27,6 @@ from drivers.drive_types import DEFAULT, type_of
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
-from simulation.harness.drive_presets import DRIVES
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -196,8 +195,7 @@ def _open_third_node(walk: Lockstep, bus: str) -> MockPort:
 
 
 def measure(folder: Path, *, frames: int = 1_000_000, seed: int = 1, drive: str = DEFAULT) -> dict[str, Any]:
-    if drive not in DRIVES:
-        raise SystemExit(f"--drive {drive}: must be one of {', '.join(DRIVES)}")
+    require_drive(drive)
     freeze_garbage()
     parts = {mode.name.lower(): fuzz(mode, frames // 2, seed, drive) for mode in (Mode.BOOT, Mode.IDLE)}
     reached = all(

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.example_robot import require_drive
 from benchmarks.local_robot import LONGEST_WAIT_S, LocalRobot
 from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.stress.recorded_robot import read_record
 from drivers.drive_types import DEFAULT
 from simulation.body.plant import STEP_S
-from simulation.harness.drive_presets import DRIVES
 from simulation.harness.peer import WATCHDOG_S
 
 TOLERANCE_S = 0.01  # between the kill and the robot's reading of what was sent before it
@@ -73,8 +73,7 @@ def end_s(marked: npt.NDArray[np.bool_]) -> float:
 
 
 def measure(folder: Path, *, kills: int = 40, drive: str = DEFAULT) -> dict[str, Any]:
-    if drive not in DRIVES:
-        raise SystemExit(f"--drive {drive}: must be one of {', '.join(DRIVES)}")
+    require_drive(drive)
     rounds: list[dict[str, Any]] = []
     invalid_walks = 0
     while len(rounds) < kills and invalid_walks < ATTEMPTS * kills:

@@ -3,7 +3,7 @@
 A real daemon records a simulated robot with short segments, every tick of it. After each kill the next daemon or the
 recovery command recovers the folder, and three independent readers open every log of the run: ours, rosbags and
 mcap-ros2-support. Ticks are numbered and count the missed ones, so a missing or doubled row shows; the monotonic stamp
-of the last row shows how much is missing at the end.
+of the last row shows how much is missing at the end. `--drive` takes another type of drive, such as moteus.
 """
 
 import os
@@ -18,9 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.example_robot import require_drive
 from benchmarks.local_robot import LONGEST_WAIT_S, LocalRobot, kill_session, wait_for
 from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.stress.resources import children_of
+from drivers.drive_types import DEFAULT
 from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
 from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.log_reading.recovery import recover_all
@@ -138,9 +140,10 @@ def sums_of(kills: list[dict[str, Any]]) -> dict[str, Any]:
     } | {name: sum(kill[name] for kill in kills) for name in SUMMED}
 
 
-def measure(folder: Path, *, kills: int = 100, seed: int = 1) -> dict[str, Any]:
+def measure(folder: Path, *, kills: int = 100, seed: int = 1, drive: str = DEFAULT) -> dict[str, Any]:
+    require_drive(drive)
     chance, rounds = Random(seed), []
-    robot = LocalRobot(folder, "segment_s = 1.5\nrest_hz = 0.0\n")
+    robot = LocalRobot(folder, "segment_s = 1.5\nrest_hz = 0.0\n", drive)
     try:
         for number in range(kills):
             victim = VICTIMS[number % len(VICTIMS)]
@@ -150,7 +153,7 @@ def measure(folder: Path, *, kills: int = 100, seed: int = 1) -> dict[str, Any]:
         robot.end()
     sums = sums_of(rounds)
     reached = not (sums["missing_inside"] or sums["doubled"] or sums["unsound"]) and sums["worst_end_s"] <= BAR_S
-    report = {"kills": kills, "seed": seed, "sums": sums, "rounds": rounds}
+    report = {"drive": drive, "kills": kills, "seed": seed, "sums": sums, "rounds": rounds}
     return evaluated(report, f"every log opens, at most {BAR_S:g} s missing at its end, nothing else", reached)
 
 

@@ -116,7 +116,7 @@ def test_can_fuzz(drive: str) -> None:
     assert parts["idle"]["frames_sent"] > 100
 
 
-@pytest.mark.parametrize("name", ["can_fuzz", "daemon_kills"])
+@pytest.mark.parametrize("name", ["can_fuzz", "daemon_kills", "log_kills"])
 def test_an_unknown_drive_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     measure = import_module(BENCHMARKS[name]).measure
     with pytest.raises(SystemExit, match="mit:AK80-9"):
