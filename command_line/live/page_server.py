@@ -66,13 +66,14 @@ class Viewers:
 
     def begin(self, robot: dict[str, Any]) -> None:
         with self._lock:
-            self._robot, self._strides = robot, []
+            self._robot, self._strides, self._tick = robot, [], None
             self._send({"robot": robot})
 
     def add(self) -> Viewer:
         viewer = Viewer()
         with self._lock:
-            viewer.put({"robot": self._robot, "tick": self._tick, "strides": self._strides})
+            known_robot = {"robot": self._robot} if self._robot else {}
+            viewer.put(known_robot | {"tick": self._tick, "strides": self._strides})
             self._viewers.append(viewer)
         return viewer
 
