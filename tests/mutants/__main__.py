@@ -65,7 +65,7 @@ def _run_tests(subject: Subject, tree: ast.Module) -> int:
 def survivors_of(subject: Subject) -> tuple[int, list[str]]:
     """Return the number of all mutants, and the texts of those that no test notices."""
     total, survivors = 0, []
-    for mutant in mutants_of(subject.module):
+    for mutant in mutants_of(subject.module, subject.functions):
         total += 1
         if is_killed(subject, mutant.tree):
             continue

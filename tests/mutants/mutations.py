@@ -8,7 +8,7 @@ statement out. Names, annotations and messages are left alone.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import NamedTuple
@@ -150,10 +150,20 @@ def parsed(module: str) -> ast.Module:
     return ast.parse(source_of(module).read_text(encoding="utf-8"))
 
 
-def mutants_of(module: str) -> Iterator[Mutant]:
+def lines_of(tree: ast.Module, functions: Collection[str]) -> set[int]:
+    nodes = [each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef) and each.name in functions]
+    assert len(nodes) == len(functions)
+    return {line for each in nodes for line in range(each.lineno, (each.end_lineno or each.lineno) + 1)}
+
+
+def mutants_of(module: str, functions: Collection[str] = ()) -> Iterator[Mutant]:
+    """Yield the mutants of some functions, or of the whole module."""
     original = parsed(module)
+    lines = lines_of(original, functions)
     parents = {child: node for node in ast.walk(original) for child in ast.iter_child_nodes(node)}
     for number, node in enumerate(_nodes(original)):
+        if functions and getattr(node, "lineno", 0) not in lines:
+            continue
         for kind in (changes_of, omissions_of):
             for position, (text, _) in enumerate(kind(node)):
                 tree = deepcopy(original)

@@ -9,6 +9,7 @@ class Subject(NamedTuple):
     module: str
     tests: tuple[str, ...]  # in the order in which they run, below tests/
     selected: str = ""  # pytest's expression of the tests that run
+    functions: tuple[str, ...] = ()  # of the module; none: all of it
     equivalent: dict[str, str] = {}  # the text of a mutant that behaves the same, and why
 
 
@@ -29,7 +30,9 @@ SUBJECTS = (
         EVERY_MUTANT,
     ),
     Subject("drivers.moteus.gate_tables", ("drivers/moteus/test_gate_table.py",)),
+    Subject("drivers.moteus.codec", ("drivers/moteus/test_gate_table.py",), functions=("decode_torque",)),
     Subject("drivers.mit.gate_tables", ("drivers/mit/test_gate_table.py",)),
+    Subject("drivers.mit.codec", ("drivers/mit/test_gate_table.py",), functions=("decode_torque", "_decode")),
     Subject(
         "drivers.can.reopening_port",
         ("drivers/can/test_reopening_port.py",),

@@ -1,6 +1,6 @@
 """Frames to a drive in MIT mode that pass the gate and frames that do not."""
 
-from math import inf, nan
+from math import inf, isnan, nan
 from random import Random
 
 import pytest
@@ -156,6 +156,11 @@ def test_any_other_payload_becomes_zero_torque_or_the_command_to_leave(data: byt
     assert closed.send(data) == [codec.LEAVE]
     assert armed.send(data) == [codec.encode_torque(0.0, 10.0)]
     assert (closed.gate.refused, armed.gate.refused) == (1, 1)
+
+
+def test_a_torque_has_twelve_bits_and_none_of_those_of_kd() -> None:
+    assert codec.decode_torque(bytes.fromhex("8000800000000fff"), 10.0) == pytest.approx(10.0)
+    assert isnan(codec.decode_torque(bytes.fromhex("8000800000001000"), 10.0))
 
 
 @pytest.mark.parametrize("kind", [codec.WRITE, codec.STORE])
