@@ -75,6 +75,7 @@ def write_report(
     folder.mkdir(parents=True, exist_ok=True)
     summary, page = folder / SUMMARY, folder / PAGE
     _write(summary, json_pieces(report))
+    del report  # it may be as large as a picture
     figures = [figure for section in sections for figure in section.figures]
     pictures: list[Path] = []
     for done, figure in enumerate(figures):
