@@ -1,12 +1,16 @@
 """How long one whole tick takes while the robot walks, and where that time goes.
 
 The simulated robot walks the paper's track adaptively, in step with the daemon's own loop, with four drives on two
-buses. The robot computes between the ticks and outside of every figure; no tick waits for a deadline, so processor
-and caches are warmer than on a robot (benchmarks.speed.loop_jitter shows ticks that begin asleep). Five kinds of
+buses. The robot computes between the ticks and outside of every figure. Hot ticks wait for no deadline, so processor
+and caches are warmer than on a robot; before each cold tick the processor sleeps for a period. Five kinds of
 buses carry the frames: python-can's in-process `virtual` interface, our `mock` bus without python-can, the `local`
 bus's sockets, and SocketCAN on pairs of sockets, by the socket's own frames (`socketcan`) and by python-can's send and
 recv (`python-can`). `--bus` measures only one of them; `--drive` chooses the type of its drives. A rig of one flipper
 with two motors on one bus walks in turn with the robot, and `two_motors` compares its ticks.
+
+`ratios` hardly depend on the computer: whole ticks in reads and sends of their frames by bare sockets
+(bare_sockets.py), which take turns with them, and cold ticks, ticks that close a stride, and the longest tick in whole
+ticks. All are medians but the longest.
 
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
 of one mark, some 0.2 us; whole ticks carry one reading of the clock.
@@ -18,7 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.example_robot import load_example, load_one_flipper
-from benchmarks.report import evaluated, run_benchmark, show_progress
+from benchmarks.report import evaluated, run_benchmark, show_progress, summary_us
+from benchmarks.speed.bare_sockets import BareSockets, count_frames
 from benchmarks.speed.timed_walk import TimedWalk
 from benchmarks.speed.wirings import VARIANTS, make_wiring
 from drivers.drive_types import DEFAULT
@@ -34,13 +39,28 @@ def measure_variant(variant: str, seconds: int, folder: Path, drive: str) -> dic
             _walk(stack, configuration, variant, folder / str(len(configuration.drive)))
             for configuration in (load_example(drive), load_one_flipper())
         ]
+        bare = BareSockets(count_frames(load_example(drive), folder))
+        stack.callback(bare.close)
         for second in range(seconds):
             show_progress(second, seconds, f"{variant} bus")
             for walk in walks:
                 walk.run_blocks()
+            bare.run_block()
         report, two_motors = (walk.report() for walk in walks)
         ratio = two_motors["whole_us"]["median"] / report["whole_us"]["median"]
+        report |= {"bare_sockets_us": summary_us(bare.durations_s)}
+        report |= {"ratios": _ratios(report)}
         return report | {"two_motors": {"whole_us": two_motors["whole_us"], "ratio": round(ratio, 3)}}
+
+
+def _ratios(report: dict[str, Any]) -> dict[str, float]:
+    whole_us = report["whole_us"]["median"]
+    return {
+        "hot_to_bare_sockets": round(whole_us / report["bare_sockets_us"]["median"], 2),
+        "cold_to_hot": round(report["cold_us"]["median"] / whole_us, 2),
+        "closing_to_hot": round(report["whole_closing_us"]["median"] / whole_us, 2),
+        "longest_to_hot": round(report["whole_us"]["max"] / whole_us, 2),
+    }
 
 
 def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: Path) -> TimedWalk:

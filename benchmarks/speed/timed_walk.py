@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
-from time import perf_counter
+from time import perf_counter, sleep
 from typing import Any
 
 from benchmarks.report import summary_us
 from benchmarks.speed.wirings import Wiring
 from control.controller import WalkOrder
 from control.modes import Mode
-from control.rate import RATE_HZ
+from control.rate import PERIOD_S, RATE_HZ
 from drivers.drive_types import make_drives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
@@ -22,6 +22,7 @@ from simulation.harness.robot import SimulatedRobot
 from simulation.mud.track import paper_track
 
 BLOCK_TICKS = round(RATE_HZ)
+COLD_FRACTION = 4  # one cold tick for so many hot ones, because they take real time
 WARM_UP_S = 2.0  # to the end of the first stride
 STAGES = {  # in their order, by the loop's method that begins each
     "read": "drives.read",  # drain the buses, decode
@@ -71,6 +72,7 @@ class Samples:
     def __init__(self) -> None:
         self.whole: list[float] = []
         self.whole_closing: list[float] = []  # of those, the ones that close a stride
+        self.cold: list[float] = []  # after the processor has slept for a period
         self.stages: dict[str, list[float]] = {stage: [] for stage in STAGES}
         self.adapt_closing: list[float] = []
 
@@ -103,17 +105,20 @@ class TimedWalk:
     def run_blocks(self) -> None:
         """Runs one block of each kind."""
         for _ in range(BLOCK_TICKS):
-            duration_s, closing = self._tick()
+            duration_s, closing = self.tick()
             self.samples.whole.append(duration_s)
             if closing:
                 self.samples.whole_closing.append(duration_s)
+        for _ in range(BLOCK_TICKS // COLD_FRACTION):
+            sleep(PERIOD_S)
+            self.samples.cold.append(self.tick()[0])
         with self.marks.attached():
             for _ in range(BLOCK_TICKS):
                 self._add_stages(*self._marked_tick())
         if self.walk.loop.mode is not Mode.WALKING:
             raise RuntimeError(f"the robot does not walk any more: {self.walk.loop.fault}")
 
-    def _tick(self) -> tuple[float, bool]:
+    def tick(self) -> tuple[float, bool]:
         """Returns the duration of one whole tick, and whether it closed a stride."""
         walk = self.walk
         walk.tick_number += 1
@@ -126,7 +131,7 @@ class TimedWalk:
     def _marked_tick(self) -> tuple[dict[str, float], bool]:
         moments_s = self.marks.moments_s
         moments_s.clear()
-        _, closing = self._tick()
+        _, closing = self.tick()
         moments_s.append(perf_counter())
         durations_s = (end_s - start_s for start_s, end_s in pairwise(moments_s))
         return dict(zip(STAGES, durations_s, strict=True)), closing
@@ -143,6 +148,7 @@ class TimedWalk:
         return {
             "whole_us": summary_us(samples.whole) | {"ticks": len(samples.whole)},
             "whole_closing_us": summary_us(samples.whole_closing) | {"ticks": len(samples.whole_closing)},
+            "cold_us": summary_us(samples.cold) | {"ticks": len(samples.cold)},
             "stages_us": {stage: summary_us(durations_s) for stage, durations_s in samples.stages.items()},
             "adapt_closing_us": summary_us(samples.adapt_closing) | {"ticks": len(samples.adapt_closing)},
             "dropped_rows": self.recorder.dropped,

@@ -67,6 +67,8 @@ def test_tick_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
         assert all(set(stage) == SUMMARY for stage in figures["stages_us"].values())
         assert set(figures["whole_us"]) == SUMMARY | {"ticks"}
         assert figures.keys() >= {"whole_closing_us", "adapt_closing_us", "dropped_rows"}
+        assert set(figures["cold_us"]) == SUMMARY | {"ticks"} and set(figures["bare_sockets_us"]) == SUMMARY
+        assert set(figures["ratios"]) == {"hot_to_bare_sockets", "cold_to_hot", "closing_to_hot", "longest_to_hot"}
 
 
 def test_loop_jitter() -> None:
