@@ -117,7 +117,7 @@ def _leaves(table: Mapping[str, Any], path: str) -> Iterator[tuple[str, Any]]:
 
 
 def with_values(tables: Tables, values: Values) -> Tables:
-    """Return the tables of one walk with these values. Raises ConfigurationError for a key that no table there can have."""
+    """Return the tables of one walk with these values. Raises ConfigurationError for a key that fits no table."""
     changed = deepcopy(tables)
     for key, value in values.items():
         root, *names = key.split(".")
