@@ -12,6 +12,9 @@ with two motors on one bus walks in turn with the robot, and `two_motors` compar
 (bare_sockets.py), which take turns with them, and cold ticks, ticks that close a stride, and the longest tick in whole
 ticks. All are medians but the longest.
 
+`serving_us` is the cost of serving the status socket after a tick: without a request, with a viewer's request for the
+status, and with one for the largest answer (served_walk.py).
+
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
 of one mark, some 0.2 us; whole ticks carry one reading of the clock.
 """
@@ -24,16 +27,19 @@ from typing import Any
 from benchmarks.example_robot import load_example, load_one_flipper
 from benchmarks.report import evaluated, run_benchmark, show_progress, summary_us
 from benchmarks.speed.bare_sockets import BareSockets, count_frames
+from benchmarks.speed.served_walk import ServedWalk
+from benchmarks.speed.serving_time import fullest_methods
 from benchmarks.speed.timed_walk import TimedWalk
 from benchmarks.speed.wirings import VARIANTS, make_wiring
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
+from firmware_host.operator.status_socket import Methods
 
 BAR_US = 200.0
 
 
-def measure_variant(variant: str, seconds: int, folder: Path, drive: str) -> dict[str, Any]:
+def measure_variant(variant: str, seconds: int, folder: Path, drive: str, fullest: Methods) -> dict[str, Any]:
     with ExitStack() as stack:
         walks = [
             _walk(stack, configuration, variant, folder / str(len(configuration.drive)))
@@ -41,15 +47,19 @@ def measure_variant(variant: str, seconds: int, folder: Path, drive: str) -> dic
         ]
         bare = BareSockets(count_frames(load_example(drive), folder))
         stack.callback(bare.close)
+        served = ServedWalk(walks[0], fullest, folder)
+        stack.callback(served.close)
         for second in range(seconds):
             show_progress(second, seconds, f"{variant} bus")
             for walk in walks:
                 walk.run_blocks()
             bare.run_block()
+            served.run_block()
         report, two_motors = (walk.report() for walk in walks)
         ratio = two_motors["whole_us"]["median"] / report["whole_us"]["median"]
         report |= {"bare_sockets_us": summary_us(bare.durations_s)}
-        report |= {"ratios": _ratios(report)}
+        report |= {"serving_us": served.report()}
+        report |= {"ratios": _ratios(report) | served.ratios(report["whole_us"]["median"])}
         return report | {"two_motors": {"whole_us": two_motors["whole_us"], "ratio": round(ratio, 3)}}
 
 
@@ -77,10 +87,10 @@ def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: 
 
 def measure(folder: Path, *, seconds: int = 20, bus: str = "", drive: str = DEFAULT) -> dict[str, Any]:
     """The verdict is that of the virtual bus, or of the only one that was measured."""
-    measured = {}
+    measured, fullest = {}, fullest_methods()
     for variant in [bus] if bus else VARIANTS:
         (folder / variant).mkdir()
-        measured[variant] = measure_variant(variant, seconds, folder / variant, drive)
+        measured[variant] = measure_variant(variant, seconds, folder / variant, drive, fullest)
     bus = bus or "virtual"
     report = {"seconds": seconds, "drive": drive, "variants": measured, "bar_us": BAR_US}
     reached = measured[bus]["whole_us"]["median"] <= BAR_US

@@ -16,7 +16,15 @@ import pytest
 
 from benchmarks.behaviour import differences
 from benchmarks.report import run_benchmark, show_progress, summary_us
-from benchmarks.speed import campaign_speed, lockstep_speed, tick_time, timed_walk, viewers_cost
+from benchmarks.speed import (
+    campaign_speed,
+    lockstep_speed,
+    served_walk,
+    serving_time,
+    tick_time,
+    timed_walk,
+    viewers_cost,
+)
 from benchmarks.speed.timed_walk import STAGES
 from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
@@ -37,6 +45,7 @@ FOLDERS = {
 }  # fmt: skip
 BENCHMARKS = {name: f"benchmarks.{folder}.{name}" for folder, names in FOLDERS.items() for name in names}
 SUMMARY = {"median", "p99", "max"}
+SERVING = {"idle", "status", "largest"}
 
 
 def report_of(name: str, *arguments: str) -> dict[str, Any]:
@@ -57,6 +66,8 @@ def report_of(name: str, *arguments: str) -> dict[str, Any]:
 def test_tick_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(timed_walk, "WARM_UP_S", 1.0)
     monkeypatch.setattr(timed_walk, "BLOCK_TICKS", 50)
+    monkeypatch.setattr(served_walk, "BLOCK_TICKS", 50)
+    monkeypatch.setattr(serving_time, "STRIDES", 1)
     monkeypatch.setattr(timed_walk, "freeze_garbage", lambda: None)  # it switches garbage collection off
     assert run_benchmark(tick_time.measure, ["--seconds", "1"]) == 0
     report = json.loads(capsys.readouterr().out)
@@ -68,7 +79,13 @@ def test_tick_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
         assert set(figures["whole_us"]) == SUMMARY | {"ticks"}
         assert figures.keys() >= {"whole_closing_us", "adapt_closing_us", "dropped_rows"}
         assert set(figures["cold_us"]) == SUMMARY | {"ticks"} and set(figures["bare_sockets_us"]) == SUMMARY
-        assert set(figures["ratios"]) == {"hot_to_bare_sockets", "cold_to_hot", "closing_to_hot", "longest_to_hot"}
+        assert set(figures["serving_us"]) == SERVING and figures["serving_us"]["largest"]["bytes"] > 1000
+        assert set(figures["ratios"]) == {f"serving_{name}_to_hot" for name in (*SERVING, "viewer")} | {
+            "hot_to_bare_sockets",
+            "cold_to_hot",
+            "closing_to_hot",
+            "longest_to_hot",
+        }
 
 
 def test_loop_jitter() -> None:
