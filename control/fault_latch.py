@@ -50,7 +50,7 @@ class FaultLatch:
     def blocking(self, forced: bool = False) -> list[Fault]:
         """The present faults that block arming."""
         least = Blocks.ALWAYS if forced else Blocks.UNLESS_FORCED
-        return [fault for fault in self.present if fault.kind.blocks >= least]
+        return [each.fault for each in self._present.values() if each.fault.kind.blocks >= least]
 
     def update(self, present: Sequence[Fault], energised: bool, clearing: bool = False, ticks: int = 1) -> None:
         """Take in all faults that this tick detects, `ticks` after the last update."""

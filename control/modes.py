@@ -41,7 +41,7 @@ class Health(NamedTuple):
     """The state of the robot that transitions depend on."""
 
     drives_heard: bool = False
-    closed_loop: bool = False  # all drives
+    closed_loop: bool = False  # all drives, since they were asked; only while arming
     walk_finished: bool = False  # all ordered strides are complete
     raised: bool = False  # the flippers are up, or the wait for them is over
     settled: bool = False  # damped joints are at rest, or the wait for that is over

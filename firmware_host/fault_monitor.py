@@ -10,7 +10,7 @@ from control.faults import Fault, FaultKind
 from control.gait.recovery import is_in_mud
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
-from control.monitors.joint_monitor import JointFacts, JointMonitor
+from control.monitors.joint_monitor import JointMonitor, TickFacts
 from control.monitors.motion_monitor import JointDynamics
 from control.rate import PERIOD_S
 from control.records import (
@@ -176,17 +176,20 @@ class FaultMonitor:
         self, found: list[Fault], tick: Tick, monitor_input: MonitorInput, drives: Joints[DriveHealth]
     ) -> None:
         mode, sent_nm = monitor_input.mode, monitor_input.sent.torques_nm
-        dt_s = (1 + tick.missed) * self._period_s
         followed = None if monitor_input.freeing else monitor_input.targets  # those of a pull lead
         targets = followed or self._no_targets
-        energised, moving, damping = mode in ENERGISED, mode in MOVING, mode is Mode.DAMPING
-        may_stand_still = monitor_input.freeing or mode not in HELD
+        facts = TickFacts(
+            now_s=tick.now_s,
+            dt_s=(1 + tick.missed) * self._period_s,
+            energised=mode in ENERGISED,
+            moving=mode in MOVING,
+            may_stand_still=monitor_input.freeing or mode not in HELD,
+            damping=mode is Mode.DAMPING,
+        )
         for joint, health, state, torque_nm, target in zip(
             self.joints, drives, monitor_input.states, sent_nm, targets, strict=True
         ):
-            # without keywords, which take twice as long: one for each joint is made in every tick
-            facts = JointFacts(tick.now_s, dt_s, energised, moving, torque_nm, may_stand_still, target, damping)
-            for fault in joint.update(facts, state):
+            for fault in joint.update(facts, state, torque_nm, target):
                 if fault.kind is FaultKind.FOLLOWING_ERROR and self._is_held_back(fault.subject, tick, monitor_input):
                     continue
                 found.append(_explained(fault, health))

@@ -136,7 +136,7 @@ class Loop:
         self.events.report_faults(tick.now_s, self.faults.begun, self.faults.over)
         return Health(
             drives_heard=self.mode is not Mode.BOOT or self.drives.heard,
-            closed_loop=self._all_in_closed_loop(),
+            closed_loop=self.mode is Mode.ARMING and self._all_in_closed_loop(),
             walk_finished=self.controller.walk_finished,
             raised=self.controller.raised,
             settled=self.controller.settled,
@@ -163,9 +163,9 @@ class Loop:
         )
 
     def _all_in_closed_loop(self) -> bool:
-        """Whether all drives report closed loop; while arming, only in heartbeats that are newer than the request."""
-        oldest_s = self._mode_since_s if self.mode is Mode.ARMING else NEVER_S
-        return all(state.closed_loop and state.heartbeat_stamp_s > oldest_s for state in self.states)
+        """Whether all drives report closed loop, in heartbeats that are newer than the request to arm."""
+        asked_s = self._mode_since_s
+        return all(state.closed_loop and state.heartbeat_stamp_s > asked_s for state in self.states)
 
     def _pop_request(self) -> Request:
         """Return the request to act on in this tick; none arms or walks while the daemon ends."""

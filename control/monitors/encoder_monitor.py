@@ -45,9 +45,10 @@ class EncoderMonitor:
 
     def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
         """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""
-        if state.angle_stamp_s == self._stamp_s:
+        stamp_s, before_s = state.angle_stamp_s, self._stamp_s
+        if stamp_s == before_s:
             return None
-        gap_s = max(state.angle_stamp_s - self._stamp_s, 0.0)
+        gap_s = stamp_s - before_s if stamp_s > before_s else 0.0
         fault = None
         if gap_s > LONGEST_GAP_S:  # also that before the first message
             self._reset_frozen()
@@ -58,16 +59,17 @@ class EncoderMonitor:
             fault = self._check_jump(state, gap_s, dt_s)
             if self._repeated:
                 self._reset_frozen()
-        self._angle_rad, self._velocity_rad_s, self._stamp_s = (
-            state.angle_rad, state.velocity_rad_s, state.angle_stamp_s
-        )  # fmt: skip
+        self._angle_rad, self._velocity_rad_s, self._stamp_s = state.angle_rad, state.velocity_rad_s, stamp_s
         return fault
 
     def _check_jump(self, state: DriveState, gap_s: float, dt_s: float) -> Fault | None:
         """Return a fault if the step differs from the mean velocity's by more than a late stamp explains."""
+        velocity_rad_s, before_rad_s = state.velocity_rad_s, self._velocity_rad_s
         step_rad = state.angle_rad - self._angle_rad
-        error_rad = abs(step_rad - (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s)
-        late_rad = max(abs(state.velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
+        error_rad = abs(step_rad - (velocity_rad_s + before_rad_s) / 2.0 * gap_s)
+        if not error_rad > self._jump_rad:
+            return None
+        late_rad = max(abs(velocity_rad_s), abs(before_rad_s)) * dt_s
         if not error_rad > self._jump_rad + late_rad:
             return None
         return FaultKind.ENCODER_JUMP.fault(self._joint, step_deg=degrees(abs(step_rad)), gap_ms=gap_s * 1e3)
@@ -89,6 +91,8 @@ class EncoderMonitor:
             self.forget_torque()
             return False
         self._unchanged_s += gap_s
-        self._lowest_nm = min(self._lowest_nm, torque_nm)
-        self._highest_nm = max(self._highest_nm, torque_nm)
+        if torque_nm < self._lowest_nm:
+            self._lowest_nm = torque_nm
+        if torque_nm > self._highest_nm:
+            self._highest_nm = torque_nm
         return self._unchanged_s > UNCHANGED_S and self._highest_nm - self._lowest_nm > YIELDING_NM

@@ -63,16 +63,14 @@ class FaultBounds:
     disk_slow_s: Annotated[float, Bounds(0.05, 60.0), Meaning("for one write of the log: reported")] = 2.0
 
 
-class JointFacts(NamedTuple):
-    """The state of the loop in one tick."""
+class TickFacts(NamedTuple):
+    """The state of the loop in one tick, which is the same for all joints."""
 
     now_s: float
     dt_s: float
     energised: bool  # torque is or may be on
-    moving: bool  # closed loop is expected of the drive
-    torque_nm: float  # sent in the tick before
+    moving: bool  # closed loop is expected of the drives
     may_stand_still: bool  # at any torque: without stiffness, or in a recovery that pulls on purpose
-    target: JointTarget | None = None  # of the tick before; None without stiffness
     damping: bool = False
 
 
@@ -120,15 +118,18 @@ class JointMonitor:
         self._motion.reset()
         self._stillness.reset()
 
-    def update(self, facts: JointFacts, state: DriveState) -> list[Fault]:
+    def update(
+        self, facts: TickFacts, state: DriveState, torque_nm: float, target: JointTarget | None = None
+    ) -> list[Fault]:
+        """Return all faults of a tick. Torque and target are those of the tick before; no target: no stiffness."""
         found: list[Fault] = []
         # One sample after a gap does not show the state during the gap.
-        seen = facts if facts.dt_s <= MOST_SEEN_S else facts._replace(dt_s=MOST_SEEN_S)
+        seen_s = facts.dt_s if facts.dt_s <= MOST_SEEN_S else MOST_SEEN_S
         self._watch_signals(found, facts, state)
-        self._watch_drive(found, seen, state)
-        self._watch_motion(found, seen, state)
-        self._watch_load(found, seen, state)
-        self._watch_heat(found, facts, state)
+        self._watch_drive(found, facts, seen_s, state)
+        self._watch_motion(found, facts, seen_s, state, torque_nm, target)
+        self._watch_load(found, facts, seen_s, state.current_a, torque_nm)
+        self._watch_heat(found, facts, state, torque_nm)
         return found
 
     def _fault(self, kind: FaultKind, **values: float | str) -> Fault:
@@ -136,7 +137,7 @@ class JointMonitor:
 
     # signals
 
-    def _watch_signals(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+    def _watch_signals(self, found: list[Fault], facts: TickFacts, state: DriveState) -> None:
         bounds, now_s = self._bounds, facts.now_s
         if self._answers_only:
             now_s -= self._unasked(facts.dt_s, state.heartbeat_stamp_s)
@@ -147,9 +148,9 @@ class JointMonitor:
                 found.append(self._fault(FaultKind.CURRENT_SILENT, age_s=current_s))
         if now_s - state.heartbeat_stamp_s > self._heartbeat_silence_s:
             found.append(self._fault(FaultKind.HEARTBEAT_SILENT, age_s=now_s - state.heartbeat_stamp_s))
-        if isfinite(state.temperature_stamp_s) and now_s - state.temperature_stamp_s > SLOW_SILENCE_S:
+        if now_s - state.temperature_stamp_s > SLOW_SILENCE_S and isfinite(state.temperature_stamp_s):
             found.append(self._fault(FaultKind.TEMPERATURE_SILENT, age_s=now_s - state.temperature_stamp_s))
-        if isfinite(state.bus_voltage_stamp_s) and now_s - state.bus_voltage_stamp_s > SLOW_SILENCE_S:
+        if now_s - state.bus_voltage_stamp_s > SLOW_SILENCE_S and isfinite(state.bus_voltage_stamp_s):
             found.append(self._fault(FaultKind.VOLTAGE_SILENT, age_s=now_s - state.bus_voltage_stamp_s))
 
     def _unasked(self, dt_s: float, answer_stamp_s: float) -> float:
@@ -183,21 +184,21 @@ class JointMonitor:
 
     # the drive's own state
 
-    def _watch_drive(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+    def _watch_drive(self, found: list[Fault], facts: TickFacts, seen_s: float, state: DriveState) -> None:
         if state.error_flags:
             found.append(self._fault(FaultKind.DRIVE_ERROR, flags=f"0x{state.error_flags:x}"))
         if facts.moving and not state.closed_loop:
             found.append(self._fault(FaultKind.DRIVE_DISARMED))
-        self._energised_s = self._energised_s + facts.dt_s if state.closed_loop and not facts.energised else 0.0
+        self._energised_s = self._energised_s + seen_s if state.closed_loop and not facts.energised else 0.0
         if self._energised_s > ENERGISED_S:
             found.append(self._fault(FaultKind.DRIVE_ENERGISED, activity="in closed loop"))
         if state.bus_voltage_v < self._bounds.voltage_low_v or self._low_s:
-            self._watch_voltage(found, facts, state.bus_voltage_v)
+            self._watch_voltage(found, seen_s, state.bus_voltage_v)
 
-    def _watch_voltage(self, found: list[Fault], facts: JointFacts, voltage_v: float) -> None:
+    def _watch_voltage(self, found: list[Fault], seen_s: float, voltage_v: float) -> None:
         bounds = self._bounds
-        self._low_s = self._low_s + facts.dt_s if voltage_v < bounds.voltage_low_v else 0.0
-        self._under_s = self._under_s + facts.dt_s if voltage_v < bounds.voltage_min_v else 0.0
+        self._low_s = self._low_s + seen_s if voltage_v < bounds.voltage_low_v else 0.0
+        self._under_s = self._under_s + seen_s if voltage_v < bounds.voltage_min_v else 0.0
         if self._under_s > TWO_MESSAGES_S:
             found.append(self._fault(FaultKind.VOLTAGE_UNDER, voltage_v=voltage_v, least_v=bounds.voltage_min_v))
         elif self._low_s > TWO_MESSAGES_S:
@@ -205,28 +206,36 @@ class JointMonitor:
 
     # motion
 
-    def _watch_motion(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+    def _watch_motion(
+        self,
+        found: list[Fault],
+        facts: TickFacts,
+        seen_s: float,
+        state: DriveState,
+        torque_nm: float,
+        target: JointTarget | None,
+    ) -> None:
         angle_rad, velocity_rad_s = state.angle_rad, abs(state.velocity_rad_s)
         if not self._low_rad <= angle_rad <= self._high_rad:
             found.append(self._out_of_range(angle_rad))
-        self._fast_s = self._fast_s + facts.dt_s if velocity_rad_s > self._fast_rad_s else 0.0
-        if self._fast_s and self._fast_s > max(self._bounds.fast_s - facts.dt_s / 2.0, 0.0):
+        self._fast_s = self._fast_s + seen_s if velocity_rad_s > self._fast_rad_s else 0.0
+        if self._fast_s and self._fast_s > max(self._bounds.fast_s - seen_s / 2.0, 0.0):
             limit_rad_s = self._limits.velocity_rad_s
             kind = FaultKind.JOINT_VELOCITY
             found.append(self._fault(kind, velocity_rad_s=velocity_rad_s, limit_rad_s=limit_rad_s))
-        if not self._stillness.update(angle_rad, facts.dt_s):
+        if not self._stillness.update(angle_rad, seen_s):
             self._stalled_s = 0.0
         if not facts.energised:
             self._encoder.forget_torque()
             if self._stillness.still_s < REST_S:
                 found.append(self._fault(FaultKind.JOINT_MOVING))
-        encoder_fault = self._encoder.update(state, facts.dt_s, facts.torque_nm)
+        encoder_fault = self._encoder.update(state, seen_s, torque_nm)
         if encoder_fault:
             found.append(encoder_fault)
         if encoder_fault or not facts.moving:
             self._motion.reset()
         else:
-            self._motion.update(found, state, facts.dt_s, facts.torque_nm, facts.target)
+            self._motion.update(found, state, seen_s, torque_nm, target)
 
     def _out_of_range(self, angle_rad: float) -> Fault:
         low, high = degrees(self._low_rad), degrees(self._high_rad)
@@ -234,36 +243,38 @@ class JointMonitor:
 
     # load
 
-    def _watch_load(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
-        self._current_ticks = self._current_ticks + 1 if abs(state.current_a) > self._most_a else 0
+    def _watch_load(
+        self, found: list[Fault], facts: TickFacts, seen_s: float, current_a: float, torque_nm: float
+    ) -> None:
+        self._current_ticks = self._current_ticks + 1 if abs(current_a) > self._most_a else 0
         if self._current_ticks >= CURRENT_TICKS:
-            current_a = abs(state.current_a)
-            found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=current_a, limit_a=self._most_a))
-        self._watch_torque(found, facts, state)
-        pushed = abs(facts.torque_nm) >= self._saturated_nm > 0.0 and not facts.may_stand_still
-        self._stalled_s = self._stalled_s + facts.dt_s if pushed else 0.0
+            found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=abs(current_a), limit_a=self._most_a))
+        self._watch_torque(found, facts, seen_s, current_a * self._constant_nm_a, torque_nm)
+        pushed = abs(torque_nm) >= self._saturated_nm > 0.0 and not facts.may_stand_still
+        self._stalled_s = self._stalled_s + seen_s if pushed else 0.0
         if self._stalled_s > STALLED_S:
             found.append(self._fault(FaultKind.JOINT_NOT_FOLLOWING, stalled_s=self._stalled_s))
 
-    def _watch_torque(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+    def _watch_torque(
+        self, found: list[Fault], facts: TickFacts, seen_s: float, measured_nm: float, torque_nm: float
+    ) -> None:
         """Detect a drive that does not exert the commanded torque: a frozen current, lost commands, a silent clamp."""
-        differs = abs(facts.torque_nm - state.current_a * self._constant_nm_a) > self._missing_nm
-        self._missing_s = self._missing_s + facts.dt_s if differs and facts.moving else 0.0
+        differs = abs(torque_nm - measured_nm) > self._missing_nm
+        self._missing_s = self._missing_s + seen_s if differs and facts.moving else 0.0
         if self._missing_s > MISSING_S:
-            given_nm = state.current_a * self._constant_nm_a
             kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]
-            found += [self._fault(kind, measured_nm=given_nm, commanded_nm=facts.torque_nm) for kind in kinds]
+            found += [self._fault(kind, measured_nm=measured_nm, commanded_nm=torque_nm) for kind in kinds]
 
     # heat
 
-    def _watch_heat(self, found: list[Fault], facts: JointFacts, state: DriveState) -> None:
+    def _watch_heat(self, found: list[Fault], facts: TickFacts, state: DriveState, torque_nm: float) -> None:
         measured_c = state.temperature_c
         self._hot_s = self._hot_s + facts.dt_s if self._nearly_hot_c <= measured_c else 0.0
         if not measured_c < self._nearly_hot_c and not self._hot_s > TWO_MESSAGES_S:
             measured_c = UNKNOWN
         current_a = state.current_a if abs(state.current_a) < 2.0 * self._most_a else UNKNOWN  # more is no measurement
         if facts.now_s - state.current_stamp_s > self._bounds.silence_s:  # an old current does not heat for ever
-            current_a = facts.torque_nm / self._constant_nm_a
+            current_a = torque_nm / self._constant_nm_a
         winding_c = self.winding.update(facts.dt_s, current_a, measured_c)
         if winding_c < self._nearly_hot_c:
             return

@@ -66,7 +66,7 @@ class MotionMonitor:
     def reset(self) -> None:
         self.unexplained_j = self.away_rad = 0.0
         self._stamp_s, self._angle_rad, self._velocity_rad_s = NEVER_S, UNKNOWN, UNKNOWN
-        self._target_rad = UNKNOWN
+        self._target_rad = self._lag_rad = UNKNOWN
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
         self._punctual_s = SETTLING_S  # since the last gap
 
@@ -76,24 +76,26 @@ class MotionMonitor:
         """Add the faults of a new sample. `torque_nm` was commanded for the last `dt_s`; no target: no stiffness."""
         self._impulse_nm_s += torque_nm * dt_s
         self._elapsed_s += dt_s
-        if state.angle_stamp_s == self._stamp_s:
+        stamp_s, elapsed_s = state.angle_stamp_s, self._elapsed_s
+        if stamp_s == self._stamp_s:
             return
-        angle_rad, velocity_rad_s, elapsed_s = state.angle_rad, state.velocity_rad_s, self._elapsed_s
+        angle_rad, velocity_rad_s = state.angle_rad, state.velocity_rad_s
+        target_rad = UNKNOWN if target is None else target.angle_rad
         self._punctual_s = self._punctual_s + elapsed_s if elapsed_s < PUNCTUAL_S else 0.0
         step_rad, farthest_rad = angle_rad - self._angle_rad, FASTEST_RAD_S * elapsed_s
         measured = -FASTEST_RAD_S < velocity_rad_s < FASTEST_RAD_S and -farthest_rad < step_rad < farthest_rad
         if measured and elapsed_s < LONGEST_GAP_S:  # never true of the first sample, which follows on UNKNOWN
-            self._add(elapsed_s, step_rad, velocity_rad_s, target)
+            self._add(elapsed_s, step_rad, velocity_rad_s, target_rad)
         self._impulse_nm_s = self._elapsed_s = 0.0
-        self._stamp_s, self._angle_rad, self._velocity_rad_s = state.angle_stamp_s, angle_rad, velocity_rad_s
-        self._target_rad = UNKNOWN if target is None else target.angle_rad
-        following = target is None or abs(target.angle_rad - angle_rad) <= self._following_rad
+        self._stamp_s, self._angle_rad, self._velocity_rad_s = stamp_s, angle_rad, velocity_rad_s
+        self._target_rad, self._lag_rad = target_rad, abs(target_rad - angle_rad)
+        following = not self._lag_rad > self._following_rad  # also without a target
         if not (following and self.unexplained_j <= self._runaway_j and self.away_rad <= AWAY_RAD):
             self._report(found, target)
 
-    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target: JointTarget | None) -> None:
+    def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float) -> None:
         """Add a sample to the energy, and to the path away where the joint had a target and still has one."""
-        before_rad_s, target_rad = self._velocity_rad_s, self._target_rad
+        before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         work_j = self._impulse_nm_s / elapsed_s * step_rad
         unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
@@ -102,11 +104,11 @@ class MotionMonitor:
             self.away_rad = 0.0
             return
         self.away_rad *= 1.0 - elapsed_s / AWAY_LEAK_S
-        if target is None or target_rad != target_rad:
+        step_of_target_rad = abs(target_rad - self._target_rad)
+        if step_of_target_rad != step_of_target_rad:
             return
-        angle_rad = self._angle_rad
-        error_rad = abs(target.angle_rad - (angle_rad + step_rad)) - abs(target_rad - angle_rad)
-        away_rad = self.away_rad + (abs(step_rad) - abs(target.angle_rad - target_rad)) + error_rad
+        error_rad = abs(target_rad - (self._angle_rad + step_rad)) - self._lag_rad
+        away_rad = self.away_rad + (abs(step_rad) - step_of_target_rad) + error_rad
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
 
     def _report(self, found: list[Fault], target: JointTarget | None) -> None:

@@ -49,5 +49,5 @@ class Winding:
         temperature_c += (parameters.room_c + rise_k - temperature_c) * dt_s / (parameters.time_constant_s + dt_s)
         if measured_c > temperature_c:  # never true of NaN
             temperature_c = measured_c
-        self.temperature_c = min(temperature_c, HOTTEST_C)
-        return self.temperature_c
+        self.temperature_c = temperature_c = HOTTEST_C if temperature_c > HOTTEST_C else temperature_c
+        return temperature_c

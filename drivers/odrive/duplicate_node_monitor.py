@@ -28,14 +28,10 @@ class DuplicateNodeMonitor:
 
     def reset(self) -> None:
         self._earliest_s.clear()
-        self._frequent = False
+        self._frequent = self.found = False
         self._turns = self._turns_before = UNKNOWN
         self._contradictions = 0
         self._contradicted_s = NEVER_S
-
-    @property
-    def found(self) -> bool:
-        return self._frequent or self._contradictions >= CONTRADICTIONS
 
     def on_heartbeat(self, read_s: float, read_before_s: float) -> None:
         """Handles a heartbeat that arrived after `read_before_s` and was read at `read_s`."""
@@ -44,6 +40,7 @@ class DuplicateNodeMonitor:
         earliest_s.append(read_before_s)
         if read_s - self._contradicted_s > FORGET_S:
             self._contradictions = 0
+        self.found = self._frequent or self._contradictions >= CONTRADICTIONS
 
     def on_reading(self, turns: float, read_s: float) -> None:
         """Counts a reading that is far from the previous one and equals the one before that."""
@@ -52,5 +49,6 @@ class DuplicateNodeMonitor:
             returned = abs(turns - self._turns_before) < SAME_TURNS
             self._contradictions = self._contradictions + 1 if returned else 0
             self._contradicted_s = read_s
+            self.found = self._frequent or self._contradictions >= CONTRADICTIONS
         self._turns_before = self._turns
         self._turns = turns

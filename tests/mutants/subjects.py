@@ -91,13 +91,16 @@ SUBJECTS = (
         equivalent={
             "0.0 to 1.0 in `self, state: DriveState, dt_s: float, torque_nm: float=0.0`": "a torque that never changes",
             "without `self._reset_frozen()` in `def reset(self) -> None:`": "the first message does the same",
+            "never in `if not error_rad > self._jump_rad:`": SPEED,
+            "without `return None` in `if not error_rad > self._jump_rad:`": SPEED,
+            "Gt to GtE in `error_rad > self._jump_rad`": "the exact bound is compared again",
         },
     ),
     Subject(
         "control.monitors.motion_monitor",
         ("control/monitors/test_motion_bounds.py", "control/monitors/test_motion_monitor.py"),
         equivalent={
-            "LtE to Lt in `abs(target.angle_rad - angle_rad) <= self._following_rad`": REPORTED,
+            "Gt to GtE in `self._lag_rad > self._following_rad`": REPORTED,
             "LtE to Lt in `self.unexplained_j <= self._runaway_j`": REPORTED,
             "LtE to Lt in `self.away_rad <= AWAY_RAD`": REPORTED,
             "always in `if not (following and self.unexplained_j <= self._runaway_j and"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from math import radians
 from typing import Any
 
+from control.faults import Fault
 from control.limits import JointLimits, JointRange
-from control.monitors.joint_monitor import FaultBounds, JointFacts, JointMonitor
+from control.monitors.joint_monitor import FaultBounds, JointMonitor, TickFacts
 from control.monitors.winding import WindingParameters
 from control.rate import PERIOD_S
-from control.records import DriveState
+from control.records import DriveState, JointTarget
 
 JOINT = "left_sweep"
 NOW_S = 1000.0
@@ -37,5 +38,14 @@ def make_monitor(
     return JointMonitor(JOINT, limits, SPAN, bounds, *drive, answers_only=answers_only)
 
 
-def facts(now_s: float = NOW_S, **changes: Any) -> JointFacts:
-    return JointFacts(now_s, PERIOD_S, True, True, 0.0, False)._replace(**changes)
+def faults_of(
+    monitor: JointMonitor,
+    state: DriveState,
+    now_s: float = NOW_S,
+    torque_nm: float = 0.0,
+    target: JointTarget | None = None,
+    **changes: Any,
+) -> list[Fault]:
+    """Return the faults that the monitor finds in one tick, with these changes of the loop's state."""
+    facts = TickFacts(now_s, PERIOD_S, True, True, False)._replace(**changes)
+    return monitor.update(facts, state, torque_nm, target)

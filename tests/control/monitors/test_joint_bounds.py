@@ -20,7 +20,7 @@ from tests.control.monitors.monitored_joint import (
     NOW_S,
     TORQUE_CONSTANT_NM_A,
     WINDING,
-    facts,
+    faults_of,
     make_monitor,
 )
 
@@ -30,7 +30,7 @@ def state(**changes: Any) -> DriveState:
 
 
 def found(monitor: JointMonitor, measured: DriveState, **changes: Any) -> set[str]:
-    return {fault.name for fault in monitor.update(facts(**changes), measured)}
+    return {fault.name for fault in faults_of(monitor, measured, **changes)}
 
 
 def ticks_until(name: str, measured: DriveState, monitor: JointMonitor | None = None, **changes: Any) -> int:
@@ -199,7 +199,7 @@ def winding_c(measured: DriveState, torque_nm: float = 0.0, bounds: FaultBounds 
     """Return the winding's temperature after a minute."""
     monitor = make_monitor(bounds)
     for _ in range(60):
-        monitor.update(facts(dt_s=1.0, torque_nm=torque_nm), measured._replace(temperature_c=0.0))
+        faults_of(monitor, measured._replace(temperature_c=0.0), dt_s=1.0, torque_nm=torque_nm)
     return monitor.winding.temperature_c
 
 
@@ -229,9 +229,9 @@ def test_a_winding_heats_for_the_whole_time_that_a_gap_lasted() -> None:
     """
     long, short = make_monitor(), make_monitor()
     hot = state(current_a=10.0, temperature_c=0.0)
-    long.update(facts(dt_s=1.0), hot)
+    faults_of(long, hot, dt_s=1.0)
     for _ in range(100):
-        short.update(facts(dt_s=0.01), hot)
+        faults_of(short, hot, dt_s=0.01)
     assert long.winding.temperature_c == pytest.approx(short.winding.temperature_c, rel=0.02)
     assert long.winding.temperature_c > WINDING.room_c + 0.5
 
@@ -260,7 +260,7 @@ def test_a_heat_fault_reports_the_temperature_of_the_sensor_or_of_the_winding_th
         monitor = make_monitor()
         for _ in range(60):
             monitor.winding.temperature_c = 99.0
-            faults = monitor.update(facts(), state(temperature_c=measured_c))
+            faults = faults_of(monitor, state(temperature_c=measured_c))
         assert [fault.name for fault in faults] == [name]
         assert dict(faults[0].values)["temperature_c"] == pytest.approx(expected_c, abs=0.01)
 
@@ -268,7 +268,7 @@ def test_a_heat_fault_reports_the_temperature_of_the_sensor_or_of_the_winding_th
 def test_every_fault_reports_the_values_that_it_was_found_by() -> None:
     def values(name: str, measured: DriveState, **changes: Any) -> dict[str, float | str]:
         monitor = make_monitor()
-        faults = [fault for _ in range(800) for fault in monitor.update(facts(**changes), measured)]
+        faults = [fault for _ in range(800) for fault in faults_of(monitor, measured, **changes)]
         return dict(next(fault for fault in faults if fault.name == name).values)
 
     assert values("torque_missing", state(current_a=2.0), torque_nm=0.7) == {

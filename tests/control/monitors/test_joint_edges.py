@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from control.limits import JointLimits
-from control.monitors.joint_monitor import ENERGISED_S, FaultBounds, JointFacts, JointMonitor
+from control.monitors.joint_monitor import ENERGISED_S, FaultBounds, JointMonitor, TickFacts
 from control.rate import PERIOD_S
-from tests.control.monitors.monitored_joint import BOUNDS, HEALTHY, LIMITS, NOW_S, SPAN, facts, make_monitor
+from tests.control.monitors.monitored_joint import BOUNDS, HEALTHY, LIMITS, NOW_S, SPAN, faults_of, make_monitor
 
 STAMPS = ("angle_stamp_s", "current_stamp_s", "heartbeat_stamp_s", "temperature_stamp_s")
 BOTH = ("angle_stamp_s", "current_stamp_s")
@@ -22,7 +22,7 @@ BOTH = ("angle_stamp_s", "current_stamp_s")
 def reported(monitor: JointMonitor, now_s: float = NOW_S, changed: Any = None, **state: Any) -> dict[str, Any]:
     """Return the values of each fault by its name, for one sample whose other signals are new."""
     stamps: dict[str, Any] = dict.fromkeys(STAMPS, now_s)
-    found = monitor.update(facts(now_s, **(changed or {})), HEALTHY._replace(**(stamps | state)))
+    found = faults_of(monitor, HEALTHY._replace(**(stamps | state)), now_s, **(changed or {}))
     return {fault.name: dict(fault.values) for fault in found}
 
 
@@ -108,7 +108,7 @@ def test_a_third_current_in_a_row_is_too_large() -> None:
 
 
 def test_torque_is_missing_while_damping_only_where_the_loop_damps() -> None:
-    assert JointFacts(0.0, PERIOD_S, True, True, 0.0, False).damping is False
+    assert TickFacts(0.0, PERIOD_S, True, True, False).damping is False
 
 
 # a reset begins everything again

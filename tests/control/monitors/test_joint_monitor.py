@@ -29,7 +29,7 @@ from tests.control.monitors.monitored_joint import (
     JOINT,
     LIMITS,
     NOW_S,
-    facts,
+    faults_of,
     make_monitor,
 )
 
@@ -50,7 +50,7 @@ SEVERITY = [
 
 def seen(monitor: JointMonitor, state: DriveState, now_s: float = NOW_S, **changes: Any) -> dict[str, str]:
     """Return the messages of the faults by name."""
-    found = monitor.update(facts(now_s, **changes), state)
+    found = faults_of(monitor, state, now_s, **changes)
     assert all(fault.subject == JOINT for fault in found)
     return {fault.name: exact_message(fault) for fault in found}
 
