@@ -7,18 +7,17 @@ from time import perf_counter, sleep
 from typing import Any
 
 from benchmarks.report import summary_us
+from benchmarks.speed.wired_walk import wire
 from benchmarks.speed.wirings import Wiring
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.rate import PERIOD_S, RATE_HZ
-from drivers.drive_types import make_drives
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recording
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick
-from simulation.harness.lockstep import Lockstep, drives_of, plant_of
-from simulation.harness.robot import SimulatedRobot
+from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 
 BLOCK_TICKS = round(RATE_HZ)
@@ -82,16 +81,7 @@ class TimedWalk:
 
     def __init__(self, configuration: Configuration, wiring: Wiring, recorder: Recording) -> None:
         self.walk = Lockstep(configuration, paper_track())
-        self.walk.robot = SimulatedRobot(
-            plant_of(configuration),
-            paper_track(),
-            drives_of(configuration),
-            {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
-            wiring.robot,
-        )
-        drives = make_drives(configuration.drive, wiring.loop, configuration.limits, configuration.watchdog_endpoints)
-        pose, clock = self.walk.loop.pose, lambda: self.walk.now_s
-        self.walk.loop = Loop(configuration, drives, pose, recorder, clock)
+        wire(self.walk, configuration, wiring, recorder)
         self.recorder = recorder
         self.marks = StageMarks(self.walk.loop)
         self.samples = Samples()

@@ -1,0 +1,163 @@
+"""Whether the robot walks without a missed tick on a computer that is slower than this one by a factor.
+
+The simulated robot walks the paper's track adaptively over pairs of sockets, in lockstep with the daemon's own loop and
+with a log. The same walk runs `--walks` times. A walk is deterministic, so tick n does the same work in each of them:
+the shortest of its durations is that work, and the rest is noise of this computer. Durations are of the processor's
+time, which contains no other program's. Serving clients is in no tick; tick_time has its cost.
+
+It then walks once for each factor with these durations times the factor: its loop and its ticker read a clock that runs
+accordingly (scaled_clock.py), so a late tick has its effect on the robot. `slow` counts the ticks that take more than a
+period: `end` has those after an insertion or an extraction, in which strides are fitted and closed, `elsewhere` the
+others. `skipped` are the deadlines that passed without a tick. `largest_factor` is the largest one without a miss: a
+period in the longest of these ticks.
+"""
+
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+from benchmarks.example_robot import load_example
+from benchmarks.report import evaluated, run_benchmark, show_progress
+from benchmarks.speed.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
+from benchmarks.speed.wired_walk import wire
+from benchmarks.speed.wirings import make_wiring
+from control.controller import WalkOrder
+from control.modes import Mode
+from control.rate import PERIOD_S
+from control.records import Phase
+from firmware_host.computer.realtime import freeze_garbage
+from firmware_host.log.recorder import Recorder
+from simulation.mud.track import paper_track
+
+OTHER_FACTOR = 2.5  # with the one that is asked for, the range of a Raspberry Pi and a Jetson
+END_TICKS = 60  # of a stance or a swing: the work of the end before it is finished
+AFTER = (Phase.STANCE, Phase.SWING)
+
+BeforeTick = Callable[[int, int], None]
+
+
+class WalkTick(NamedTuple):
+    """A tick by its position in the walk, and its work."""
+
+    span: int  # number of the phase in the walk
+    number: int  # within the phase
+    phase: Phase
+    worked_s: float
+
+    @property
+    def at_end(self) -> bool:
+        """Whether an insertion or a stride has just ended."""
+        return self.phase in AFTER and self.number < END_TICKS
+
+
+def walk_once(
+    folder: Path, seconds: float, clock: ScaledClock, before_tick: BeforeTick
+) -> tuple[ScaledWalk, list[WalkTick]]:
+    """Returns the walk at its end, and its ticks."""
+    folder.mkdir(parents=True)
+    configuration = load_example()
+    with ExitStack() as stack:
+        wiring = make_wiring("socketcan", configuration.bus, folder)
+        for port in (*wiring.robot.values(), *wiring.loop.values()):
+            stack.callback(port.close)
+        recorder = Recorder(folder / "walk.mcap", configuration.text, {}, rig=configuration.rig)
+        stack.callback(recorder.close, timeout_s=10.0)
+        walk = ScaledWalk(configuration, paper_track(), clock)
+        wire(walk, configuration, wiring, recorder)
+        walk.arm()
+        walk.walk(WalkOrder(configuration.adaptation.initial_depth_m))
+        freeze_garbage()
+        return walk, walk_ticks(walk, round(seconds / PERIOD_S), before_tick)
+
+
+def walk_ticks(walk: ScaledWalk, number: int, before_tick: BeforeTick) -> list[WalkTick]:
+    """Returns the next ticks; `before_tick` gets the position of each."""
+    ticks, span, index, phase = list[WalkTick](), 0, 0, Phase.REST
+    for _ in range(number):
+        before, phase = phase, walk.loop.controller.target.phase  # that this tick measures
+        span, index = (span, index + 1) if phase is before else (span + 1, 0)
+        before_tick(span, index)
+        walk.step()
+        ticks.append(WalkTick(span, index, phase, walk.worked_s))
+    return ticks
+
+
+def measure_work(folder: Path, seconds: float, walks: int) -> list[WalkTick]:
+    """Returns the ticks of a walk, each with its shortest duration. Raises RuntimeError where walks differ or end."""
+    measured = []
+    for number in range(walks):
+        show_progress(number, walks, "the same walk again")
+        walk, ticks = walk_once(folder / str(number), seconds, ScaledClock(0.0), lambda span, index: None)
+        if walk.loop.mode is not Mode.WALKING:
+            raise RuntimeError(f"the robot does not walk any more: {walk.loop.fault}")
+        measured.append(ticks)
+    return least_work(measured)
+
+
+def least_work(walks: Sequence[Sequence[WalkTick]]) -> list[WalkTick]:
+    """Returns the ticks of identical walks, each with its shortest duration. Raises RuntimeError where they differ."""
+    if any([tick[:3] for tick in walk] != [tick[:3] for tick in walks[0]] for walk in walks):
+        raise RuntimeError("the walks differ: their phases change at different ticks")
+    return [same[0]._replace(worked_s=min(tick.worked_s for tick in same)) for same in zip(*walks, strict=True)]
+
+
+def walk_slowly(folder: Path, ticks: Sequence[WalkTick], factor: float) -> dict[str, Any]:
+    """Walks with the recorded work times the factor; a tick that the recorded walk does not have takes the median."""
+    works_s, usual_s, work = {tick[:2]: tick.worked_s for tick in ticks}, median_s(ticks), RecordedWork()
+
+    def before_tick(span: int, index: int) -> None:
+        work.next_s = works_s.get((span, index), usual_s)
+
+    clock = ScaledClock(factor, work)
+    walk, walked = walk_once(folder / f"{factor:g}", len(ticks) * PERIOD_S, clock, before_tick)
+    late = [tick.at_end for tick in walked if factor * tick.worked_s > PERIOD_S]
+    skipped = walk.loop.timing.missed_ticks
+    return {
+        "end": sum(late),
+        "elsewhere": len(late) - sum(late),
+        "skipped": skipped,
+        "mode": walk.loop.mode.name.lower(),
+    }
+
+
+def median_s(ticks: Sequence[WalkTick]) -> float:
+    return median(tick.worked_s for tick in ticks)
+
+
+def longest_s(ticks: Sequence[WalkTick], at_end: bool) -> float:
+    return max((tick.worked_s for tick in ticks if tick.at_end is at_end), default=0.0)
+
+
+def largest_factor(ticks: Sequence[WalkTick], at_end: bool) -> float | None:
+    """Returns the factor at which the longest of these ticks takes a period; None where there is no such tick."""
+    longest = longest_s(ticks, at_end)
+    return PERIOD_S / longest if longest > 0.0 else None
+
+
+def summary_of(ticks: Sequence[WalkTick]) -> dict[str, Any]:
+    kinds = {"end": True, "elsewhere": False}
+    largest = {name: largest_factor(ticks, at_end) for name, at_end in kinds.items()}
+    longest_us = {name: 1e6 * longest_s(ticks, at_end) for name, at_end in kinds.items()}
+    median_us = 1e6 * median_s(ticks)
+    return {
+        "ticks": {name: sum(tick.at_end is at_end for tick in ticks) for name, at_end in kinds.items()},
+        "median_us": round(median_us, 1),
+        "longest_us": {name: round(each_us, 1) for name, each_us in longest_us.items()},
+        "longest_to_median": {name: round(each_us / median_us, 2) for name, each_us in longest_us.items()},
+        "largest_factor": {name: factor and round(factor, 2) for name, factor in largest.items()},
+    }
+
+
+def measure(folder: Path, *, factor: float = 5.0, walks: int = 5, seconds: float = 20.0) -> dict[str, Any]:
+    ticks = measure_work(folder, seconds, walks)
+    slow = {f"{each:g}": walk_slowly(folder / "slow", ticks, each) for each in sorted({OTHER_FACTOR, factor})}
+    report = {"factor": factor, "walks": walks, "seconds": seconds} | summary_of(ticks) | {"slow": slow}
+    reached = slow[f"{factor:g}"]["end"] == 0
+    return evaluated(report, f"no missed tick at a stride's end with factor {factor:g}", reached)
+
+
+if __name__ == "__main__":
+    sys.exit(run_benchmark(measure))

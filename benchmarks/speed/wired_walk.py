@@ -1,0 +1,31 @@
+"""Puts a lockstep of robot and loop on given wiring, with a log."""
+
+from benchmarks.speed.wirings import Wiring
+from drivers.drive_types import make_drives
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.log.recorder import Recording
+from firmware_host.loop import Loop
+from simulation.devices.motion_capture import AT_EVERY_TICK, SimulatedPose
+from simulation.harness.lockstep import Lockstep, drives_of, plant_of
+from simulation.harness.robot import SimulatedRobot
+from simulation.mud.track import paper_track
+
+POSE_SEED = 2
+
+
+def wire(walk: Lockstep, configuration: Configuration, wiring: Wiring, recorder: Recording) -> None:
+    """Replaces robot and loop of a lockstep that has not begun; the robot is on the paper's track."""
+    walk.robot = SimulatedRobot(
+        plant_of(configuration),
+        paper_track(),
+        drives_of(configuration),
+        {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
+        wiring.robot,
+    )
+    drives = make_drives(configuration.drive, wiring.loop, configuration.limits, configuration.watchdog_endpoints)
+    pose = SimulatedPose(walk.robot.plant, AT_EVERY_TICK, POSE_SEED)
+
+    def now_s() -> float:
+        return walk.now_s
+
+    walk.loop = Loop(configuration, drives, pose, recorder, now_s, now_s)
