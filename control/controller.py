@@ -204,7 +204,8 @@ class Controller:
             self._enter(mode, states)
         self.target = RESTING
         self.present = present = self._predict(states, sent_nm or self._no_torque) if self._predict else states
-        elapsed_s = max(elapsed_s, dt_s)
+        if elapsed_s < dt_s:
+            elapsed_s = dt_s
         self._since_s += elapsed_s
         if mode not in MOVING:
             return self._no_torque
@@ -212,7 +213,8 @@ class Controller:
             trusted = trusted or same_for_all(True, self.rig)
             self._watch_rest(elapsed_s, states, trusted)
             return damping_torques_nm(present, self.gains, trusted, DAMPING_NM)
-        self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
+        if self._fade < 1.0:
+            self._fade = min(1.0, self._fade + dt_s / max(self.motion.fade_in_s, dt_s))
         if mode is Mode.STOPPING and self._path is not None and self._path.finished:
             self._up = self.is_up(states)
             self._waited_s += elapsed_s

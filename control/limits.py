@@ -60,28 +60,35 @@ def limited_torque_nm(
     wanted_nm: float, previous_nm: float, state: DriveState, limits: JointLimits, span: JointRange, dt_s: float
 ) -> float:
     """Return the torque of one joint, given the one sent `dt_s` ago. All values must be finite."""
-    largest_nm = limits.torque_nm * _cool_fraction(state.temperature_c, limits)
-    upward_nm = largest_nm if state.angle_rad < span.max_rad else 0.0
-    downward_nm = largest_nm if state.angle_rad > span.min_rad else 0.0
-    upward_nm *= _slow_fraction(state.velocity_rad_s, limits.velocity_rad_s)
-    downward_nm *= _slow_fraction(-state.velocity_rad_s, limits.velocity_rad_s)
-    torque_nm = min(max(wanted_nm, -downward_nm), upward_nm)
+    angle_rad, velocity_rad_s, largest_nm = state.angle_rad, state.velocity_rad_s, limits.torque_nm
+    if state.temperature_c >= limits.temperature_warm_c:  # a drive without thermistor reports NaN or 0
+        largest_nm *= _cool_fraction(state.temperature_c, limits)
+    upward_nm = largest_nm if angle_rad < span.max_rad else 0.0
+    downward_nm = largest_nm if angle_rad > span.min_rad else 0.0
+    fade_rad_s = (1.0 - VELOCITY_FADE) * limits.velocity_rad_s
+    if velocity_rad_s > fade_rad_s:
+        upward_nm *= _slow_fraction(velocity_rad_s, limits.velocity_rad_s)
+    elif velocity_rad_s < -fade_rad_s:
+        downward_nm *= _slow_fraction(-velocity_rad_s, limits.velocity_rad_s)
     slew_nm = limits.torque_rate_nm_s * dt_s
-    return min(max(torque_nm, previous_nm - slew_nm), previous_nm + slew_nm)
+    return _clip(_clip(wanted_nm, -downward_nm, upward_nm), previous_nm - slew_nm, previous_nm + slew_nm)
+
+
+def _clip(value: float, low: float, high: float) -> float:
+    """Return the value, or the bound that it exceeds; in half the time of `min` and `max`."""
+    if value < low:
+        return low
+    return high if value > high else value
 
 
 def _cool_fraction(temperature_c: float, limits: JointLimits) -> float:
-    """Return 1 for a cool motor, falling to 0 for a hot one. A drive without thermistor reports NaN or 0: cool."""
-    if not temperature_c >= limits.temperature_warm_c:
-        return 1.0
+    """Return 1 for a warm motor, falling to 0 for a hot one."""
     span_c = max(limits.temperature_hot_c - limits.temperature_warm_c, 1e-9)
     return max(0.0, (limits.temperature_hot_c - temperature_c) / span_c)
 
 
 def _slow_fraction(velocity_rad_s: float, limit_rad_s: float) -> float:
-    """Return 1 below the fade and 0 from the limit on, for torque in the direction of `velocity_rad_s`."""
-    if velocity_rad_s <= (1.0 - VELOCITY_FADE) * limit_rad_s:
-        return 1.0
+    """Return 1 where the fade begins and 0 from the limit on, for torque in the direction of `velocity_rad_s`."""
     if velocity_rad_s >= limit_rad_s:
         return 0.0
     return (limit_rad_s - velocity_rad_s) / (VELOCITY_FADE * limit_rad_s)

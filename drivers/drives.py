@@ -11,7 +11,7 @@ from itertools import chain
 
 from control.records import NEVER_S, DriveStates, Joints, Torques
 from drivers.can.can_port import CanPort
-from drivers.can.frames import EXTENDED_MASK, STANDARD_MASK, Frame, MalformedMessageError
+from drivers.can.frames import EXTENDED_MASK, STANDARD_MASK, MalformedMessageError
 from drivers.drive import FD, DriveAxis, DriveHealth
 from drivers.transmit_gate import TransmitGate
 
@@ -77,20 +77,22 @@ class Drives:
             axis.begin_read(now_s)
         for port, receivers in self._receivers:
             for frame in port.receive():
-                identifier, data, is_remote, is_error, is_extended, _, is_fd, _ = frame
+                identifier, data, is_remote, is_error, is_extended, stamp_s, is_fd, _ = frame
                 receive = receivers.get(identifier | FD if is_fd else identifier)
                 if receive is None or is_remote or is_error or is_extended is not (identifier > STANDARD_MASK):
                     self.unknown_frames += 1
                     continue
+                if not 0.0 <= now_s - stamp_s < LONGEST_IN_QUEUE_S:  # the port does not know, or uses another clock
+                    stamp_s = now_s
                 try:
-                    receive(data, _stamp_s(frame, now_s))
+                    receive(data, stamp_s)
                 except MalformedMessageError:
                     self.malformed_frames += 1
         return Joints(*[axis.state for axis in self.axes])
 
     @property
     def _lost(self) -> int:
-        return sum(port.failed_sends for port in self.ports.values())
+        return sum([port.failed_sends for port in self.ports.values()])
 
     @property
     def heard(self) -> bool:
@@ -193,8 +195,3 @@ def _both(
         second(data, now_s)
 
     return receive
-
-
-def _stamp_s(frame: Frame, now_s: float) -> float:
-    """Returns when a frame was on the bus; now where its port does not know, or uses another clock."""
-    return frame.stamp_s if 0.0 <= now_s - frame.stamp_s < LONGEST_IN_QUEUE_S else now_s

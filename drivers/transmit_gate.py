@@ -97,7 +97,8 @@ class TransmitGate:
         largest_nm, step_nm = self._largest_nm + 0.5 * code_step_nm, self._step_nm + 1.5 * code_step_nm
         if not -largest_nm <= torque_nm <= largest_nm:
             return f"the limit is {self._largest_nm:.4g} N·m"
-        if not min(before_nm - step_nm, 0.0) <= torque_nm <= max(before_nm + step_nm, 0.0):
+        lowest_nm, highest_nm = before_nm - step_nm, before_nm + step_nm
+        if (torque_nm < lowest_nm and torque_nm < 0.0) or (torque_nm > highest_nm and torque_nm > 0.0):
             return f"too far from the {before_nm:.4g} N·m before"
         return ""
 
@@ -125,6 +126,7 @@ class GatedPort:
             self._while_open.update(table.while_open)
             self._checks.update(table.checks)
             self._requests.update(table.requests)
+        self._listed = self._always.keys() | self._while_open.keys() | self._checks.keys()
         (self._kind,) = {table.kind for table in self._tables.values()} or {FrameKind()}
 
     def forget_torques(self) -> None:
@@ -136,7 +138,7 @@ class GatedPort:
         if is_remote or is_error or (is_extended, is_fd, bit_rate_switch) != self._kind:
             passes = frame._replace(stamp_s=NEVER_S) in self._requests
         else:
-            passes = self._may_leave(identifier, data)
+            passes = identifier in self._listed and self._may_leave(identifier, data)
             if identifier in self._tables:
                 if not passes:
                     self._send_torque(frame, self._tables[identifier])

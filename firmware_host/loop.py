@@ -195,8 +195,8 @@ class Loop:
             self.events.report_end_of_move(now_s, reason)
 
     def _control(self, missed_ticks: int) -> Torques:
-        step_s = min(1 + missed_ticks, LONGEST_STEP_TICKS) * self.period_s
         elapsed_s = (1 + missed_ticks) * self.period_s
+        step_s = min(1 + missed_ticks, LONGEST_STEP_TICKS) * self.period_s if missed_ticks else elapsed_s
         trusted = self.fault_monitor.trusted if self.mode is Mode.DAMPING else None
         return self.controller.step(step_s, self.mode, self.states, trusted, elapsed_s, self.sent.torques_nm)
 

@@ -16,7 +16,9 @@ class Histogram:
 
     def add(self, duration_s: float) -> None:
         duration_us = duration_s * 1e6
-        bucket = min(max(int(duration_us), 0), LONGEST_US)
+        bucket = int(duration_us) if duration_us > 0.0 else 0
+        if bucket > LONGEST_US:
+            bucket = LONGEST_US
         self._counts[bucket] += 1
         self._block_counts[bucket // BLOCK_US] += 1
         self.count += 1

@@ -78,7 +78,8 @@ class CanSimpleAxis(DriveSignals):
 
     def _receive_encoder(self, data: bytes, now_s: float) -> None:
         turns, turns_s = codec.GET_ENCODER_ESTIMATES.decode(data)
-        _require_finite(turns + turns_s)
+        if not isfinite(turns + turns_s):
+            raise MalformedMessageError("a position or velocity that is not finite")
         if now_s - self._angle_stamp_s > RESTART_SILENCE_S:
             self._on_silence()
         self._duplicates.on_reading(turns, self._read_s)
@@ -90,7 +91,8 @@ class CanSimpleAxis(DriveSignals):
         setpoint_a, measured_a = codec.GET_IQ.decode(data)
         if not self.closed_loop:
             measured_a = self._idle_current_a(data, measured_a)
-        _require_finite(measured_a)
+        if not isfinite(measured_a):
+            raise MalformedMessageError("a current that is not finite")
         if now_s - self._current_stamp_s > RESTART_SILENCE_S:
             self._on_silence()
         self._current_a = self._current_sign * measured_a
@@ -189,8 +191,3 @@ class CanSimpleAxis(DriveSignals):
 
     def _transmit(self, message: Message, *values: float) -> None:
         self._outlet.send(Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values)))
-
-
-def _require_finite(value: float) -> None:
-    if not isfinite(value):
-        raise MalformedMessageError("not a finite number")

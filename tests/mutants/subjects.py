@@ -23,6 +23,10 @@ SUBJECTS = (
         "drivers.transmit_gate",
         ("drivers/test_transmit_gate.py", "drivers/moteus/test_gate_table.py", "drivers/mit/test_gate_table.py"),
         EVERY_MUTANT,
+        equivalent={
+            "Lt to LtE in `torque_nm < 0.0`": "zero has passed before",
+            "Gt to GtE in `torque_nm > 0.0`": "zero has passed before",
+        },
     ),
     Subject(
         "drivers.odrive.gate_tables",
@@ -47,7 +51,10 @@ SUBJECTS = (
         equivalent={
             "True to False in `strict=True`": "each of them has one value for each joint",
             "GtE to Gt in `velocity_rad_s >= limit_rad_s`": CONTINUOUS,
-            "LtE to Lt in `velocity_rad_s <= (1.0 - VELOCITY_FADE) * limit_rad_s`": CONTINUOUS,
+            "Gt to GtE in `velocity_rad_s > fade_rad_s`": CONTINUOUS,
+            "Lt to LtE in `velocity_rad_s < -fade_rad_s`": CONTINUOUS,
+            "Lt to LtE in `value < low`": CONTINUOUS,
+            "Gt to GtE in `value > high`": CONTINUOUS,
         },
     ),
     Subject(
