@@ -16,7 +16,7 @@ from packaging.version import Version
 from tests.folders import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-NOT_ON_A_ROBOT = {"test", "docs", "cluster"}
+NOT_ON_A_ROBOT = {"test", "docs", "cluster", "loops"}
 EXTRAS = {
     "robot.txt": {"serial", "screen"},
     "robot_with_extras.txt": PROJECT["project"]["optional-dependencies"].keys() - NOT_ON_A_ROBOT,
