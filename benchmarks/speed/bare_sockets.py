@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 from benchmarks.speed.timed_walk import BLOCK_TICKS, TimedWalk
-from benchmarks.speed.wirings import Wiring, make_wiring
+from benchmarks.walks.wirings import Wiring, make_wiring
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration

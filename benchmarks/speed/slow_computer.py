@@ -9,48 +9,31 @@ It then walks once for each factor with these durations times the factor: its lo
 accordingly (scaled_clock.py), so a late tick has its effect on the robot. `slow` counts the ticks that take more than a
 period: `end` has those after an insertion or an extraction, in which strides are fitted and closed, `elsewhere` the
 others. `skipped` are the deadlines that passed without a tick. `largest_factor` is the largest one without a miss: a
-period in the longest of these ticks.
+period in the longest of these ticks. `--picture FILE` draws the ticks of the first strides; it needs matplotlib.
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import Any
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import evaluated, run_benchmark, show_progress
-from benchmarks.speed.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
-from benchmarks.speed.wired_walk import wire
-from benchmarks.speed.wirings import make_wiring
+from benchmarks.speed.slow_picture import plot_ticks
+from benchmarks.walks.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
+from benchmarks.walks.walk_ticks import BeforeTick, WalkTick, least_work, walk_ticks
+from benchmarks.walks.wired_walk import wire
+from benchmarks.walks.wirings import make_wiring
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.rate import PERIOD_S
-from control.records import Phase
 from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.log.recorder import Recorder
 from simulation.mud.track import paper_track
 
 OTHER_FACTOR = 2.5  # with the one that is asked for, the range of a Raspberry Pi and a Jetson
-END_TICKS = 60  # of a stance or a swing: the work of the end before it is finished
-AFTER = (Phase.STANCE, Phase.SWING)
-
-BeforeTick = Callable[[int, int], None]
-
-
-class WalkTick(NamedTuple):
-    """A tick by its position in the walk, and its work."""
-
-    span: int  # number of the phase in the walk
-    number: int  # within the phase
-    phase: Phase
-    worked_s: float
-
-    @property
-    def at_end(self) -> bool:
-        """Whether an insertion or a stride has just ended."""
-        return self.phase in AFTER and self.number < END_TICKS
 
 
 def walk_once(
@@ -73,18 +56,6 @@ def walk_once(
         return walk, walk_ticks(walk, round(seconds / PERIOD_S), before_tick)
 
 
-def walk_ticks(walk: ScaledWalk, number: int, before_tick: BeforeTick) -> list[WalkTick]:
-    """Returns the next ticks; `before_tick` gets the position of each."""
-    ticks, span, index, phase = list[WalkTick](), 0, 0, Phase.REST
-    for _ in range(number):
-        before, phase = phase, walk.loop.controller.target.phase  # that this tick measures
-        span, index = (span, index + 1) if phase is before else (span + 1, 0)
-        before_tick(span, index)
-        walk.step()
-        ticks.append(WalkTick(span, index, phase, walk.worked_s))
-    return ticks
-
-
 def measure_work(folder: Path, seconds: float, walks: int) -> list[WalkTick]:
     """Returns the ticks of a walk, each with its shortest duration. Raises RuntimeError where walks differ or end."""
     measured = []
@@ -95,13 +66,6 @@ def measure_work(folder: Path, seconds: float, walks: int) -> list[WalkTick]:
             raise RuntimeError(f"the robot does not walk any more: {walk.loop.fault}")
         measured.append(ticks)
     return least_work(measured)
-
-
-def least_work(walks: Sequence[Sequence[WalkTick]]) -> list[WalkTick]:
-    """Returns the ticks of identical walks, each with its shortest duration. Raises RuntimeError where they differ."""
-    if any([tick[:3] for tick in walk] != [tick[:3] for tick in walks[0]] for walk in walks):
-        raise RuntimeError("the walks differ: their phases change at different ticks")
-    return [same[0]._replace(worked_s=min(tick.worked_s for tick in same)) for same in zip(*walks, strict=True)]
 
 
 def walk_slowly(folder: Path, ticks: Sequence[WalkTick], factor: float) -> dict[str, Any]:
@@ -151,8 +115,12 @@ def summary_of(ticks: Sequence[WalkTick]) -> dict[str, Any]:
     }
 
 
-def measure(folder: Path, *, factor: float = 5.0, walks: int = 5, seconds: float = 20.0) -> dict[str, Any]:
+def measure(
+    folder: Path, *, factor: float = 5.0, walks: int = 5, seconds: float = 20.0, picture: str = ""
+) -> dict[str, Any]:
     ticks = measure_work(folder, seconds, walks)
+    if picture:
+        plot_ticks(ticks, factor, Path(picture))
     slow = {f"{each:g}": walk_slowly(folder / "slow", ticks, each) for each in sorted({OTHER_FACTOR, factor})}
     report = {"factor": factor, "walks": walks, "seconds": seconds} | summary_of(ticks) | {"slow": slow}
     reached = slow[f"{factor:g}"]["end"] == 0

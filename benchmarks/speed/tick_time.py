@@ -30,7 +30,7 @@ from benchmarks.speed.bare_sockets import BareSockets, count_frames
 from benchmarks.speed.served_walk import ServedWalk
 from benchmarks.speed.serving_time import fullest_methods
 from benchmarks.speed.timed_walk import TimedWalk
-from benchmarks.speed.wirings import VARIANTS, make_wiring
+from benchmarks.walks.wirings import VARIANTS, make_wiring
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder

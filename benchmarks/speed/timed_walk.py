@@ -7,8 +7,8 @@ from time import perf_counter, sleep
 from typing import Any
 
 from benchmarks.report import summary_us
-from benchmarks.speed.wired_walk import wire
-from benchmarks.speed.wirings import Wiring
+from benchmarks.walks.wired_walk import wire
+from benchmarks.walks.wirings import Wiring
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.rate import PERIOD_S, RATE_HZ

@@ -27,9 +27,9 @@ from benchmarks.speed import (
 )
 from benchmarks.speed.paced_loops import LOOPS
 from benchmarks.speed.timed_walk import STAGES
-from benchmarks.speed.wirings import VARIANTS
 from benchmarks.stress import log_kills
 from benchmarks.stress.harmless_frames import is_harmless
+from benchmarks.walks.wirings import VARIANTS
 from drivers.can.frames import Frame
 from drivers.mit import codec as mit
 from drivers.moteus import codec as moteus

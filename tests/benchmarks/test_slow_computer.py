@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks.speed import slow_computer
-from benchmarks.speed.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
-from benchmarks.speed.slow_computer import END_TICKS, WalkTick, largest_factor, least_work, summary_of, walk_slowly
+from benchmarks.speed.slow_computer import largest_factor, summary_of, walk_slowly
+from benchmarks.speed.slow_picture import plot_ticks
+from benchmarks.walks.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
+from benchmarks.walks.walk_ticks import END_TICKS, WalkTick, least_work
 from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
@@ -120,6 +122,12 @@ def test_the_largest_factor_brings_the_longest_tick_to_a_period() -> None:
     summary = summary_of(ticks)
     assert summary["ticks"] == {"end": 1, "elsewhere": 2}
     assert summary["longest_to_median"] == {"end": 2.0, "elsewhere": 1.0}
+
+
+def test_a_picture_is_drawn_of_the_ticks(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    plot_ticks([walk_tick(1e-4), walk_tick(2e-4, END_TICKS)], FACTOR, tmp_path / "ticks.svg")
+    assert "<svg" in (tmp_path / "ticks.svg").read_text(encoding="utf-8")
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from can.interfaces.socketcan import constants
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.speed.wirings import CanSocket, open_bus, open_pair
+from benchmarks.walks.wirings import CanSocket, open_bus, open_pair
 from control.records import JOINTS, NEVER_S
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.frames import Frame, encode_frame

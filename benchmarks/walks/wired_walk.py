@@ -1,6 +1,6 @@
 """Puts a lockstep of robot and loop on given wiring, with a log."""
 
-from benchmarks.speed.wirings import Wiring
+from benchmarks.walks.wirings import Wiring
 from drivers.drive_types import make_drives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recording
