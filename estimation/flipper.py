@@ -2,15 +2,20 @@
 
 Each stroke is stored as batches of equal travel (stroke.py). At the end of the insertion the estimator finds the
 surface (surface.py) and fits k_p; when the stride closes it fits k_e (stroke_fit.py), and fits or bounds k_s
-(shear.py). The clinging weight and the joint's friction are measured again in every swing (tare.py, air.py). A stride
-without evidence of mud has no coefficients. The coefficients are linear in the joint torques, so the fits need no third
-force component, which two torques cannot determine; forces are mapped for display only.
+(shear.py). Each of these is a unit of bounded work (control/bounded_work.py). The surface corrects the tare, which the
+loads of the stance contain: samples that arrive before are learned as soon as the tare is corrected, so they do not
+depend on when the units run. A stance that ends before finishes the work at once. The clinging weight and the joint's
+friction are measured again in every swing (tare.py, air.py). A stride without evidence of mud has no coefficients. The
+coefficients are linear in the joint torques, so the fits need no third force component, which two torques cannot
+determine; forces are mapped for display only, until the tare is corrected with that of before.
 """
 
 from collections.abc import Sequence
 from functools import partial
 from math import cos, hypot, isfinite, sin
+from typing import NamedTuple
 
+from control.bounded_work import Work, WorkQueue, finished
 from control.geometry import FlipperGeometry
 from control.plate.integrals import growth_exponent
 from control.records import UNKNOWN, Estimate, FlipperLoad, Phase
@@ -33,9 +38,9 @@ from estimation.strokes.stroke_fit import (
     insertion_samples,
     level_free,
 )
-from estimation.strokes.surface import find_surface
+from estimation.strokes.surface import Surface, find_surface
 from estimation.strokes.surface_memory import SurfaceMemory, unknown_surface
-from estimation.strokes.tare import Tare
+from estimation.strokes.tare import Tare, Zero
 
 STEPS_M = {Phase.INSERTION: 0.0015, Phase.STANCE: 0.006, Phase.EXTRACTION: 0.001}
 OWN_ERROR_M = 0.002  # offset between the mud's surface and the depth where a stroke's own force begins
@@ -43,6 +48,20 @@ TWO_SURFACES = "the strokes find two surfaces"
 NO_MUD = "no evidence of mud: the torques are those of friction"
 FREE_FRACTION = 0.4  # of the clearance: an edge this far above the mud is in free air
 CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke of 3 cm wets
+
+
+class ClosingStride(NamedTuple):
+    """What the coefficients of a stride are fitted from."""
+
+    stance: Stroke
+    extraction: Stroke
+    surface: Surface
+    k_p: Estimate
+    deepest_m: float
+    is_stuck: bool  # the flipper did not come out
+    zero: Zero
+    tare_drift_n: float
+    friction_error_nm: float
 
 
 class FlipperEstimator(StrideEstimator):
@@ -56,6 +75,7 @@ class FlipperEstimator(StrideEstimator):
         base: Base = Base.FREE,
         drag_n: float = 0.0,
         surface_error_m: float = 0.001,
+        work: WorkQueue | None = None,
     ) -> None:
         self.base = base
         self.drag_n = drag_n  # of the body on each flipper
@@ -66,8 +86,7 @@ class FlipperEstimator(StrideEstimator):
         self._free_m = -FREE_FRACTION * geometry.clearance_m
         self._tare = Tare()
         self._extractions = ScatterMemory()
-        self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
-        super().__init__(flipper, geometry, drive, motion_between)
+        super().__init__(flipper, geometry, drive, motion_between, work)
 
     def reset(self) -> None:
         self._tare.reset()
@@ -76,24 +95,28 @@ class FlipperEstimator(StrideEstimator):
         self._own_surfaces.reset()
         self._extractions.reset()
         self._travel_m = UNKNOWN
+        self._is_fitting = self._is_taring = False  # the work of the last insertion
+        self._waiting: list[tuple[float, Phase, JointLoad, float]] = []  # samples, until the tare is corrected
         super().reset()
 
     def _reset_stride(self) -> None:
-        for stroke in self._strokes.values():
-            stroke.reset()
+        self._strokes = {phase: Stroke(step_m) for phase, step_m in STEPS_M.items()}
         self._surface = unknown_surface(self.surface_error_m)
         self._k_p = NOT_THERE
 
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
+        if self._is_taring:
+            self._waiting.append((now_s, phase, load, body_x_m))
+            self._update_load(phase, load)
+        else:
+            self._learn_now(now_s, phase, load, body_x_m)
+
+    def _learn_now(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         sweep_rad, adduction_rad, depth_m = load[:3]
         if phase not in self._strokes and depth_m < self._free_m and phase is not Phase.RECOVERY:
             self._tare.update(self._rise_m(load), load.adduction_nm)
             self._air.update(sweep_rad, load.sweep_nm)
-        sweep_nm, adduction_nm = self._mud_torques_nm(phase, load)
-        force_x_n, force_z_n = smallest_force_n(self.geometry, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
-        if phase is Phase.STANCE:
-            force_z_n = UNKNOWN
-        self._load = FlipperLoad(sweep_nm, adduction_nm, force_x_n, force_z_n, depth_m)
+        sweep_nm, adduction_nm = self._update_load(phase, load)
         stroke = self._strokes.get(phase)
         if stroke is not None:
             self._travel_m = self.geometry.flipper_length_m * sweep_rad if phase is Phase.STANCE else depth_m
@@ -102,7 +125,17 @@ class FlipperEstimator(StrideEstimator):
             )
             if phase is not Phase.EXTRACTION:
                 self._deepest_m = larger(depth_m, self._deepest_m)
-            self._record_extremes(phase, self._load, body_x_m)
+            self._record_extremes(phase, self.load, body_x_m)
+
+    def _update_load(self, phase: Phase, load: JointLoad) -> tuple[float, float]:
+        """Set `load`; return the torques of the mud on sweep and adduction."""
+        sweep_rad, adduction_rad, depth_m = load[:3]
+        sweep_nm, adduction_nm = self._mud_torques_nm(phase, load)
+        force_x_n, force_z_n = smallest_force_n(self.geometry, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
+        if phase is Phase.STANCE:
+            force_z_n = UNKNOWN
+        self.load = FlipperLoad(sweep_nm, adduction_nm, force_x_n, force_z_n, depth_m)
+        return sweep_nm, adduction_nm
 
     def _mud_torques_nm(self, phase: Phase, load: JointLoad) -> tuple[float, float]:
         """Return the load on sweep and adduction without the clinging mud, and without friction in a stroke."""
@@ -122,67 +155,103 @@ class FlipperEstimator(StrideEstimator):
 
     def _end_phase(self, now_s: float, ended: Phase) -> None:
         if ended in self._strokes:
+            self._finish_insertion()
             self._strokes[ended].close(now_s, self._travel_m)
         if ended is Phase.INSERTION:
-            self._learn_insertion(self._strokes[Phase.INSERTION].moving())
+            self._is_fitting = self._is_taring = True
+            self.work.add(self._learn_insertion(self._strokes[Phase.INSERTION]))
+
+    def _finish_insertion(self) -> None:
+        if self._is_fitting:
+            self.work.finish()
 
     def _begin_phase(self, phase: Phase) -> None:
         if phase is Phase.INSERTION:
+            self._finish_insertion()
             self._air.close()
             self._tare.set_zero(self._air.is_air)
 
-    def _learn_insertion(self, batches: Sequence[Batch]) -> None:
-        """Find the surface, correct the zero by the force above it, and fit k_p.
-
-        k_p counts from the depth where the stroke's own force begins: a lag between angle and current shifts both.
-        """
+    def _learn_insertion(self, insertion: Stroke) -> Work[None]:
+        """Find the surface and correct the zero by the force above it; the fit comes after the other flipper's zero."""
+        batches = insertion.moving()
         length_m, arm_m = self.geometry.flipper_length_m, hypot(self.geometry.flipper_length_m, self.geometry.drop_m)
         depths_m = [b.travel_m for b in batches]
         forces_n = [b.adduction_nm / (arm_m * cos(b.sweep_rad)) for b in batches]
         samples = sum([b.samples for b in batches])
         sample_m = (depths_m[-1] - depths_m[0]) / samples if samples else 0.0
-        found = find_surface(depths_m, forces_n)
-        self._surface = self._surfaces.update(found, sample_m)
-        level_n, level_error_n = (value * arm_m / length_m for value in self._surface[2:4])
+        found = yield from find_surface(depths_m, forces_n)
+        yield
+        surface = self._surfaces.update(found, sample_m)
+        level_n, level_error_n = (value * arm_m / length_m for value in surface[2:4])
         corrected_n = self._tare.correct(-level_n, level_error_n)
+        self._learn_waiting()
         below = level_free(batches, -corrected_n * length_m)
+        self.work.add(self._fit_insertion(insertion, below, found, surface))
+
+    def _fit_insertion(self, insertion: Stroke, below: Sequence[Batch], found: Surface, surface: Surface) -> Work[None]:
+        """Fit k_p from the depth where the stroke's own force begins: a lag between angle and current shifts both."""
         own = self._own_surfaces.update(found, 0.0)
-        self._k_p = fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+        yield
+        k_p = yield from fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)
+        if self._strokes[Phase.INSERTION] is insertion:  # else a stop ended the stride
+            self._surface, self._k_p = surface, k_p
         self.fits = StrideFits(k_p=partial(insertion_samples, self.geometry, below, own))
+        self._is_fitting = False
+
+    def _learn_waiting(self) -> None:
+        """Learn the samples that waited for the corrected tare."""
+        self._is_taring = False
+        for sample in self._waiting:
+            self._learn_now(*sample)
+        self._waiting.clear()
 
     @property
     def surface_m(self) -> float:
         """The estimated depth of the surface below its nominal height."""
         return self._surface.depth_m
 
-    def _learned(self) -> Learned:
+    def _learned(self) -> Work[Learned]:
         stance, extraction = self._strokes[Phase.STANCE], self._strokes[Phase.EXTRACTION]
         if not self._met_mud(stance.batches, extraction.batches):
             self.fits = NO_FITS
             no_mud = NOT_THERE._replace(reason=NO_MUD)
-            return Learned(k_p=no_mud, k_s=no_mud, k_e=no_mud, surface_m=self.surface_m, extraction_torque_nm=UNKNOWN)
-        shear = find_shear(self.geometry, stance.batches, self.surface_m, self.base, self.drag_n)
+            return finished(Learned(no_mud, no_mud, no_mud, self.surface_m, extraction_torque_nm=UNKNOWN))
+        stride = ClosingStride(
+            stance=stance,
+            extraction=extraction,
+            surface=self._surface,
+            k_p=self._k_p,
+            deepest_m=self._deepest_m,
+            is_stuck=self._stuck and self._is_held,
+            zero=self._tare.zero,
+            tare_drift_n=self._tare.drift_n,
+            friction_error_nm=self._air.std_error_nm,
+        )
+        return self._learn_stride(stride)
+
+    def _learn_stride(self, stride: ClosingStride) -> Work[Learned]:
+        """Fit k_s and k_e; the next stride may have begun, so no state of the stride under way is read."""
+        stance, extraction, surface = stride.stance, stride.extraction, stride.surface
+        shear = find_shear(self.geometry, stance.batches, surface.depth_m, self.base, self.drag_n)
+        yield
+        k_e = yield from self._learn_extraction(stride)
+        yield
         self.fits = self.fits._replace(
-            k_s=partial(shear_samples, self.geometry, stance.batches, self.surface_m, shear),
-            k_e=partial(extraction_samples, self.geometry, extraction.moving(), self._surface, extraction.first_m),
+            k_s=partial(shear_samples, self.geometry, stance.batches, surface.depth_m, shear),
+            k_e=partial(extraction_samples, self.geometry, extraction.moving(), surface, extraction.first_m),
         )
         return Learned(
-            k_p=self._named(self._k_p),
-            k_s=self._named(self._shear_estimate(shear)),
-            k_e=self._named(self._learn_extraction(extraction)),
-            surface_m=self.surface_m,
+            k_p=_named(stride.k_p, surface),
+            k_s=_named(self._shear_estimate(shear, stride), surface),
+            k_e=_named(k_e, surface),
+            surface_m=surface.depth_m,
             extraction_torque_nm=max([-batch.adduction_nm for batch in extraction.batches], default=UNKNOWN),
-            surface_std_error_m=self._surface.std_error_m,
-            other_surface_m=self._surface.other_m,
+            surface_std_error_m=surface.std_error_m,
+            other_surface_m=surface.other_m,
             stance=shear.case,
-            tare_n=self._tare.zero.weight_n,
-            tare_drift_n=self._tare.drift_n,
+            tare_n=stride.zero.weight_n,
+            tare_drift_n=stride.tare_drift_n,
         )
-
-    def _named(self, estimate: Estimate) -> Estimate:
-        """Add that the trial has two surfaces as the reason of an estimate that has none."""
-        is_ambiguous = isfinite(self._surface.other_m) and not estimate.reason
-        return estimate._replace(reason=TWO_SURFACES) if is_ambiguous else estimate
 
     def _met_mud(self, stance: Sequence[Batch], extraction: Sequence[Batch]) -> bool:
         """Return whether the stance or the extraction needs more torque than friction."""
@@ -190,22 +259,28 @@ class FlipperEstimator(StrideEstimator):
         pulled_nm = median([-batch.adduction_nm for batch in extraction]) if extraction else 0.0
         return self._air.is_push(pushed_nm) or self._air.is_pull(pulled_nm)
 
-    def _learn_extraction(self, stroke: Stroke) -> Estimate:
-        zero_error_n, start_m = self._tare.zero.std_error_n, stroke.first_m
-        reported = fit_extraction(
-            self.geometry, stroke.moving(), self._surface, zero_error_n, self._extractions, start_m
+    def _learn_extraction(self, stride: ClosingStride) -> Work[Estimate]:
+        stroke, surface = stride.extraction, stride.surface
+        reported = yield from fit_extraction(
+            self.geometry, stroke.moving(), surface, stride.zero.std_error_n, self._extractions, stroke.first_m
         )
-        if reported.valid or not (self._stuck and self._is_held):
+        if reported.valid or not stride.is_stuck:
             return reported
-        return bound_extraction(self.geometry, stroke.batches, self._surface)
+        return bound_extraction(self.geometry, stroke.batches, surface)
 
-    def _shear_estimate(self, shear: Shear) -> Estimate:
+    def _shear_estimate(self, shear: Shear, stride: ClosingStride) -> Estimate:
         """Add the errors of friction and of the surface, dk = (n + 1) k dδ / z as pressure and area grow with depth."""
         if shear.fit is None:
             return NOT_THERE._replace(samples=shear.samples, reason=shear.reason or NOT_THERE.reason)
-        depth_m = self._deepest_m - self.surface_m
+        depth_m = stride.deepest_m - stride.surface.depth_m
         power = 1.0 + growth_exponent(self.geometry, depth_m)
-        surface = power * shear.fit.slope * self._surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
-        friction = self._air.std_error_nm / shear.moment_m4
+        surface = power * shear.fit.slope * stride.surface.std_error_m / depth_m if depth_m > 0.0 else 0.0
+        friction = stride.friction_error_nm / shear.moment_m4
         estimate = evaluated(shear.fit, hypot(surface, friction), shear.samples)
         return estimate._replace(at_least=shear.at_least, reason=estimate.reason or shear.reason)
+
+
+def _named(estimate: Estimate, surface: Surface) -> Estimate:
+    """Add that the trial has two surfaces as the reason of an estimate that has none."""
+    is_ambiguous = isfinite(surface.other_m) and not estimate.reason
+    return estimate._replace(reason=TWO_SURFACES) if is_ambiguous else estimate

@@ -1,7 +1,9 @@
 """The estimator that the loop, the replay and the experiments share: all flippers, and the mud from stride to stride.
 
 Its input is drive states, the gait's phase and the body's position, one sample a tick; it uses no bus and no clock. The
-same samples give the same numbers to the last digit, live or from a log. Two methods share its interface: `default`, in
+fits at the ends of a stride take longer than a tick. So the loop adds samples and runs the fits later, in units of
+bounded work, and a replay updates, which runs them at once. The same samples give the same numbers to the last digit,
+live or from a log, however many units run in a tick. Two methods share its interface: `default`, in
 torque space, and `paper`, the published one, with its biases.
 """
 
@@ -9,10 +11,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
+from control.bounded_work import Work, WorkQueue, finish
 from control.bounds import Bounds, Meaning
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, MudEstimate
-from control.records import FLIPPERS, TWO_FLIPPERS, BodyPose, DriveStates, FlipperLoad, Phase, Rig, StrideEstimate
+from control.records import (
+    FLIPPERS,
+    NO_LOAD,
+    TWO_FLIPPERS,
+    BodyPose,
+    DriveStates,
+    FlipperLoad,
+    Phase,
+    Rig,
+    StrideEstimate,
+)
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import NO_COMMANDS, FlipperDrive
 from estimation.knowledge import MudKnowledge
@@ -47,6 +60,13 @@ class MudReading(NamedTuple):
     strides: tuple[StrideEstimate, ...] = ()  # closed by this sample
 
 
+class Sampled(NamedTuple):
+    """The result of one sample before the work that it causes."""
+
+    loads: tuple[FlipperLoad, ...]
+    closing: Work[tuple[StrideEstimate, ...]] | None = None  # estimates the strides that this sample closed
+
+
 class MudEstimator:
     """Owns the flippers' estimators, the memory from stride to stride, and the map along the track."""
 
@@ -60,17 +80,20 @@ class MudEstimator:
     ) -> None:
         """`drives` has one item for each flipper; a thrust below `body_drag_n` cannot move the body."""
         drag_n = body_drag_n / len(rig.flippers)
+        self.work = WorkQueue()  # of the ends of insertions
         self.flippers = tuple(
-            _flipper_estimator(flipper, geometry, drive, parameters, drag_n)
+            _flipper_estimator(flipper, geometry, drive, parameters, drag_n, self.work)
             for flipper, drive in zip(rig.flippers, drives, strict=True)
         )
         self._knowledge = MudKnowledge()
         self._commands_s = NO_COMMANDS  # the loop sends new commands after each sample
-        self._closed: list[StrideEstimate] = []  # of one flipper, while the other one waits for its exit
+        self._closed: list[Work[StrideEstimate]] = []  # of one flipper, while the other one waits for its exit
         self.map = MudMap()
         self.mud_estimate: MudEstimate = NOTHING_KNOWN
 
     def reset(self) -> None:
+        """Forget everything; work that is not finished is dropped."""
+        self.work.clear()
         for flipper in self.flippers:
             flipper.reset()
         self._knowledge.reset()
@@ -84,28 +107,53 @@ class MudEstimator:
         return next(each.fits for each in self.flippers if each.flipper == flipper)
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> MudReading:
+        """Add a sample and finish all the work that it causes."""
+        loads, closing = self.add(now_s, phase, states, body)
+        if not self.work.is_empty:
+            self.work.finish()
+            pairs = zip(loads, self.flippers, strict=True)
+            loads = tuple(NO_LOAD if load is NO_LOAD else flipper.load for load, flipper in pairs)
+        return MudReading(loads, () if closing is None else finish(closing))
+
+    def add(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> Sampled:
         """Take in the newest state of every drive and the body's pose, in the gait's phase that they belong to."""
         commands_s, self._commands_s = self._commands_s, (self._commands_s[1], now_s)
         body_x_m = body.x_m
         loads, joints = [], iter(states)
         for flipper in self.flippers:
-            load, stride = flipper.update(now_s, phase, next(joints), next(joints), body_x_m, commands_s)
+            load, stride = flipper.add(now_s, phase, next(joints), next(joints), body_x_m, commands_s)
             loads.append(load)
             if stride is not None:
                 self._closed.append(stride)
         if not self._closed or any([flipper.is_closing for flipper in self.flippers]):
-            return MudReading(tuple(loads))
-        strides = tuple(sorted(self._closed, key=lambda stride: (stride.index, FLIPPERS.index(stride.flipper))))
+            return Sampled(tuple(loads))
+        closing = self._estimate(tuple(self._closed), body_x_m)
         self._closed.clear()
+        return Sampled(tuple(loads), closing)
+
+    def _estimate(self, closed: Sequence[Work[StrideEstimate]], body_x_m: float) -> Work[tuple[StrideEstimate, ...]]:
+        """Estimate the strides that closed, and the mud after them."""
+        yield  # the tick in which the strides closed has enough to do
+        found = []
+        for each in closed:
+            found.append((yield from each))
+            yield
+        strides = tuple(sorted(found, key=lambda stride: (stride.index, FLIPPERS.index(stride.flipper))))
         self.mud_estimate = self._knowledge.update(strides)
+        yield
         self.map.update(body_x_m, strides)
-        return MudReading(tuple(loads), strides)
+        return strides
 
 
 def _flipper_estimator(
-    flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, parameters: EstimationParameters, drag_n: float
+    flipper: str,
+    geometry: FlipperGeometry,
+    drive: FlipperDrive,
+    parameters: EstimationParameters,
+    drag_n: float,
+    work: WorkQueue,
 ) -> FlipperEstimator | PaperEstimator:
     if parameters.method == "paper":
-        return PaperEstimator(flipper, geometry, drive, drag_n if parameters.paper.compensation else 0.0)
+        return PaperEstimator(flipper, geometry, drive, drag_n if parameters.paper.compensation else 0.0, work)
     base = Base.FIXED if parameters.fixed_base else Base.FREE
-    return FlipperEstimator(flipper, geometry, drive, base, drag_n, parameters.surface_error_m)
+    return FlipperEstimator(flipper, geometry, drive, base, drag_n, parameters.surface_error_m, work)

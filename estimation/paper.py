@@ -14,6 +14,7 @@ mud the paper adds the body's drag to f_x; with `compensation`, half of it is ad
 
 from math import isfinite
 
+from control.bounded_work import Work, WorkQueue, finished
 from control.geometry import FlipperGeometry
 from control.plate.integrals import mean_width_m, moment_width_m
 from control.records import UNKNOWN, FlipperLoad, Phase
@@ -31,11 +32,18 @@ ADVANCED_M = 0.002  # from here on the body counts as advancing
 class PaperEstimator(StrideEstimator):
     """Owns the running sums of the stride under way of one flipper."""
 
-    def __init__(self, flipper: str, geometry: FlipperGeometry, drive: FlipperDrive, drag_n: float = 0.0) -> None:
+    def __init__(
+        self,
+        flipper: str,
+        geometry: FlipperGeometry,
+        drive: FlipperDrive,
+        drag_n: float = 0.0,
+        work: WorkQueue | None = None,
+    ) -> None:
         """`drag_n`, the body's drag on each flipper, is added to the thrust while the body advances; 0: as measured."""
         self.drag_n = drag_n
         self._penetration, self._shear, self._extraction = LineFit(), LineFit(), LineFit()
-        super().__init__(flipper, geometry, drive, motion_at)
+        super().__init__(flipper, geometry, drive, motion_at, work)
 
     def _reset_stride(self) -> None:
         for fit in (self._penetration, self._shear, self._extraction):
@@ -49,14 +57,14 @@ class PaperEstimator(StrideEstimator):
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
         length_m = self.geometry.flipper_length_m
         force_n = paper_force_n(load.sweep_rad, load.adduction_rad, load.sweep_nm, load.adduction_nm, length_m)
-        self._load = FlipperLoad(load.sweep_nm, load.adduction_nm, *force_n, load.depth_m)
-        self._record_extremes(phase, self._load, body_x_m)
+        self.load = FlipperLoad(load.sweep_nm, load.adduction_nm, *force_n, load.depth_m)
+        self._record_extremes(phase, self.load, body_x_m)
         if phase is Phase.INSERTION:
-            self._learn_insertion(self._load)
+            self._learn_insertion(self.load)
         elif phase is Phase.STANCE:
-            self._learn_stance(load.sweep_rad, self._load, body_x_m)
+            self._learn_stance(load.sweep_rad, self.load, body_x_m)
         elif phase is Phase.EXTRACTION:
-            self._learn_extraction(self._load)
+            self._learn_extraction(self.load)
 
     def _learn_insertion(self, load: FlipperLoad) -> None:
         if not isfinite(self._surface_m):
@@ -95,14 +103,15 @@ class PaperEstimator(StrideEstimator):
         """The detected surface, or the nominal one before it is detected."""
         return self._surface_m if isfinite(self._surface_m) else 0.0
 
-    def _learned(self) -> Learned:
+    def _learned(self) -> Work[Learned]:
         k_p = self._penetration.estimate()
         if not isfinite(self._surface_m):
             k_p = k_p._replace(reason=f"no force above {SURFACE_FORCE_N} N in insertion")
-        return Learned(
+        learned = Learned(
             k_p=k_p,
             k_s=self._shear.estimate(),
             k_e=self._extraction.estimate(),
             surface_m=self.surface_m,
             extraction_torque_nm=self._extraction_nm,
         )
+        return finished(learned)

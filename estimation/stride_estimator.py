@@ -1,15 +1,19 @@
 """The shell of both estimators: it follows one flipper through its strides and closes each of them in swing.
 
 A method learns coefficients from the samples of a stride; the shell does the rest. It turns currents into loads, counts
-phases and strides, records the largest forces, and assembles the estimate of a stride once the flipper has left the mud
-after its extraction. The methods are `FlipperEstimator` (flipper.py) and `PaperEstimator` (paper.py).
+phases and strides, records the largest forces, and closes a stride once the flipper has left the mud after its
+extraction. Its estimate takes longer than a tick, so a stride that closes gives work (control/bounded_work.py), which
+depends on nothing that is measured later. The methods are `FlipperEstimator` (flipper.py) and `PaperEstimator`
+(paper.py).
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from math import inf, isfinite
 from typing import NamedTuple
 
+from control.bounded_work import Work, WorkQueue
 from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate
@@ -44,7 +48,10 @@ class StrideEstimator(ABC):
         geometry: FlipperGeometry,
         drive: FlipperDrive,
         motion: Callable[[DriveState, DriveState, CommandTimes], JointMotion],
+        work: WorkQueue | None = None,
     ) -> None:
+        """`work` is the queue for what takes longer than a tick; the flippers of a robot share it."""
+        self.work = WorkQueue() if work is None else work
         self.flipper = flipper
         self.geometry = geometry
         self.fits: StrideFits = NO_FITS  # of the stride that closed last, until its next insertion
@@ -56,7 +63,7 @@ class StrideEstimator(ABC):
         """Forget everything, the count of strides included."""
         self._loads.reset()
         self._clock.reset()
-        self._load = NO_LOAD
+        self.load = NO_LOAD
         self._body_at_close_m = UNKNOWN
         self._begin_stride(0.0, UNKNOWN)
 
@@ -70,7 +77,7 @@ class StrideEstimator(ABC):
             self._body_at_close_m = body_x_m
         self._reset_stride()
 
-    def update(
+    def add(
         self,
         now_s: float,
         phase: Phase,
@@ -78,8 +85,9 @@ class StrideEstimator(ABC):
         adduction: DriveState,
         body_x_m: float,
         commands_s: CommandTimes = NO_COMMANDS,
-    ) -> tuple[FlipperLoad, StrideEstimate | None]:
-        """Return the load now and, once the flipper has left the mud after its extraction, the estimate of the stride.
+    ) -> tuple[FlipperLoad, Work[StrideEstimate] | None]:
+        """Return the load now and, once the flipper has left the mud after its extraction, the work that estimates the
+        stride.
 
         A flipper that is still in the mud has GRACE_S to come out.
         """
@@ -93,9 +101,9 @@ class StrideEstimator(ABC):
         load = self._loads.update(sweep, adduction, commands_s)
         if load is not None:
             self._learn(now_s, phase, load, body_x_m)
-        return self._load, closed
+        return self.load, closed
 
-    def _change_phase(self, now_s: float, phase: Phase, body_x_m: float) -> StrideEstimate | None:
+    def _change_phase(self, now_s: float, phase: Phase, body_x_m: float) -> Work[StrideEstimate] | None:
         change = self._clock.change(now_s, phase)
         self._end_phase(now_s, change.ended)
         if change.ended is Phase.EXTRACTION:
@@ -112,7 +120,7 @@ class StrideEstimator(ABC):
         self._begin_phase(phase)
         return closed
 
-    def _wait_for_exit(self, now_s: float, body_x_m: float) -> StrideEstimate | None:
+    def _wait_for_exit(self, now_s: float, body_x_m: float) -> Work[StrideEstimate] | None:
         """Close the stride that waits, as soon as its flipper is out of the mud or is held by it."""
         is_in_mud = self._is_in_mud()
         if is_in_mud and now_s - self._extracted_s < GRACE_S:
@@ -128,9 +136,11 @@ class StrideEstimator(ABC):
     def _is_in_mud(self) -> bool:
         return is_in_mud(self.geometry, *self._loads.angles_rad)
 
-    def _close(self, now_s: float, body_x_m: float) -> StrideEstimate:
-        learned, duration_s = self._learned(), self._clock.duration_s
-        estimate = StrideEstimate(
+    def _close(self, now_s: float, body_x_m: float) -> Work[StrideEstimate]:
+        """Close the stride; the work that is returned has all that was measured."""
+        duration_s = self._clock.duration_s
+        measured = partial(
+            StrideEstimate,
             flipper=self.flipper,
             index=self._clock.index,
             t_start_s=self._clock.start_s,
@@ -138,27 +148,16 @@ class StrideEstimator(ABC):
             insertion_s=duration_s[Phase.INSERTION],
             stance_s=duration_s[Phase.STANCE],
             extraction_s=duration_s[Phase.EXTRACTION],
-            k_p=learned.k_p,
-            k_s=learned.k_s,
-            k_e=learned.k_e,
-            surface_m=learned.surface_m,
-            surface_std_error_m=learned.surface_std_error_m,
-            other_surface_m=learned.other_surface_m,
-            depth_m=self._deepest_m - learned.surface_m,
             released=not self._stuck,
             insertion_force_n=self._insertion_n,
             stance_force_n=self._stance_n,
             extraction_force_n=self._extraction_n,
             step_m=body_x_m - self._body_at_close_m,
             position_m=self._body_at_insertion_m,
-            stance=learned.stance,
-            tare_n=learned.tare_n,
-            tare_drift_n=learned.tare_drift_n,
-            extraction_torque_nm=learned.extraction_torque_nm,
         )
         self._clock.index += 1
         self._body_at_close_m = body_x_m
-        return estimate
+        return _estimated(measured, self._deepest_m, self._learned())
 
     def _record_extremes(self, phase: Phase, load: FlipperLoad, body_x_m: float) -> None:
         """Record the largest forces of the stride, and where the body was at the end of the insertion."""
@@ -176,17 +175,24 @@ class StrideEstimator(ABC):
 
     @abstractmethod
     def _learn(self, now_s: float, phase: Phase, load: JointLoad, body_x_m: float) -> None:
-        """Take in a new load: set `_load` and `_deepest_m`, and call `_record_extremes`."""
+        """Take in a new load: set `load` and `_deepest_m`, and call `_record_extremes`."""
 
     @abstractmethod
-    def _learned(self) -> Learned:
-        """Return the result of the stride that closes."""
+    def _learned(self) -> Work[Learned]:
+        """Return the work that gives the result of the stride that closes, on what is known now."""
 
     def _end_phase(self, now_s: float, ended: Phase) -> None:  # noqa: B027  a method may ignore it
         """React to the end of a phase."""
 
     def _begin_phase(self, phase: Phase) -> None:  # noqa: B027
         """React to the beginning of a phase, after a stride that ends with it has closed."""
+
+
+def _estimated(
+    measured: Callable[..., StrideEstimate], deepest_m: float, learning: Work[Learned]
+) -> Work[StrideEstimate]:
+    learned = yield from learning
+    return measured(depth_m=deepest_m - learned.surface_m, **learned._asdict())
 
 
 def larger(value: float, largest: float) -> float:

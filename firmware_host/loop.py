@@ -1,9 +1,10 @@
 """The control loop: one tick of the robot, from the bus to the bus.
 
-`Loop.tick` is the whole control path and reads in the order in which it happens. The same object runs in the daemon,
-in simulation and in tests, with the drives, the pose source and the recorder that it is given. It owns the mode, the
-present faults and the last command. Its parts are public for the daemon and for fault injection; everything that only
-reads takes a snapshot (loop_snapshot.py).
+`Loop.tick` is the whole control path and reads in the order in which it happens. The estimates at a stride's ends are
+computed after the command, a bounded unit a tick (mud_learning.py). The same object runs in the daemon, in simulation
+and in tests, with the drives, the pose source and the recorder that it is given. It owns the mode, the present faults
+and the last command. Its parts are public for the daemon and for fault injection; everything that only reads takes a
+snapshot (loop_snapshot.py).
 """
 
 import time
@@ -23,7 +24,7 @@ from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.log.recorder import Recording
-from firmware_host.log.rows import STRIDE_KIND, TICK_KIND, stride_row, tick_packing
+from firmware_host.log.rows import TICK_KIND, tick_packing
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
@@ -78,14 +79,14 @@ class Loop:
         self._tick_row = tick_packing(configuration.rig)
 
     def tick(self, tick: Tick) -> None:
-        """Read the drives, learn from the mud, choose the mode, control the joints, send the torques, and record."""
+        """Read the drives, choose the mode, control the joints, send the torques, learn from the mud, and record."""
         now_s = tick.now_s
         self.missed_ticks += tick.missed
         self.target = self.controller.target
         self.states = self.drives.read(now_s)
         self.body = self.pose.read(now_s)
         self.learning.update(now_s, self.target.phase, self.states, self.body)
-        self._adapt_gait(now_s)
+        self.learning.adapt(self.controller)
         self.health = self._examine(tick, self._end_lost_lease(now_s))
         self._enter(next_mode(self.mode, self._pop_request(), self.health), now_s)
         self.forced = self.forced and self.mode in ENERGISED
@@ -93,7 +94,9 @@ class Loop:
             self._end_move(now_s, fault_message(self.fault))
         self.sent = self._limit(self._control(tick.missed))
         self._command(now_s)
-        self._record(tick)
+        sent_s = self._clock()
+        self.events.report_learning(now_s, self.learning.step(self.controller, LONGEST_STEP_TICKS * self.period_s))
+        self._record(tick, sent_s - now_s)
 
     @property
     def fault(self) -> Fault | None:
@@ -104,14 +107,6 @@ class Loop:
     def stride_depth_m(self) -> float:
         """The commanded depth of this stride."""
         return self.controller.gait.commanded_depth_m
-
-    def _adapt_gait(self, now_s: float) -> None:
-        """Choose the next stride's depth once a stride, in swing; end an insertion that meets solid mud."""
-        closed, messages = self.learning.step(self.controller)
-        for message in messages:
-            self.events.report(now_s, message)
-        for stride in closed:
-            self.recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
 
     def _end_lost_lease(self, now_s: float) -> str:
         """Return the name of the program that lost the lease, if this is a fault; with torque off it just ends."""
@@ -128,7 +123,7 @@ class Loop:
 
     def _examine(self, tick: Tick, lost_lease_holder: str) -> Health:
         """Detect and latch faults, and collect the facts that the mode depends on."""
-        present = self.fault_monitor.update(tick, self._monitor_input(lost_lease_holder)) + self.learning.faults
+        present = self.fault_monitor.update(tick, self._monitor_input(lost_lease_holder)) + self.learning.pop_faults()
         if self.controller.fault:
             present.append(self.controller.fault)
         clearing = tick.now_s <= self._clearing_until_s
@@ -180,6 +175,7 @@ class Loop:
         flippers_up = self.controller.is_up(self.states)
         self.events.report_mode_change(now_s, self.mode, mode, self.fault, self.health.rested, flippers_up)
         if mode is Mode.WALKING:
+            self.events.report_learning(now_s, self.learning.finish())
             self.learning.reset(self.controller.order.depth_m)
         if mode is Mode.ARMING:
             self._clearing_until_s = NEVER_S  # a request to clear does not apply to faults from here on
@@ -228,9 +224,9 @@ class Loop:
             self.drives.request_settings(now_s)
         self.drives.send(self.sent.torques_nm, self.period_s)
 
-    def _record(self, tick: Tick) -> None:
+    def _record(self, tick: Tick, sent_s: float) -> None:
         tick_s = self._clock() - tick.now_s
-        self.recorder.put(TICK_KIND, self._tick_row(tick, tick_s, self))
+        self.recorder.put(TICK_KIND, self._tick_row(tick, sent_s, self))
         if self.controller.recovery.events:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)

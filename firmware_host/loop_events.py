@@ -10,7 +10,8 @@ from math import inf
 from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.log.recorder import Recording
-from firmware_host.log.rows import EVENT, EVENT_KIND
+from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, stride_row
+from firmware_host.mud_learning import LearningReport
 from firmware_host.operator.fault_texts import fault_advice, fault_message
 
 REQUEST_PERIOD_S = 1.0
@@ -59,6 +60,13 @@ class LoopEvents:
         """Write a message into the log and keep it as the notice."""
         self.notice = message
         self.report(now_s, message)
+
+    def report_learning(self, now_s: float, learned: LearningReport) -> None:
+        """Write the strides that closed, and what was chosen after them."""
+        for message in learned.messages:
+            self.report(now_s, message)
+        for stride in learned.strides:
+            self._recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
 
     def report_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
         for fault in begun:

@@ -101,7 +101,7 @@ def take_snapshot(loop: Loop) -> LoopSnapshot:
             for name, port in drives.ports.items()
         ),
         frames=FrameCounts(drives.unknown_frames, drives.malformed_frames, drives.refused_commands),
-        loads=dict(zip(loop.configuration.rig.flippers, learning.reading.loads, strict=True)),
+        loads=dict(zip(loop.configuration.rig.flippers, learning.loads, strict=True)),
         body=loop.body,
         pose=loop.pose.report(),
         sent=loop.sent,

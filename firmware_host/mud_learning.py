@@ -1,24 +1,36 @@
 """Learns the mud's coefficients while the robot walks, and adapts the gait to them.
 
 Each sample goes to the estimator together with the phase in which the measured motion was commanded, as in the log.
-Once a stride, in swing, the depth of the next stride is chosen. An insertion that meets solid mud ends early.
+An insertion that meets solid mud ends early. Once a stride, in swing, the strides of all flippers close, and the depth
+of the next stride is chosen.
+
+What takes longer than a tick, the fits at the end of an insertion and the close with its choice, is bounded work
+(control/bounded_work.py). The loop runs one unit a tick after the command of that tick, so an insertion is fitted
+within 16 ticks, and a stride closes 24 ticks after its swing began (some 50 by the method `gait`), at the latest before
+the next insertion uses its choice: all units run at once in a swing that is too short for them, and in a new walk,
+whose beginning finishes the strides of the one before. A choice that comes only after the next insertion began is
+logged as such.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from control.controller import Controller
+from control.bounded_work import Work
+from control.controller import Controller, WalkOrder
 from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthAdaptation, DepthChoice, Method
 from control.depth.gait_choice import GaitAdaptation
 from control.depth.paper_choice import PaperAdaptation
 from control.faults import Fault, FaultKind
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
-from control.records import NO_LOAD, BodyPose, DriveStates, Estimate, Phase, Rig, StrideEstimate
-from estimation.mud import MudEstimator, MudReading
+from control.records import NO_LOAD, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
+from estimation.mud import MudEstimator
 from firmware_host.configuration.configuration import Configuration
 
 FIRM_TICKS = 3  # with a high load until an insertion ends: one outlier does not end it
+UNITS_PER_TICK = 1  # of bounded work
+ALL_UNITS = 10_000
+STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION)
 STORED_STRIDES = 200  # for clients of the status socket
 LARGEST_N_M3 = 1e10  # 10 kN/cm³, a thousand times the stiffest mud
 
@@ -37,6 +49,16 @@ class ClosedStride(NamedTuple):
     chosen_depth_m: float
 
 
+class LearningReport(NamedTuple):
+    """The results of the last units, for the log."""
+
+    strides: Sequence[ClosedStride] = ()
+    messages: Sequence[str] = ()
+
+
+NOTHING_LEARNED = LearningReport()
+
+
 class MudLearning:
     """Owns the estimator, the choice of depth and the latest strides."""
 
@@ -52,51 +74,89 @@ class MudLearning:
         self.adaptation = method(
             configuration.adaptation, configuration.geometry, configuration.gait, configuration.rig
         )
-        self.reading = MudReading(tuple(NO_LOAD for _ in configuration.rig.flippers))
+        self.loads: tuple[FlipperLoad, ...] = tuple(NO_LOAD for _ in configuration.rig.flippers)
+        self.units_per_tick = UNITS_PER_TICK
         self.strides: list[ClosedStride] = []
         self.strides_closed = 0  # since the start
         self.depth_reason = ""  # of the next stride
         self._firm_ticks = 0
+        self._turns = configuration.adaptation.method == "gait"
+        self._closing: Work[tuple[StrideEstimate, ...]] | None = None  # begun by the last sample
+        self._closed: list[ClosedStride] = []  # since the last report
+        self._messages: list[str] = []  # likewise
+        self._unexamined: list[StrideEstimate] = []
 
     def reset(self, depth_m: float) -> None:
-        """Start a new walk; earlier strides stay stored."""
+        """Start a new walk; earlier strides stay stored. Work that is not finished is dropped: run all units before."""
         self.estimator.reset()
         self.adaptation.reset(depth_m)
         self.depth_reason = "start"
         self._firm_ticks = 0
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
-        self.reading = self.estimator.update(now_s, phase, states, body)
+        """Take in a sample."""
+        self.loads, self._closing = self.estimator.add(now_s, phase, states, body)
 
-    def step(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
-        """Adapt the gait in this tick; returns the strides that closed, and messages for the log."""
-        closed, messages = self._close(controller) if self.reading.strides else ([], [])
+    def adapt(self, controller: Controller) -> None:
+        """Begin to close the strides that the last sample ended; end an insertion that has met solid mud."""
+        closing, self._closing = self._closing, None
+        if closing is not None:
+            work = self._close(closing, controller, controller.order, controller.gait.commanded_depth_m)
+            self.estimator.work.add(work)
         if self._is_firm(controller) and controller.gait.end_insertion():
-            messages.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: solid mud")
-        return closed, messages
+            self._messages.append(f"insertion ended at {controller.gait.commanded_depth_m:.4f} m: solid mud")
 
-    def _close(self, controller: Controller) -> tuple[list[ClosedStride], list[str]]:
+    def step(self, controller: Controller, within_s: float) -> LearningReport:
+        """Run the units of this tick, or all if the next stride's depth must be set within this time."""
+        if not self.estimator.work.is_empty:
+            due = controller.gait.is_choice_due(within_s, self._turns)
+            self.estimator.work.run(ALL_UNITS if due else self.units_per_tick)
+        return self._pop_report()
+
+    def finish(self) -> LearningReport:
+        """Run all units that are left."""
+        self.estimator.work.finish()
+        return self._pop_report()
+
+    def _pop_report(self) -> LearningReport:
+        if not (self._closed or self._messages):
+            return NOTHING_LEARNED
+        report = LearningReport(self._closed, self._messages)
+        self._closed, self._messages = [], []
+        return report
+
+    def _close(
+        self, closing: Work[tuple[StrideEstimate, ...]], controller: Controller, order: WalkOrder, walked_m: float
+    ) -> Work[None]:
+        """Estimate the strides that end, choose the depth of the next one, and publish both."""
+        strides = yield from closing
+        yield
         messages = ["another mud"] if self.estimator.mud_estimate.boundary else []
-        messages += self._choose(controller)
-        depth_m = controller.gait.next_depth_m
-        first = self.strides_closed
-        closed = [ClosedStride(first + i, estimate, depth_m) for i, estimate in enumerate(self.reading.strides)]
+        messages += yield from self._choose(controller, order, strides, walked_m)
+        self._messages += messages
+        depth_m, first = controller.gait.next_depth_m, self.strides_closed
+        closed = [ClosedStride(first + i, estimate, depth_m) for i, estimate in enumerate(strides)]
+        self._closed += closed
+        self._unexamined += strides
         self.strides_closed += len(closed)
         self.strides = (self.strides + closed)[-STORED_STRIDES:]
-        return closed, messages
 
-    def _choose(self, controller: Controller) -> list[str]:
+    def _choose(
+        self, controller: Controller, order: WalkOrder, strides: Sequence[StrideEstimate], walked_m: float
+    ) -> Work[list[str]]:
         """Choose the depth of the next stride, and its gait if the method chooses that too; returns messages."""
-        gait, order = controller.gait, controller.order
+        gait = controller.gait
         if not order.adaptive:
             gait.next_depth_m, self.depth_reason = order.depth_m, "fixed"
             return []
-        choice = self.adaptation.step(self.estimator.mud_estimate, self.reading.strides, gait.commanded_depth_m)
+        choice = yield from self.adaptation.choose(self.estimator.mud_estimate, strides, walked_m)
         parameters = choice.gait or gait.parameters
         self.depth_reason = _reason_text(choice)
-        changes = (choice.depth_m, parameters) != (gait.next_depth_m, gait.next_parameters)
+        if (choice.depth_m, parameters) == (gait.next_depth_m, gait.next_parameters):
+            return []
         gait.next_depth_m, gait.next_parameters = choice.depth_m, parameters
-        return [_choice_text(choice)] if changes else []
+        late = ["the depth was chosen after the next insertion began"] if controller.target.phase in STROKES else []
+        return [_choice_text(choice), *late]
 
     def _is_firm(self, controller: Controller) -> bool:
         """Whether an insertion of an adaptive walk has met solid mud."""
@@ -104,14 +164,14 @@ class MudLearning:
             self._firm_ticks = 0
             return False
         limit_nm = self.adaptation.largest_insertion_nm
-        firm = any([load.adduction_torque_nm > limit_nm for load in self.reading.loads])
+        firm = any([load.adduction_torque_nm > limit_nm for load in self.loads])
         self._firm_ticks = self._firm_ticks + 1 if firm else 0
         return self._firm_ticks >= FIRM_TICKS
 
-    @property
-    def faults(self) -> list[Fault]:
-        """Faults of strides in this tick whose coefficients are beyond what any mud has."""
-        wild = [stride for stride in self.reading.strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
+    def pop_faults(self) -> list[Fault]:
+        """Return faults of the strides that closed since the last call: coefficients beyond what any mud has."""
+        strides, self._unexamined = self._unexamined, []
+        wild = [stride for stride in strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
         return [FaultKind.ESTIMATE_WILD.fault(each.flipper, stride=each.index) for each in wild]
 
 

@@ -14,6 +14,10 @@ Robot = TypeVar("Robot", bound=Lockstep)
 
 
 def copy_of(robot: Robot) -> Robot:
-    """Returns an independent robot in exactly the same state."""
+    """Returns an independent robot in exactly the same state.
+
+    Work that is not finished cannot be copied; finishing it in this tick changes no digit of its result.
+    """
+    robot.loop.learning.estimator.work.finish()
     shared = [robot.loop.configuration, *MESSAGES]
     return deepcopy(robot, {id(each): each for each in shared})

@@ -9,14 +9,15 @@ recv (`python-can`). `--bus` measures only one of them; `--drive` chooses the ty
 with two motors on one bus walks in turn with the robot, and `two_motors` compares its ticks.
 
 `ratios` hardly depend on the computer: whole ticks in reads and sends of their frames by bare sockets
-(bare_sockets.py), which take turns with them, and cold ticks, ticks that close a stride, and the longest tick in whole
-ticks. All are medians but the longest.
+(bare_sockets.py), which take turns with them, and, in whole ticks, cold ticks, the longest tick of each end of an
+insertion or a stride, and the longest of all. All but the last are medians.
 
 `serving_us` is the cost of serving the status socket after a tick: without a request, with a viewer's request for the
 status, and with one for the largest answer (served_walk.py).
 
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
-of one mark, some 0.2 us; whole ticks carry one reading of the clock.
+of one mark, some 0.2 us; whole ticks carry one reading of the clock. The ends of an insertion and of a stride have work
+that is spread over ticks: `longest_us` summarises the longest tick of each of them.
 """
 
 import sys
@@ -63,12 +64,12 @@ def measure_variant(variant: str, seconds: int, folder: Path, drive: str, fulles
         return report | {"two_motors": {"whole_us": two_motors["whole_us"], "ratio": round(ratio, 3)}}
 
 
-def _ratios(report: dict[str, Any]) -> dict[str, float]:
-    whole_us = report["whole_us"]["median"]
+def _ratios(report: dict[str, Any]) -> dict[str, float | None]:
+    whole_us, ends = report["whole_us"]["median"], report["longest_us"]["ends"]
     return {
         "hot_to_bare_sockets": round(whole_us / report["bare_sockets_us"]["median"], 2),
         "cold_to_hot": round(report["cold_us"]["median"] / whole_us, 2),
-        "closing_to_hot": round(report["whole_closing_us"]["median"] / whole_us, 2),
+        "ends_to_hot": round(report["longest_us"]["median"] / whole_us, 2) if ends else None,
         "longest_to_hot": round(report["whole_us"]["max"] / whole_us, 2),
     }
 

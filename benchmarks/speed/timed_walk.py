@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 from time import perf_counter, sleep
 from typing import Any
 
@@ -27,11 +28,12 @@ STAGES = {  # in their order, by the loop's method that begins each
     "read": "drives.read",  # drain the buses, decode
     "pose": "pose.read",  # simulated here
     "estimate": "learning.update",  # both flippers
-    "adapt": "_adapt_gait",  # no stride closes
+    "adapt": "learning.adapt",  # an insertion that meets solid mud ends
     "mode": "_examine",  # examine, request, next mode
     "controller": "controller.step",  # gait, inverse kinematics, PD
     "limits": "_limit",
     "command": "_command",  # encode and send four torques
+    "learn": "learning.step",  # after the command: one unit of the work at a stride's ends
     "record": "_record",  # row packing and the pipe
 }
 
@@ -66,14 +68,13 @@ class StageMarks:
 
 
 class Samples:
-    """Durations in seconds. Only ticks that close a stride choose a depth: their `adapt` is separate."""
+    """Durations in seconds."""
 
     def __init__(self) -> None:
         self.whole: list[float] = []
-        self.whole_closing: list[float] = []  # of those, the ones that close a stride
+        self.longest: list[float] = []  # tick of each end of an insertion or of a stride
         self.cold: list[float] = []  # after the processor has slept for a period
         self.stages: dict[str, list[float]] = {stage: [] for stage in STAGES}
-        self.adapt_closing: list[float] = []
 
 
 class TimedWalk:
@@ -94,52 +95,49 @@ class TimedWalk:
 
     def run_blocks(self) -> None:
         """Runs one block of each kind."""
-        for _ in range(BLOCK_TICKS):
-            duration_s, closing = self.tick()
-            self.samples.whole.append(duration_s)
-            if closing:
-                self.samples.whole_closing.append(duration_s)
+        block = [self.tick() for _ in range(BLOCK_TICKS)]
+        self.samples.whole += [duration_s for duration_s, _ in block]
+        runs = [(worked, [duration_s for duration_s, _ in ticks]) for worked, ticks in groupby(block, itemgetter(1))]
+        self.samples.longest += [max(durations_s) for worked, durations_s in runs[1:-1] if worked]  # whole ones
         for _ in range(BLOCK_TICKS // COLD_FRACTION):
             sleep(PERIOD_S)
             self.samples.cold.append(self.tick()[0])
         with self.marks.attached():
             for _ in range(BLOCK_TICKS):
-                self._add_stages(*self._marked_tick())
+                self._add_stages(self._marked_tick())
         if self.walk.loop.mode is not Mode.WALKING:
             raise RuntimeError(f"the robot does not walk any more: {self.walk.loop.fault}")
 
     def tick(self) -> tuple[float, bool]:
-        """Returns the duration of one whole tick, and whether it closed a stride."""
+        """Returns the duration of one whole tick, and whether it had work of the end of an insertion or a stride."""
         walk = self.walk
         walk.tick_number += 1
         walk.robot.advance(walk.now_s)
-        tick, closed_before = Tick(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.learning.strides_closed
+        tick, work = Tick(walk.now_s, 0.0, walk.tick_number, 0), walk.loop.learning.estimator.work
+        worked = not work.is_empty
         start_s = perf_counter()
         walk.loop.tick(tick)
-        return perf_counter() - start_s, walk.loop.learning.strides_closed > closed_before
+        duration_s = perf_counter() - start_s
+        return duration_s, worked or not work.is_empty
 
-    def _marked_tick(self) -> tuple[dict[str, float], bool]:
+    def _marked_tick(self) -> dict[str, float]:
         moments_s = self.marks.moments_s
         moments_s.clear()
-        _, closing = self.tick()
+        self.tick()
         moments_s.append(perf_counter())
         durations_s = (end_s - start_s for start_s, end_s in pairwise(moments_s))
-        return dict(zip(STAGES, durations_s, strict=True)), closing
+        return dict(zip(STAGES, durations_s, strict=True))
 
-    def _add_stages(self, stages: dict[str, float], closing: bool) -> None:
+    def _add_stages(self, stages: dict[str, float]) -> None:
         for stage, duration_s in stages.items():
-            if closing and stage == "adapt":
-                self.samples.adapt_closing.append(duration_s)
-            else:
-                self.samples.stages[stage].append(duration_s)
+            self.samples.stages[stage].append(duration_s)
 
     def report(self) -> dict[str, Any]:
-        samples = self.samples
+        samples, ends = self.samples, len(self.samples.longest)
         return {
             "whole_us": summary_us(samples.whole) | {"ticks": len(samples.whole)},
-            "whole_closing_us": summary_us(samples.whole_closing) | {"ticks": len(samples.whole_closing)},
+            "longest_us": summary_us(samples.longest) | {"ends": ends},
             "cold_us": summary_us(samples.cold) | {"ticks": len(samples.cold)},
             "stages_us": {stage: summary_us(durations_s) for stage, durations_s in samples.stages.items()},
-            "adapt_closing_us": summary_us(samples.adapt_closing) | {"ticks": len(samples.adapt_closing)},
             "dropped_rows": self.recorder.dropped,
         }

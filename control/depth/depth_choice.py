@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, Protocol
 
+from control.bounded_work import Work, batched
 from control.bounds import Bounds, Meaning
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of
@@ -31,6 +32,7 @@ from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
+DEPTHS_PER_UNIT, STEPS_PER_UNIT, EXTRACTIONS_PER_UNIT = 3, 4, 4  # of bounded work: less than half a tick
 Method = Literal["default", "paper", "gait"]
 
 
@@ -99,8 +101,13 @@ class Adaptation(Protocol):
 
     def reset(self, depth_m: float) -> None: ...
 
-    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
-        """Choose from the strides that just closed at the commanded depth `walked_m`, and the estimate after them."""
+    def choose(
+        self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
+    ) -> Work[DepthChoice]:
+        """Choose from the strides that just closed at the commanded depth `walked_m`, and the estimate after them.
+
+        The choice is work in bounded units, of which the loop runs one a tick.
+        """
 
 
 class Candidate(NamedTuple):
@@ -161,15 +168,18 @@ class DepthAdaptation:
         self.choice = DepthChoice(depth_m, False, "start")
         self.forecast.reset()
 
-    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+    def choose(
+        self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
+    ) -> Work[DepthChoice]:
         """Choose the next stride; without an estimate of the thrust it stays the same, unless a flipper was stuck."""
         self.forecast.update(mud_estimate, strides, walked_m)
+        yield
         stuck = any(not stride.released for stride in strides)
-        steps_m = self._steps_m()
+        steps_m = yield from self._steps_m()
         if steps_m or stuck:
-            index, reason = self._fastest(steps_m or [0.0] * len(self.candidates))
+            index, reason = yield from self._fastest(steps_m or [0.0] * len(self.candidates))
             slips = bool(steps_m) and steps_m[index] < self.geometry.flipper_length_m / 2.0
-            self.choice = self._choose(self.candidates[index], slips, "a flipper was stuck" if stuck else reason)
+            self.choice = self._choice_of(self.candidates[index], slips, "a flipper was stuck" if stuck else reason)
         else:
             self.choice = self.choice._replace(reason="nothing known of the thrust, depth kept")
         return self.choice
@@ -178,10 +188,10 @@ class DepthAdaptation:
     def largest_insertion_nm(self) -> float:
         return self.parameters.insertion_fraction * self.forecast.lifting_torque_nm
 
-    def _choose(self, best: Candidate, slips: bool, reason: str) -> DepthChoice:
+    def _choice_of(self, best: Candidate, slips: bool, reason: str) -> DepthChoice:
         return DepthChoice(best.depth_m, slips, reason)
 
-    def _steps_m(self) -> list[float]:
+    def _steps_m(self) -> Work[list[float]]:
         """Predict the step of every candidate; an empty list if nothing is known of the thrust.
 
         The thrust is that in the middle of the sweep: a gait that reaches a depth at the ends reaches it there too.
@@ -190,23 +200,32 @@ class DepthAdaptation:
         stiffness_n_m = self._flippers * self.parameters.mobilisation_n_m
         self.forecast.gait = self.candidates[0].gait
         tractions = dict[float, Traction]()
-        for depth_m in self._depths_m:
-            thrust_n = self.forecast.thrust_n(depth_m)
-            if thrust_n is None:
-                return []
-            tractions[depth_m] = Traction(thrust_n, stiffness_n_m)
-        return [carried_m(each.motion, drag, tractions[each.depth_m]) for each in self.candidates]
+        for depths_m in batched(self._depths_m, DEPTHS_PER_UNIT):
+            for depth_m in depths_m:
+                thrust_n = self.forecast.thrust_n(depth_m)
+                if thrust_n is None:
+                    return []
+                tractions[depth_m] = Traction(thrust_n, stiffness_n_m)
+            yield
+        steps_m: list[float] = []
+        for candidates in batched(self.candidates, STEPS_PER_UNIT):
+            steps_m += [carried_m(each.motion, drag, tractions[each.depth_m]) for each in candidates]
+            yield
+        return steps_m
 
-    def _fastest(self, steps_m: Sequence[float]) -> tuple[int, str]:
+    def _fastest(self, steps_m: Sequence[float]) -> Work[tuple[int, str]]:
         """Return the index of the fastest candidate that comes out, and the reason; of equals, the deepest.
 
         The candidates are tried from the fastest on, because the forecast of an extraction takes time.
         """
         pairs = zip(steps_m, self.candidates, strict=True)
         merits = [(step_m / each.duration_s, each.depth_m) for step_m, each in pairs]
-        for index in sorted(range(len(merits)), key=merits.__getitem__, reverse=True):
-            if self._comes_out(self.candidates[index]):
-                return index, "fastest" if merits[index][0] > 0.0 else "thrust"
+        ordered = sorted(range(len(merits)), key=merits.__getitem__, reverse=True)
+        for indices in batched(ordered, EXTRACTIONS_PER_UNIT):
+            for index in indices:
+                if self._comes_out(self.candidates[index]):
+                    return index, "fastest" if merits[index][0] > 0.0 else "thrust"
+            yield
         return 0, "extraction"
 
     def _comes_out(self, stride: Candidate) -> bool:

@@ -20,6 +20,7 @@ from dataclasses import replace
 from functools import partial
 from math import floor
 
+from control.bounded_work import Work
 from control.depth.depth_choice import (
     AdaptationParameters,
     Candidate,
@@ -89,12 +90,14 @@ class GaitAdaptation(DepthAdaptation):
         self._widest_deg = self.parameters.gait.min_sweep_deg
         self._stuck: list[Candidate] = []
 
-    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+    def choose(
+        self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
+    ) -> Work[DepthChoice]:
         self._walked = self._walked._replace(depth_m=walked_m)
         self._remember(any(not stride.released for stride in strides), mud_estimate.boundary)
         self._widest_deg = self._next_widest_deg(strides)
         self.forecast.gait = self._walked.gait  # the strides that the forecast learns from
-        return super().step(mud_estimate, strides, walked_m)
+        return super().choose(mud_estimate, strides, walked_m)
 
     def _remember(self, stuck: bool, boundary: bool) -> None:
         """Record a stride that stuck; one that came out clears those that it covers."""
@@ -120,6 +123,6 @@ class GaitAdaptation(DepthAdaptation):
             return False
         return super()._comes_out(stride)
 
-    def _choose(self, best: Candidate, slips: bool, reason: str) -> DepthChoice:
+    def _choice_of(self, best: Candidate, slips: bool, reason: str) -> DepthChoice:
         self._walked = best
-        return super()._choose(best, slips, reason)._replace(gait=best.gait)
+        return super()._choice_of(best, slips, reason)._replace(gait=best.gait)

@@ -15,6 +15,7 @@ came out late and pulled the body back (or no pose excludes that) proves f_e ≥
 from collections.abc import Sequence
 from math import inf
 
+from control.bounded_work import Work, finished
 from control.depth.depth_choice import AdaptationParameters, DepthChoice, depth_grid
 from control.depth.forecast import GRID_M
 from control.gait.gait import GaitParameters
@@ -49,7 +50,9 @@ class PaperAdaptation:
         self._late_m = inf  # depth of the last stride, if a flipper was still in the mud after its extraction
         self._stuck_m = inf  # the shallowest one in this mud whose swing pulled the body back
 
-    def step(self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float) -> DepthChoice:
+    def choose(
+        self, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
+    ) -> Work[DepthChoice]:
         for stride in sorted(strides, key=lambda stride: stride.flipper):  # the right one last
             self._k_s = stride.k_s if stride.k_s.valid else self._k_s
             self._k_e = stride.k_e if stride.k_e.valid else self._k_e
@@ -60,7 +63,7 @@ class PaperAdaptation:
             self.choice = DepthChoice(depth_m, self._slips(depth_m), "deepest that comes out" if out else "extraction")
         else:
             self.choice = self.choice._replace(reason="no k_e known, depth kept")
-        return self.choice
+        return finished(self.choice)
 
     @property
     def largest_insertion_nm(self) -> float:

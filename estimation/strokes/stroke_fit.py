@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from math import cos, hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
+from control.bounded_work import Work, finish
 from control.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate.integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
@@ -33,6 +34,7 @@ TORQUE_REPEATABILITY = 0.032  # of a torque, as the paper measured it
 CROSS_COUPLING_UNCERTAINTY = 0.12
 LARGEST_UNCERTAINTY = 0.75  # of a coefficient: beyond it even the 80 % interval reaches zero
 HELD_BATCHES = 3  # in a row, 6 mm of rise, that must withstand a bound
+BATCHES_PER_UNIT = 10  # of bounded work
 TOO_SHORT = f"fewer than {MIN_BATCHES} pieces of travel in the mud"
 NOT_THERE = Estimate(UNKNOWN, UNKNOWN, 0, False, TOO_SHORT)
 NOT_OUT = "the flipper did not come out"
@@ -41,7 +43,8 @@ UNOBSERVABLE = f"vertical lever under {100.0 * MIN_VERTICAL_LEVER_M:g} cm: not o
 
 def fit_insertion(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, zero_error_n: float
-) -> Estimate:
+) -> Work[Estimate]:
+    """Fit k_p, in bounded units."""
     return _fit(geometry, batches, surface, zero_error_n, None, 1.0, inf)
 
 
@@ -52,8 +55,11 @@ def fit_extraction(
     zero_error_n: float,
     scatter: ScatterMemory,
     start_m: float,
-) -> Estimate:
-    """Fit k_e; `start_m` is the depth from which the flipper rises; the scatter of its short strokes is pooled."""
+) -> Work[Estimate]:
+    """Fit k_e, in bounded units.
+
+    `start_m` is the depth from which the flipper rises; the scatter of its short strokes is pooled.
+    """
     return _fit(geometry, batches, surface, zero_error_n, scatter, -1.0, _deepest_m(surface, start_m))
 
 
@@ -64,14 +70,14 @@ def _deepest_m(surface: Surface, start_m: float) -> float:
 
 def insertion_samples(geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface) -> FitSamples | None:
     """Return the samples of `fit_insertion`; None where it has no fit."""
-    return _samples(_pieces(geometry, batches, surface, 1.0, inf))
+    return _samples(finish(_pieces(geometry, batches, surface, 1.0, inf)))
 
 
 def extraction_samples(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, start_m: float
 ) -> FitSamples | None:
     """Return the samples of `fit_extraction`; None where it has no fit."""
-    return _samples(_pieces(geometry, batches, surface, -1.0, _deepest_m(surface, start_m)))
+    return _samples(finish(_pieces(geometry, batches, surface, -1.0, _deepest_m(surface, start_m))))
 
 
 def _samples(pieces: "_Pieces") -> FitSamples | None:
@@ -125,12 +131,13 @@ def _fit(
     scatter: ScatterMemory | None,
     sign: float,
     deepest_m: float,
-) -> Estimate:
-    pieces = _pieces(geometry, batches, surface, sign, deepest_m)
+) -> Work[Estimate]:
+    pieces = yield from _pieces(geometry, batches, surface, sign, deepest_m)
     fit = fit_through_origin(pieces.moments, pieces.torques)
     if fit is None:
         hidden = pieces.lever_m < MIN_VERTICAL_LEVER_M
         return NOT_THERE._replace(samples=pieces.samples, reason=UNOBSERVABLE if hidden else TOO_SHORT)
+    yield
     deepest_m = max(pieces.depths_m)
     edge_m2 = mean_width_m(geometry, deepest_m) * geometry.plate_thickness_m
     scales_m = [depth_m / growth_exponent(geometry, depth_m) for depth_m in pieces.depths_m]
@@ -144,9 +151,12 @@ def _fit(
 
 def _pieces(
     geometry: FlipperGeometry, batches: Sequence[Batch], surface: Surface, sign: float, deepest_m: float
-) -> _Pieces:
+) -> Work[_Pieces]:
     moments, torques, crossed_nm, depths_m, paths_m, samples, lever_m = [], [], [], [], [], 0, inf
-    for batch, path_m in zip(batches, travels_m(batches, surface.depth_m, deepest_m), strict=True):
+    travelled = zip(batches, travels_m(batches, surface.depth_m, deepest_m), strict=True)
+    for number, (batch, path_m) in enumerate(travelled, 1):
+        if number % BATCHES_PER_UNIT == 0:
+            yield
         vertical_m = geometry.vertical_lever_m(batch.sweep_rad, batch.adduction_rad)
         lever_m = min(lever_m, vertical_m)
         if path_m < SHORTEST_M or vertical_m < MIN_VERTICAL_LEVER_M:
@@ -160,6 +170,7 @@ def _pieces(
         depths_m.append(max(batch.travel_m - surface.depth_m, path_m / 2.0))
         paths_m.append(path_m)
         samples += batch.samples
+    yield
     return _Pieces(moments, torques, crossed_nm, depths_m, paths_m, samples, lever_m)
 
 

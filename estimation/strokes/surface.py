@@ -17,6 +17,7 @@ from math import exp, hypot, inf, sqrt
 from operator import mul
 from typing import NamedTuple
 
+from control.bounded_work import Work
 from control.exact_sum import exact_sum
 from control.records import UNKNOWN
 from estimation.strokes.origin_fit import NORMAL_MAD, median
@@ -46,8 +47,8 @@ class Surface(NamedTuple):
 NO_SURFACE = Surface(UNKNOWN, UNKNOWN, 0.0, inf, False)
 
 
-def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Surface:
-    """Find the surface from the batches of one insertion, in order of depth."""
+def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Work[Surface]:
+    """Find the surface from the batches of one insertion, in order of depth, in bounded units."""
     n = len(depths_m)
     if n < MIN_ABOVE + MIN_BELOW or depths_m[0] >= depths_m[-1]:
         return NO_SURFACE
@@ -55,7 +56,8 @@ def find_surface(depths_m: Sequence[float], forces_n: Sequence[float]) -> Surfac
         return NO_SURFACE
     clipped_n = hampel_filtered(forces_n)
     mean_n = exact_sum(clipped_n) / n
-    surface = _mud_begins(depths_m, [force_n - mean_n for force_n in clipped_n])
+    yield
+    surface = yield from _mud_begins(depths_m, [force_n - mean_n for force_n in clipped_n])
     return surface._replace(level_n=surface.level_n + mean_n) if surface.found else surface
 
 
@@ -73,10 +75,11 @@ def hampel_filtered(forces_n: Sequence[float]) -> list[float]:
     return [b if abs(a - b) > outlier_n else a for a, b in zip(own, medians_n, strict=True)]
 
 
-def _mud_begins(x: Sequence[float], y: Sequence[float]) -> Surface:
+def _mud_begins(x: Sequence[float], y: Sequence[float]) -> Work[Surface]:
     """Choose between no surface, jump and kink; the mean of `y` is zero."""
     square = exact_sum([force_n * force_n for force_n in y])
     jumps, kinks, kinks_m = _explained(x, y)
+    yield
     largest, best = max(jumps), max(kinks)
     variance = max((square - largest) / max(len(x) - 4, 1), LEAST_VARIANCE_N2)
     jump, jump_n, slope_n_m = _jump(x, y, jumps, variance)

@@ -6,9 +6,10 @@ from dataclasses import replace
 from math import nan
 from typing import Any
 
+from control.bounded_work import finished
 from control.modes import Mode, Request
 from control.records import Estimate, StrideEstimate
-from estimation.mud import MudReading
+from estimation.mud import Sampled
 from experiments.faults.bench import FaultBench
 from experiments.faults.injectors import Injector, once
 
@@ -82,17 +83,17 @@ def loop_stalled(ticks: int) -> Injector:
 def absurd_stride(bench: FaultBench, joint: str) -> None:
     """Make the next sample close a stride with a coefficient of 10²⁰ N/m³."""
     estimator = bench.loop.learning.estimator
-    true_update = estimator.update
+    true_add = estimator.add
     wild = Estimate(1e20, 1.0, 100, True)
     stride = StrideEstimate(
         "left", 0, 0.0, 1.0, 0.4, 0.3, 0.1, wild, wild, wild, 0.0, 0.03, True, 1.0, 1.0, -1.0, 0.1
     )  # fmt: skip
 
-    def update(*arguments: Any) -> MudReading:
-        del estimator.__dict__["update"]  # once
-        return true_update(*arguments)._replace(strides=(stride,))
+    def add(*arguments: Any) -> Sampled:
+        del estimator.__dict__["add"]  # once
+        return true_add(*arguments)._replace(closing=finished((stride,)))
 
-    estimator.__dict__["update"] = update
+    estimator.__dict__["add"] = add
 
 
 # the daemon

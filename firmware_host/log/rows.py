@@ -139,7 +139,7 @@ def tick_packing(rig: Rig) -> Callable[..., bytes]:
         "now_s, target, body, sent = tick.now_s, loop.target, loop.body, loop.sent",
         f"{', '.join(rig.joints)} = loop.states",
         f"{', '.join(f'{joint}_nm' for joint in rig.joints)} = sent.torques_nm",
-        f"{', '.join(rig.flippers)}, = loop.learning.reading.loads",
+        f"{', '.join(rig.flippers)}, = loop.learning.loads",
     )
 
 

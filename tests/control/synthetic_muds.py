@@ -3,11 +3,13 @@
 The plate is summed over small pieces here, without the formulas of control/plate.
 """
 
+from collections.abc import Sequence
 from math import nan
 
 import numpy as np
 
-from control.depth.depth_choice import AdaptationParameters
+from control.bounded_work import finish
+from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthChoice
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
@@ -27,6 +29,13 @@ def reported(
 ) -> Coefficient:
     """Return a coefficient of the paper's own law (one k at every depth), unless an exponent is given."""
     return Coefficient(value, uncertainty, depth_m, exponent, exponent_uncertainty, 8)
+
+
+def choose_now(
+    adaptation: Adaptation, mud_estimate: MudEstimate, strides: Sequence[StrideEstimate], walked_m: float
+) -> DepthChoice:
+    """Run all units of a choice at once."""
+    return finish(adaptation.choose(mud_estimate, strides, walked_m))
 
 
 def bound(value: float, depth_m: float = 0.03) -> Coefficient:

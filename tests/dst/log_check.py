@@ -48,6 +48,7 @@ def log_problems(folder: Path, robot: RecordedRobot) -> Iterator[str]:
 
 
 def _replay_problems(log: Log, loop: Loop) -> Iterator[str]:
+    loop.learning.finish()  # the run may end between the units of a stride that closes
     live = [repr(dataclasses.astuple(stride.estimate)) for stride in loop.learning.strides]
     if loop.target.stride < 0 and not live:
         return

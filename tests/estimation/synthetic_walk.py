@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from random import Random
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from control.bounded_work import finish
 from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
 from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.rate import PERIOD_S
-from control.records import DriveState, Phase
+from control.records import DriveState, FlipperLoad, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive
+from estimation.stride_estimator import StrideEstimator
 
 DEPTH_M, SURFACE_M = 0.03, 0.002
 K_P, K_S, K_E = 1.0e6, 0.6e6, 0.7e6  # N/m³, about the paper's middle mud
@@ -25,8 +27,17 @@ GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 DRIVE = FlipperDrive(ArmMass(), 0.083, 0.083)
 
 
+def update(flipper: StrideEstimator, *sample: Any) -> tuple[FlipperLoad, StrideEstimate | None]:
+    """Add a sample to one flipper and finish all the work that it causes."""
+    load, closing = flipper.add(*sample)
+    if not flipper.work.is_empty:
+        flipper.work.finish()
+        load = flipper.load
+    return load, None if closing is None else finish(closing)
+
+
 class Sample(NamedTuple):
-    """One tick of one flipper: the arguments of an estimator's `update`."""
+    """One tick of one flipper: the arguments of an estimator's `add`."""
 
     now_s: float
     phase: Phase

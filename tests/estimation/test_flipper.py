@@ -29,6 +29,7 @@ from estimation.joint_load import FlipperDrive
 from estimation.stride_estimator import GRACE_S
 from estimation.strokes.shear import Base
 from estimation.strokes.stroke_fit import MIN_VERTICAL_LEVER_M, NOT_OUT
+from tests.estimation.synthetic_walk import update
 
 RATE_HZ = 380.0
 INSTANT_S = 1e-5  # over which accelerations are taken: none of the gait's changes within it
@@ -185,7 +186,7 @@ def waiting(rows: Sequence[Row]) -> list[Row]:
 
 def closed(rows: Iterable[Row], flipper: FlipperEstimator | None = None) -> list[StrideEstimate]:
     flipper = flipper or estimator()
-    strides = [flipper.update(*row)[1] for row in rows]
+    strides = [update(flipper, *row)[1] for row in rows]
     return [stride for stride in strides if stride is not None]
 
 
@@ -404,7 +405,7 @@ def test_samples_that_are_not_finite_are_skipped(joint: str, field: str, bad: fl
     rows = rows_of(motion(), MUD, HEAVY)
     between = [each for row in rows for each in (row, _invalid(row, joint, field, bad))]
     assert repr(one(between, estimator(HEAVY))) == repr(one(rows, estimator(HEAVY)))
-    assert estimator().update(*_invalid(rows[0], joint, field, bad)) == (NO_LOAD, None)
+    assert update(estimator(), *_invalid(rows[0], joint, field, bad)) == (NO_LOAD, None)
 
 
 def _invalid(row: Row, joint: str, field: str, bad: float) -> Row:
@@ -589,7 +590,7 @@ def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
     mud, flipper = MUD._replace(weight_n=0.7, friction_nm=0.02), estimator()
     moments = motion()
     for i, row in enumerate(rows_of(moments, mud)[:-1]):
-        load, _ = flipper.update(*row)
+        load, _ = update(flipper, *row)
         if row.phase is Phase.STANCE is moments[i - 1].phase:
             sweep_nm, adduction_nm = mud_torques_nm(moments[i], mud)
             assert load.sweep_torque_nm == pytest.approx(sweep_nm, abs=0.01)
@@ -600,7 +601,7 @@ def test_the_load_is_the_mud_without_what_clings_to_the_flipper() -> None:
 def test_forces_are_the_smallest_ones_and_in_stance_none_upward_is_reported() -> None:
     """The pose is half-way between two samples."""
     flipper, rows = estimator(), rows_of(motion())[:-1]
-    loads = [flipper.update(*row)[0] for row in rows]
+    loads = [update(flipper, *row)[0] for row in rows]
     for before, row, load in zip(rows, rows[1:], loads[1:], strict=False):
         sweep_rad = (before.sweep.angle_rad + row.sweep.angle_rad) / 2.0
         lift_rad = (before.adduction.angle_rad + row.adduction.angle_rad) / 2.0
@@ -615,8 +616,8 @@ def test_forces_are_the_smallest_ones_and_in_stance_none_upward_is_reported() ->
 def test_a_row_that_repeats_shows_the_same_load() -> None:
     flipper = estimator()
     for row in rows_of(motion())[:-1]:
-        load, _ = flipper.update(*row)
-        assert repr(flipper.update(*row)) == repr((load, None))
+        load, _ = update(flipper, *row)
+        assert repr(update(flipper, *row)) == repr((load, None))
 
 
 def test_the_largest_forces_of_the_stride_are_reported() -> None:

@@ -29,6 +29,7 @@ from estimation.paper import PaperEstimator
 from estimation.recorded_states import recorded_states
 from estimation.strokes.shear import Base
 from tests.estimation.synthetic_walk import DRIVE, GEOMETRY, K_P, Sample, later, stride_samples
+from tests.estimation.synthetic_walk import update as update_one
 
 Four = tuple[float, float, float, float]
 STRIDES, PERIOD_OF_STRIDE_S = 3, 2.0
@@ -72,7 +73,9 @@ def test_each_flipper_gets_the_samples_that_it_would_get_alone(method: Method) -
     times_s = [nan, nan, *(sample.now_s for sample in left)]  # a sample answers the commands of the two before it
     for a, b, earlier_s, later_s in zip(left, right, times_s, times_s[1:], strict=False):
         reading = update(mud, a, b)
-        reported = [alone[flipper].update(*row, (earlier_s, later_s)) for flipper, row in (("left", a), ("right", b))]
+        reported = [
+            update_one(alone[flipper], *row, (earlier_s, later_s)) for flipper, row in (("left", a), ("right", b))
+        ]
         assert repr(reading.loads) == repr((reported[0][0], reported[1][0]))
         assert repr(reading.strides) == repr(tuple(stride for _, stride in reported if stride is not None))
 

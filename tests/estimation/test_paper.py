@@ -32,6 +32,7 @@ from estimation.joint_load import FlipperDrive
 from estimation.mud import EstimationParameters, MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
 from estimation.stride_estimator import GRACE_S
+from tests.estimation.synthetic_walk import update
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 EDGE_M2, WIDTH_M, LENGTH_M = 0.025 * 0.004, 0.025, 0.12
@@ -149,7 +150,7 @@ def states_of(sample: Sample) -> FlipperJoints[DriveState]:
 
 
 def feed(flipper: PaperEstimator, sample: Sample) -> tuple[FlipperLoad, StrideEstimate | None]:
-    return flipper.update(sample.now_s, sample.phase, *states_of(sample), sample.body_x_m)
+    return update(flipper, sample.now_s, sample.phase, *states_of(sample), sample.body_x_m)
 
 
 def closed(samples: Iterable[Sample], flipper: PaperEstimator | None = None) -> list[StrideEstimate]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from control.controller import Controller
 from control.faults import Fault
 from control.modes import ENERGISED, Health, Mode
 from control.records import NEVER_S
@@ -47,19 +46,17 @@ class NoPose:
 class Silent:
     """Takes every call and does nothing: learning, events, timing."""
 
-    faults: list[Fault] = []
-
     def __getattr__(self, name: str) -> Any:
         return lambda *values, **named: None
 
-    def step(self, controller: Controller) -> Any:
-        return (), ()
+    def pop_faults(self) -> list[Fault]:
+        return []
 
 
 class AbstractLoop(Loop):
     """The loop without log, learning and limits of torque."""
 
-    def _record(self, tick: Tick) -> None:
+    def _record(self, tick: Tick, sent_s: float) -> None:
         pass
 
 

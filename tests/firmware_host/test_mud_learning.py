@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from control.bounded_work import finished
 from control.controller import WalkOrder
-from control.faults import FaultKind
+from control.faults import Fault, FaultKind
 from control.gait.gait import GaitParameters
-from control.records import NO_LOAD, Estimate, GaitTarget, Phase, StrideEstimate
-from estimation.mud import MudReading
+from control.records import NO_LOAD, Estimate, FlipperLoad, GaitTarget, Phase, StrideEstimate
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.mud_learning import FIRM_TICKS, LARGEST_N_M3, STORED_STRIDES, MudLearning
 
@@ -56,17 +56,24 @@ def learning(configuration: Configuration) -> MudLearning:
     return made
 
 
-def step(learning: MudLearning, controller: FakeController) -> tuple[list[Any], list[str]]:
-    closed, messages = learning.step(controller)  # type: ignore[arg-type]
-    return list(closed), messages
+def step(
+    learning: MudLearning,
+    controller: FakeController,
+    *strides: StrideEstimate,
+    loads: tuple[FlipperLoad, ...] = (),
+) -> tuple[list[Any], list[str]]:
+    """Let one tick close these strides, and run all units of the work."""
+    learning.loads, learning._closing = loads, finished(strides) if strides else None
+    learning.adapt(controller)  # type: ignore[arg-type]
+    closed, messages = learning.finish()
+    return list(closed), list(messages)
 
 
 def test_strides_of_both_flippers_are_numbered_through(learning: MudLearning) -> None:
     controller = FakeController(WalkOrder(0.04, adaptive=False))
     numbers = []
     for index in range(3):
-        learning.reading = MudReading(strides=(stride("left", index), stride("right", index)))
-        closed, _ = step(learning, controller)
+        closed, _ = step(learning, controller, stride("left", index), stride("right", index))
         numbers += [(each.number, each.estimate.flipper, each.chosen_depth_m) for each in closed]
     assert numbers == [(number, ("left", "right")[number % 2], 0.04) for number in range(6)]
     assert learning.strides_closed == 6
@@ -74,32 +81,40 @@ def test_strides_of_both_flippers_are_numbered_through(learning: MudLearning) ->
 
 def test_a_fixed_depth_does_not_depend_on_the_mud(learning: MudLearning) -> None:
     controller = FakeController(WalkOrder(0.045, adaptive=False))
-    learning.reading = MudReading(strides=(stride(k_p=Estimate(1e9, 1.0, 100, True)),))
-    step(learning, controller)
+    step(learning, controller, stride(k_p=Estimate(1e9, 1.0, 100, True)))
     assert controller.gait.next_depth_m == 0.045
 
 
 def test_without_a_stride_nothing_is_learned(learning: MudLearning) -> None:
     controller = FakeController(WalkOrder(0.03))
     assert step(learning, controller) == ([], [])
-    assert learning.faults == []
+    assert learning.pop_faults() == []
 
 
 def test_only_the_latest_strides_are_stored_but_all_are_counted(learning: MudLearning) -> None:
     controller = FakeController(WalkOrder(0.03, adaptive=False))
     for index in range(STORED_STRIDES + 50):
-        learning.reading = MudReading(strides=(stride("left", index),))
-        step(learning, controller)
+        step(learning, controller, stride("left", index))
     assert len(learning.strides) == STORED_STRIDES
     assert learning.strides_closed == STORED_STRIDES + 50
     assert learning.strides[-1].number == STORED_STRIDES + 49
 
 
 def test_a_new_walk_preserves_earlier_strides(learning: MudLearning) -> None:
-    learning.reading = MudReading(strides=(stride(),))
-    step(learning, FakeController(WalkOrder(0.03, adaptive=False)))
+    step(learning, FakeController(WalkOrder(0.03, adaptive=False)), stride())
     learning.reset(0.03)
     assert len(learning.strides) == learning.strides_closed == 1
+
+
+@pytest.mark.parametrize(("phase", "messages"), [(Phase.SWING, 1), (Phase.INSERTION, 2), (Phase.STANCE, 2)])
+def test_a_depth_that_comes_after_the_insertion_began_is_logged_as_late(
+    learning: MudLearning, phase: Phase, messages: int
+) -> None:
+    controller = FakeController(WalkOrder(0.03), target=GaitTarget(phase, 0, 0.0, 0.0, 0.0, 0.0))
+    closed = stride(released=False, depth_m=0.03)
+    _, reported = step(learning, controller, closed)
+    assert controller.gait.next_depth_m != 0.03
+    assert len(reported) == messages
 
 
 # firm mud
@@ -113,9 +128,8 @@ def firm_ticks(learning: MudLearning, order: WalkOrder, phase: Phase, loads: lis
     reported = []
     for firm in loads:
         load = NO_LOAD._replace(adduction_torque_nm=limit_nm + 0.01 if firm else limit_nm)
-        learning.reading = MudReading((NO_LOAD, load))
         before = controller.gait.ended
-        step(learning, controller)
+        step(learning, controller, loads=(NO_LOAD, load))
         reported.append(controller.gait.ended > before)
     return reported
 
@@ -137,26 +151,30 @@ def test_only_adaptive_insertions_end_early(learning: MudLearning, adaptive: boo
 def test_the_early_end_of_an_insertion_is_logged_once(learning: MudLearning) -> None:
     controller = FakeController(WalkOrder(0.03))
     load = NO_LOAD._replace(adduction_torque_nm=10.0)
-    learning.reading = MudReading((load, load))
-    reported = [message for _ in range(10) for message in step(learning, controller)[1]]
+    reported = [message for _ in range(10) for message in step(learning, controller, loads=(load, load))[1]]
     assert reported == ["insertion ended at 0.0300 m: solid mud"]
 
 
 # wild coefficients
 
 
+def faults_of(learning: MudLearning, closed: StrideEstimate) -> list[Fault]:
+    step(learning, FakeController(WalkOrder(0.03, adaptive=False)), closed)
+    return learning.pop_faults()
+
+
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
 @pytest.mark.parametrize("value", [nan, inf, -inf, LARGEST_N_M3, -1.01 * LARGEST_N_M3])
 def test_a_coefficient_beyond_any_mud_is_a_fault(learning: MudLearning, name: str, value: float) -> None:
-    learning.reading = MudReading(strides=(stride("right", 7, **{name: Estimate(value, 1e5, 100, True)}),))
-    (fault,) = learning.faults
+    (fault,) = faults_of(learning, stride("right", 7, **{name: Estimate(value, 1e5, 100, True)}))
     assert fault == FaultKind.ESTIMATE_WILD.fault("right", stride=7)
 
 
 @pytest.mark.parametrize("std_error", [nan, inf, LARGEST_N_M3])
 def test_a_std_error_that_is_not_finite_is_a_fault(learning: MudLearning, std_error: float) -> None:
-    learning.reading = MudReading(strides=(stride(k_s=Estimate(2e6, std_error, 100, True)),))
-    assert [fault.name for fault in learning.faults] == ["estimate_wild"]
+    faults = faults_of(learning, stride(k_s=Estimate(2e6, std_error, 100, True)))
+    assert [fault.name for fault in faults] == ["estimate_wild"]
+    assert learning.pop_faults() == []  # it lasts for one tick
 
 
 @pytest.mark.parametrize(
@@ -169,8 +187,7 @@ def test_a_std_error_that_is_not_finite_is_a_fault(learning: MudLearning, std_er
     ],
 )
 def test_coefficients_within_bounds_or_invalid_are_no_fault(learning: MudLearning, estimate: Estimate) -> None:
-    learning.reading = MudReading(strides=(stride(k_e=estimate),))
-    assert learning.faults == []
+    assert faults_of(learning, stride(k_e=estimate)) == []
 
 
 def test_wild_coefficients_never_lead_to_a_depth_out_of_bounds(
@@ -183,7 +200,6 @@ def test_wild_coefficients_never_lead_to_a_depth_out_of_bounds(
         wild = Estimate(value, abs(value), 100, True)
         strides = (stride("left", index, k_p=wild, k_s=wild, k_e=wild),)
         estimator.mud_estimate = estimator._knowledge.update(strides)
-        learning.reading = MudReading(strides=strides)
-        step(learning, controller)
+        step(learning, controller, *strides)
         bounds = configuration.adaptation
         assert bounds.min_depth_m <= controller.gait.next_depth_m <= bounds.max_depth_m

@@ -63,6 +63,11 @@ def until_swing(robot: Lockstep) -> bool:
     return robot.run_until(lambda: robot.loop.target.phase is Phase.SWING, longest_s(PARAMETERS) + 5.0)
 
 
+def until_closed(robot: Lockstep) -> bool:
+    """Run the ticks over which the work of a stride is spread."""
+    return robot.run_until(lambda: len(robot.loop.learning.strides) == 2, 50.0 * PERIOD_S)
+
+
 @pytest.fixture(scope="module")
 def in_stance(configuration: Configuration) -> Lockstep:
     """Return a robot with short recoveries and with its flippers inserted in mud that releases them."""
@@ -147,6 +152,7 @@ def free_itself(configuration: Configuration, kilopascal: float, log: Recorder |
     assert robot.now_s - stuck_s < longest_s(PARAMETERS)
     assert robot.robot.plant.body_m > stuck_m + 0.06
     assert recorder.texts[-1].startswith("the flippers came out after")
+    assert until_closed(robot)
     assert [stride.estimate.released for stride in robot.loop.learning.strides] == [False, False]
     assert until_phase(robot, Phase.INSERTION)
     assert robot.loop.mode is Mode.WALKING
@@ -184,6 +190,7 @@ def test_one_flipper_alone_is_named_and_its_stride_alone_was_not_released(config
     robot.robot.plant.arms[1].track = mud(6.0)
     assert until_swing(robot)
     assert recorder.about("stuck")[0] == "the right flipper is stuck, attempt 1 of 3"
+    assert until_closed(robot)
     released = {stride.estimate.flipper: stride.estimate.released for stride in robot.loop.learning.strides}
     assert released == {"left": True, "right": False}
 

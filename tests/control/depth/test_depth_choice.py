@@ -23,6 +23,7 @@ from tests.control.synthetic_muds import (
     apart,
     both,
     bound,
+    choose_now,
     estimated,
     lift_m4,
     reported,
@@ -45,7 +46,7 @@ def chosen(
 ) -> DepthChoice:
     adaptation = adapted()
     adaptation.reset(commanded_m)
-    return adaptation.step(mud_estimate, both() if strides is None else strides, adaptation.choice.depth_m)
+    return choose_now(adaptation, mud_estimate, both() if strides is None else strides, adaptation.choice.depth_m)
 
 
 def duration_s(depth_m: float) -> float:
@@ -129,7 +130,9 @@ class TestTheFastestDepth:
 
     def test_mud_that_grows_sticky_is_walked_shallower(self) -> None:
         adaptation = adapted()
-        before, after = (adaptation.step(estimated(reported(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY))
+        before, after = (
+            choose_now(adaptation, estimated(reported(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY)
+        )
         assert after.depth_m < before.depth_m
 
     @pytest.mark.parametrize("k_e", [1.1e6, 1.3e6, 1.6e6])
@@ -158,7 +161,7 @@ class TestTheFastestDepth:
             AdaptationParameters(body_damping_n_s_m=20.0),
             AdaptationParameters(pad_width_m=0.1),
         ):
-            assert adapted(burden).step(estimated(SOFT, LOOSE), both(), 0.03).depth_m > plain
+            assert choose_now(adapted(burden), estimated(SOFT, LOOSE), both(), 0.03).depth_m > plain
 
     def test_a_surface_that_lies_deeper_needs_a_deeper_stride(self) -> None:
         level, sunk = (chosen(estimated(SOFT, LOOSE), both(surface_m=surface_m)) for surface_m in (0.0, 0.0075))
@@ -170,13 +173,13 @@ class TestUnknownMud:
         adaptation = adapted()
         adaptation.reset(0.0375)
         kept = DepthChoice(0.0375, False, "nothing known of the thrust, depth kept")
-        assert adaptation.step(estimated(None, STICKY), both(), adaptation.choice.depth_m) == kept
-        assert adaptation.step(NOTHING_KNOWN, both(), adaptation.choice.depth_m) == kept
-        assert adaptation.step(estimated(FIRM, LOOSE), [], adaptation.choice.depth_m) == kept
+        assert choose_now(adaptation, estimated(None, STICKY), both(), adaptation.choice.depth_m) == kept
+        assert choose_now(adaptation, NOTHING_KNOWN, both(), adaptation.choice.depth_m) == kept
+        assert choose_now(adaptation, estimated(FIRM, LOOSE), [], adaptation.choice.depth_m) == kept
 
     def test_a_reset_starts_at_its_depth(self) -> None:
         adaptation = adapted()
-        adaptation.step(estimated(BOTTOMLESS, LOOSE), both(), adaptation.choice.depth_m)
+        choose_now(adaptation, estimated(BOTTOMLESS, LOOSE), both(), adaptation.choice.depth_m)
         adaptation.reset(0.02)
         assert adaptation.choice == DepthChoice(0.02, False, "start")
 
@@ -279,25 +282,25 @@ class TestStuck:
 
     def test_a_depth_that_stuck_is_excluded_for_any_estimate(self) -> None:
         adaptation = adapted()
-        assert adaptation.step(self.SINKING, both(), adaptation.choice.depth_m).depth_m == same_depth(0.05)
+        assert choose_now(adaptation, self.SINKING, both(), adaptation.choice.depth_m).depth_m == same_depth(0.05)
         for strides in (both(0.04, released=False), both(0.025), both(0.03), both(0.0375)):
-            assert adaptation.step(self.SINKING, strides, adaptation.choice.depth_m).depth_m <= 0.0375 + 1e-9
+            assert choose_now(adaptation, self.SINKING, strides, adaptation.choice.depth_m).depth_m <= 0.0375 + 1e-9
 
     def test_a_flipper_that_comes_out_of_where_it_stuck_may_go_deeper_again(self) -> None:
         adaptation = adapted()
         adaptation.reset(0.04)
-        adaptation.step(self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
-        assert adaptation.step(self.SINKING, both(0.04), adaptation.choice.depth_m).depth_m == same_depth(0.05)
+        choose_now(adaptation, self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
+        assert choose_now(adaptation, self.SINKING, both(0.04), adaptation.choice.depth_m).depth_m == same_depth(0.05)
 
     def test_where_a_flipper_stuck_is_forgotten_in_another_mud_and_in_another_walk(self) -> None:
         other_mud, other_walk = adapted(), adapted()
         for adaptation in (other_mud, other_walk):
-            adaptation.step(self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
+            choose_now(adaptation, self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
         other_walk.reset(0.03)
-        assert other_mud.step(
-            self.SINKING._replace(boundary=True), both(), other_mud.choice.depth_m
+        assert choose_now(
+            other_mud, self.SINKING._replace(boundary=True), both(), other_mud.choice.depth_m
         ).depth_m == same_depth(0.05)
-        assert other_walk.step(self.SINKING, both(), other_walk.choice.depth_m).depth_m == same_depth(0.05)
+        assert choose_now(other_walk, self.SINKING, both(), other_walk.choice.depth_m).depth_m == same_depth(0.05)
 
     def test_a_lower_bound_of_suction_never_proves_that_a_flipper_comes_out(self) -> None:
         unknown, at_least = (chosen(estimated(BOTTOMLESS, k_e), both(0.03)) for k_e in (None, bound(0.1e6)))
@@ -392,7 +395,9 @@ class TestMuds:
         depths_m = []
         for _ in range(6):
             depth_m = adaptation.choice.depth_m
-            depths_m.append(adaptation.step(clay.mud_estimate(), both(depth_m, extraction_nm=0.2), depth_m).depth_m)
+            depths_m.append(
+                choose_now(adaptation, clay.mud_estimate(), both(depth_m, extraction_nm=0.2), depth_m).depth_m
+            )
         assert len(set(depths_m[1:])) == 1
 
 
@@ -425,7 +430,7 @@ class TestRange:
     ) -> None:
         adaptation = adapted()
         for mud_estimate, pair in walk:
-            choice = adaptation.step(mud_estimate, pair, adaptation.choice.depth_m)
+            choice = choose_now(adaptation, mud_estimate, pair, adaptation.choice.depth_m)
             assert PARAMETERS.min_depth_m <= choice.depth_m <= PARAMETERS.max_depth_m
             assert GEOMETRY.is_reachable(radians(GAIT.sweep_angle_deg), choice.depth_m)
 
@@ -439,13 +444,13 @@ class TestRange:
         adaptation.reset(parameters.min_depth_m)
         assert (
             parameters.min_depth_m
-            <= adaptation.step(mud_estimate, pair, adaptation.choice.depth_m).depth_m
+            <= choose_now(adaptation, mud_estimate, pair, adaptation.choice.depth_m).depth_m
             <= max_depth_m + 1e-9
         )
 
     def test_a_least_depth_out_of_reach_raises_nothing(self) -> None:
         parameters = AdaptationParameters(min_depth_m=0.15, max_depth_m=0.2)
-        assert adapted(parameters).step(estimated(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
+        assert choose_now(adapted(parameters), estimated(FIRM, LOOSE), both(), 0.03).depth_m == 0.15
 
     def test_the_grid_contains_both_ends_of_its_range(self) -> None:
         assert adapted()._depths_m == pytest.approx(DEPTHS_M, abs=1e-12)

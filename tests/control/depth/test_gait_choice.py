@@ -17,7 +17,7 @@ from control.limits import JointLimits
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
 from control.plate.integrals import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
-from tests.control.synthetic_muds import both
+from tests.control.synthetic_muds import both, choose_now
 
 GEOMETRY, GAIT = FlipperGeometry(), GaitParameters()
 PARAMETERS = AdaptationParameters(method="gait")
@@ -56,7 +56,7 @@ def sweep_deg(choice: DepthChoice) -> float:
 def settled(mud_estimate: MudEstimate, count: int = 5) -> DepthChoice:
     adaptation = adapted()
     for _ in range(count):
-        choice = adaptation.step(mud_estimate, strides(), adaptation.choice.depth_m)
+        choice = choose_now(adaptation, mud_estimate, strides(), adaptation.choice.depth_m)
     return choice
 
 
@@ -99,7 +99,7 @@ def test_it_takes_the_fastest_of_all_pairs_that_come_out(
     felt = Estimate(k_e, 0.05 * k_e, 50, True)
     closed = [replace(each, k_e=felt) for each in strides(torque_nm=torque_nm, depth_m=0.015, surface_m=surface_m)]
     walked, mud_estimate = replace(GAIT, sweep_angle_deg=walked_deg), estimated(k_s, k_e)
-    choice = GaitAdaptation(PARAMETERS, GEOMETRY, walked).step(mud_estimate, closed, 0.03)
+    choice = choose_now(GaitAdaptation(PARAMETERS, GEOMETRY, walked), mud_estimate, closed, 0.03)
     easily = torque_nm < 0.7 * LIFTING_NM
     pairs = brute_force(mud_estimate, closed, walked, walked_deg + (WIDENING_DEG if easily else 0.0))
     if not pairs or pairs[0][0] == 0.0:
@@ -123,8 +123,11 @@ def test_the_torque_of_an_extraction_is_that_of_the_pose_at_its_own_rear(deg: fl
         adaptation = GaitAdaptation(narrowed, GEOMETRY, replace(GAIT, sweep_angle_deg=40.0))
         k_e = Coefficient(fraction * just, 0.05 * fraction * just, 0.02, 0.0, 0.0, 8)
         flipper = FlipperEstimate(None, reported(2e6), k_e)
-        choice = adaptation.step(
-            MudEstimate(None, reported(2e6), k_e, flipper, flipper), strides(depth_m=nan), adaptation.choice.depth_m
+        choice = choose_now(
+            adaptation,
+            MudEstimate(None, reported(2e6), k_e, flipper, flipper),
+            strides(depth_m=nan),
+            adaptation.choice.depth_m,
         )
         assert (choice.reason == "fastest") is comes_out
 
@@ -151,7 +154,7 @@ def test_the_first_stride_is_walked_as_configured() -> None:
 def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() -> None:
     adaptation, before_deg, widest_deg = adapted(), 30.0, 0.0
     for _ in range(6):
-        now_deg = sweep_deg(adaptation.step(FIRM, strides(), 0.03))
+        now_deg = sweep_deg(choose_now(adaptation, FIRM, strides(), 0.03))
         assert now_deg <= before_deg + WIDENING_DEG
         before_deg, widest_deg = now_deg, max(widest_deg, now_deg)
     assert widest_deg == 50.0
@@ -159,18 +162,18 @@ def test_the_sweep_grows_by_no_more_than_one_widening_from_stride_to_stride() ->
 
 @pytest.mark.parametrize("torque_nm", [0.7 * LIFTING_NM, nan])
 def test_no_stride_is_wider_after_an_extraction_that_was_hard_or_was_not_seen(torque_nm: float) -> None:
-    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=torque_nm), 0.03)) == 30.0
-    assert sweep_deg(adapted().step(FIRM, strides(torque_nm=0.69 * LIFTING_NM), 0.03)) > 30.0
+    assert sweep_deg(choose_now(adapted(), FIRM, strides(torque_nm=torque_nm), 0.03)) == 30.0
+    assert sweep_deg(choose_now(adapted(), FIRM, strides(torque_nm=0.69 * LIFTING_NM), 0.03)) > 30.0
 
 
 def test_one_flipper_that_was_hard_to_lift_is_enough() -> None:
     left, right = strides()[0], strides(torque_nm=0.6)[1]
-    assert sweep_deg(adapted().step(FIRM, [left, right], 0.03)) == 30.0
+    assert sweep_deg(choose_now(adapted(), FIRM, [left, right], 0.03)) == 30.0
 
 
 def test_a_sweep_narrower_than_the_methods_becomes_its_narrowest_at_once() -> None:
     adaptation = GaitAdaptation(PARAMETERS, GEOMETRY, replace(GAIT, sweep_angle_deg=15.0))
-    choice = adaptation.step(FIRM, strides(torque_nm=0.7), adaptation.choice.depth_m)
+    choice = choose_now(adaptation, FIRM, strides(torque_nm=0.7), adaptation.choice.depth_m)
     assert (sweep_deg(choice), choice.reason) == (30.0, "fastest")
 
 
@@ -178,75 +181,78 @@ class TestStuck:
     def walked(self) -> tuple[GaitAdaptation, DepthChoice]:
         adaptation = adapted()
         for _ in range(4):
-            choice = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
+            choice = choose_now(adaptation, FIRM, strides(), adaptation.choice.depth_m)
         return adaptation, choice
 
     def test_nothing_as_deep_and_as_wide_is_tried_again_in_the_same_mud(self) -> None:
         adaptation, stuck = self.walked()
         for torque_nm in (0.2, 0.3, 0.2, 0.2):
-            choice = adaptation.step(
-                FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m), adaptation.choice.depth_m
+            choice = choose_now(
+                adaptation, FIRM, strides(torque_nm == 0.3, torque_nm, stuck.depth_m), adaptation.choice.depth_m
             )
             assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
     def test_the_next_stride_has_the_narrowest_sweep(self) -> None:
         adaptation, stuck = self.walked()
         assert sweep_deg(stuck) == 50.0
-        assert sweep_deg(adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m), 0.03)) == 30.0
+        assert sweep_deg(choose_now(adaptation, FIRM, strides(released=False, depth_m=stuck.depth_m), 0.03)) == 30.0
 
     def test_the_commanded_depth_is_excluded_where_the_flipper_was_pressed_deeper(self) -> None:
         """By the depth that the flipper reached, the commanded depth would be safe."""
         adaptation, stuck = self.walked()
-        choice = adaptation.step(FIRM, strides(released=False, depth_m=0.05), adaptation.choice.depth_m)
+        choice = choose_now(adaptation, FIRM, strides(released=False, depth_m=0.05), adaptation.choice.depth_m)
         assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
     def test_at_the_shallowest_and_narrowest_it_stays_until_it_comes_out_of_there(self) -> None:
         parameters = replace(PARAMETERS, initial_depth_m=0.015)
         adaptation = GaitAdaptation(parameters, GEOMETRY, GAIT)
         for _ in range(2):
-            choice = adaptation.step(FIRM, strides(released=False, depth_m=0.03), adaptation.choice.depth_m)
+            choice = choose_now(adaptation, FIRM, strides(released=False, depth_m=0.03), adaptation.choice.depth_m)
             assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "a flipper was stuck")
-        choice = adaptation.step(FIRM, strides(depth_m=0.03), adaptation.choice.depth_m)
+        choice = choose_now(adaptation, FIRM, strides(depth_m=0.03), adaptation.choice.depth_m)
         assert (choice.depth_m, sweep_deg(choice)) > (0.015, 30.0)
 
     def test_the_reason_names_it(self) -> None:
         adaptation, _ = self.walked()
-        assert adaptation.step(FIRM, strides(released=False), adaptation.choice.depth_m).reason == "a flipper was stuck"
+        assert (
+            choose_now(adaptation, FIRM, strides(released=False), adaptation.choice.depth_m).reason
+            == "a flipper was stuck"
+        )
 
     @pytest.mark.parametrize("forgotten", ["another mud", "another walk"])
     def test_it_is_forgotten_in_another_mud_and_in_another_walk(self, forgotten: str) -> None:
         adaptation, stuck = self.walked()
-        adaptation.step(FIRM, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m)
+        choose_now(adaptation, FIRM, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m)
         if forgotten == "another walk":
             adaptation.reset(0.03)
-        adaptation.step(FIRM._replace(boundary=True), strides(), adaptation.choice.depth_m)
+        choose_now(adaptation, FIRM._replace(boundary=True), strides(), adaptation.choice.depth_m)
         for _ in range(4):
-            choice = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
+            choice = choose_now(adaptation, FIRM, strides(), adaptation.choice.depth_m)
         assert (choice.depth_m, choice.gait) == (stuck.depth_m, stuck.gait)
 
     def test_with_no_thrust_known_it_goes_on_with_something_else(self) -> None:
         adaptation, stuck = self.walked()
-        choice = adaptation.step(
-            NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m
+        choice = choose_now(
+            adaptation, NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m
         )
         assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
 
 
 def test_where_nothing_is_known_of_the_thrust_depth_and_gait_stay() -> None:
     adaptation = adapted()
-    before = adaptation.step(FIRM, strides(), adaptation.choice.depth_m)
-    after = adaptation.step(NOTHING_KNOWN, strides(), adaptation.choice.depth_m)
+    before = choose_now(adaptation, FIRM, strides(), adaptation.choice.depth_m)
+    after = choose_now(adaptation, NOTHING_KNOWN, strides(), adaptation.choice.depth_m)
     assert (after.depth_m, after.gait) == (before.depth_m, before.gait)
     assert "nothing known" in after.reason
 
 
 def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None:
-    choice = adapted().step(estimated(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01), 0.03)
+    choice = choose_now(adapted(), estimated(2.0e6, 50e6), strides(torque_nm=0.75, depth_m=0.01), 0.03)
     assert (choice.depth_m, sweep_deg(choice), choice.reason) == (0.015, 30.0, "extraction")
 
 
 def test_where_none_predicts_a_step_the_deepest_is_taken() -> None:
-    choice = adapted().step(estimated(0.005e6, 0.001e6), strides(), 0.03)
+    choice = choose_now(adapted(), estimated(0.005e6, 0.001e6), strides(), 0.03)
     assert (choice.reason, choice.slips) == ("thrust", True)
     assert choice.depth_m == pytest.approx(0.05)
 
@@ -256,7 +262,9 @@ def test_where_none_predicts_a_step_the_deepest_is_taken() -> None:
 def test_every_choice_is_within_bounds_and_reach(k_s: float, k_e: float, seed: int) -> None:
     adaptation = adapted()
     for i in range(4):
-        choice = adaptation.step(estimated(k_s, k_e), strides(released=bool(seed >> i & 1)), adaptation.choice.depth_m)
+        choice = choose_now(
+            adaptation, estimated(k_s, k_e), strides(released=bool(seed >> i & 1)), adaptation.choice.depth_m
+        )
         assert 0.015 <= choice.depth_m <= min(0.05, GEOMETRY.deepest_m(sweep_deg(choice)))
         assert 30.0 <= sweep_deg(choice) <= 50.0
 
@@ -282,6 +290,6 @@ def test_only_this_method_has_a_shorter_swing() -> None:
 
 def test_a_stuck_stride_is_not_forgotten_after_a_shallower_one() -> None:
     adaptation = adapted()
-    held = adaptation.step(STICKY, strides(released=False, depth_m=0.04), 0.04)
-    adaptation.step(STICKY, strides(depth_m=0.02), 0.02)
+    held = choose_now(adaptation, STICKY, strides(released=False, depth_m=0.04), 0.04)
+    choose_now(adaptation, STICKY, strides(depth_m=0.02), 0.02)
     assert any(each.depth_m == 0.04 for each in adaptation._stuck), held

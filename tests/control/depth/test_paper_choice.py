@@ -19,6 +19,7 @@ from tests.control.synthetic_muds import (
     GEOMETRY,
     NOT_REPORTED,
     PARAMETERS,
+    choose_now,
     estimated,
     measured,
     reported,
@@ -38,7 +39,7 @@ def alike(k_s: Estimate, k_e: Estimate) -> list[StrideEstimate]:
 
 
 def chosen(k_s: Estimate, k_e: Estimate) -> DepthChoice:
-    return adapted().step(NOTHING_KNOWN, alike(k_s, k_e), 0.03)
+    return choose_now(adapted(), NOTHING_KNOWN, alike(k_s, k_e), 0.03)
 
 
 class TestDepth:
@@ -60,7 +61,7 @@ class TestDepth:
         """In round numbers the force is 2 N/cm³ · 1 cm² · 3 cm = 6 N."""
         for motor_force_n, depth_m in ((6.0 + 1e-9, 0.03), (6.0 - 1e-9, 0.0275)):
             parameters = AdaptationParameters(motor_force_n=motor_force_n)
-            choice = adapted(parameters).step(NOTHING_KNOWN, alike(NOT_REPORTED, measured(2.0e6)), 0.03)
+            choice = choose_now(adapted(parameters), NOTHING_KNOWN, alike(NOT_REPORTED, measured(2.0e6)), 0.03)
             assert choice.depth_m == pytest.approx(depth_m)
 
     def test_where_nothing_comes_out_it_is_the_shallowest(self) -> None:
@@ -75,7 +76,7 @@ class TestDepth:
     @given(st.floats(1e4, 1e7), st.floats(0.0, 5e6))
     def test_uncertainty_and_the_memory_of_many_strides_are_ignored(self, k_e: float, uncertainty: float) -> None:
         uncertain = measured(k_e)._replace(std_error=uncertainty)
-        choice = adapted().step(estimated(reported(3e6), reported(9e6)), alike(NOT_REPORTED, uncertain), 0.03)
+        choice = choose_now(adapted(), estimated(reported(3e6), reported(9e6)), alike(NOT_REPORTED, uncertain), 0.03)
         assert choice == chosen(NOT_REPORTED, measured(k_e))
 
 
@@ -111,14 +112,14 @@ class TestSlip:
             GaitParameters(stance_speed_m_s=0.2),
         )
         for k_s, slips in ((0.0587e6, True), (0.0589e6, False)):
-            choice = adapted(parameters, gait).step(NOTHING_KNOWN, alike(measured(k_s), measured(1e6)), 0.03)
+            choice = choose_now(adapted(parameters, gait), NOTHING_KNOWN, alike(measured(k_s), measured(1e6)), 0.03)
             assert choice.slips == slips
 
     def test_a_larger_pad_slips_sooner(self) -> None:
         """The pad is 4 cm wide and 3 cm deep, 18 cm³, so it slips up to 5 N / 44.5 cm³ = 0.1124 N/cm³."""
         parameters = AdaptationParameters(pad_width_m=0.04, pad_depth_m=0.03)
         for k_s, slips in ((0.1122e6, True), (0.1125e6, False)):
-            choice = adapted(parameters).step(NOTHING_KNOWN, alike(measured(k_s), measured(1e6)), 0.03)
+            choice = choose_now(adapted(parameters), NOTHING_KNOWN, alike(measured(k_s), measured(1e6)), 0.03)
             assert choice.slips == slips
 
 
@@ -126,43 +127,50 @@ class TestMemory:
     @pytest.mark.parametrize("first", [0, 1])
     def test_the_right_flipper_decides_in_any_order(self, first: int) -> None:
         strides = [stride("left", k_e=measured(1e6)), stride("right", k_e=measured(2e6))]
-        assert adapted().step(NOTHING_KNOWN, strides[first:] + strides[:first], 0.03).depth_m == pytest.approx(0.03)
+        assert choose_now(adapted(), NOTHING_KNOWN, strides[first:] + strides[:first], 0.03).depth_m == pytest.approx(
+            0.03
+        )
 
     def test_the_left_flipper_decides_where_the_right_one_is_unknown(self) -> None:
         strides = [stride("left", k_e=measured(2e6)), stride("right")]
-        assert adapted().step(NOTHING_KNOWN, strides, 0.03).depth_m == pytest.approx(0.03)
+        assert choose_now(adapted(), NOTHING_KNOWN, strides, 0.03).depth_m == pytest.approx(0.03)
 
     def test_the_last_valid_coefficients_stay(self) -> None:
         adaptation = adapted()
-        known = adaptation.step(NOTHING_KNOWN, alike(measured(0.08e6), measured(1e6)), adaptation.choice.depth_m)
+        known = choose_now(adaptation, NOTHING_KNOWN, alike(measured(0.08e6), measured(1e6)), adaptation.choice.depth_m)
         assert known.slips
         invalid = measured(9e6)._replace(valid=False)
-        assert adaptation.step(NOTHING_KNOWN, alike(invalid, invalid), adaptation.choice.depth_m) == known
-        assert adaptation.step(NOTHING_KNOWN, [], adaptation.choice.depth_m) == known
-        assert adaptation.step(
-            NOTHING_KNOWN, alike(invalid, measured(2e6)), adaptation.choice.depth_m
+        assert choose_now(adaptation, NOTHING_KNOWN, alike(invalid, invalid), adaptation.choice.depth_m) == known
+        assert choose_now(adaptation, NOTHING_KNOWN, [], adaptation.choice.depth_m) == known
+        assert choose_now(
+            adaptation, NOTHING_KNOWN, alike(invalid, measured(2e6)), adaptation.choice.depth_m
         ) == THREE_CM._replace(slips=True)
-        assert adaptation.step(NOTHING_KNOWN, alike(measured(0.3e6), invalid), adaptation.choice.depth_m) == THREE_CM
+        assert (
+            choose_now(adaptation, NOTHING_KNOWN, alike(measured(0.3e6), invalid), adaptation.choice.depth_m)
+            == THREE_CM
+        )
 
     def test_without_a_k_e_the_depth_stays(self) -> None:
         adaptation = adapted()
         adaptation.reset(0.04)
         kept = DepthChoice(0.04, False, "no k_e known, depth kept")
-        assert adaptation.step(NOTHING_KNOWN, alike(measured(1e6), NOT_REPORTED), adaptation.choice.depth_m) == kept
-        assert adaptation.step(estimated(reported(1e6), reported(1e6)), [], adaptation.choice.depth_m) == kept
+        assert (
+            choose_now(adaptation, NOTHING_KNOWN, alike(measured(1e6), NOT_REPORTED), adaptation.choice.depth_m) == kept
+        )
+        assert choose_now(adaptation, estimated(reported(1e6), reported(1e6)), [], adaptation.choice.depth_m) == kept
 
     def test_a_reset_forgets_and_starts_at_its_depth(self) -> None:
         adaptation = adapted()
         assert adaptation.choice == DepthChoice(PARAMETERS.initial_depth_m, False, "start")
-        adaptation.step(NOTHING_KNOWN, alike(measured(1e6), measured(1e6)), adaptation.choice.depth_m)
+        choose_now(adaptation, NOTHING_KNOWN, alike(measured(1e6), measured(1e6)), adaptation.choice.depth_m)
         adaptation.reset(0.02)
         assert adaptation.choice == DepthChoice(0.02, False, "start")
-        assert adaptation.step(NOTHING_KNOWN, [], adaptation.choice.depth_m).depth_m == 0.02
+        assert choose_now(adaptation, NOTHING_KNOWN, [], adaptation.choice.depth_m).depth_m == 0.02
 
     def test_a_stuck_flipper_does_not_decide(self) -> None:
         """The paper's conditions do not include it."""
         stuck = [stride("right", released=False, depth_m=nan, k_e=measured(1e6))]
-        assert adapted().step(NOTHING_KNOWN, stuck, 0.03).depth_m == pytest.approx(0.05)
+        assert choose_now(adapted(), NOTHING_KNOWN, stuck, 0.03).depth_m == pytest.approx(0.05)
 
 
 numbers = st.floats() | st.floats(0.0, 1e7)
@@ -173,5 +181,5 @@ estimates = st.builds(Estimate, numbers, numbers, st.just(9), st.booleans())
 def test_for_any_input_the_depth_stays_in_its_range(walk: list[tuple[Estimate, Estimate]]) -> None:
     adaptation = adapted()
     for k_s, k_e in walk:
-        depth_m = adaptation.step(NOTHING_KNOWN, alike(k_s, k_e), adaptation.choice.depth_m).depth_m
+        depth_m = choose_now(adaptation, NOTHING_KNOWN, alike(k_s, k_e), adaptation.choice.depth_m).depth_m
         assert PARAMETERS.min_depth_m <= depth_m <= PARAMETERS.max_depth_m

@@ -410,3 +410,22 @@ def test_an_insertion_does_not_end_above_the_mud() -> None:
     gait.step(0.05)
     assert not gait.end_insertion()
     assert (gait.step(0.0).phase, gait.commanded_depth_m) == (Phase.INSERTION, 0.03)
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_choice_is_due_before_a_stride_uses_it(turns: bool) -> None:
+    """It is due in the last ticks of a swing and, if the gait turns, in the last ticks of its first half."""
+    gait, due_s = Gait(GaitParameters(), FlipperGeometry()), list[float]()
+    gait.reset(0.03)
+    within_s, swing_s = 3.0 * PERIOD_S, GaitParameters().swing_duration_s
+    begun_s, now_s = 0.0, 0.0
+    while gait.stride == 0:
+        phase = gait.step(PERIOD_S).phase
+        now_s += PERIOD_S
+        begun_s = begun_s if phase is Phase.SWING else now_s
+        if gait.is_choice_due(within_s, turns):
+            assert phase is Phase.SWING
+            due_s.append(now_s - begun_s)
+    assert len(due_s) == (3 + 3 * turns)
+    assert due_s[-1] == pytest.approx(swing_s, abs=2.0 * PERIOD_S)
+    assert due_s[0] == pytest.approx(swing_s / 2.0 if turns else swing_s, abs=5.0 * PERIOD_S)

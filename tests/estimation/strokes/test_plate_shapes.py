@@ -6,6 +6,7 @@ from math import cos, hypot, radians, sin
 import numpy as np
 import pytest
 
+from control.bounded_work import finish
 from control.geometry import FlipperGeometry
 from control.plate.outline import Corner
 from estimation.strokes.scatter_memory import ScatterMemory
@@ -72,14 +73,14 @@ def stroke(geometry: FlipperGeometry, k_n_m3: float) -> list[Batch]:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_an_insertion_gives_the_known_k_p(shape: str) -> None:
-    reported = fit_insertion(SHAPES[shape], stroke(SHAPES[shape], K_P), KNOWN, 0.0)
+    reported = finish(fit_insertion(SHAPES[shape], stroke(SHAPES[shape], K_P), KNOWN, 0.0))
     assert reported.valid and reported.value == pytest.approx(K_P, rel=0.005)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_an_extraction_gives_the_known_k_e(shape: str) -> None:
     raised = stroke(SHAPES[shape], -K_E)[::-1]
-    reported = fit_extraction(SHAPES[shape], raised, KNOWN, 0.0, ScatterMemory(), raised[0].travel_m)
+    reported = finish(fit_extraction(SHAPES[shape], raised, KNOWN, 0.0, ScatterMemory(), raised[0].travel_m))
     assert reported.valid and reported.value == pytest.approx(K_E, rel=0.005)
 
 
@@ -95,5 +96,5 @@ def test_a_stance_gives_the_known_k_s(shape: str) -> None:
 
 def test_the_wrong_shape_is_noticed() -> None:
     """The same strokes read with the paper's rectangle are wrong by tens of percent."""
-    reported = fit_insertion(SHAPES["rectangle"], stroke(SHAPES["trapezoid"], K_P), KNOWN, 0.0)
+    reported = finish(fit_insertion(SHAPES["rectangle"], stroke(SHAPES["trapezoid"], K_P), KNOWN, 0.0))
     assert abs(reported.value / K_P - 1.0) > 0.2

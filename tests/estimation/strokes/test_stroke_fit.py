@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from control.bounded_work import finish
 from control.geometry import FlipperGeometry
 from control.plate.integrals import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import Estimate
@@ -90,13 +91,13 @@ def up(
 
 
 def insertion(batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0) -> Estimate:
-    return fit_insertion(GEOMETRY, batches, surface, zero_error_n)
+    return finish(fit_insertion(GEOMETRY, batches, surface, zero_error_n))
 
 
 def extraction(
     batches: Sequence[Batch], surface: Surface = NOMINAL, zero_error_n: float = 0.0, start_m: float = 0.03
 ) -> Estimate:
-    return fit_extraction(GEOMETRY, batches, surface, zero_error_n, ScatterMemory(), start_m)
+    return finish(fit_extraction(GEOMETRY, batches, surface, zero_error_n, ScatterMemory(), start_m))
 
 
 # the law is found

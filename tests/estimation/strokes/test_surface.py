@@ -9,6 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from control.bounded_work import finish
 from estimation.strokes.origin_fit import fit_through_origin
 from estimation.strokes.surface import (
     MIN_ABOVE,
@@ -36,7 +37,7 @@ def noise(seed: int, count: int) -> Array:
 
 
 def found(depths_m: Array, forces_n: Array) -> Surface:
-    return find_surface(depths_m.tolist(), forces_n.tolist())
+    return finish(find_surface(depths_m.tolist(), forces_n.tolist()))
 
 
 class Scores(NamedTuple):
@@ -234,9 +235,9 @@ def test_a_line_from_the_first_batch_on_has_its_surface_there_or_none() -> None:
 def test_a_flipper_at_rest_gives_no_slope() -> None:
     """The depths are equal up to rounding: the spread of a line through them may come out below zero."""
     forces_n = [0.0, 0.0, 1.0, 2.0, 1.5, 1.0, 2.0, 1.5]
-    assert find_surface([0.01] * 8, forces_n) == NO_SURFACE
+    assert finish(find_surface([0.01] * 8, forces_n)) == NO_SURFACE
     for depth_m in np.linspace(0.005, 0.04, 50).tolist():
-        held = find_surface([0.0, depth_m / 3.0, *[depth_m] * 6], [0.0, 0.0, 1.0, 1.1, 1.0, 1.1, 1.0, 1.1])
+        held = finish(find_surface([0.0, depth_m / 3.0, *[depth_m] * 6], [0.0, 0.0, 1.0, 1.1, 1.0, 1.1, 1.0, 1.1]))
         assert depth_m / 3.0 <= held.depth_m <= depth_m
 
 
@@ -254,13 +255,13 @@ modest_depths = st.floats(-0.1, 0.1)
 @given(st.lists(st.tuples(modest_depths, st.floats()), max_size=40))
 def test_nothing_makes_the_search_raise(pairs: list[tuple[float, float]]) -> None:
     """The depths come from finite angles and may go back and forth; the forces may be any float."""
-    find_surface([depth_m for depth_m, _ in pairs], [force_n for _, force_n in pairs])
+    finish(find_surface([depth_m for depth_m, _ in pairs], [force_n for _, force_n in pairs]))
 
 
 @given(st.lists(st.tuples(modest_depths, st.floats(-100.0, 100.0)), max_size=40))
 def test_a_surface_lies_where_the_flipper_was(pairs: list[tuple[float, float]]) -> None:
     ordered = sorted(pairs)
-    surface = find_surface([depth_m for depth_m, _ in ordered], [force_n for _, force_n in ordered])
+    surface = finish(find_surface([depth_m for depth_m, _ in ordered], [force_n for _, force_n in ordered]))
     if surface.found:
         assert ordered[0][0] <= surface.depth_m <= ordered[-1][0]
         assert surface.std_error_m >= 0.0
