@@ -132,7 +132,8 @@ class FaultKind(StrEnum):
     LOOP_CRAWLING = "loop_crawling", "loop", DRIVES_IDLE, ALWAYS, BY_HAND, 25
     LOOP_STALLED = "loop_stalled", "loop", DAMPING, ALWAYS, WHEN_GONE, 2
     CLOCK_STEP = "clock_step", "clock", WARN, NO, WHEN_GONE, 2
-    ESTIMATE_WILD = "estimate_wild", "estimator", WARN, NO, WHEN_GONE, 2
+    # a stride closes in 25 to 40 units, one a tick
+    ESTIMATE_WILD = "estimate_wild", "estimator", WARN, NO, WHEN_GONE, 60
     POSE_LOST = "pose_lost", "pose", WARN, NO, WHEN_GONE, 22
     LEASE_LOST = "lease_lost", "lease", SOFT_STOP, ALWAYS, WHEN_GONE, 2
     # the log

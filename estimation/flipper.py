@@ -2,12 +2,12 @@
 
 Each stroke is stored as batches of equal travel (stroke.py). At the end of the insertion the estimator finds the
 surface (surface.py) and fits k_p; when the stride closes it fits k_e (stroke_fit.py), and fits or bounds k_s
-(shear.py). Each of these is a unit of bounded work (control/bounded_work.py). The surface corrects the tare, which the
-loads of the stance contain: samples that arrive before are learned as soon as the tare is corrected, so they do not
-depend on when the units run. A stance that ends before finishes the work at once. The clinging weight and the joint's
-friction are measured again in every swing (tare.py, air.py). A stride without evidence of mud has no coefficients. The
-coefficients are linear in the joint torques, so the fits need no third force component, which two torques cannot
-determine; forces are mapped for display only, until the tare is corrected with that of before.
+(shear.py). Each of these is a unit of bounded work (control/computing/bounded_work.py). The surface corrects the tare,
+which the loads of the stance contain: samples that arrive before are learned as soon as the tare is corrected, so they
+do not depend on when the units run. A stance that ends before finishes the work at once. The clinging weight and the
+joint's friction are measured again in every swing (tare.py, air.py). A stride without evidence of mud has no
+coefficients. The coefficients are linear in the joint torques, so the fits need no third force component, which two
+torques cannot determine; forces are mapped for display only, until the tare is corrected with that of before.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from functools import partial
 from math import cos, hypot, isfinite, sin
 from typing import NamedTuple
 
-from control.bounded_work import Work, WorkQueue, finished
+from control.computing.bounded_work import Work, WorkQueue, finished
 from control.geometry import FlipperGeometry
 from control.plate.integrals import growth_exponent
 from control.records import UNKNOWN, Estimate, FlipperLoad, Phase

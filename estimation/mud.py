@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
-from control.bounded_work import Work, WorkQueue, finish
 from control.bounds import Bounds, Meaning
+from control.computing.bounded_work import Work, WorkQueue, finish
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, MudEstimate
 from control.records import (

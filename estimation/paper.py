@@ -14,7 +14,7 @@ mud the paper adds the body's drag to f_x; with `compensation`, half of it is ad
 
 from math import isfinite
 
-from control.bounded_work import Work, WorkQueue, finished
+from control.computing.bounded_work import Work, WorkQueue, finished
 from control.geometry import FlipperGeometry
 from control.plate.integrals import mean_width_m, moment_width_m
 from control.records import UNKNOWN, FlipperLoad, Phase

@@ -2,9 +2,9 @@
 
 A method learns coefficients from the samples of a stride; the shell does the rest. It turns currents into loads, counts
 phases and strides, records the largest forces, and closes a stride once the flipper has left the mud after its
-extraction. Its estimate takes longer than a tick, so a stride that closes gives work (control/bounded_work.py), which
-depends on nothing that is measured later. The methods are `FlipperEstimator` (flipper.py) and `PaperEstimator`
-(paper.py).
+extraction. Its estimate takes longer than a tick, so a stride that closes gives work
+(control/computing/bounded_work.py), which depends on nothing that is measured later. The methods are
+`FlipperEstimator` (flipper.py) and `PaperEstimator` (paper.py).
 """
 
 from abc import ABC, abstractmethod
@@ -13,7 +13,7 @@ from functools import partial
 from math import inf, isfinite
 from typing import NamedTuple
 
-from control.bounded_work import Work, WorkQueue
+from control.computing.bounded_work import Work, WorkQueue
 from control.gait.recovery import is_in_mud
 from control.geometry import FlipperGeometry
 from control.records import NO_LOAD, UNKNOWN, DriveState, Estimate, FlipperLoad, Phase, StrideEstimate

@@ -5,17 +5,17 @@ An insertion that meets solid mud ends early. Once a stride, in swing, the strid
 of the next stride is chosen.
 
 What takes longer than a tick, the fits at the end of an insertion and the close with its choice, is bounded work
-(control/bounded_work.py). The loop runs one unit a tick after the command of that tick, so an insertion is fitted
-within 16 ticks, and a stride closes 24 ticks after its swing began (some 50 by the method `gait`), at the latest before
-the next insertion uses its choice: all units run at once in a swing that is too short for them, and in a new walk,
-whose beginning finishes the strides of the one before. A choice that comes only after the next insertion began is
-logged as such.
+(control/computing/bounded_work.py). The loop runs one unit a tick after the command of that tick, so an insertion is
+fitted some 20 ticks after its end, and a stride closes some 30 ticks after its swing began (40 by the method `gait`),
+at the latest before the next insertion uses its choice: all units run at once in a swing that is too short for them,
+and in a new walk, whose beginning finishes the strides of the one before. A choice that comes only after the next
+insertion began is logged as such.
 """
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from control.bounded_work import Work
+from control.computing.bounded_work import Work
 from control.controller import Controller, WalkOrder
 from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthAdaptation, DepthChoice, Method
 from control.depth.gait_choice import GaitAdaptation

@@ -23,8 +23,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, Protocol
 
-from control.bounded_work import Work, batched
 from control.bounds import Bounds, Meaning
+from control.computing.bounded_work import Work, batched
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of
 from control.gait.gait import GaitParameters, stride_duration_s

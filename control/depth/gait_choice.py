@@ -20,7 +20,7 @@ from dataclasses import replace
 from functools import partial
 from math import floor
 
-from control.bounded_work import Work
+from control.computing.bounded_work import Work
 from control.depth.depth_choice import (
     AdaptationParameters,
     Candidate,

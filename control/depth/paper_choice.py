@@ -15,7 +15,7 @@ came out late and pulled the body back (or no pose excludes that) proves f_e ≥
 from collections.abc import Sequence
 from math import inf
 
-from control.bounded_work import Work, finished
+from control.computing.bounded_work import Work, finished
 from control.depth.depth_choice import AdaptationParameters, DepthChoice, depth_grid
 from control.depth.forecast import GRID_M
 from control.gait.gait import GaitParameters

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from math import sqrt
 from typing import NamedTuple
 
-from control.exact_sum import exact_sum
+from control.computing.exact_sum import exact_sum
 from control.records import UNKNOWN
 
 

@@ -20,7 +20,7 @@ from math import inf, isfinite, sqrt
 from operator import mul
 from typing import NamedTuple
 
-from control.exact_sum import exact_sum
+from control.computing.exact_sum import exact_sum
 
 HUBER = 3.0  # with the usual 1.345 the ends of strokes in mud that deviates from the law would be outliers
 NORMAL_MAD = 1.4826

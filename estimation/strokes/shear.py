@@ -18,7 +18,7 @@ from enum import Enum
 from math import cos, hypot, inf, isfinite, sin
 from typing import NamedTuple
 
-from control.exact_sum import exact_sum
+from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate.integrals import moment_width_m, stance_moment_m4, submerged_plate
 from control.records import UNKNOWN

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from math import cos, hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
-from control.bounded_work import Work, finish
-from control.exact_sum import exact_sum
+from control.computing.bounded_work import Work, finish
+from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
 from control.plate.integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate

@@ -17,8 +17,8 @@ from math import exp, hypot, inf, sqrt
 from operator import mul
 from typing import NamedTuple
 
-from control.bounded_work import Work
-from control.exact_sum import exact_sum
+from control.computing.bounded_work import Work
+from control.computing.exact_sum import exact_sum
 from control.records import UNKNOWN
 from estimation.strokes.origin_fit import NORMAL_MAD, median
 

@@ -28,7 +28,7 @@ from collections.abc import Sequence
 from math import hypot, sqrt
 from typing import NamedTuple
 
-from control.exact_sum import exact_sum
+from control.computing.exact_sum import exact_sum
 from control.records import UNKNOWN
 from estimation.strokes.surface import NO_SURFACE, Surface
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import nan
 from typing import Any
 
-from control.bounded_work import finished
+from control.computing.bounded_work import finished
 from control.modes import Mode, Request
 from control.records import Estimate, StrideEstimate
 from estimation.mud import Sampled

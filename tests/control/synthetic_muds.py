@@ -8,7 +8,7 @@ from math import nan
 
 import numpy as np
 
-from control.bounded_work import finish
+from control.computing.bounded_work import finish
 from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthChoice
 from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from random import Random
 from typing import Any, NamedTuple
 
-from control.bounded_work import finish
+from control.computing.bounded_work import finish
 from control.gait.gait import Gait, GaitParameters, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass

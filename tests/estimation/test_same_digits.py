@@ -13,7 +13,7 @@ from math import inf, isnan, nan
 
 import pytest
 
-from control.exact_sum import exact_sum
+from control.computing.exact_sum import exact_sum
 from tests.estimation.coefficient_digits import coefficient_digits
 from tests.folders import ROOT
 
@@ -33,7 +33,7 @@ def test_no_sum_of_floats_depends_on_the_version_of_python() -> None:
     """`sum` may count samples, and may add values that are only tested for being finite."""
     sources = chain((ROOT / "control").rglob("*.py"), (ROOT / "estimation").rglob("*.py"))
     found = [f"{path}: {text}" for path in sources for text in bare_sums(path.read_text(encoding="utf-8"))]
-    assert not found, f"use exact_sum, see control/exact_sum.py: {found}"
+    assert not found, f"use exact_sum, see control/computing/exact_sum.py: {found}"
 
 
 @pytest.mark.parametrize(

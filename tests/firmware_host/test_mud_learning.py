@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from control.bounded_work import finished
+from control.computing.bounded_work import finished
 from control.controller import WalkOrder
 from control.faults import Fault, FaultKind
 from control.gait.gait import GaitParameters

@@ -6,7 +6,7 @@ from math import cos, hypot, radians, sin
 import numpy as np
 import pytest
 
-from control.bounded_work import finish
+from control.computing.bounded_work import finish
 from control.geometry import FlipperGeometry
 from control.plate.outline import Corner
 from estimation.strokes.scatter_memory import ScatterMemory

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from control.bounded_work import finish
+from control.computing.bounded_work import finish
 from control.geometry import FlipperGeometry
 from control.plate.integrals import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import Estimate

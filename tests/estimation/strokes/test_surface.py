@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from control.bounded_work import finish
+from control.computing.bounded_work import finish
 from estimation.strokes.origin_fit import fit_through_origin
 from estimation.strokes.surface import (
     MIN_ABOVE,

@@ -177,6 +177,7 @@ def observe_walk(lockstep: Lockstep, strides: int) -> list[StrideTruth]:
     while len(truths) < 2 * strides:
         lockstep.step()
         truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target.phase)
+    lockstep.loop.learning.finish()  # the strides that have just ended
     return truths
 
 

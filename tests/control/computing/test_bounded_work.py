@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from control.bounded_work import Work, WorkQueue, batched, finish, finished
+from control.computing.bounded_work import Work, WorkQueue, batched, finish, finished
 
 
 def counting(log: list[str], name: str, units: int) -> Work[None]:
