@@ -5,15 +5,17 @@ shapes are fitted. Mud with end bearing makes the force jump: a constant, and an
 rises from zero makes a kink: the line starts at the constant, at the depth that fits best. (A line's slope and
 intercept have no bias however soft the mud is. The paper's trigger at 0.5 N lies too deep by 0.5 N over the slope.) The
 residuals weight the shapes: each counts with exp(-½ residual/variance), with Akaike's penalty for the jump's additional
-parameter. The surface is their weighted mean; its standard error includes theirs and their difference. The error of a
-jump is the range of borders that fit almost as well (a likelihood interval), that of a kink the intercept's.
+parameter. The surface is their weighted mean; its standard error includes theirs and their difference. A jump is the
+mean over all borders, each weighted by its likelihood: the best border alone moves by whole batches where a small
+change of the forces, such as a delay of 5 ms, makes another one fit slightly better. The error of a jump is the
+standard deviation of the border, that of a kink the intercept's.
 
 One insertion locates the surface to about a millimetre; `SurfaceMemory` (surface_memory.py) combines it with the
 nominal height and with the other strokes.
 """
 
 from collections.abc import Sequence
-from math import exp, hypot, inf, sqrt
+from math import exp, inf, sqrt
 from operator import mul
 from typing import NamedTuple
 
@@ -26,7 +28,6 @@ MIN_ABOVE, MIN_BELOW = 2, 4  # batches
 FREEDOM = 2.0  # residual variances that a jump must save for its additional parameter, after Akaike
 CLEAR = 12.0  # F of border and line against a constant alone; from there on the stroke met mud
 LAW_FRACTION = 0.18  # of the depth below a kink: what a force with the exponent 1.5 in place of 1 shifts it
-LIKELY = 4.0  # residual variances by which a border may fit worse and still be likely
 LEAST_VARIANCE_N2 = 1e-12
 SHARPEST_M = 1e-5  # smallest standard error: no mud is smoother
 REACH = 2  # batches to either side: one outlying sample is in two loads, so in two batches at most
@@ -122,22 +123,28 @@ def _explained(x: Sequence[float], y: Sequence[float]) -> tuple[list[float], lis
 
 
 def _jump(x: Sequence[float], y: Sequence[float], jumps: list[float], variance: float) -> tuple[Surface, float, float]:
-    """Return the best jump, its size, and the slope below it."""
+    """Return the mean jump over all borders by their likelihood, its size, and the slope below the best border."""
     largest = max(jumps)
-    likely = [border for border, square in enumerate(jumps, MIN_ABOVE) if square >= largest - LIKELY * variance]
     border = MIN_ABOVE + jumps.index(largest)
     mean_x, mean_y, slope, _ = _line(x[border:], y[border:])
-    edge_m, level_n = (x[border - 1] + x[border]) / 2.0, exact_sum(y[:border]) / border
-    error_m = _border_error_m(x, likely[0], likely[-1])
+    level_n = exact_sum(y[:border]) / border
+    edge_m, error_m = _mean_border_m(x, [exp((square - largest) / (2.0 * variance)) for square in jumps])
     jump_n = mean_y + slope * (edge_m - mean_x) - level_n
     return Surface(edge_m, error_m, level_n, sqrt(variance / border), True), jump_n, slope
 
 
-def _border_error_m(depths_m: Sequence[float], first: int, last: int) -> float:
-    """Combine a quarter of the likely borders' range with the uniform error within one batch."""
-    gap_m = depths_m[last] - depths_m[last - 1]
-    range_m = depths_m[last] - depths_m[first]
-    return hypot(range_m / 4.0, gap_m / sqrt(12.0))
+def _mean_border_m(depths_m: Sequence[float], likelihoods: Sequence[float]) -> tuple[float, float]:
+    """Return mean and standard deviation of the border, which is equally probable at each depth before the stroke."""
+    total = first = second = 0.0
+    pairs = zip(depths_m[MIN_ABOVE - 1 :], depths_m[MIN_ABOVE:], likelihoods, strict=False)
+    for above_m, below_m, likelihood in pairs:
+        gap_m, middle_m = below_m - above_m, (above_m + below_m) / 2.0 - depths_m[0]
+        weight = max(abs(gap_m), SHARPEST_M) * likelihood
+        total += weight
+        first += weight * middle_m
+        second += weight * (middle_m * middle_m + gap_m * gap_m / 12.0)
+    mean_m = first / total
+    return depths_m[0] + mean_m, sqrt(max(0.0, second / total - mean_m * mean_m))
 
 
 def _kink(x: Sequence[float], y: Sequence[float], border: int, kink_m: float, residual: float) -> Surface:

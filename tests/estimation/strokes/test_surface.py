@@ -87,12 +87,13 @@ def test_k_law_mud_of_any_slope_has_little_bias(slope_n_cm: float, table_sd: flo
     ("noise_n", "count"), [(REFERENCE_NOISE_N, REFERENCE_COUNT), (BATCH_NOISE_N, BATCH_COUNT)], ids=["rows", "batches"]
 )
 def test_two_standard_errors_cover_the_surface_of_k_law_mud(slope_n_cm: float, noise_n: float, count: int) -> None:
-    """The measured coverage is 92 to 97 %, three sampling errors of 400 runs are 4 %; the errors are no larger than
-    needed.
+    """The measured coverage is 93 to 98 %, three sampling errors of 400 runs are 4 %. The errors are no larger than a
+    kink and a jump in the same gap between two batches require, 1.0 to 1.5 times the scatter in this mud: they also
+    allow for the jump, which this mud never has. (The best border alone scattered more: 0.9 to 1.3 times.)
     """
     result = scores(100.0 * slope_n_cm, 0.0, noise_n, count)
     assert 0.88 <= result.covered <= 0.99
-    assert 0.7 <= result.reported_mm / np.std(result.errors_mm) <= 1.3
+    assert 0.7 <= result.reported_mm / np.std(result.errors_mm) <= 1.6
 
 
 @pytest.mark.parametrize("shift_m", [-0.005, 0.0, 0.0007, 0.004])
@@ -265,6 +266,28 @@ def test_a_surface_lies_where_the_flipper_was(pairs: list[tuple[float, float]]) 
     if surface.found:
         assert ordered[0][0] <= surface.depth_m <= ordered[-1][0]
         assert surface.std_error_m >= 0.0
+
+
+def test_a_small_change_of_the_forces_moves_a_jump_by_a_small_part_of_a_batch() -> None:
+    """Two batches lie half-way up the jump, so that two borders 3 mm apart fit equally well; 0.02 N chooses between
+    them. The best border alone moves by 3 mm.
+    """
+    z = np.arange(-0.015, 0.03, 0.0015)
+    middle = (z > 0.0) & (z < 0.0031)
+    force = np.where(z > 0.0, 2.0, 0.0) + 0.2 * noise(3, len(z))
+
+    def surface_m(middle_n: float) -> float:
+        return found(z, np.where(middle, middle_n, force)).depth_m
+
+    moved_m = np.diff([surface_m(middle_n) for middle_n in np.arange(0.7, 1.3, 0.02)])
+    assert np.max(np.abs(moved_m)) <= 0.0005
+
+
+def test_a_jump_is_found_where_the_flipper_stood_on_the_mud() -> None:
+    """Batches at one depth leave no travel between them in which the border could lie."""
+    z = np.array([-0.006, -0.004, -0.002, *[0.0] * 6])
+    surface = found(z, np.array([0.0, 0.01, -0.01, 3.0, 3.01, 2.99, 3.0, 3.01, 2.99]))
+    assert -0.002 <= surface.depth_m <= 0.0
 
 
 # outliers
