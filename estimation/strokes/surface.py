@@ -84,6 +84,7 @@ def _mud_begins(x: Sequence[float], y: Sequence[float]) -> Work[Surface]:
     largest, best = max(jumps), max(kinks)
     variance = max((square - largest) / max(len(x) - 4, 1), LEAST_VARIANCE_N2)
     jump, jump_n, slope_n_m = _jump(x, y, jumps, variance)
+    yield
     if largest < CLEAR * 2.0 * variance or (slope_n_m < 0.0 and jump.level_n > 0.0):
         return NO_SURFACE
     if not (slope_n_m > 0.0 and best > 0.0):
