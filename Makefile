@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --duration
 # Exact versions with hashes, for installations as root; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
 
-.PHONY: help lock setup demo test test-vm mutants dst lint docs docs-links man clean
+.PHONY: help lock setup demo test test-compiled test-vm mutants dst lint docs docs-links man clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -29,6 +29,9 @@ test: .venv/test  ## run all tests without network: first those that compute, th
 	$(PYTEST) $(REAL_TIME) $(ARGS); real_time=$$?; \
 	echo "exit status: computing tests $$computing, real-time tests $$real_time"; \
 	test $$computing -eq 0 -a $$real_time -eq 0
+
+test-compiled: .venv/test  ## build the compiled tick and compare it with the sources, digit by digit; needs a C compiler
+	$(BIN)/python -m pytest -v -m compiled tests/compiled $(ARGS)
 
 test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virtual machine
 	@$(BIN)/python -m virtual_machine.installed_robot

@@ -5,11 +5,9 @@ wants none. The limits decide which torques leave for the drives (control/limits
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import radians
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds, Meaning
 from control.faults import Fault, FaultKind
 from control.gait.gait import Gait, GaitParameters
 from control.gait.joint_path import JointPath, still
@@ -18,6 +16,7 @@ from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains, VelocityPrediction, damping_torques_nm, joint_torques_nm
 from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
+from control.parameters.motion_parameters import MotionParameters as MotionParameters  # for its users here
 from control.records import (
     TWO_FLIPPERS,
     DriveStates,
@@ -32,22 +31,6 @@ from control.records import (
     same_for_all,
     same_for_each,
 )
-
-
-@dataclass(frozen=True)
-class MotionParameters:
-    """Parameters of motions outside the gait."""
-
-    path_speed_rad_s: Annotated[
-        float, Bounds(0.05, 10.0), Meaning("of joints that move to a pose outside of the gait")
-    ] = 1.0
-    fade_in_s: Annotated[
-        float, Bounds(0.0, 10.0), Meaning("in which stiffness rises to its full value after arming")
-    ] = 0.5
-    longest_hold_s: Annotated[
-        float, Bounds(0.0, 86400.0), Meaning("after which torque goes off by itself; 0: never")
-    ] = 600.0
-
 
 UP_RAD = 0.12  # from level: the edge of a 12 cm arm is then 1.4 cm lower, still out of the mud
 RAISING_S = 1.0  # longest wait for flippers that are stuck in the mud

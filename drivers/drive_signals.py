@@ -7,18 +7,17 @@ two parts of the report that change without a frame of the drive are compared at
 from abc import ABC, abstractmethod
 
 from control.records import NEVER_S, UNKNOWN, DriveState
-from drivers.drive import DriveHealth, DriveParameters, Outlet
+from drivers.drive import DriveHealth, Outlet
 from drivers.setpoint_monitor import SetpointMonitor
 
 
 class DriveSignals(ABC):
     """Owns the newest value of every signal that arrived; a protocol derives its `DriveAxis` from it."""
 
-    parameters: DriveParameters
-
-    def __init__(self, joint: str, outlet: Outlet, setpoints: SetpointMonitor) -> None:
-        """The protocol's axis calls `reset` at the end of its own."""
+    def __init__(self, joint: str, sign: int, outlet: Outlet, setpoints: SetpointMonitor) -> None:
+        """`sign`: -1 for a mirrored motor. The protocol's axis calls `reset` at the end of its own."""
         self.joint = joint
+        self._sign = sign
         self._outlet = outlet
         self.setpoints = setpoints
 
@@ -82,7 +81,7 @@ class DriveSignals(ABC):
             restarts=self.restarts,
             duplicate_id=self.duplicates,
             foreign_commands=self._foreign_commands,
-            setpoint_problem=self.setpoints.problem(self.parameters.sign),
+            setpoint_problem=self.setpoints.problem(self._sign),
         )
 
     @property

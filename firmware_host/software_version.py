@@ -2,10 +2,13 @@
 
 import json
 from contextlib import suppress
+from importlib.machinery import ExtensionFileLoader
 from importlib.metadata import PackageNotFoundError, distribution, version
+from importlib.util import find_spec
 from pathlib import Path
 
 PACKAGE = "mudskipper"
+MODULE_OF_TICK = "firmware_host.loop"
 
 
 def software_version() -> str:
@@ -22,6 +25,12 @@ def software_commit() -> str:
     """
     root = Path(__file__).parents[1]
     return _checkout_commit(root / ".git") or _installed_commit()
+
+
+def is_compiled() -> bool:
+    """Return whether the modules of a tick run compiled: setup.py compiles all of them or none."""
+    spec = find_spec(MODULE_OF_TICK)
+    return spec is not None and isinstance(spec.loader, ExtensionFileLoader)
 
 
 def build_metadata() -> dict[str, str]:

@@ -56,7 +56,7 @@ from firmware_host.operator.status_client import (
     StatusClient,
 )
 from firmware_host.pose_sources import open_pose
-from firmware_host.software_version import software_version
+from firmware_host.software_version import is_compiled, software_version
 from firmware_host.user_groups import load_rights
 
 ROOT = Path("/")
@@ -92,6 +92,7 @@ def examine_all(configuration: Configuration, socket: Path, links: dict[str, Can
     yield from daemon
     yield from _examine_groups(configuration, socket)
     yield from examine_this_python()
+    yield ok("tick", f"this installation runs it {'compiled' if is_compiled() else 'interpreted'}")
 
 
 def _examine_clock() -> Finding:
@@ -118,7 +119,8 @@ def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, li
 
 def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
     """Yields the findings about the status of a daemon; `version` is that of this command."""
-    text, same = f"runs, version {status['version']}, {status['mode']}", status["version"] == version
+    form = "compiled" if status.get("compiled") else "interpreted"  # an older daemon does not say it
+    text, same = f"runs, version {status['version']}, {form}, {status['mode']}", status["version"] == version
     text += "" if same else f"; this command is version {version}"
     yield ok_if(same, "daemon", text, "'systemctl restart mudskipper', with the robot disarmed")
     for drive in status["drives"]:

@@ -250,7 +250,8 @@ def _loop_text(report: dict[str, Any]) -> str:
         (
             f"loop   {loop['rate_hz']:.2f} Hz, {loop['ticks']} ticks, {loop['missed_ticks']} missed",
             f"late   {late['p50']:.0f} us median, {late['p99']:.0f} p99, {late['max']:.0f} worst",
-            f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst",
+            f"tick   {tick['p50']:.0f} us median, {tick['p99']:.0f} p99, {tick['max']:.0f} worst,"
+            f" {'compiled' if report.get('compiled') else 'interpreted'}",
             f"bus    {bus['unknown_frames']} unknown, {bus['malformed_frames']} malformed,"
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")

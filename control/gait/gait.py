@@ -7,32 +7,14 @@ speed rises and falls as half a cosine, so joint velocities are continuous and z
 insertion that ends early, which stops within a tick).
 """
 
-from dataclasses import dataclass
 from math import cos, fsum, pi, radians, sin
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds, Meaning
 from control.geometry import FlipperGeometry
+from control.parameters.gait_parameters import GaitParameters as GaitParameters  # for its users here
 from control.records import GaitTarget, Phase
 
 RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time, for each end of a phase
-
-
-@dataclass(frozen=True)
-class GaitParameters:
-    sweep_angle_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("the stance sweeps from plus to minus this angle")] = (
-        30.0
-    )
-    insertion_speed_m_s: Annotated[float, Bounds(0.005, 1.0), Meaning("of the plate's lower edge, downward")] = 0.1
-    stance_speed_m_s: Annotated[float, Bounds(0.005, 2.0), Meaning("of the plate along its arc, backward")] = 0.5
-    extraction_speed_m_s: Annotated[float, Bounds(0.005, 2.0), Meaning("of the plate's lower edge, upward")] = 0.5
-    swing_speed_m_s: Annotated[
-        float, Bounds(0.005, 2.0), Meaning("of the plate along its arc, where swing_duration_s is 0")
-    ] = 0.5
-    swing_duration_s: Annotated[float, Bounds(0.0, 10.0), Meaning("0 derives it from swing_speed_m_s")] = (
-        0.8  # the authors' robot
-    )
-    pause_s: Annotated[float, Bounds(0.0, 60.0), Meaning("after insertion, after stance and after extraction")] = 0.0
 
 
 # Section II-B of the paper's experiments with a fixed base: slow everywhere, the mud relaxes between phases.

@@ -4,17 +4,16 @@
 a single sample cannot show. Bounds that depend on the machine are in FaultBounds, all others are constants here.
 """
 
-from dataclasses import dataclass
 from math import degrees, isfinite, radians
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds, Meaning
 from control.faults import Fault, FaultKind
 from control.limits import JointLimits, JointRange
 from control.monitors.encoder_monitor import EncoderMonitor
 from control.monitors.motion_monitor import JointDynamics, MotionMonitor
 from control.monitors.stillness import Stillness
 from control.monitors.winding import Winding, WindingParameters
+from control.parameters.fault_bounds import FaultBounds as FaultBounds  # for its users here
 from control.rate import PERIOD_S
 from control.records import NEVER_S, UNKNOWN, DriveState, JointTarget
 
@@ -32,35 +31,6 @@ STALLED_S = 2.0  # longer than an insertion, a stance or an extraction of the pa
 MISSING_FRACTION = 0.3  # of the torque limit: difference between commanded and measured torque
 MISSING_S = 0.1
 TWO_MESSAGES_S = 0.15  # two messages at an interval of 0.1 s: a single outlier is no fault
-
-
-@dataclass(frozen=True)
-class FaultBounds:
-    """The bounds of faults that depend on the machine. T is the loop's period of 2.63 ms."""
-
-    late_s: Annotated[float, Bounds(0.003, 2.0), Meaning("without position or current: reported")] = 0.0053  # 2 T
-    quiet_s: Annotated[float, Bounds(0.005, 2.0), Meaning("without position or current: damping")] = 0.0079  # 3 T
-    silence_s: Annotated[
-        float, Bounds(0.005, 2.0), Meaning("without position or current: drives idle; of the loop itself: damping")
-    ] = 0.0263  # 10 T
-    jump_rad: Annotated[
-        float, Bounds(0.01, 10.0), Meaning("of a position beyond what a joint can do: noise, late stamps")
-    ] = 0.05
-    fast_s: Annotated[float, Bounds(0.003, 2.0), Meaning("faster than the velocity limit allows")] = 0.0079  # 3 T
-    lag_s: Annotated[float, Bounds(0.005, 2.0), Meaning("missed by the loop in a row: soft stop")] = 0.0131  # 5 T
-    crawl_s: Annotated[float, Bounds(0.005, 2.0), Meaning("mean of five ticks: too seldom to brake a joint")] = (
-        0.0105  # 4 T
-    )
-    lag_fraction: Annotated[float, Bounds(0.01, 10.0), Meaning("by which 100 ticks take longer than they should")] = 0.1
-    longest_watchdog_s: Annotated[
-        float, Bounds(0.01, 10.0), Meaning("that a drive may be set to, or the robot is not armed")
-    ] = 0.3
-    voltage_low_v: Annotated[float, Bounds(0.0, 100.0), Meaning("supply below this is reported; 0: never")] = 20.0
-    voltage_min_v: Annotated[float, Bounds(0.0, 100.0), Meaning("supply below this: soft stop; 0: never")] = 18.0
-    disk_free_fraction: Annotated[
-        float, Bounds(0.0, 0.9), Meaning("of the log's disk, below which nothing is armed")
-    ] = 0.05
-    disk_slow_s: Annotated[float, Bounds(0.05, 60.0), Meaning("for one write of the log: reported")] = 2.0
 
 
 class TickFacts(NamedTuple):

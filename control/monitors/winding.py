@@ -10,23 +10,13 @@ low estimate: measure your motors. A sensor that reads higher corrects the model
 the model would take hours to cool from one absurd reading.
 """
 
-from dataclasses import dataclass
 from math import isfinite
-from typing import Annotated
 
-from control.bounds import Bounds, Meaning
+from control.parameters.winding_parameters import WindingParameters as WindingParameters  # for its users here
 
 COPPER_PER_K = 0.0039
 REFERENCE_C = 25.0
 HOTTEST_C = 250.0  # enamel has burnt by then
-
-
-@dataclass(frozen=True)
-class WindingParameters:
-    resistance_ohm: Annotated[float, Bounds(0.001, 50.0), Meaning("of one phase to the star point")] = 0.5
-    thermal_resistance_k_w: Annotated[float, Bounds(0.01, 100.0), Meaning("from the winding to the air")] = 1.25
-    time_constant_s: Annotated[float, Bounds(1.0, 10000.0), Meaning("with which the winding warms and cools")] = 60.0
-    room_c: Annotated[float, Bounds(-40.0, 60.0), Meaning("temperature of the air")] = 30.0
 
 
 class Winding:

@@ -36,7 +36,7 @@ class MitAxis(DriveSignals):
     def __init__(self, joint: str, parameters: MitParameters, outlet: Outlet) -> None:
         tolerance_nm = TOLERANCE_NM + parameters.ranges.torque_step_nm
         setpoints = SetpointMonitor(parameters.command_delay_s, tolerance_nm=tolerance_nm, measured=True)
-        super().__init__(joint, outlet, setpoints)
+        super().__init__(joint, parameters.sign, outlet, setpoints)
         self.parameters = parameters
         self._ranges = parameters.ranges
         self._zero_rad = TURN_RAD * parameters.zero_turn

@@ -38,7 +38,7 @@ class MoteusAxis(DriveSignals):
     parameters: MoteusParameters
 
     def __init__(self, joint: str, parameters: MoteusParameters, outlet: Outlet) -> None:
-        super().__init__(joint, outlet, SetpointMonitor(parameters.command_delay_s))
+        super().__init__(joint, parameters.sign, outlet, SetpointMonitor(parameters.command_delay_s))
         self.parameters = parameters
         self._id = codec.command_id(parameters.node_id)
         self._rad_per_turn = parameters.sign * TURN_RAD

@@ -42,7 +42,7 @@ class CanSimpleAxis(DriveSignals):
         setpoints = SetpointMonitor(
             parameters.command_delay_s, parameters.velocity_limit_turn_s, parameters.velocity_gain_nm_s_turn
         )
-        super().__init__(joint, outlet, setpoints)
+        super().__init__(joint, parameters.sign, outlet, setpoints)
         self.parameters = parameters
         self.settings = settings
         self._rad_per_turn = parameters.sign * TURN_RAD

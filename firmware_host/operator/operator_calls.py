@@ -30,7 +30,7 @@ from firmware_host.operator.reports import (
 from firmware_host.operator.rpc import RefusedError
 from firmware_host.operator.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
 from firmware_host.operator.status_socket import Methods
-from firmware_host.software_version import software_version
+from firmware_host.software_version import is_compiled, software_version
 
 Method = Callable[[dict[str, Any], Caller], Any]
 
@@ -47,6 +47,7 @@ class OperatorCalls:
         self._warnings = warnings
         self._clock = clock
         self._version = software_version()
+        self._compiled = is_compiled()
         drives = loop.configuration.drive
         self._rig = loop.configuration.rig
         self._bus_of = {joint: drives[joint].bus for joint in self._rig.joints}
@@ -81,6 +82,7 @@ class OperatorCalls:
             "schema": "status/2",
             "robot": loop.configuration.robot.name,
             "version": self._version,
+            "compiled": self._compiled,
             "now_s": self._clock(),  # as the log's stamps
             "mode": now.mode.name.lower(),
             "moving": now.moving,

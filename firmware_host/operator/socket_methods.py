@@ -156,6 +156,7 @@ STATUS_KEYS = {
     "schema": "version of this answer",
     "robot": "name of the robot",
     "version": "version of the software",
+    "compiled": "whether the modules of a tick run compiled",
     "now_s": "the loop's monotonic clock in s, as in the log",
     "mode": "mode of the robot",
     "moving": "whether joints are on their way to a pose that was requested",

@@ -1,0 +1,21 @@
+"""Motions outside of the gait (control/controller.py)."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from control.bounds import Bounds, Meaning
+
+
+@dataclass(frozen=True)
+class MotionParameters:
+    """Parameters of motions outside the gait."""
+
+    path_speed_rad_s: Annotated[
+        float, Bounds(0.05, 10.0), Meaning("of joints that move to a pose outside of the gait")
+    ] = 1.0
+    fade_in_s: Annotated[
+        float, Bounds(0.0, 10.0), Meaning("in which stiffness rises to its full value after arming")
+    ] = 0.5
+    longest_hold_s: Annotated[
+        float, Bounds(0.0, 86400.0), Meaning("after which torque goes off by itself; 0: never")
+    ] = 600.0

@@ -1,0 +1,70 @@
+"""Compiles the modules of a tick with mypyc where MUDSKIPPER_COMPILED=1 asks for it.
+
+`tool.mudskipper.compiled` in pyproject.toml lists these modules; all other metadata is there too. The same sources run
+in both forms and give the same digits, so the C compiler must not fuse a product and a sum into one rounding, as it
+otherwise does on ARM. Each compiled build uses a folder of its own: an extension that an earlier build left would be
+imported in place of the source.
+"""
+
+import os
+import sys
+import sysconfig
+import tomllib
+from pathlib import Path
+from shutil import which
+from tempfile import TemporaryDirectory
+
+from setuptools import Extension, setup
+
+VARIABLE = "MUDSKIPPER_COMPILED"
+COMPILER = "mypy>=1.14,<3"  # mypyc comes with it
+OPTIONS = ["-ffp-contract=off", "-Wno-error", "-g0"]
+
+
+def compiled_modules() -> list[str]:
+    modules: list[str] = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["tool"]["mudskipper"][
+        "compiled"
+    ]
+    return modules
+
+
+def make_extensions(folder: str) -> list[Extension]:
+    """Return the extensions, whose C sources are written into the folder."""
+    from mypyc.build import mypycify  # only here, since no other installation needs it
+
+    options = ["--config-file=", "--ignore-missing-imports"]  # types of packages that the build does not have
+    paths = [*options, *compiled_modules()]
+    extensions: list[Extension] = mypycify(paths, opt_level="2", group_name="mudskipper", target_dir=folder)
+    for extension in extensions:
+        extension.extra_compile_args += OPTIONS
+    return extensions
+
+
+def is_asked_for() -> bool:
+    value = os.environ.get(VARIABLE, "")
+    if value not in ("", "0", "1"):
+        raise SystemExit(f"{VARIABLE}={value}: must be 1 for a compiled tick, or 0")
+    if value == "1" and {"editable_wheel", "develop"} & set(sys.argv):
+        raise SystemExit(f"{VARIABLE}=1: an editable installation runs the sources; install without --editable")
+    return value == "1"
+
+
+def require_compiler() -> None:
+    compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()[0]
+    if not which(compiler):
+        raise SystemExit(
+            f"{VARIABLE}=1: there is no C compiler '{compiler}'; 'apt install gcc', or leave {VARIABLE} out"
+        )
+    header = Path(sysconfig.get_path("include")) / "Python.h"
+    if not header.exists():
+        raise SystemExit(f"{VARIABLE}=1: there is no {header}; 'apt install python3-dev', or leave {VARIABLE} out")
+
+
+if not is_asked_for():
+    setup()
+elif "bdist_wheel" in sys.argv:
+    require_compiler()
+    with TemporaryDirectory() as base:
+        setup(ext_modules=make_extensions(f"{base}/sources"), options={"build": {"build_base": base}})
+else:  # pip asks for the metadata, and by egg_info for what the build needs
+    setup(setup_requires=[COMPILER] if "egg_info" in sys.argv else [])
