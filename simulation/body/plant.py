@@ -10,22 +10,18 @@ Euler at STEP_S: the stiffest spring, mud along a plate 5 cm deep in the stiffes
 swing at about 400 rad/s.
 """
 
-from dataclasses import dataclass
 from itertools import chain
 from math import copysign, radians, sin
 from operator import add
 from random import Random
-from typing import Annotated
 
-from control.bounds import Bounds
-from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
-from control.records import TWO_FLIPPERS, JointAngles, Joints, Rig, Torques
+from control.records import JointAngles, Joints, Torques
 from simulation.body.bench_mount import BenchMount
-from simulation.body.free_body import BodyShape, FreeBody
+from simulation.body.free_body import FreeBody
+from simulation.body.plant_parameters import PlantParameters as PlantParameters  # for its users here
 from simulation.body.rail_body import Body, BodyMotion, DragPad, RailBody
 from simulation.mud.carriage import Carriage
-from simulation.mud.disturbances import NONE, Disturbances, StrokeHistory, clinging_torques_nm
+from simulation.mud.disturbances import NONE, StrokeHistory, clinging_torques_nm
 from simulation.mud.flipper_contact import (
     NO_CONTACT,
     ArmMotion,
@@ -40,29 +36,6 @@ from simulation.mud.track import Track
 
 STEP_S = 0.001
 END_STOPS_RAD = (radians(100.0), radians(85.0))  # sweep, adduction: the arm meets the body
-
-
-@dataclass(frozen=True)
-class PlantParameters:
-    rig: Rig = TWO_FLIPPERS
-    geometry: FlipperGeometry = FlipperGeometry()
-    arm_mass: ArmMass = ArmMass()
-    joint_friction_nm_s: Annotated[float, Bounds(0.0, 0.1)] = 0.002
-    joint_coulomb_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
-    body_mass_kg: Annotated[float, Bounds(0.05, 100.0)] = 1.0
-    rail_drag_n: Annotated[float, Bounds(0.0, 100.0)] = 2.5  # the paper's, without the pad
-    rail_damping_n_s_m: Annotated[float, Bounds(0.0, 1000.0)] = 6.0  # how that grows with speed: fitted to Table I
-    pad_width_m: Annotated[float, Bounds(0.0, 0.5)] = 0.015
-    pad_depth_m: Annotated[float, Bounds(0.0, 0.5)] = 0.02
-    disturbances: Disturbances = NONE
-    fixed_base: bool = False  # the body never moves, as in the paper's trials of a single flipper
-    free_body: bool = False  # without a rail, of this shape
-    body: BodyShape = BodyShape()
-
-    def __post_init__(self) -> None:
-        """Raises ValueError where the options contradict each other."""
-        if self.fixed_base and self.free_body:
-            raise ValueError("a body on a fixed base cannot be free")
 
 
 class Arm:

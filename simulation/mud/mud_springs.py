@@ -11,7 +11,7 @@ included, so SIDEWAYS_YIELD_M is 15 mm. Along the plate and under its edge mud y
 thin layers do.
 """
 
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from simulation.mud.clay import (
     ADHESION,
@@ -44,8 +44,6 @@ class PlateStep(NamedTuple):
 # middle above the lower edge, the depth of that middle, the submerged height, and the mud's strength there.
 Strip = tuple[float, float, float, float]
 
-Fraction = TypeVar("Fraction", float, complex)
-
 
 def submerged_strips(
     submerged_m: float, strip_m: float, per_upward: float, clay: Clay, foot_m: float = 0.0
@@ -68,27 +66,27 @@ def submerged_strips(
     return strips
 
 
-class Springs(Generic[Fraction]):
+class Springs:
     """Owns the strain of some pieces of mud, as fractions of their slow yield forces, and these forces."""
 
-    def __init__(self, unstrained: list[Fraction]) -> None:
-        self._unstrained: list[Fraction] = unstrained
+    def __init__(self, pieces: int) -> None:
+        self._pieces = pieces
         self.reset()
 
     def reset(self) -> None:
-        self._fractions: list[Fraction] = list(self._unstrained)
-        self._limits_n = [0.0] * len(self._fractions)
+        self._fractions = [0.0] * self._pieces
+        self._limits_n = [0.0] * self._pieces
 
     def fade(self, remaining: float) -> None:
         self._fractions = [fraction * remaining for fraction in self._fractions]
 
 
-class PressedColumn(Springs[float]):
+class PressedColumn(Springs):
     """The mud that a column of strips presses on."""
 
     def __init__(self, profile_width_m: float, yield_m: float) -> None:
         """`profile_width_m`: of the whole body, for the pressure law."""
-        super().__init__([0.0] * STRIPS)
+        super().__init__(STRIPS)
         self.profile_width_m = profile_width_m
         self.yield_m = yield_m
 
@@ -122,11 +120,18 @@ class PressedColumn(Springs[float]):
         return force_n, moment_nm
 
 
-class RubbedColumn(Springs[complex]):
+class RubbedColumn(Springs):
     """The mud that sticks to a column: its strain is a vector in the plate's plane, outward + i upward."""
 
     def __init__(self) -> None:
-        super().__init__([0j] * STRIPS)
+        super().__init__(STRIPS)
+
+    def reset(self) -> None:
+        super().reset()
+        self._strains = [0j] * STRIPS
+
+    def fade(self, remaining: float) -> None:
+        self._strains = [strain * remaining for strain in self._strains]
 
     def step(
         self, step: PlateStep, strips: list[Strip], breadth_m: float, velocity_m_s: complex, per_upward_s: float
@@ -139,31 +144,31 @@ class RubbedColumn(Springs[complex]):
         layered, per_yield = bool(clay.layers), dt_s / LENGTHWAYS_YIELD_M
         sticking_n_m = ADHESION * clay.strength_pa * breadth_m
         moved, per_m = per_yield * velocity_m_s, per_yield * per_upward_s
-        fractions, limits_n = self._fractions, self._limits_n
+        strains, limits_n = self._strains, self._limits_n
         force_n, moment_nm = 0j, 0.0
         for place, (above_edge_m, _, covered_m, strength_pa) in enumerate(strips):
             if layered:
                 sticking_n_m = ADHESION * strength_pa * breadth_m
             limit_n = sticking_n_m * covered_m
-            fraction, before_n = fractions[place], limits_n[place]
+            strain, before_n = strains[place], limits_n[place]
             if limit_n > before_n:
-                fraction *= before_n / limit_n
-            fraction = fraction - moved - per_m * above_edge_m
-            stretch = abs(fraction)
+                strain *= before_n / limit_n
+            strain = strain - moved - per_m * above_edge_m
+            stretch = abs(strain)
             if stretch > rate:
-                fraction *= rate / stretch
-            fractions[place], limits_n[place] = fraction, limit_n
-            force_n += fraction * limit_n
-            moment_nm += fraction.real * limit_n * above_edge_m
+                strain *= rate / stretch
+            strains[place], limits_n[place] = strain, limit_n
+            force_n += strain * limit_n
+            moment_nm += strain.real * limit_n * above_edge_m
         limits_n[len(strips) :] = DRY_N[len(strips) :]
         return force_n, moment_nm
 
 
-class LowerEdge(Springs[float]):
+class LowerEdge(Springs):
     """The mud under the two halves of the lower edge, which yields at the bearing force."""
 
     def __init__(self, thickness_m: float) -> None:
-        super().__init__([0.0, 0.0])
+        super().__init__(2)
         self.thickness_m = thickness_m
 
     def step(

@@ -18,7 +18,6 @@ At rest loads relax: they fade by up to `relaxation` within half a second, and m
 """
 
 from math import exp, sqrt
-from typing import Any
 
 from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.mud_springs import (
@@ -51,7 +50,7 @@ class PanelContact:
         self._pressed = [PressedColumn(size.width_m, SIDEWAYS_YIELD_M) for _ in range(2)]
         self._rubbed = [RubbedColumn() for _ in range(2)]
         self._edge = LowerEdge(size.thickness_m)
-        self.parts: tuple[Springs[Any], ...] = (*self._pressed, *self._rubbed, self._edge)
+        self.parts: tuple[Springs, ...] = (*self._pressed, *self._rubbed, self._edge)
 
     def step(self, step: PlateStep) -> tuple[float, ...]:
         """Returns the panel's part of the wrench."""
@@ -94,7 +93,7 @@ class PlateContact:
         self._sides_m = sides_m(size, STRIPS)
         self._inner_side, self._outer_side = (PressedColumn(size.thickness_m, LENGTHWAYS_YIELD_M) for _ in range(2))
         self._rubbed_sides = [(RubbedColumn(), side_m) for side_m in self._sides_m] if size.corners_m else []
-        self._parts: tuple[Springs[Any], ...] = (
+        self._parts: tuple[Springs, ...] = (
             *(part for panel in self._panels for part in panel.parts),
             self._inner_side,
             self._outer_side,

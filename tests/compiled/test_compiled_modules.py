@@ -1,9 +1,10 @@
-"""The list of modules to compile names only modules that may be compiled."""
+"""The list of modules to compile names only modules that may be compiled, and all that have to be."""
 
 from __future__ import annotations
 
 import ast
 import tomllib
+from collections.abc import Iterator
 
 import pytest
 
@@ -11,6 +12,15 @@ from tests.folders import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 MODULES: list[str] = PROJECT["tool"]["mudskipper"]["compiled"]
+PACKAGES = [pattern.rstrip("*") for pattern in PROJECT["tool"]["setuptools"]["packages"]["find"]["include"]]
+INTERPRETED_BASES = {"NamedTuple", "Enum", "IntEnum", "Exception", "ValueError", "RuntimeError"}  # compiled or not
+
+
+def classes_of(module: str) -> Iterator[tuple[str, set[str]]]:
+    """Yield the name of each class of a module, and the names of its bases."""
+    for node in ast.walk(ast.parse((ROOT / module).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ClassDef):
+            yield node.name, {ast.unparse(base).partition("[")[0].rpartition(".")[2] for base in node.bases}
 
 
 def test_every_module_is_named_once() -> None:
@@ -22,3 +32,12 @@ def test_no_compiled_class_has_bounds(module: str) -> None:
     """The compiler drops `Annotated`, so values beyond the bounds would pass."""
     tree = ast.parse((ROOT / module).read_text(encoding="utf-8"))
     assert "Annotated" not in {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+
+
+def test_no_interpreted_class_has_a_compiled_base() -> None:
+    """Python refuses to create an object of such a class."""
+    compiled = {name for module in MODULES for name, bases in classes_of(module) if not bases & INTERPRETED_BASES}
+    paths = (path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+    interpreted = {str(path.relative_to(ROOT)) for path in paths} - set(MODULES)
+    found = [f"{module}: {name}" for module in interpreted for name, bases in classes_of(module) if bases & compiled]
+    assert found == []

@@ -1,11 +1,14 @@
-"""Walks four strides in lockstep with each type of drive and prints the hashes of all frames and log rows, as JSON."""
+"""Walks in lockstep with each model of drive and prints the hashes of all frames and log rows, as JSON.
+
+Some of these drives cannot follow the walk: their faults belong to the log too.
+"""
 
 import json
 from hashlib import sha256
+from itertools import chain
 
 from benchmarks.example_robot import load_example, load_one_flipper
 from control.controller import WalkOrder
-from control.modes import Mode
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.software_version import is_compiled
@@ -14,7 +17,7 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 
 STRIDES = 4
-LONGEST_S = 20.0
+WALK_S = 8.0  # which ends with a rest
 
 
 class HashingRecorder(NullRecorder):
@@ -34,16 +37,11 @@ def walk_hashes(configuration: Configuration) -> dict[str, object]:
     listeners, digest, frames = [bus.open() for bus in robot.buses.values()], sha256(), 0
     robot.arm(forced=True)  # a MIT drive cannot report its watchdog
     robot.walk(WalkOrder(0.03, adaptive=True, strides=STRIDES))
-
-    def is_over() -> bool:
-        nonlocal frames
-        for listener in listeners:
-            for frame in listener.receive():
-                frames += 1
-                digest.update(repr(frame[:3]).encode())
-        return robot.loop.mode is Mode.HOLD
-
-    assert robot.run_until(is_over, LONGEST_S)
+    for _ in range(round(WALK_S / robot.period_s)):
+        robot.step()
+        for frame in chain.from_iterable(listener.receive() for listener in listeners):
+            frames += 1
+            digest.update(repr(frame[:3]).encode())
     return {
         "rows": (recorder.rows, recorder.digest.hexdigest()),
         "frames": (frames, digest.hexdigest()),
