@@ -17,6 +17,7 @@ from firmware_host.computer.realtime import freeze_garbage
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recording
 from firmware_host.loop import Loop
+from firmware_host.software_version import is_compiled
 from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
@@ -41,7 +42,8 @@ STAGES = {  # in their order, by the loop's method that begins each
 class StageMarks:
     """Owns the times at which the current tick entered its stages; a stage lasts until the next begins.
 
-    The loop's own methods are wrapped while the marks are attached, so the loop knows nothing of it.
+    The loop's own methods are wrapped while the marks are attached, so the loop knows nothing of it. Methods that are
+    compiled cannot be wrapped, so a compiled tick has no stages.
     """
 
     def __init__(self, loop: Loop) -> None:
@@ -102,11 +104,15 @@ class TimedWalk:
         for _ in range(BLOCK_TICKS // COLD_FRACTION):
             sleep(PERIOD_S)
             self.samples.cold.append(self.tick()[0])
+        if not is_compiled():
+            self._run_marked_block()
+        if self.walk.loop.mode is not Mode.WALKING:
+            raise RuntimeError(f"the robot does not walk any more: {self.walk.loop.fault}")
+
+    def _run_marked_block(self) -> None:
         with self.marks.attached():
             for _ in range(BLOCK_TICKS):
                 self._add_stages(self._marked_tick())
-        if self.walk.loop.mode is not Mode.WALKING:
-            raise RuntimeError(f"the robot does not walk any more: {self.walk.loop.fault}")
 
     def tick(self) -> tuple[float, bool]:
         """Returns the duration of one whole tick, and whether it had work of the end of an insertion or a stride."""
@@ -138,6 +144,6 @@ class TimedWalk:
             "whole_us": summary_us(samples.whole) | {"ticks": len(samples.whole)},
             "longest_us": summary_us(samples.longest) | {"ends": ends},
             "cold_us": summary_us(samples.cold) | {"ticks": len(samples.cold)},
-            "stages_us": {stage: summary_us(durations_s) for stage, durations_s in samples.stages.items()},
+            "stages_us": {stage: summary_us(each) for stage, each in samples.stages.items() if each},
             "dropped_rows": self.recorder.dropped,
         }

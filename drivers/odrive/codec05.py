@@ -9,7 +9,7 @@ Where those two differ, the firmware counts: the DBC has 32 of the motor's 64 er
 
 from drivers.odrive.codec import Message, error_text
 
-HEARTBEAT = Message(0x01, "<I4B")  # axis error, axis state; bit 0 of each: motor, encoder, controller error
+HEARTBEAT: Message = Message(0x01, "<I4B")  # axis error, axis state; bit 0 of each: motor, encoder, controller error
 GET_MOTOR_ERROR = Message(0x03, "<Q")
 GET_ENCODER_ERROR = Message(0x04, "<I4x")
 GET_ENCODER_COUNT = Message(0x0A, "<ii")  # counts since power-on, and within one turn
