@@ -13,8 +13,11 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from numpy.typing import ArrayLike
 
 from experiments.pictures.colours import FAINT, FLIPPER_COLOURS, FORWARD, INK, MUD_SHADES, OUTCOME_COLOURS, SURFACE, UP
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
@@ -38,6 +41,7 @@ LEGEND: dict[str, Any] = {
     "handlelength": 1.5,
 }
 STYLE: dict[Any, Any] = {
+    "agg.path.chunksize": 1000,  # points: a curve of an hour takes 16 MB where it is drawn at once
     "pdf.fonttype": 42,  # TrueType: journals refuse matplotlib's own Type 3
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
@@ -111,11 +115,26 @@ def _body_panels(walk: RecordedWalk) -> Panels:
 
 def _shade(panel: Axes, regions: list[MudRegion], noticed_s: list[float]) -> None:
     across: dict[str, Any] = {"transform": panel.get_xaxis_transform()}  # from the bottom to the top
-    spans = [[(r.start_s, 0.0), (r.start_s, 1.0), (r.end_s, 1.0), (r.end_s, 0.0)] for r in regions]
-    panel.add_collection(PolyCollection(spans, facecolors=MUD_SHADES, linewidths=0, zorder=0, **across), autolim=False)
-    lines = [[(at_s, 0.0), (at_s, 1.0)] for at_s in noticed_s]
-    dashed: dict[str, Any] = {"colors": INK, "linewidths": 1.0, "linestyles": [NOTICED_DASHES], "zorder": 2}
-    panel.add_collection(LineCollection(lines, **dashed, **across), autolim=False)
+    for number, shade in enumerate(MUD_SHADES):
+        own = regions[number :: len(MUD_SHADES)]
+        starts_s, ends_s = [region.start_s for region in own], [region.end_s for region in own]
+        panel.add_artist(_boxes(starts_s, ends_s, np.ones(len(own)), color=shade, zorder=0, **across))
+    dashed: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": NOTICED_DASHES}
+    panel.add_artist(_uprights(noticed_s, np.zeros(len(noticed_s)), np.ones(len(noticed_s)), **dashed, **across))
+
+
+def _boxes(starts: ArrayLike, ends: ArrayLike, heights: Floats, **look: Any) -> PathPatch:
+    """Return boxes that stand on zero as one artist: one of its own for each takes ten kilobytes."""
+    zeros = np.zeros_like(heights)
+    x, y = np.column_stack([starts, starts, ends, ends, ends]), np.column_stack([zeros, heights, heights, zeros, zeros])
+    codes = np.tile([Outline.MOVETO, *[Outline.LINETO] * 3, Outline.CLOSEPOLY], len(heights))
+    return PathPatch(Outline(np.dstack([x, y]).reshape(-1, 2), codes), linewidth=0, **look)
+
+
+def _uprights(at: ArrayLike, low: Floats, high: Floats, **look: Any) -> Line2D:
+    """Return vertical lines as one artist."""
+    y = np.column_stack([low, high, np.full_like(low, np.nan)])
+    return Line2D(np.repeat(at, y.shape[1]), y.ravel(), solid_capstyle="butt", **look)
 
 
 def _name_muds(panel: Axes, regions: list[MudRegion], length_s: float) -> None:
@@ -163,18 +182,17 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
         marked = [s for s in known if (bool(s[f"{name}_at_least"]), bool(s[f"{name}_valid"])) == (at_least, valid)]
         if not marked:
             continue
-        panel.errorbar(
-            [stride["stamp_s"] for stride in marked],
-            [stride[name] / 1e6 for stride in marked],
-            [2.0 * stride[f"{name}_std_error"] / 1e6 for stride in marked],
-            fmt="^" if at_least else "o",
-            markersize=5,
-            linewidth=0.0,
-            elinewidth=1.2,
-            color=colour,
-            markerfacecolor=colour if valid else "white",
-            label="_",
+        stamps_s, values, errors = (
+            np.array([stride[key] for stride in marked]) for key in ("stamp_s", name, f"{name}_std_error")
         )
+        low, high = (values - 2.0 * errors) / 1e6, (values + 2.0 * errors) / 1e6
+        panel.add_artist(_uprights(stamps_s, low, high, color=colour, linewidth=1.2))
+        look: dict[str, Any] = {
+            "color": colour,
+            "markerfacecolor": colour if valid else "white",
+            "zorder": 2.1,
+        }  # above the lines
+        panel.plot(stamps_s, values / 1e6, "^" if at_least else "o", markersize=5, **look)
     largest = max((stride[name] / 1e6 for stride in walk.strides if np.isfinite(stride[name])), default=0.0)
     panel.set_ylim(0.0, HEADROOM * largest if largest > 0.0 else 1.0)
     if name == COEFFICIENTS[0]:
@@ -202,29 +220,19 @@ def _plot_position(panel: Axes, walk: RecordedWalk) -> None:
     _plot_curve(panel, walk, walk.body_x_m, color=INK, linewidth=1.2)
 
 
-def _draw_bars(panel: Axes, starts: Floats, heights: Floats, widths: Floats, look: dict[str, Any]) -> None:
-    """Draw many bars as one artist: one of its own for each takes ten kilobytes."""
-    ends, zeros = starts + widths, np.zeros_like(starts)
-    x, y = np.column_stack([starts, starts, ends, ends]), np.column_stack([zeros, heights, heights, zeros])
-    bars = PolyCollection(list(np.dstack([x, y])), linewidths=0, **look)
-    bars.sticky_edges.y.append(0.0)  # the axis begins there, as that of single bars
-    panel.add_collection(bars)
-    panel.autoscale_view()
-
-
 def _plot_steps(panel: Axes, walk: RecordedWalk) -> None:
     """Draw a bar from the start of each stride to its end, in the colour of its outcome."""
     known = [stride for stride in walk.own_strides if np.isfinite(stride["step_m"])]
     for outcome in Outcome:
         own = [stride for stride in known if outcome_of(stride, walk.geometric_step_m) is outcome]
-        starts_s = [stride["t_start_s"] for stride in own]
-        lengths_s = [stride["stamp_s"] - stride["t_start_s"] for stride in own]
-        steps_cm = [100.0 * stride["step_m"] for stride in own]
+        starts_s, ends_s = (np.array([stride[key] for stride in own]) for key in ("t_start_s", "stamp_s"))
+        steps_cm = np.array([100.0 * stride["step_m"] for stride in own])
         look: dict[str, Any] = {"color": OUTCOME_COLOURS[outcome], "label": str(outcome)}
         if own and walk.source is None:
-            panel.bar(starts_s, steps_cm, lengths_s, align="edge", **look)
+            panel.bar(starts_s, steps_cm, ends_s - starts_s, align="edge", **look)
         elif own:
-            _draw_bars(panel, np.array(starts_s), np.array(steps_cm), np.array(lengths_s), look)
+            panel.add_patch(_boxes(starts_s, ends_s, steps_cm, **look)).sticky_edges.y.append(0.0)
+            panel.autoscale_view()
     panel.axhline(0.0, color=FAINT, linewidth=0.8)
     if np.isfinite(walk.geometric_step_m):
         step_cm = 100.0 * walk.geometric_step_m

@@ -82,7 +82,7 @@ def write_report(
         watch("pictures drawn", done, len(figures))
         pictures += _draw(figure, [folder / f"{figure.name}{ending}" for ending in (".png", *also)])
         gc.collect()  # the parts of a picture refer to each other: the next one shall not stand next to them in memory
-    _write(page, [_page(folder, title, sections, logs, also)])
+    _write(page, _page_lines(folder, title, sections, logs, also))
     return [page, summary, *pictures, *logs]
 
 
@@ -164,25 +164,29 @@ def _save_again(picture: Any, path: Path) -> None:
         picture.savefig(path)
 
 
-def _page(folder: Path, title: str, sections: Sequence[Section], logs: Sequence[Path], also: Sequence[str]) -> str:
+def _page_lines(
+    folder: Path, title: str, sections: Sequence[Section], logs: Sequence[Path], also: Sequence[str]
+) -> Iterator[str]:
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     logs_text = f"Logs: {', '.join(escape(log.name) for log in logs)}." if logs else ""
-    body = "\n".join(_section(section, folder, also) for section in sections)
-    return (
+    yield (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}</style></head><body>\n<h1>{escape(title)}</h1>\n"
-        f'<p class="when">{made}, mudskipper {escape(software_version())}</p>\n{body}\n'
-        f"<footer>Numbers: {SUMMARY}. {logs_text}</footer>\n</body></html>\n"
+        f'<p class="when">{made}, mudskipper {escape(software_version())}</p>\n'
     )
+    for section in sections:
+        yield from (f"{part}\n" for part in _section_parts(section, folder, also))
+    yield f"<footer>Numbers: {SUMMARY}. {logs_text}</footer>\n</body></html>\n"
 
 
-def _section(section: Section, folder: Path, also: Sequence[str]) -> str:
-    paragraphs = [f"<p>{escape(part)}</p>" for part in section.text.split("\n\n") if part]
-    tables = [("", section.rows)] * bool(section.rows) + [*section.tables]
-    figures = [_figure(figure, folder, also) for figure in section.figures]
-    screen = [f"<pre>{escape(section.screen)}</pre>"] if section.screen else []
-    parts = [f"<h2>{escape(section.heading)}</h2>", *paragraphs, *(_table(*titled) for titled in tables)]
-    return "\n".join([*parts, *screen, *figures])
+def _section_parts(section: Section, folder: Path, also: Sequence[str]) -> Iterator[str]:
+    yield f"<h2>{escape(section.heading)}</h2>"
+    yield from (f"<p>{escape(part)}</p>" for part in section.text.split("\n\n") if part)
+    for title, rows in [("", section.rows)] * bool(section.rows) + [*section.tables]:
+        yield _table(title, rows)
+    if section.screen:
+        yield f"<pre>{escape(section.screen)}</pre>"
+    yield from (_figure(figure, folder, also) for figure in section.figures)
 
 
 def _table(title: str, rows: Rows) -> str:

@@ -5,6 +5,7 @@ Moments in cm⁴ and torques in N·cm make the slope of a line the coefficient i
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from experiments.run_report.run import ReportedStride, Run
 CM4 = 1e8  # in m⁴
 MOST_DRAWN = 10  # strides of each mud, evenly over the run
 MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
-LEGEND_COLUMNS = 5
+LEGEND_COLUMNS = 3
 INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
 SIZE_IN, DOTS_PER_INCH = (10.0, 7.2), 120
 
@@ -64,28 +65,30 @@ def drawn_muds(run: Run) -> list[str]:
     return [mud for mud in strides if mud in drawn]
 
 
-def drawn_samples(run: Run, flipper: str, name: str) -> Iterator[tuple[str, FitSamples]]:
-    """Yield the mud and the samples of at most MOST_DRAWN strides of each drawn mud."""
+def drawn_samples(run: Run, flipper: str, name: str) -> Iterator[tuple[str, list[FitSamples]]]:
+    """Yield each drawn mud with the samples of at most MOST_DRAWN of its strides."""
     by_mud: dict[str, list[ReportedStride]] = {}
     muds = drawn_muds(run)
     for stride in run.strides:
         if stride.mud in muds and stride.samples(flipper, name):
             by_mud.setdefault(stride.mud, []).append(stride)
     for mud, strides in by_mud.items():
-        for position in np.unique(np.linspace(0, len(strides) - 1, MOST_DRAWN).round().astype(int)):
-            if samples := strides[position].samples(flipper, name):
-                yield mud, samples
+        drawn = np.unique(np.linspace(0, len(strides) - 1, MOST_DRAWN).round().astype(int))
+        yield mud, [samples for number in drawn if (samples := strides[number].samples(flipper, name))]
 
 
 def _draw_fits(
-    fit: Axes, residuals: Axes, drawn: Iterator[tuple[str, FitSamples]], looks: Mapping[str, dict[str, Any]]
+    fit: Axes, residuals: Axes, drawn: Iterator[tuple[str, list[FitSamples]]], looks: Mapping[str, dict[str, Any]]
 ) -> None:
-    for mud, samples in drawn:
-        moments, torques = CM4 * np.array(samples.moments_m4), N_CM * np.array(samples.torques_nm)
-        end = moments.max()
-        fit.plot(moments, torques, **_mark(looks[mud]))
-        fit.plot([0.0, end], [0.0, samples.slope / N_CM3 * end], color=looks[mud]["color"], linewidth=0.8)
-        residuals.plot(moments, N_CM * np.array(samples.residuals_nm), **_mark(looks[mud]))
+    """Draw all strides of a mud as one artist of each kind: one of its own takes ten kilobytes."""
+    for mud, strides in drawn:
+        samples = [(each.moments_m4, each.torques_nm, each.residuals_nm) for each in strides]
+        moments, torques, remains = (np.concatenate(parts) for parts in zip(*samples, strict=True))
+        ends = [(max(each.moments_m4), each.slope / N_CM3) for each in strides]
+        lines = [([0.0, CM4 * end, nan], [0.0, slope * CM4 * end, nan]) for end, slope in ends]
+        fit.plot(CM4 * moments, N_CM * torques, **_mark(looks[mud]))
+        fit.plot(*np.hstack(lines), color=looks[mud]["color"], linewidth=0.8)
+        residuals.plot(CM4 * moments, N_CM * remains, **_mark(looks[mud]))
     residuals.axhline(0.0, color=FAINT, linewidth=0.8)
 
 

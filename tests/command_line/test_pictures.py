@@ -5,15 +5,14 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from PIL import Image
 
 import command_line.logs.log_commands
@@ -155,7 +154,7 @@ def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) ->
     np.testing.assert_array_equal(lines["commanded"], 100.0 * walk.depth_command_m)
     chosen_cm = [100.0 * stride["chosen_depth_m"] for stride in walk.own_strides]
     np.testing.assert_array_equal(lines["chosen for the next stride"], chosen_cm)
-    bars = [bar.get_height() for axes in [panel(figure, "step")] for bar in axes.patches if bar.get_width() < 2.0]  # type: ignore[attr-defined]
+    bars = [bar.get_height() for bar in panel(figure, "step").patches if isinstance(bar, Rectangle)]
     assert bars == pytest.approx([100.0 * stride["step_m"] for stride in walk.own_strides])
 
 
@@ -163,10 +162,11 @@ def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) ->
 def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: Figure, name: str) -> None:
     walk = read_walk(two_walks, 1)
     reported = [s for flipper in (0, 1) for s in walk.strides if s["flipper"] == flipper and np.isfinite(s[name])]
-    containers: Sequence[Any] = [bar for axes in row_of(figure, f"${name}$") for bar in axes.containers]
-    bars = [segment for container in containers for segment in container.lines[2][0].get_segments()]
+    solid = [line for axes in row_of(figure, f"${name}$") for line in axes.lines if line.get_linestyle() == "-"]
+    heights = [np.asarray(line.get_ydata()) for line in solid]
+    bars = [(each[0::3][number], each[1::3][number]) for each in heights for number in range(len(each) // 3)]
     assert len(reported) == len(bars) > 1
-    for stride, ((_, low), (_, high)) in zip(reported, bars, strict=True):
+    for stride, (low, high) in zip(reported, bars, strict=True):
         assert (high + low) / 2.0 == pytest.approx(stride[name] / 1e6)
         assert (high - low) / 4.0 == pytest.approx(stride[f"{name}_std_error"] / 1e6)
 
