@@ -8,7 +8,7 @@ deadline shows as more than a period. Start and first stride of the daemon are o
 the median of those of the turns.
 
 Loops that only wait (paced_loops.py), ours, OpenSourceLeg's and that of loop-rate-limiters, take turns with them at 380
-and 1,000 Hz. `left_out` names those that are not installed.
+and 1,000 Hz. `left_out` names those that are not installed: `pip install 'mudskipper[loops]'` adds them.
 
 Everything runs twice: `held` keeps the processors awake for all loops alike, as the daemon does while torque is on, and
 `sleeping` lets them sleep between ticks, for the daemon by `stay_awake = false`. Only figures of the same half may be
@@ -143,6 +143,8 @@ def measure(folder: Path, *, seconds: float = 20.0) -> Report:
     report: Report = {"rounds": rounds, "turn_s": turn_s} | {name: half.report() for name, half in halves.items()}
     daemons = [each for half in halves.values() for each in half.daemon]
     report["left_out"] = sorted(set(LOOPS) - set(present_loops()))
+    if report["left_out"]:
+        warnings.append(f"without {', '.join(report['left_out'])}: pip install 'mudskipper[loops]'")
     report["warnings"] = warnings
     report["faults"] = sum(each["mode"] != "walking" for each in daemons)
     report["dropped_rows"] = sum(each["log"]["dropped"] for each in daemons)

@@ -4,7 +4,7 @@
 `ticker` is the daemon's. `loop-rate-limiters` sleeps until a period after its last return. `opensourceleg` is
 OpenSourceLeg's SoftRealtimeLoop, which sleeps for the rest of a period since the last one began;
 `opensourceleg (phase)` is the same with `maintain_original_phase`, which keeps to absolute deadlines. The libraries are
-optional: `pip install mudskipper[loops]`.
+optional: `pip install 'mudskipper[loops]'`.
 
 Loops without absolute deadlines have no lateness, so all are compared by their jitter, the difference of each interval
 from the period, and by their mean rate.

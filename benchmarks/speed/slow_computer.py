@@ -15,6 +15,7 @@ period in the longest of these ticks. `--picture FILE` draws the ticks of the fi
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
+from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -118,6 +119,8 @@ def summary_of(ticks: Sequence[WalkTick]) -> dict[str, Any]:
 def measure(
     folder: Path, *, factor: float = 5.0, walks: int = 5, seconds: float = 20.0, picture: str = ""
 ) -> dict[str, Any]:
+    if picture and not find_spec("matplotlib"):
+        raise SystemExit("--picture needs matplotlib: pip install 'mudskipper[plots]'")
     ticks = measure_work(folder, seconds, walks)
     if picture:
         plot_ticks(ticks, factor, Path(picture))

@@ -25,7 +25,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from benchmarks.example_robot import load_example, load_one_flipper
+from benchmarks.example_robot import load_example, load_one_flipper, require_drive
 from benchmarks.report import evaluated, run_benchmark, show_progress, summary_us
 from benchmarks.speed.bare_sockets import BareSockets, count_frames
 from benchmarks.speed.served_walk import ServedWalk
@@ -44,7 +44,7 @@ def measure_variant(variant: str, seconds: int, folder: Path, drive: str, fulles
     with ExitStack() as stack:
         walks = [
             _walk(stack, configuration, variant, folder / str(len(configuration.drive)))
-            for configuration in (load_example(drive), load_one_flipper())
+            for configuration in (load_example(drive), load_one_flipper(drive))
         ]
         bare = BareSockets(count_frames(load_example(drive), folder))
         stack.callback(bare.close)
@@ -88,6 +88,9 @@ def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: 
 
 def measure(folder: Path, *, seconds: int = 20, bus: str = "", drive: str = DEFAULT) -> dict[str, Any]:
     """The verdict is that of the virtual bus, or of the only one that was measured."""
+    require_drive(drive)
+    if bus and bus not in VARIANTS:
+        raise SystemExit(f"--bus {bus}: must be one of {', '.join(VARIANTS)}")
     measured, fullest = {}, fullest_methods()
     for variant in [bus] if bus else VARIANTS:
         (folder / variant).mkdir()

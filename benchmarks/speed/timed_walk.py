@@ -90,8 +90,10 @@ class TimedWalk:
         self.samples = Samples()
 
     def warm_up(self) -> None:
-        self.walk.arm()
-        self.walk.walk(WalkOrder(self.walk.loop.configuration.adaptation.initial_depth_m))
+        """Arms by force where drives cannot report their watchdogs, as an operator has to."""
+        configuration = self.walk.loop.configuration
+        self.walk.arm(forced=not all(drive.reports_settings for drive in configuration.drive.values()))
+        self.walk.walk(WalkOrder(configuration.adaptation.initial_depth_m))
         self.walk.run_for(WARM_UP_S)
         freeze_garbage()
 
