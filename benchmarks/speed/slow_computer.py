@@ -15,14 +15,13 @@ period in the longest of these ticks. `--picture FILE` draws the ticks of the fi
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
-from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from benchmarks.example_robot import load_example
 from benchmarks.report import evaluated, run_benchmark, show_progress
-from benchmarks.speed.slow_picture import plot_ticks
+from benchmarks.speed.tick_pictures import plot_ticks, require_matplotlib
 from benchmarks.walks.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
 from benchmarks.walks.walk_ticks import BeforeTick, WalkTick, least_work, walk_ticks
 from benchmarks.walks.wired_walk import wire
@@ -119,8 +118,8 @@ def summary_of(ticks: Sequence[WalkTick]) -> dict[str, Any]:
 def measure(
     folder: Path, *, factor: float = 5.0, walks: int = 5, seconds: float = 20.0, picture: str = ""
 ) -> dict[str, Any]:
-    if picture and not find_spec("matplotlib"):
-        raise SystemExit("--picture needs matplotlib: pip install 'mudskipper[plots]'")
+    if picture:
+        require_matplotlib()
     ticks = measure_work(folder, seconds, walks)
     if picture:
         plot_ticks(ticks, factor, Path(picture))

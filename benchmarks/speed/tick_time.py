@@ -16,8 +16,9 @@ insertion or a stride, and the longest of all. All but the last are medians.
 status, and with one for the largest answer (served_walk.py).
 
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
-of one mark, some 0.2 us; whole ticks carry one reading of the clock. The ends of an insertion and of a stride have work
-that is spread over ticks: `longest_us` summarises the longest tick of each of them.
+of one mark, some 0.2 us; whole ticks carry one reading of the clock. `--picture FILE` draws the medians of the stages;
+it needs matplotlib. The ends of an insertion and of a stride have work that is spread over ticks: `longest_us`
+summarises the longest tick of each of them.
 """
 
 import sys
@@ -30,6 +31,7 @@ from benchmarks.report import evaluated, run_benchmark, show_progress, summary_u
 from benchmarks.speed.bare_sockets import BareSockets, count_frames
 from benchmarks.speed.served_walk import ServedWalk
 from benchmarks.speed.serving_time import fullest_methods
+from benchmarks.speed.tick_pictures import plot_parts, require_matplotlib
 from benchmarks.speed.timed_walk import TimedWalk
 from benchmarks.walks.wirings import VARIANTS, make_wiring
 from drivers.drive_types import DEFAULT
@@ -74,6 +76,10 @@ def _ratios(report: dict[str, Any]) -> dict[str, float | None]:
     }
 
 
+def _medians_us(report: dict[str, Any]) -> dict[str, float]:
+    return {stage: summary["median"] for stage, summary in report["stages_us"].items()}
+
+
 def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: Path) -> TimedWalk:
     folder.mkdir()
     wiring = make_wiring(variant, configuration.bus, folder)
@@ -86,15 +92,21 @@ def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: 
     return walk
 
 
-def measure(folder: Path, *, seconds: int = 20, bus: str = "", drive: str = DEFAULT) -> dict[str, Any]:
+def measure(
+    folder: Path, *, seconds: int = 20, bus: str = "", drive: str = DEFAULT, picture: str = ""
+) -> dict[str, Any]:
     """The verdict is that of the virtual bus, or of the only one that was measured."""
     require_drive(drive)
     if bus and bus not in VARIANTS:
         raise SystemExit(f"--bus {bus}: must be one of {', '.join(VARIANTS)}")
+    if picture:
+        require_matplotlib()
     measured, fullest = {}, fullest_methods()
     for variant in [bus] if bus else VARIANTS:
         (folder / variant).mkdir()
         measured[variant] = measure_variant(variant, seconds, folder / variant, drive, fullest)
+    if picture:
+        plot_parts({name: _medians_us(each) for name, each in measured.items()}, Path(picture))
     bus = bus or "virtual"
     report = {"seconds": seconds, "drive": drive, "variants": measured, "bar_us": BAR_US}
     reached = measured[bus]["whole_us"]["median"] <= BAR_US

@@ -24,7 +24,7 @@ MOST_ROWS = 50_000  # of all walks of a log together: two minutes; matplotlib ta
 FIRST_BIN = 32  # ticks; it has up to four rows for each drawn column, so a shorter one would save nothing
 LEAST_GAIN = 0.9  # of the rows; beyond it a trace consists of the rows around changes of phase
 AROUND = 2  # rows before and after a change of phase
-CURVE_BINS = 4096  # of one curve of a long walk: several for each column of pixels
+CURVE_BINS = 2048  # of one curve of a long walk: several for each column of pixels
 
 
 class WalkTrace:

@@ -9,12 +9,14 @@ import json
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
 import pytest
 
 from benchmarks.behaviour import differences
+from benchmarks.example_robot import load_example
 from benchmarks.report import run_benchmark, show_progress, summary_us
 from benchmarks.speed import (
     campaign_speed,
@@ -29,11 +31,13 @@ from benchmarks.speed.paced_loops import LOOPS
 from benchmarks.speed.timed_walk import STAGES
 from benchmarks.stress import log_kills
 from benchmarks.stress.harmless_frames import is_harmless
-from benchmarks.walks.wirings import VARIANTS
+from benchmarks.walks.wirings import VARIANTS, make_wiring
+from control.modes import Mode
 from drivers.can.frames import Frame
 from drivers.mit import codec as mit
 from drivers.moteus import codec as moteus
 from drivers.moteus import registers, settings
+from firmware_host.log.recorder import NullRecorder
 from tests.folders import ROOT
 
 TIMEOUT_S = 240.0  # on a machine that others keep busy
@@ -87,6 +91,20 @@ def test_tick_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
             "ends_to_hot",
             "longest_to_hot",
         }
+
+
+@pytest.mark.parametrize("arguments", [["--bus", "can7"], ["--drive", "mit:AK80"]])
+def test_an_unknown_bus_or_drive_is_refused_with_those_that_exist(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit, match=f"{' '.join(arguments)}: must be one of "):
+        run_benchmark(tick_time.measure, arguments)
+
+
+def test_drives_that_cannot_report_their_watchdogs_walk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(timed_walk, "freeze_garbage", lambda: None)  # it switches garbage collection off
+    configuration = load_example("mit:AK80-9")
+    walk = timed_walk.TimedWalk(configuration, make_wiring("mock", configuration.bus, tmp_path), NullRecorder())
+    walk.warm_up()
+    assert walk.walk.loop.mode is Mode.WALKING
 
 
 def test_loop_jitter() -> None:

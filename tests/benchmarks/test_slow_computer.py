@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.speed import slow_computer
+from benchmarks.speed import slow_computer, tick_pictures
 from benchmarks.speed.slow_computer import largest_factor, summary_of, walk_slowly
-from benchmarks.speed.slow_picture import plot_ticks
+from benchmarks.speed.tick_pictures import fractions_of, plot_parts, plot_ticks
+from benchmarks.speed.timed_walk import STAGES
 from benchmarks.walks.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
 from benchmarks.walks.walk_ticks import END_TICKS, WalkTick, least_work
 from control.rate import PERIOD_S
@@ -122,6 +123,23 @@ def test_the_largest_factor_brings_the_longest_tick_to_a_period() -> None:
     summary = summary_of(ticks)
     assert summary["ticks"] == {"end": 1, "elsewhere": 2}
     assert summary["longest_to_median"] == {"end": 2.0, "elsewhere": 1.0}
+
+
+def test_a_picture_without_matplotlib_is_refused_before_the_walks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tick_pictures, "find_spec", lambda module: None)
+    with pytest.raises(SystemExit, match=r"pip install 'mudskipper\[plots\]'"):
+        slow_computer.measure(tmp_path, picture="ticks.png")
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_parts_of_a_tick_contain_every_stage(tmp_path: Path) -> None:
+    stages_us = {stage: float(number) for number, stage in enumerate(STAGES, 1)}
+    fractions = fractions_of(stages_us)
+    assert sum(fractions.values()) == pytest.approx(1.0)
+    plot_parts({"mock": stages_us}, tmp_path / "parts.png")
+    assert (tmp_path / "parts.png").stat().st_size > 1000
 
 
 def test_a_picture_is_drawn_of_the_ticks(tmp_path: Path) -> None:
