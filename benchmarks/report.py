@@ -8,13 +8,15 @@ the progress.
 import argparse
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter, getfile, getmodule, signature
+from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 FAST_FOLDER = Path("/dev/shm")  # spares the disk
+MAY_BE_ZERO = ("seed", "first")  # the other numbers are durations, counts and factors
 
 
 def run_benchmark(measure: Callable[..., dict[str, Any]], arguments: Sequence[str] | None = None) -> int:
@@ -35,11 +37,19 @@ def run_benchmark(measure: Callable[..., dict[str, Any]], arguments: Sequence[st
             parser.add_argument(f"--{name.replace('_', '-')}", type=kind, default=option.default, help="%(default)s")
     options = vars(parser.parse_args(arguments))
     indent = None if options.pop("json") else 1
+    _require_positive(options)
     with TemporaryDirectory(prefix="mud-", dir=FAST_FOLDER if FAST_FOLDER.is_dir() else None) as folder:
         report = {"benchmark": path.stem} | measure(Path(folder), **options)
     show_progress(1, 1, "done\n")
     print(json.dumps(report, indent=indent))
     return 1 if path.parent.name == "stress" and not report["reached"] else 0
+
+
+def _require_positive(options: Mapping[str, Any]) -> None:
+    """Ends the benchmark before it measures where it would measure nothing."""
+    for name, value in options.items():
+        if not isinstance(value, str) and name not in MAY_BE_ZERO and not 0 < value < inf:
+            raise SystemExit(f"--{name.replace('_', '-')} {value:g}: must be more than 0 and finite")
 
 
 def evaluated(report: dict[str, Any], bar: str, reached: bool) -> dict[str, Any]:

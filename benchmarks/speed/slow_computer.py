@@ -118,6 +118,8 @@ def summary_of(ticks: Sequence[WalkTick]) -> dict[str, Any]:
 def measure(
     folder: Path, *, factor: float = 5.0, walks: int = 5, seconds: float = 20.0, picture: str = ""
 ) -> dict[str, Any]:
+    if seconds < PERIOD_S:
+        raise SystemExit(f"--seconds {seconds:g}: must be at least {PERIOD_S:.4f}, the period of a tick")
     if picture:
         require_matplotlib()
     ticks = measure_work(folder, seconds, walks)

@@ -55,8 +55,9 @@ def plot_ticks(ticks: Sequence[WalkTick], factor: float, path: Path) -> None:
     figure = Figure(figsize=(8.0, 2.6), layout="constrained")
     panel = figure.add_subplot()
     for at_end, colour, label in ((False, FAINT, "other ticks"), (True, END, "ends of insertions and strides")):
-        points = [(n * PERIOD_S, factor * t.worked_s / PERIOD_S) for n, t in enumerate(shown) if t.at_end is at_end]
-        panel.plot(*zip(*points, strict=True), ".", markersize=2.5, color=colour, label=label)
+        own = [(number, tick) for number, tick in enumerate(shown) if tick.at_end is at_end]
+        times_s, periods = [n * PERIOD_S for n, _ in own], [factor * tick.worked_s / PERIOD_S for _, tick in own]
+        panel.plot(times_s, periods, ".", markersize=2.5, color=colour, label=label)
     panel.axhline(1.0, color=INK, linewidth=0.8)
     panel.set(xlabel="time (s)", ylabel=f"tick × {factor:g}\n(periods)", xlim=(0.0, SHOWN_S), ylim=(0.0, None))
     panel.spines[["top", "right"]].set_visible(False)

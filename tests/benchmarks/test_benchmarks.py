@@ -305,6 +305,16 @@ def test_log_kills_ends_with_a_status_for_its_bar(
     assert json.loads(capsys.readouterr().out)["reached"] is (status == 0)
 
 
+def test_a_seed_may_be_zero_and_a_count_may_not(capsys: pytest.CaptureFixture[str]) -> None:
+    def measure(folder: Path, *, seed: int = 1, walks: int = 2, name: str = "") -> dict[str, Any]:
+        return {"seed": seed, "walks": walks, "name": name}
+
+    assert run_benchmark(measure, ["--json", "--seed", "0"]) == 0
+    assert json.loads(capsys.readouterr().out)["seed"] == 0
+    with pytest.raises(SystemExit, match="^--walks 0: must be more than 0"):
+        run_benchmark(measure, ["--walks", "0"])
+
+
 @pytest.mark.parametrize("name", BENCHMARKS)
 def test_help_describes_the_benchmark(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     module = import_module(BENCHMARKS[name])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.report import run_benchmark
 from benchmarks.speed import slow_computer, tick_pictures
 from benchmarks.speed.slow_computer import largest_factor, summary_of, walk_slowly
 from benchmarks.speed.tick_pictures import fractions_of, plot_parts, plot_ticks
@@ -134,6 +135,18 @@ def test_a_picture_without_matplotlib_is_refused_before_the_walks(
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--walks", "0"), ("--seconds", "0"), ("--seconds", "0.001"), ("--factor", "-1"), ("--factor", "nan")],
+)
+def test_options_that_leave_nothing_to_measure_are_refused_before_the_walks(
+    option: str, value: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(slow_computer, "walk_once", lambda *_: pytest.fail("it walks"))
+    with pytest.raises(SystemExit, match=f"^{option} {value}: must be "):
+        run_benchmark(slow_computer.measure, [option, value])
+
+
 def test_the_parts_of_a_tick_contain_every_stage(tmp_path: Path) -> None:
     stages_us = {stage: float(number) for number, stage in enumerate(STAGES, 1)}
     fractions = fractions_of(stages_us)
@@ -142,9 +155,10 @@ def test_the_parts_of_a_tick_contain_every_stage(tmp_path: Path) -> None:
     assert (tmp_path / "parts.png").stat().st_size > 1000
 
 
-def test_a_picture_is_drawn_of_the_ticks(tmp_path: Path) -> None:
+@pytest.mark.parametrize("ticks", [[walk_tick(1e-4), walk_tick(2e-4, END_TICKS)], [walk_tick(1e-4)]])
+def test_a_picture_is_drawn_of_the_ticks(ticks: list[WalkTick], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    plot_ticks([walk_tick(1e-4), walk_tick(2e-4, END_TICKS)], FACTOR, tmp_path / "ticks.svg")
+    plot_ticks(ticks, FACTOR, tmp_path / "ticks.svg")
     assert "<svg" in (tmp_path / "ticks.svg").read_text(encoding="utf-8")
 
 
