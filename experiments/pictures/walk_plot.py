@@ -28,7 +28,9 @@ from experiments.reports.error_table import COEFFICIENTS
 
 WIDTH_IN, PANEL_IN, DOTS_PER_INCH = 10.0, 1.55, 120
 TITLE_HEIGHT = 1.3  # above the names of the muds, in heights of a panel
-NOTICED_DASHES = (0, (2, 2))
+MOST_DASHES = 20  # of noticed muds; more would cover the curves
+DASHES: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": (0, (2, 2))}
+MARKS: dict[str, Any] = {"color": INK, "linestyle": "", "marker": "|", "markersize": 9.0, "markeredgewidth": 0.7}
 SHORTEST_S = 0.1  # least length of the time axis
 ROOM_FOR_LETTER = 0.018  # of the width of a panel
 HEADROOM = 1.6  # top of a panel as a multiple of its largest value; error bars may be cut
@@ -119,8 +121,11 @@ def _shade(panel: Axes, regions: list[MudRegion], noticed_s: list[float]) -> Non
         own = regions[number :: len(MUD_SHADES)]
         starts_s, ends_s = [region.start_s for region in own], [region.end_s for region in own]
         panel.add_artist(_boxes(starts_s, ends_s, np.ones(len(own)), color=shade, zorder=0, **across))
-    dashed: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": NOTICED_DASHES}
-    panel.add_artist(_uprights(noticed_s, np.zeros(len(noticed_s)), np.ones(len(noticed_s)), **dashed, **across))
+    bottoms, tops = np.zeros(len(noticed_s)), np.ones(len(noticed_s))
+    if len(noticed_s) > MOST_DASHES:
+        panel.add_artist(Line2D(noticed_s, tops, **MARKS, **across))
+    else:
+        panel.add_artist(_uprights(noticed_s, bottoms, tops, **DASHES, **across))
 
 
 def _boxes(starts: ArrayLike, ends: ArrayLike, heights: Floats, **look: Any) -> PathPatch:
@@ -169,7 +174,8 @@ def _explain_coefficients(panel: Axes, walk: RecordedWalk) -> None:
     if any(not stride[f"{name}_valid"] for name in COEFFICIENTS for stride in walk.own_strides):
         panel.plot([], [], "o", color=FAINT, markerfacecolor="white", label="not valid")
     if walk.noticed_s:
-        panel.plot([], [], color=INK, linewidth=1.0, linestyle=NOTICED_DASHES, label="another mud noticed")
+        look = MARKS if len(walk.noticed_s) > MOST_DASHES else DASHES
+        panel.plot([], [], **look, label="another mud noticed")
     if panel.get_legend_handles_labels()[0]:
         panel.legend(ncols=3, **LEGEND)
 

@@ -27,19 +27,17 @@ from experiments.run_report.run import ReportedStride, Run
 CM4 = 1e8  # in m⁴
 MOST_DRAWN = 10  # strides of each mud, evenly over the run
 MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
-LEGEND_COLUMNS = 3
+LEGEND_COLUMN_IN = 2.8  # "k_p 1.4 N/cm³, from 3200 s" with its mark
 INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
-SIZE_IN, DOTS_PER_INCH = (10.0, 7.2), 120
+WIDTH_IN, HEIGHT_IN, DOTS_PER_INCH = (6.0, 10.0), 7.2, 120  # with one flipper, and with two
 
 
 def plot_fits(run: Run, path: Path) -> Figure:
     """Draw into a PNG, SVG or PDF file."""
     muds = drawn_muds(run)
-    looks = looks_of(muds)
+    looks, width_in = looks_of(muds), WIDTH_IN[len(run.flippers) - 1]
     with rc_context(STYLE):
-        figure = Figure(
-            figsize=(SIZE_IN[0] * (1.0 if len(run.flippers) > 1 else 0.6), SIZE_IN[1]), layout="constrained"
-        )
+        figure = Figure(figsize=(width_in, HEIGHT_IN), layout="constrained")
         axes = figure.subplots(len(COEFFICIENTS), 2 * len(run.flippers), squeeze=False)
         for row, name in zip(axes, COEFFICIENTS, strict=True):
             for fit, residuals, flipper in zip(row[::2], row[1::2], run.flippers, strict=True):
@@ -51,9 +49,8 @@ def plot_fits(run: Run, path: Path) -> Figure:
         for panel in axes[-1]:
             panel.set_xlabel("moment (cm⁴)")
         handles = [axes[0, 0].plot([], [], **_mark(looks[mud]), label=mud)[0] for mud in muds]
-        figure.legend(
-            handles=handles, loc="outside upper center", ncols=min(max(len(muds), 1), LEGEND_COLUMNS), frameon=False
-        )
+        columns = min(max(len(muds), 1), int(width_in / LEGEND_COLUMN_IN))
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
         figure.savefig(path, dpi=DOTS_PER_INCH)
     return figure
 

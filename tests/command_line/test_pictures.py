@@ -24,7 +24,7 @@ from experiments.pictures.mud_layout import describe_mud, layout_of_track, mud_r
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
-from experiments.pictures.walk_plot import plot_walk
+from experiments.pictures.walk_plot import MOST_DASHES, plot_walk
 from firmware_host.log_reading.lab.export import write_lab_csv
 from firmware_host.log_reading.log_reader import read_log
 from simulation.mud.clay import MUDS, Clay
@@ -230,6 +230,20 @@ def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_
         (0.0, second["t_start_s"], describe_mud(walk.strides[:2])),
         (second["t_start_s"], walk.time_s[-1], "k_p 0.20 N/cm³"),
     ]
+
+
+@pytest.mark.parametrize(("muds", "is_across"), [(MOST_DASHES, True), (MOST_DASHES + 1, False)])
+def test_many_noticed_muds_are_marked_above_the_curves(
+    muds: int, is_across: bool, two_walks: Path, tmp_path: Path
+) -> None:
+    walk = read_walk(two_walks, 1)
+    noticed_s = np.linspace(0.0, walk.time_s[-1], muds)
+    figure = drawn(walk._replace(noticed_s=noticed_s.tolist()), tmp_path / "walk.png")
+    for axes in figure.axes:
+        own = [line for line in axes.lines if line.get_transform() == axes.get_xaxis_transform()]
+        heights = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in own])
+        assert set(heights[np.isfinite(heights)]) == ({0.0, 1.0} if is_across else {1.0})
+        assert {x for line in own for x in np.asarray(line.get_xdata())} == set(noticed_s)
 
 
 def test_muds_with_equal_values_are_distinguished_by_time_and_those_without_a_value_are_marked(two_walks: Path) -> None:

@@ -109,3 +109,13 @@ def test_a_run_with_hundreds_of_muds_draws_those_with_the_most_strides(monkeypat
     legend, *_ = figure_of(run, monkeypatch).legends
     assert [text.get_text() for text in legend.get_texts()] == drawn_muds(run)
     assert {mud for mud, _ in drawn_samples(run, "left", "k_p")} == set(drawn_muds(run))
+
+
+def test_the_legend_of_one_flipper_fits_into_its_narrower_picture(tmp_path: Path) -> None:
+    muds = [f"k_p 1.7 N/cm³, from {number} s" for number in range(2000, 2000 + MOST_MUDS)]
+    run = run_of([fitted(mud) for mud in muds])
+    for flippers in (("left", "right"), ("right",)):
+        figure = plot_fits(replace(run, flippers=flippers), tmp_path / "fits.png")
+        legend, *_ = figure.legends
+        outline = legend.get_window_extent()
+        assert outline.x0 >= 0.0 and outline.x1 <= figure.bbox.width
