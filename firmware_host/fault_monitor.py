@@ -11,7 +11,6 @@ from control.gait.recovery import is_in_mud
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointMonitor, TickFacts
-from control.monitors.motion_monitor import JointDynamics
 from control.rate import PERIOD_S
 from control.records import (
     NEVER_S,
@@ -22,7 +21,6 @@ from control.records import (
     JointTargets,
     Phase,
     same_for_all,
-    same_for_each,
 )
 from drivers.can.can_port import BusState
 from drivers.drive import DriveHealth
@@ -77,23 +75,7 @@ class FaultMonitor:
         joints = configuration.rig.joints
         self._no_targets: Joints[JointTarget | None] = same_for_all(None, configuration.rig)
         self._all_trusted = same_for_all(True, configuration.rig)
-        self.joints = tuple(
-            JointMonitor(
-                joint,
-                configuration.limits,
-                joint_range,
-                configuration.faults,
-                configuration.winding,
-                configuration.drive[joint].current_limit_a,
-                configuration.drive[joint].torque_constant_nm_a,
-                configuration.drive[joint].heartbeat_period_s,
-                dynamics,
-                configuration.drive[joint].answers_only,
-            )
-            for joint, joint_range, dynamics in zip(
-                joints, configuration.joint_ranges, _joint_dynamics(configuration), strict=True
-            )
-        )
+        self.joints = _joint_monitors(configuration)
         self._geometry = configuration.geometry
         self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
@@ -290,12 +272,22 @@ class FaultMonitor:
                 self._pose_stamp_s = None
 
 
-def _joint_dynamics(configuration: Configuration) -> Joints[JointDynamics]:
-    arm, gains = configuration.arm, configuration.gains
-    return same_for_each(
-        JointDynamics(arm.sweep_inertia_kg_m2, gains.sweep_stiffness_nm_rad),
-        JointDynamics(arm.adduction_inertia_kg_m2, gains.adduction_stiffness_nm_rad),
-        configuration.rig,
+def _joint_monitors(configuration: Configuration) -> tuple[JointMonitor, ...]:
+    ranges, dynamics, drives = configuration.joint_ranges, configuration.joint_dynamics, configuration.drive
+    return tuple(
+        JointMonitor(
+            joint,
+            configuration.limits,
+            joint_range,
+            configuration.faults,
+            configuration.winding,
+            drives[joint].current_limit_a,
+            drives[joint].torque_constant_nm_a,
+            drives[joint].heartbeat_period_s,
+            own_dynamics,
+            drives[joint].answers_only,
+        )
+        for joint, joint_range, own_dynamics in zip(configuration.rig.joints, ranges, dynamics, strict=True)
     )
 
 

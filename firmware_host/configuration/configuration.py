@@ -18,6 +18,7 @@ from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointLimits, JointRange
 from control.monitors.joint_monitor import FaultBounds
+from control.monitors.motion_monitor import JointDynamics
 from control.monitors.winding import WindingParameters
 from control.records import Joints, Rig, same_for_each
 from drivers.can.bus_load import BitRates
@@ -158,4 +159,11 @@ class Configuration:
         limits = self.limits
         sweep = JointRange(radians(limits.sweep_min_deg), radians(limits.sweep_max_deg))
         adduction = JointRange(radians(limits.adduction_min_deg), radians(limits.adduction_max_deg))
+        return same_for_each(sweep, adduction, self.rig)
+
+    @property
+    def joint_dynamics(self) -> Joints[JointDynamics]:
+        arm, gains = self.arm, self.gains
+        sweep = JointDynamics(arm.sweep_inertia_kg_m2, gains.sweep_stiffness_nm_rad)
+        adduction = JointDynamics(arm.adduction_inertia_kg_m2, gains.adduction_stiffness_nm_rad)
         return same_for_each(sweep, adduction, self.rig)
