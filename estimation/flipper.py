@@ -2,12 +2,14 @@
 
 Each stroke is stored as batches of equal travel (stroke.py). At the end of the insertion the estimator finds the
 surface (surface.py) and fits k_p; when the stride closes it fits k_e (stroke_fit.py), and fits or bounds k_s
-(shear.py). Each of these is a unit of bounded work (control/computing/bounded_work.py). The surface corrects the tare,
-which the loads of the stance contain: samples that arrive before are learned as soon as the tare is corrected, so they
-do not depend on when the units run. A stance that ends before finishes the work at once. The clinging weight and the
-joint's friction are measured again in every swing (tare.py, air.py). A stride without evidence of mud has no
-coefficients. The coefficients are linear in the joint torques, so the fits need no third force component, which two
-torques cannot determine; forces are mapped for display only, until the tare is corrected with that of before.
+(shear.py). The clinging weight and the joint's friction are measured again in every swing (tare.py, air.py). A stride
+without evidence of mud has no coefficients. The coefficients are linear in the joint torques, so the fits need no third
+force component, which two torques cannot determine; forces are mapped for display only.
+
+The fits run in units of bounded work (control/computing/bounded_work.py). The surface of an insertion corrects the
+tare, which the loads of the following stance contain. So samples of the stance wait until the tare is corrected, and
+the results do not depend on when the units run; only the displayed forces use the previous tare until then. A stance
+that ends before the units finishes them at once.
 """
 
 from collections.abc import Sequence
@@ -51,7 +53,7 @@ CLINGING_M = 0.015  # above the lower edge: the middle of the part that a stroke
 
 
 class ClosingStride(NamedTuple):
-    """What the coefficients of a stride are fitted from."""
+    """The measurements of a stride from which its coefficients are fitted."""
 
     stance: Stroke
     extraction: Stroke
@@ -172,7 +174,10 @@ class FlipperEstimator(StrideEstimator):
             self._tare.set_zero(self._air.is_air)
 
     def _learn_insertion(self, insertion: Stroke) -> Work[None]:
-        """Find the surface and correct the zero by the force above it; the fit comes after the other flipper's zero."""
+        """Find the surface and correct the tare by the force above it.
+
+        The fit of k_p is queued last, so that no flipper's tare waits for the fit of another flipper.
+        """
         batches = insertion.moving()
         length_m, arm_m = self.geometry.flipper_length_m, hypot(self.geometry.flipper_length_m, self.geometry.drop_m)
         depths_m = [b.travel_m for b in batches]
@@ -189,7 +194,10 @@ class FlipperEstimator(StrideEstimator):
         self.work.add(self._fit_insertion(insertion, below, found, surface))
 
     def _fit_insertion(self, insertion: Stroke, below: Sequence[Batch], found: Surface, surface: Surface) -> Work[None]:
-        """Fit k_p from the depth where the stroke's own force begins: a lag between angle and current shifts both."""
+        """Fit k_p from the depth where the stroke's own force begins.
+
+        A lag between angle and current shifts this depth and the force alike.
+        """
         own = self._own_surfaces.update(found, 0.0)
         yield
         k_p = yield from fit_insertion(self.geometry, below, own, self._tare.zero.std_error_n)

@@ -1,10 +1,10 @@
 """The estimator that the loop, the replay and the experiments share: all flippers, and the mud from stride to stride.
 
 Its input is drive states, the gait's phase and the body's position, one sample a tick; it uses no bus and no clock. The
-fits at the ends of a stride take longer than a tick. So the loop adds samples and runs the fits later, in units of
-bounded work, and a replay updates, which runs them at once. The same samples give the same numbers to the last digit,
-live or from a log, however many units run in a tick. Two methods share its interface: `default`, in
-torque space, and `paper`, the published one, with its biases.
+fits at a stride's ends take longer than a tick. The loop calls `add` and runs the fits afterwards in units of bounded
+work; a replay calls `update`, which runs them at once. The same samples give the same numbers to the last digit, live
+or from a log, however many units run in a tick. Two methods share the interface: `default`, in torque space, and
+`paper`, the published one, with its biases.
 """
 
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ class MudReading(NamedTuple):
 
 
 class Sampled(NamedTuple):
-    """The result of one sample before the work that it causes."""
+    """The result of one sample, without that of the work which it causes."""
 
     loads: tuple[FlipperLoad, ...]
     closing: Work[tuple[StrideEstimate, ...]] | None = None  # estimates the strides that this sample closed
@@ -133,7 +133,7 @@ class MudEstimator:
 
     def _estimate(self, closed: Sequence[Work[StrideEstimate]], body_x_m: float) -> Work[tuple[StrideEstimate, ...]]:
         """Estimate the strides that closed, and the mud after them."""
-        yield  # the tick in which the strides closed has enough to do
+        yield  # the tick in which the strides close has other work already
         found = []
         for each in closed:
             found.append((yield from each))

@@ -2,7 +2,7 @@
 
 A method learns coefficients from the samples of a stride; the shell does the rest. It turns currents into loads, counts
 phases and strides, records the largest forces, and closes a stride once the flipper has left the mud after its
-extraction. Its estimate takes longer than a tick, so a stride that closes gives work
+extraction. The estimate of a stride takes longer than a tick, so a stride that closes returns it as bounded work
 (control/computing/bounded_work.py), which depends on nothing that is measured later. The methods are
 `FlipperEstimator` (flipper.py) and `PaperEstimator` (paper.py).
 """
@@ -86,10 +86,10 @@ class StrideEstimator(ABC):
         body_x_m: float,
         commands_s: CommandTimes = NO_COMMANDS,
     ) -> tuple[FlipperLoad, Work[StrideEstimate] | None]:
-        """Return the load now and, once the flipper has left the mud after its extraction, the work that estimates the
-        stride.
+        """Return the load now, and the work that estimates the stride if it closes with this sample.
 
-        A flipper that is still in the mud has GRACE_S to come out.
+        A stride closes once the flipper has left the mud after its extraction; a flipper that is still in the mud has
+        GRACE_S to come out.
         """
         closed = None
         if phase is not self._clock.phase:
@@ -137,7 +137,7 @@ class StrideEstimator(ABC):
         return is_in_mud(self.geometry, *self._loads.angles_rad)
 
     def _close(self, now_s: float, body_x_m: float) -> Work[StrideEstimate]:
-        """Close the stride; the work that is returned has all that was measured."""
+        """Close the stride and return the work that estimates it from all that was measured in it."""
         duration_s = self._clock.duration_s
         measured = partial(
             StrideEstimate,
@@ -179,7 +179,7 @@ class StrideEstimator(ABC):
 
     @abstractmethod
     def _learned(self) -> Work[Learned]:
-        """Return the work that gives the result of the stride that closes, on what is known now."""
+        """Return the work that fits the stride that closes, from the present state."""
 
     def _end_phase(self, now_s: float, ended: Phase) -> None:  # noqa: B027  a method may ignore it
         """React to the end of a phase."""

@@ -94,9 +94,9 @@ class Loop:
             self._end_move(now_s, fault_message(self.fault))
         self.sent = self._limit(self._control(tick.missed))
         self._command(now_s)
-        sent_s = self._clock()
+        sent_after_s = self._clock() - now_s
         self.events.report_learning(now_s, self.learning.step(self.controller, LONGEST_STEP_TICKS * self.period_s))
-        self._record(tick, sent_s - now_s)
+        self._record(tick, sent_after_s)
 
     @property
     def fault(self) -> Fault | None:
@@ -224,9 +224,9 @@ class Loop:
             self.drives.request_settings(now_s)
         self.drives.send(self.sent.torques_nm, self.period_s)
 
-    def _record(self, tick: Tick, sent_s: float) -> None:
+    def _record(self, tick: Tick, sent_after_s: float) -> None:
         tick_s = self._clock() - tick.now_s
-        self.recorder.put(TICK_KIND, self._tick_row(tick, sent_s, self))
+        self.recorder.put(TICK_KIND, self._tick_row(tick, sent_after_s, self))
         if self.controller.recovery.events:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)

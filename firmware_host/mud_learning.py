@@ -4,12 +4,12 @@ Each sample goes to the estimator together with the phase in which the measured 
 An insertion that meets solid mud ends early. Once a stride, in swing, the strides of all flippers close, and the depth
 of the next stride is chosen.
 
-What takes longer than a tick, the fits at the end of an insertion and the close with its choice, is bounded work
-(control/computing/bounded_work.py). The loop runs one unit a tick after the command of that tick, so an insertion is
-fitted some 20 ticks after its end, and a stride closes some 30 ticks after its swing began (40 by the method `gait`),
-at the latest before the next insertion uses its choice: all units run at once in a swing that is too short for them,
-and in a new walk, whose beginning finishes the strides of the one before. A choice that comes only after the next
-insertion began is logged as such.
+The fits at the end of an insertion, and the close of a stride with its choice, take longer than a tick. They are
+bounded work (control/computing/bounded_work.py), of which the loop runs one unit a tick after the command of that tick.
+So an insertion is fitted some 20 ticks after its end, and a stride closes some 30 ticks after its swing began (40 with
+the method `gait`). Where a swing is too short for that, all units left run at once before the next insertion begins; a
+choice that still comes later, because the mud held a flipper, is logged as late. A new walk finishes the strides of the
+one before.
 """
 
 from collections.abc import Callable, Sequence
@@ -80,21 +80,21 @@ class MudLearning:
         self.strides_closed = 0  # since the start
         self.depth_reason = ""  # of the next stride
         self._firm_ticks = 0
-        self._turns = configuration.adaptation.method == "gait"
+        self._may_turn = configuration.adaptation.method == "gait"  # to another sweep, in the swing under way
         self._closing: Work[tuple[StrideEstimate, ...]] | None = None  # begun by the last sample
         self._closed: list[ClosedStride] = []  # since the last report
         self._messages: list[str] = []  # likewise
         self._unexamined: list[StrideEstimate] = []
 
     def reset(self, depth_m: float) -> None:
-        """Start a new walk; earlier strides stay stored. Work that is not finished is dropped: run all units before."""
+        """Start a new walk. Earlier strides stay stored; unfinished work is dropped, so call `finish` before."""
         self.estimator.reset()
         self.adaptation.reset(depth_m)
         self.depth_reason = "start"
         self._firm_ticks = 0
 
     def update(self, now_s: float, phase: Phase, states: DriveStates, body: BodyPose) -> None:
-        """Take in a sample."""
+        """Add a sample to the estimator."""
         self.loads, self._closing = self.estimator.add(now_s, phase, states, body)
 
     def adapt(self, controller: Controller) -> None:
@@ -109,7 +109,7 @@ class MudLearning:
     def step(self, controller: Controller, within_s: float) -> LearningReport:
         """Run the units of this tick, or all if the next stride's depth must be set within this time."""
         if not self.estimator.work.is_empty:
-            due = controller.gait.is_choice_due(within_s, self._turns)
+            due = controller.gait.is_choice_due(within_s, self._may_turn)
             self.estimator.work.run(ALL_UNITS if due else self.units_per_tick)
         return self._pop_report()
 

@@ -1,9 +1,9 @@
 """Work that takes longer than a tick allows, as a generator: each `yield` ends a unit that is short enough.
 
-The end of an insertion and the close of a stride take up to twelve times the computing of a tick. The loop runs one of
-their units a tick, after the command of that tick. The units run in a fixed order on values that were measured before
-the work began, so the result is the same however many of them share a tick. There are no threads: no unit is
-interrupted.
+The work at the end of an insertion and at the close of a stride takes up to twelve times as long as a tick. The loop
+runs one unit of it a tick, after the command of that tick. The units run in a fixed order on values that were measured
+before the work began, so the result is the same however many of them share a tick. There are no threads: a unit is
+never interrupted.
 """
 
 from collections import deque
@@ -33,13 +33,13 @@ def finished(result: Result) -> Work[Result]:
 
 
 def batched(values: Sequence[Value], size: int) -> Iterator[Sequence[Value]]:
-    """Yield `size` values at a time, of which the last have fewer, as itertools.batched from Python 3.12 on."""
+    """Yield `size` values at a time, and the rest at the end, as itertools.batched from Python 3.12 on."""
     for start in range(0, len(values), size):
         yield values[start : start + size]
 
 
 class WorkQueue:
-    """Owns the work that is not finished; what was added first is finished first."""
+    """Owns the work that is not finished, and runs it in the order in which it was added."""
 
     def __init__(self) -> None:
         self._waiting: deque[Work[None]] = deque()

@@ -143,16 +143,16 @@ class Gait:
         """The swing follows the phase under way, in which the flippers come out of the mud."""
         return self._row == len(self._rows) - 2
 
-    def is_choice_due(self, within_s: float, turns: bool) -> bool:
-        """Return whether the swing is so nearly over that the next stride's depth must be set within this time.
+    def is_choice_due(self, within_s: float, may_turn: bool) -> bool:
+        """Return whether the next stride's depth must be set within this time, because the swing ends then.
 
-        If the next gait `turns` the swing that is under way, this is so already when half of it is nearly over.
+        If the choice `may_turn` the swing under way to another sweep angle, it is due before half of the swing is over.
         """
         phase, duration_s = self._rows[self._row][:2]
         if phase is not Phase.SWING:
             return False
         left_s = duration_s - self._time_s
-        return left_s <= within_s or (turns and 0.0 <= left_s - duration_s / 2.0 <= within_s)
+        return left_s <= within_s or (may_turn and 0.0 <= left_s - duration_s / 2.0 <= within_s)
 
     @property
     def waits(self) -> bool:

@@ -233,7 +233,7 @@ def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_
 
 
 @pytest.mark.parametrize(("muds", "is_across"), [(MOST_DASHES, True), (MOST_DASHES + 1, False)])
-def test_many_noticed_muds_are_marked_above_the_curves(
+def test_many_noticed_muds_are_marked_at_the_top_of_each_panel(
     muds: int, is_across: bool, two_walks: Path, tmp_path: Path
 ) -> None:
     walk = read_walk(two_walks, 1)
