@@ -1,9 +1,9 @@
 """Compiles the modules of a tick with mypyc where MUDSKIPPER_COMPILED=1 asks for it.
 
-`tool.mudskipper.compiled` in pyproject.toml lists these modules; all other metadata is there too. The same sources run
-in both forms and give the same digits, so the C compiler must not fuse a product and a sum into one rounding, as it
-otherwise does on ARM. Each compiled build uses a folder of its own: an extension that an earlier build left would be
-imported in place of the source.
+`tool.mudskipper.compiled` in pyproject.toml lists these modules; all other metadata is there too. Both forms give the
+same digits, so the C compiler must not fuse a product and a sum into one operation with one rounding, as it otherwise
+does on ARM. Each compiled build uses a folder of its own: an extension that an earlier build left would be imported in
+place of the source.
 """
 
 import os
@@ -22,9 +22,8 @@ OPTIONS = ["-ffp-contract=off", "-Wno-error", "-g0"]
 
 
 def compiled_modules() -> list[str]:
-    modules: list[str] = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["tool"]["mudskipper"][
-        "compiled"
-    ]
+    project = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))
+    modules: list[str] = project["tool"]["mudskipper"]["compiled"]
     return modules
 
 
