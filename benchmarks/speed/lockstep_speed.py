@@ -3,7 +3,7 @@
 One thread, thus one core: plant, four simulated drives, every frame encoded and decoded over the mock bus, and whole
 ticks of the loop without a recorder. The robot walks the paper's track adaptively from end to end, for `--longest`
 simulated seconds at most; arming is not counted. The figure of a round is simulated time over elapsed time.
-`processor_times` has the time of the processor in its place, which other programs hardly lengthen.
+`processor_times` divides by the time of the processor instead, which other programs hardly lengthen.
 """
 
 import sys

@@ -7,12 +7,13 @@ the simulated robot keeps running next to either. Lateness counts from the first
 deadline shows as more than a period. Start and first stride of the daemon are outside of every figure. A percentile is
 the median of those of the turns.
 
-Loops that only wait (paced_loops.py), ours, OpenSourceLeg's and that of loop-rate-limiters, take turns with them at 380
-and 1,000 Hz. `left_out` names those that are not installed: `pip install 'mudskipper[loops]'` adds them.
+Loops that only wait take turns with them at 380 and 1,000 Hz: the daemon's ticker, and those of OpenSourceLeg and
+loop-rate-limiters (paced_loops.py). `left_out` names those that are not installed: `pip install 'mudskipper[loops]'`
+adds them.
 
 Everything runs twice: `held` keeps the processors awake for all loops alike, as the daemon does while torque is on, and
 `sleeping` lets them sleep between ticks, for the daemon by `stay_awake = false`. Only figures of the same half may be
-compared: one loop that holds the processors awake would make the next one look late.
+compared: next to a loop that holds the processors awake, one that does not would look late.
 """
 
 import sys
@@ -100,7 +101,7 @@ class Half:
 
 
 def _paced_report(by_name: dict[str, PacedTimes]) -> Report:
-    """The jitter of each loop, and its percentiles in those of the ticker."""
+    """Return the jitter of each loop, also divided by that of the ticker."""
     reports = {name: times.report() for name, times in by_name.items()}
     own = reports["ticker"]["jitter_us"]
     for report in reports.values():

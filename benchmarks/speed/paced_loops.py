@@ -96,7 +96,7 @@ LOOPS: dict[str, tuple[str, PacedLoop]] = {  # with the module that each needs
 
 
 def present_loops() -> dict[str, PacedLoop]:
-    """The loops whose modules are installed."""
+    """Returns the loops whose modules are installed."""
     return {name: loop for name, (module, loop) in LOOPS.items() if not module or find_spec(module)}
 
 
@@ -126,7 +126,7 @@ class PacedTimes:
         raise RuntimeError("a signal ended the loop")
 
     def report(self) -> dict[str, Any]:
-        """Jitter, and the mean rate as a fraction of the rate that was asked for."""
+        """Returns the jitter, and the mean rate as a fraction of the requested rate."""
         return {
             "jitter_us": self._jitter.summary(),
             "rate_fraction": round(self._jitter.count * self.period_s / self._elapsed_s, 4),

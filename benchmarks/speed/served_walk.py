@@ -75,13 +75,13 @@ class ServedWalk:
                 return
 
     def report(self) -> dict[str, Any]:
-        """The summaries of each kind of tick."""
+        """Returns a summary of each kind of request."""
         summaries: dict[str, Any] = {name: summary_us(each) for name, each in self.durations_s.items()}
         summaries[LARGEST] |= {"method": self._largest, "bytes": self._largest_bytes}
         return summaries
 
     def ratios(self, whole_us: float) -> dict[str, float]:
-        """Medians in whole ticks; `viewer` is the mean over all ticks of what one viewer adds."""
+        """Returns medians divided by a whole tick; `viewer` is what one viewer adds to a tick in the mean."""
         medians_us = {name: summary["median"] for name, summary in self.report().items()}
         viewer_us = (medians_us[STATUS] - medians_us[IDLE]) / VIEWER_TICKS
         medians_us |= {"viewer": viewer_us}

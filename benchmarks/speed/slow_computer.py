@@ -2,14 +2,15 @@
 
 The simulated robot walks the paper's track adaptively over pairs of sockets, in lockstep with the daemon's own loop and
 with a log. The same walk runs `--walks` times. A walk is deterministic, so tick n does the same work in each of them:
-the shortest of its durations is that work, and the rest is noise of this computer. Durations are of the processor's
-time, which contains no other program's. Serving clients is in no tick; tick_time has its cost.
+the shortest of its durations is that work, and the rest is noise of this computer. Durations are in time of the
+processor, which excludes other programs. Ticks do not contain the serving of clients; tick_time measures that.
 
-It then walks once for each factor with these durations times the factor: its loop and its ticker read a clock that runs
+The robot then walks once for each factor with these durations times the factor: loop and ticker read a clock that runs
 accordingly (scaled_clock.py), so a late tick has its effect on the robot. `slow` counts the ticks that take more than a
 period: `end` has those after an insertion or an extraction, in which strides are fitted and closed, `elsewhere` the
-others. `skipped` are the deadlines that passed without a tick. `largest_factor` is the largest one without a miss: a
-period in the longest of these ticks. `--picture FILE` draws the ticks of the first strides; it needs matplotlib.
+others. `skipped` are the deadlines that passed without a tick. `largest_factor` is a period divided by the longest
+tick: up to it no tick takes longer than a period. `--picture FILE` draws the ticks of the first strides; it needs
+matplotlib.
 """
 
 import sys
@@ -69,7 +70,7 @@ def measure_work(folder: Path, seconds: float, walks: int) -> list[WalkTick]:
 
 
 def walk_slowly(folder: Path, ticks: Sequence[WalkTick], factor: float) -> dict[str, Any]:
-    """Walks with the recorded work times the factor; a tick that the recorded walk does not have takes the median."""
+    """Walks with the recorded work times the factor; a tick that the recorded walk lacks takes the median."""
     works_s, usual_s, work = {tick[:2]: tick.worked_s for tick in ticks}, median_s(ticks), RecordedWork()
 
     def before_tick(span: int, index: int) -> None:

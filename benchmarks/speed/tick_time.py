@@ -8,17 +8,17 @@ bus's sockets, and SocketCAN on pairs of sockets, by the socket's own frames (`s
 recv (`python-can`). `--bus` measures only one of them; `--drive` chooses the type of its drives. A rig of one flipper
 with two motors on one bus walks in turn with the robot, and `two_motors` compares its ticks.
 
-`ratios` hardly depend on the computer: whole ticks in reads and sends of their frames by bare sockets
-(bare_sockets.py), which take turns with them, and, in whole ticks, cold ticks, the longest tick of each end of an
-insertion or a stride, and the longest of all. All but the last are medians.
+The work at the end of an insertion and of a stride is spread over ticks: `longest_us` summarises the longest tick of
+each of these ends. `serving_us` is the cost of serving the status socket after a tick: without a request, with a
+viewer's request for the status, and with one for the largest answer (served_walk.py).
 
-`serving_us` is the cost of serving the status socket after a tick: without a request, with a viewer's request for the
-status, and with one for the largest answer (served_walk.py).
+`ratios` hardly depend on the computer. `hot_to_bare_sockets` divides a whole tick by the time in which bare sockets
+read and send its frames (bare_sockets.py), in turn with the ticks. The others are divided by a whole tick: cold ticks,
+the longest ticks of the ends, the longest tick of all, and serving. All but the longest of all are medians.
 
 Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
 of one mark, some 0.2 us; whole ticks carry one reading of the clock. `--picture FILE` draws the medians of the stages;
-it needs matplotlib. The ends of an insertion and of a stride have work that is spread over ticks: `longest_us`
-summarises the longest tick of each of them.
+it needs matplotlib.
 """
 
 import sys

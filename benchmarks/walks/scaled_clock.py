@@ -1,9 +1,9 @@
 """The time of a computer that is slower than this one by a factor: a clock for a lockstep, and the walk that uses it.
 
 A tick takes as long as this thread computes in it, by the processor's own count, times the factor. Between ticks the
-clock stands still while the simulated robot computes, and leaps over the sleep until the next deadline. The loop reads
-this clock, and the daemon's ticker waits by it, so a deadline that the slow computer misses is missed here. Recorded
-work in place of this thread's makes the walk independent of what else this computer does.
+clock stands still while the simulated robot computes, and jumps over the sleep until the next deadline. The loop reads
+this clock, and the daemon's ticker waits by it, so a deadline that the slow computer misses is missed here. With
+recorded work instead of this thread's own, the walk does not depend on the other programs of this computer.
 """
 
 import time
@@ -46,7 +46,7 @@ class ScaledClock:
 
 
 class RecordedWork:
-    """A count of work for a clock. The first reading in a tick is before its work, and all further ones are after."""
+    """The count of recorded work, for a clock. In a tick the first reading precedes the work, all others follow it."""
 
     def __init__(self) -> None:
         self.next_s = 0.0  # the work of the next tick
@@ -59,7 +59,7 @@ class RecordedWork:
 
 
 class ScaledWalk(Lockstep):
-    """A lockstep whose time is that of a scaled clock. It does not support failures or late ticks by order."""
+    """A lockstep whose time is that of a scaled clock. It does not support injected failures or late ticks."""
 
     def __init__(self, configuration: Configuration, track: Track, clock: ScaledClock) -> None:
         self._clock = clock
