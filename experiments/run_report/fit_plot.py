@@ -48,7 +48,7 @@ def plot_fits(run: Run, path: Path) -> Figure:
             row[0].set_ylabel("torque (N·cm)")
         for panel in axes[-1]:
             panel.set_xlabel("moment (cm⁴)")
-        handles = [axes[0, 0].plot([], [], **_mark(looks[mud]), label=mud)[0] for mud in muds]
+        handles = [axes[0, 0].plot([], [], **_mark(looks[mud]), label=mud.replace("k_p", "$k_p$"))[0] for mud in muds]
         columns = min(max(len(muds), 1), int(width_in / LEGEND_COLUMN_IN))
         figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
         figure.savefig(path, dpi=DOTS_PER_INCH)
