@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
 from functools import partial
 from pathlib import Path
@@ -23,6 +24,16 @@ from experiments.trials.cluster_workers import ClusterWorkers  # noqa: E402
 from tests.experiments.trials.running_cluster import running_cluster  # noqa: E402
 
 WALKS = [partial(run_mud_walk, MudWalk(MUDS["48.5"], constant_depth(0.02), seed, strides=1)) for seed in range(1, 4)]
+
+
+@pytest.fixture(autouse=True)
+def closed_clients() -> None:
+    """Closes the clients of earlier tests that found no cluster.
+
+    Otherwise the garbage collector may close one in the thread of the next client's event loop, which then waits for
+    itself.
+    """
+    gc.collect()
 
 
 @pytest.fixture(scope="module")
