@@ -26,8 +26,9 @@ from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rights import Peer
 from firmware_host.operator.rpc import RefusedError
+from firmware_host.operator.socket_methods import Level
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 

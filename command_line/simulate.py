@@ -8,8 +8,8 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.screen import complain
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration, parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness import peer
 from simulation.harness.local_setup import configuration_text, make_buses, named_folder, write_local_setup
 from simulation.harness.world import load_world

@@ -9,14 +9,15 @@ from math import radians
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
-from control.gait.gait import Gait, GaitParameters
+from control.gait.gait import Gait
 from control.gait.joint_path import JointPath, still
 from control.gait.recovery import Recovery
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains, VelocityPrediction, damping_torques_nm, joint_torques_nm
 from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
-from control.parameters.motion_parameters import MotionParameters as MotionParameters  # for its users here
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.motion_parameters import MotionParameters
 from control.records import (
     TWO_FLIPPERS,
     DriveStates,

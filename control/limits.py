@@ -8,7 +8,7 @@ slew rate limits these reductions too. Only a torque that is not a number goes t
 from math import isfinite
 from typing import NamedTuple
 
-from control.parameters.joint_limits import JointLimits as JointLimits  # for its users here
+from control.parameters.joint_limits import JointLimits
 from control.records import DriveState, DriveStates, Joints, Torques
 
 VELOCITY_FADE = 0.2  # torque that speeds a joint up fades out over this last part of the velocity limit

@@ -6,7 +6,7 @@ The joints of a robot may have drives of different types, as long as those on on
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 
-from control.limits import JointLimits
+from control.parameters.joint_limits import JointLimits
 from control.records import JOINTS
 from drivers.bench.drive_bench import DriveBench
 from drivers.can.bus_load import FrameRate

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
-from control.limits import JointLimits
+from control.parameters.joint_limits import JointLimits
 from control.records import NEVER_S
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame

@@ -32,8 +32,8 @@ from firmware_host.computer.awake_processors import AwakeProcessors
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.fault_injection.failing_host import FailingClock, FailingRecorder, FailingTicker
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
 from firmware_host.log.log_folder import first_path, new_run_id

@@ -22,7 +22,7 @@ from control.records import (
     Phase,
     same_for_all,
 )
-from drivers.can.can_port import BusState
+from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
 from drivers.drives import Drives
 from firmware_host.configuration.configuration import Configuration

@@ -6,7 +6,7 @@ Trouble of the log does not stop a robot that moves; a log that cannot be writte
 from collections import deque
 
 from control.faults import Fault, FaultKind
-from control.monitors.joint_monitor import FaultBounds
+from control.parameters.fault_bounds import FaultBounds
 from control.rate import PERIOD_S
 from firmware_host.log.recorder import LogReport
 from firmware_host.ticker import Tick

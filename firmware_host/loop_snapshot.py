@@ -13,7 +13,7 @@ from control.limits import LimitedTorques
 from control.modes import Mode
 from control.mud_estimate import MudEstimate
 from control.records import BodyPose, DriveStates, FlipperLoad, Joints, Phase
-from drivers.can.can_port import BusState
+from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
 from drivers.pose.pose_port import PoseReport
 from firmware_host.log.recorder import LogReport

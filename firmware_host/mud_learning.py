@@ -21,8 +21,8 @@ from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthAd
 from control.depth.gait_choice import GaitAdaptation
 from control.depth.paper_choice import PaperAdaptation
 from control.faults import Fault, FaultKind
-from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
+from control.parameters.gait_parameters import GaitParameters
 from control.records import NO_LOAD, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
 from estimation.mud import MudEstimator
 from firmware_host.configuration.configuration import Configuration

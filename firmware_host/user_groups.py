@@ -7,7 +7,7 @@ import grp
 import os
 
 from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.operator.rights import Group, Rights
 
 

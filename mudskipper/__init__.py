@@ -4,7 +4,7 @@
 through the daemon's socket.
 """
 
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.log_reading.log_error import LogError
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError
 from firmware_host.software_version import software_version

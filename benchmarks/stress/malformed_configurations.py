@@ -18,7 +18,7 @@ from benchmarks.example_robot import EXAMPLE
 from control.bounds import Bounds
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import RecordReader
-from simulation.body.plant import PlantParameters
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters as DriveParameters
 from simulation.harness import world
 from simulation.harness.local_setup import configuration_text

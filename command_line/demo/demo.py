@@ -19,7 +19,7 @@ from command_line.json_output import print_json
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from control.modes import Mode
 from experiments.reports.mud_names import mud_text
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.log.log_folder import DONE, log_files, present_path
 from firmware_host.log_reading.log_error import LogError
 from firmware_host.log_reading.log_reader import Log, read_log

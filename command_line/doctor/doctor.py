@@ -45,8 +45,8 @@ from firmware_host.computer.host_facts import (
     unit_limits,
 )
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.operator.reports import check_item
 from firmware_host.operator.status_client import (
     CallRefusedError,

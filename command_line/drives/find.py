@@ -13,7 +13,7 @@ from drivers.drive import DriveParameters
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table
 from firmware_host.buses import BusError
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 
 HEAD = ("id", "type", "joint", "hardware", "firmware", "serial number")
 UNKNOWN = "-"

@@ -14,7 +14,7 @@ from drivers.bench.search import expectation_problems, id_problems, search
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 
 Show = Callable[[str, int, int], None]
 NUMBERS = "flat_endpoints*.json"  # next to the configuration

@@ -10,8 +10,8 @@ from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import CanPort
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import BusParameters, Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 
 FD_RATE_KBIT_S = 5000
 STOP_DAEMON = "If that is the daemon: 'systemctl stop mudskipper', with the robot disarmed."

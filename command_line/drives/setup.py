@@ -15,8 +15,8 @@ from drivers.bench.settings_change import Names, Outcome, change_settings
 from drivers.drive_types import DRIVE_BENCHES
 from firmware_host.buses import BusError
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 
 ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 Changes = Mapping[str, Mapping[str, float]]  # by joint and key

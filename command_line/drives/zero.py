@@ -21,8 +21,9 @@ from drivers.drives import Drives
 from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
 from firmware_host.buses import BusError
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError, read_text
+from firmware_host.configuration.toml_records import read_text
 
 HEARING_S, READING_S = 1.0, 1.0
 POLL_S = 0.005

@@ -9,7 +9,7 @@ from command_line.experiments.workers import workers_of
 from command_line.screen import complain
 from experiments.campaign.campaign import run_campaign
 from experiments.campaign.campaign_file import load_campaign
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 
 
 def campaign(options: argparse.Namespace) -> int:

@@ -23,8 +23,7 @@ from experiments.robot.prompt import AutomaticOperator
 from experiments.trials.notebook import Notebook, NotebookError, anything_measured
 from experiments.trials.parallel_trials import WorkersError
 from experiments.trials.session import Ending, Finding, Session, Show
-from firmware_host.configuration.file_problems import why_not
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.operator.status_client import CallRefusedError
 
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}

@@ -12,8 +12,8 @@ from drivers.bench.found_drive import FoundDrive
 from drivers.bench.search import id_problems, search
 from drivers.drive_types import DRIVE_BENCHES
 from firmware_host.configuration.configuration import BusParameters
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.new_file import NewRobot
-from firmware_host.configuration.toml_records import ConfigurationError
 
 Found = Mapping[str, Sequence[FoundDrive]]  # by channel
 

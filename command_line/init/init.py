@@ -14,11 +14,11 @@ from control.plate.outline import Corner
 from control.records import FLIPPERS, Rig
 from drivers.drive_types import DRIVE_TYPES
 from firmware_host.buses import BusError
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.key_reference import Key, configuration_keys
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.new_file import NewRobot, drive_keys, new_file
 from firmware_host.configuration.plate_file import read_corners
-from firmware_host.configuration.toml_records import ConfigurationError
 
 PRINTED = Path("-")
 RECTANGLE = "rectangle"

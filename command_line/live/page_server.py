@@ -20,8 +20,8 @@ from command_line.operation.confirmation import end_motion
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import TWO_FLIPPERS, Phase
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.rows import STRIDE, TICK
 from firmware_host.log_reading.live_rows import LiveRow, LiveRows
 from firmware_host.operator.reports import known

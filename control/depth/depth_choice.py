@@ -27,9 +27,10 @@ from control.bounds import Bounds, Meaning
 from control.computing.bounded_work import Work, batched
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of
-from control.gait.gait import GaitParameters, stride_duration_s
+from control.gait.gait import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.parameters.gait_parameters import GaitParameters
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 DEPTHS_PER_UNIT, STEPS_PER_UNIT, EXTRACTIONS_PER_UNIT = 3, 4, 4  # of bounded work: less than half a tick

@@ -20,9 +20,9 @@ there, or the mud changes.
 from collections.abc import Sequence
 from math import exp, fsum, inf, isfinite, log, radians
 
-from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
+from control.parameters.gait_parameters import GaitParameters
 from control.plate.integrals import stroke_moment_m4, submerged_plate
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 

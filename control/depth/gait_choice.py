@@ -30,9 +30,10 @@ from control.depth.depth_choice import (
     depth_grid,
     make_candidate,
 )
-from control.gait.gait import GaitParameters, swing_duration_s
+from control.gait.gait import swing_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.parameters.gait_parameters import GaitParameters
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 SWEEP_STEP_DEG = 5.0  # 8 mm of step

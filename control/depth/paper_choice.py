@@ -18,9 +18,9 @@ from math import inf
 from control.computing.bounded_work import Work, finished
 from control.depth.depth_choice import AdaptationParameters, DepthChoice, depth_grid
 from control.depth.forecast import GRID_M
-from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.parameters.gait_parameters import GaitParameters
 from control.plate.integrals import mean_width_m, moment_width_m
 from control.records import TWO_FLIPPERS, Estimate, Rig, StrideEstimate
 

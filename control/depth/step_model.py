@@ -19,7 +19,8 @@ from functools import lru_cache
 from math import log1p, radians, sin
 from typing import NamedTuple
 
-from control.gait.gait import GaitParameters, smooth_progress
+from control.gait.gait import smooth_progress
+from control.parameters.gait_parameters import GaitParameters
 
 LONGEST_S = 1.0  # of a stance or an extraction: in a slower one inertia is negligible
 STEP_S = 0.01  # 1 kg on 500 N/m swings in 0.28 s

@@ -11,7 +11,7 @@ from math import cos, fsum, pi, radians, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from control.parameters.gait_parameters import GaitParameters as GaitParameters  # for its users here
+from control.parameters.gait_parameters import GaitParameters
 from control.records import GaitTarget, Phase
 
 RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time, for each end of a phase

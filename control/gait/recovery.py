@@ -29,10 +29,11 @@ from math import copysign, cos, fsum, radians, sin
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
-from control.gait.gait import RAMP_S, GaitParameters, swing_duration_s
+from control.gait.gait import RAMP_S, swing_duration_s
 from control.gait.joint_path import still
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
+from control.parameters.gait_parameters import GaitParameters
 from control.records import (
     TWO_FLIPPERS,
     DriveStates,

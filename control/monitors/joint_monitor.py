@@ -8,12 +8,14 @@ from math import degrees, isfinite, radians
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
-from control.limits import JointLimits, JointRange
+from control.limits import JointRange
 from control.monitors.encoder_monitor import EncoderMonitor
 from control.monitors.motion_monitor import JointDynamics, MotionMonitor
 from control.monitors.stillness import Stillness
-from control.monitors.winding import Winding, WindingParameters
-from control.parameters.fault_bounds import FaultBounds as FaultBounds  # for its users here
+from control.monitors.winding import Winding
+from control.parameters.fault_bounds import FaultBounds
+from control.parameters.joint_limits import JointLimits
+from control.parameters.winding_parameters import WindingParameters
 from control.rate import PERIOD_S
 from control.records import NEVER_S, UNKNOWN, DriveState, JointTarget
 

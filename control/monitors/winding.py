@@ -12,7 +12,7 @@ the model would take hours to cool from one absurd reading.
 
 from math import isfinite
 
-from control.parameters.winding_parameters import WindingParameters as WindingParameters  # for its users here
+from control.parameters.winding_parameters import WindingParameters
 
 COPPER_PER_K = 0.0039
 REFERENCE_C = 25.0

@@ -18,9 +18,7 @@ from can.interfaces.socketcan import SocketcanBus
 from control.records import NEVER_S
 from drivers.can.can_fd import fd_options
 from drivers.can.frames import Frame, without_stamps
-from drivers.can.port_health import MOST_FRAMES_PER_READ as MOST_FRAMES_PER_READ
-from drivers.can.port_health import BusState as BusState  # re-exported for users of a port
-from drivers.can.port_health import PortHealth
+from drivers.can.port_health import MOST_FRAMES_PER_READ, BusState, PortHealth
 from drivers.can.slcan_serial import SlcanSerial
 from drivers.can.socketcan_port import SocketcanPort
 from drivers.can.stamp_clock import StampClock

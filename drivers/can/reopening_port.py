@@ -9,8 +9,9 @@ on it, because its controller may still be off the bus.
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 
-from drivers.can.can_port import PORT_ERRORS, BusState, CanPort
+from drivers.can.can_port import PORT_ERRORS, CanPort
 from drivers.can.frames import Frame
+from drivers.can.port_health import BusState
 
 RETRY_S = 1.0
 

@@ -15,11 +15,11 @@ from collections.abc import Callable, Mapping
 from math import isfinite, isnan, nan, pi
 from typing import ClassVar
 
-from drivers.can.frames import Frame
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import DriveHealth, Outlet
 from drivers.drive_signals import DriveSignals
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
+from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.drive_settings import DriveSettings
 from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
 from drivers.odrive.parameters import OdriveParameters

@@ -11,8 +11,7 @@ from enum import IntEnum
 from struct import Struct, error
 from typing import Any
 
-from drivers.can.frames import DATA_MAX_BYTES
-from drivers.can.frames import MalformedMessageError as MalformedMessageError  # re-exported for users of the codec
+from drivers.can.frames import DATA_MAX_BYTES, MalformedMessageError
 
 
 class Message:

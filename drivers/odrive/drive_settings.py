@@ -10,10 +10,10 @@ from math import isfinite, nan
 from typing import NamedTuple
 
 from control.records import NEVER_S, UNKNOWN
-from drivers.can.frames import Frame
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import WatchdogEndpoints
 from drivers.odrive import codec
-from drivers.odrive.codec import MalformedMessageError, arbitration_id
+from drivers.odrive.codec import arbitration_id
 
 SUPPORTED = (0, 6)  # major and minor version of the firmware whose messages the codec knows
 REPEAT_UNKNOWN_S = 0.5  # between two requests for a setting that is still unknown

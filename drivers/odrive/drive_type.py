@@ -9,12 +9,12 @@ from typing import ClassVar, cast
 
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
-from drivers.can.frames import Frame
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import DriveParameters, FrameContent, Outlet, WatchdogEndpoints
 from drivers.odrive import codec, codec05
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.axis05 import Odrive05Axis
-from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
+from drivers.odrive.codec import AxisState, arbitration_id
 from drivers.odrive.gate_tables import gate_table, gate_table_05
 from drivers.odrive.parameters import Odrive05Parameters, OdriveParameters
 from drivers.transmit_gate import FrameKind, GateTable

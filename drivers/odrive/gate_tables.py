@@ -8,9 +8,9 @@ are read: the ids by which 0.6 reads parameters and its serial number do nothing
 from collections.abc import Callable, Mapping
 from math import nan
 
-from drivers.can.frames import Frame
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.odrive import codec, codec05
-from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
+from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import GateTable
 

@@ -18,7 +18,8 @@ from experiments.actuator.mismatch import Mismatch, find_mismatch
 from experiments.actuator.plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmError
 from experiments.actuator.weight_handling import WeightHandler
-from experiments.robot.bench_robot import BenchError, BenchRobot, arm, ask_to_clear_faults, require_hold
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import BenchRobot, arm, ask_to_clear_faults, require_hold
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Show

@@ -15,9 +15,9 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
 
-from firmware_host.configuration.file_problems import why_not
+from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError, read_text
+from firmware_host.configuration.toml_records import read_text
 from firmware_host.log.whole_files import whole_file
 
 BACKUP = ".before"

@@ -19,7 +19,7 @@ from math import ceil, hypot, nan, sqrt
 from control.joint_pd import GRAVITY_M_S2
 from control.monitors.joint_monitor import SATURATED_FRACTION
 from control.monitors.winding import Winding
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
 
 PAPER_WEIGHTS_G = (10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 600.0, 800.0)

@@ -20,7 +20,8 @@ from math import ceil, degrees, radians, sqrt
 from statistics import fmean, pstdev
 from typing import Any, NamedTuple
 
-from experiments.robot.bench_robot import BenchError, BenchRobot, move, require_hold
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import BenchRobot, move, require_hold
 
 OFF_RAD = radians(1.0)  # to the side, before an approach
 STEP_RAD = radians(0.6)  # at most at once: a hanging weight must not swing

@@ -18,7 +18,7 @@ from math import nan
 from control.rate import PERIOD_S
 from control.records import DriveStates, Torques
 from experiments.bench.test_rig import TestRig, idle, torque_on
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 
 FIRST_NM, GROWTH = 0.02, 1.5
 SHAKES = {"sweep": 5, "adduction": 6}  # up to 0.10 N·m, many times the friction, and 0.15 N·m: a third for the weight

@@ -25,7 +25,7 @@ from drivers.can.mock_bus import MockBus
 from drivers.drive import DriveParameters
 from drivers.drive_types import collisions, make_drives, type_of
 from drivers.pose.pose_port import NoPose
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.computer.realtime import prepare_loop
 from firmware_host.configuration.configuration import BusParameters, Configuration

@@ -20,7 +20,7 @@ from control.records import FlipperJoints, JointAngles, Rig, same_for_each
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, TestRig
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.operator.fault_texts import fault_message
 
 Vector = NDArray[np.float64]

@@ -19,7 +19,7 @@ from drivers.can.frames import Frame
 from experiments.bench.lateness import Lateness
 from experiments.bench.operator import BenchOperator
 from experiments.bench.rig import Rig
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.operator.fault_texts import fault_advice
 from firmware_host.ticker import Tick
 

@@ -18,8 +18,9 @@ from drivers.drive_types import DEFAULT
 from experiments.campaign.points import Tables
 from experiments.robot.lockstep_robot import simulated_configuration
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import read_configuration
-from firmware_host.configuration.toml_records import ConfigurationError, RecordReader, parse_document, shown
+from firmware_host.configuration.toml_records import RecordReader, parse_document, shown
 from simulation.harness.drive_presets import DRIVES
 from simulation.harness.world import World, read_world
 

@@ -13,7 +13,8 @@ from math import exp, log
 from random import Random
 from typing import Any
 
-from firmware_host.configuration.toml_records import ConfigurationError, RecordReader, shown
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.toml_records import RecordReader, shown
 
 Tables = dict[str, Any]
 Values = dict[str, Any]  # by key

@@ -10,7 +10,7 @@ from random import Random
 from control.controller import WalkOrder
 from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
-from control.monitors.joint_monitor import FaultBounds
+from control.parameters.fault_bounds import FaultBounds
 from control.records import Phase
 from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT

@@ -32,7 +32,7 @@ from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has_stride
 from experiments.trackway.report import FIXED_DEPTHS_M, PAPER_TABLE, Speed
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Finding, Show, screen_finding
-from simulation.body.plant import PlantParameters
+from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
 

@@ -14,8 +14,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from experiments.reports.text_tables import Rows as Rows
-from experiments.reports.text_tables import TitledRows
+from experiments.reports.text_tables import Rows, TitledRows
 from firmware_host.log.whole_files import whole_file
 from firmware_host.software_version import software_version
 

@@ -9,8 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from experiments.robot.bench_errors import BenchError as BenchError  # for those who import this module
-from experiments.robot.bench_errors import DaemonLostError, EndedError, RobotInUseError
+from experiments.robot.bench_errors import BenchError, DaemonLostError, EndedError, RobotInUseError
 from experiments.robot.prompt import Operator
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log

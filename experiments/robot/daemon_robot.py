@@ -16,9 +16,8 @@ from experiments.robot.bench_errors import AccessDeniedError, BenchError, Daemon
 from experiments.robot.bench_robot import ENERGISED, UNDER_WAY
 from experiments.robot.log_copies import copy_since, cut_log
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.file_problems import why_not
+from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.log_folder import run_files
 from firmware_host.log_reading.log_error import LogError
 from firmware_host.log_reading.log_reader import Log, read_logs

@@ -14,8 +14,9 @@ from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log_reading.log_reader import Log, read_log
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rights import Peer
 from firmware_host.operator.rpc import RefusedError
+from firmware_host.operator.socket_methods import Level
 from firmware_host.operator.status_client import CallRefusedError
 from simulation.harness.drive_presets import with_drive_type
 from simulation.harness.local_setup import configuration_template

@@ -14,10 +14,10 @@ from itertools import accumulate
 from math import isfinite, radians, sin
 from typing import NamedTuple
 
+from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import (
     RAISING_S,
     UNDER_WAY,
-    BenchError,
     BenchRobot,
     Status,
     arm,

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from experiments.reports.mud_names import mud_text
-from experiments.robot.bench_robot import BenchError, BenchRobot, ask_to_clear_faults, disarm, leave, rest
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import BenchRobot, ask_to_clear_faults, disarm, leave, rest
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Entry, Notebook

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from control.controller import WalkOrder
-from control.gait.gait import SINGLE_FLIPPER, GaitParameters
+from control.gait.gait import SINGLE_FLIPPER
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import BodyPose, StrideEstimate
 from drivers.drive_types import DEFAULT

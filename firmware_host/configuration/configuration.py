@@ -9,17 +9,18 @@ from math import radians
 from typing import Annotated, Literal
 
 from control.bounds import Bounds, Meaning
-from control.controller import MotionParameters
 from control.depth.depth_choice import AdaptationParameters
-from control.gait.gait import GaitParameters
 from control.gait.recovery import RecoveryParameters
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
 from control.joint_pd import ArmMass, JointGains
-from control.limits import JointLimits, JointRange
-from control.monitors.joint_monitor import FaultBounds
+from control.limits import JointRange
 from control.monitors.motion_monitor import JointDynamics
-from control.monitors.winding import WindingParameters
+from control.parameters.fault_bounds import FaultBounds
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_limits import JointLimits
+from control.parameters.motion_parameters import MotionParameters
+from control.parameters.winding_parameters import WindingParameters
 from control.records import Joints, Rig, same_for_each
 from drivers.can.bus_load import BitRates
 from drivers.drive import DriveParameters, WatchdogEndpoints

@@ -13,8 +13,8 @@ from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.consistency import contradictions
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.toml_records import (
-    ConfigurationError,
     OneOf,
     RecordReader,
     parse_document,

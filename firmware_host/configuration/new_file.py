@@ -10,10 +10,10 @@ from math import floor
 from typing import Any, NamedTuple
 
 from control.depth.depth_choice import AdaptationParameters
-from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import GAINS_OF_ASKED_DRIVES
-from control.limits import JointLimits
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_limits import JointLimits
 from control.records import TWO_FLIPPERS, Rig
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.key_reference import Key, configuration_keys, toml_value

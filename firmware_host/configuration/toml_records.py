@@ -25,7 +25,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from control.bounds import Bounds
-from firmware_host.configuration.file_problems import ConfigurationError as ConfigurationError  # for its users here
+from firmware_host.configuration.file_problems import ConfigurationError
 
 LARGEST_FILE_BYTES = 1_000_000  # hundreds of times those of a robot or a world
 

@@ -21,8 +21,8 @@ from estimation.mud_map import MapRow
 from estimation.recorded_states import recorded_states
 from estimation.strokes.fit_samples import FitSamples, StrideFits
 from firmware_host.configuration.configuration import CaptureAxis, Configuration, PoseParameters
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
 from firmware_host.log_reading.lab.findings import Finding
 from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv

@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 import msgpack
 
-from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rights import Peer
 from firmware_host.operator.rpc import LONGEST_REQUEST, SHAPE, TOO_LONG, MalformedError, make_unpacker
+from firmware_host.operator.socket_methods import Level
 
 READ_BYTES = LONGEST_REQUEST
 WRITE_BYTES = 64 * 1024  # at once

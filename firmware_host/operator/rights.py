@@ -11,8 +11,7 @@ import struct
 from typing import NamedTuple
 
 from firmware_host.operator.rpc import FOR_MEMBERS, NOT_PERMITTED
-from firmware_host.operator.socket_methods import METHODS
-from firmware_host.operator.socket_methods import Level as Level  # the rights of a method
+from firmware_host.operator.socket_methods import METHODS, Level
 
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
 SO_PEERGROUPS = 59  # asm-generic/socket.h; Python has no name for it

@@ -18,7 +18,7 @@ from random import Random
 from control.records import JointAngles, Joints, Torques
 from simulation.body.bench_mount import BenchMount
 from simulation.body.free_body import FreeBody
-from simulation.body.plant_parameters import PlantParameters as PlantParameters  # for its users here
+from simulation.body.plant_parameters import PlantParameters
 from simulation.body.rail_body import Body, BodyMotion, DragPad, RailBody
 from simulation.mud.carriage import Carriage
 from simulation.mud.disturbances import NONE, StrokeHistory, clinging_torques_nm

@@ -22,7 +22,7 @@ from firmware_host.log.recorder import NullRecorder, Recording
 from firmware_host.loop import Loop
 from firmware_host.ticker import Tick
 from simulation.body.free_body import BodyShape
-from simulation.body.plant import PlantParameters
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters, SimulatedPose
 from simulation.harness.robot import SimulatedRobot

@@ -17,8 +17,8 @@ from pathlib import Path
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.ticker import Ticker
 from simulation.devices.pose_broadcast import PoseBroadcast
 from simulation.harness.blocks import on_blocks

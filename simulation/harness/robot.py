@@ -10,7 +10,8 @@ from random import Random
 from control.records import Joints, Torques
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
-from simulation.body.plant import STEP_S, Plant, PlantParameters
+from simulation.body.plant import STEP_S, Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive
 from simulation.devices.foreign_master import ForeignMaster

@@ -13,16 +13,16 @@ from typing import Annotated, Any
 
 from control.bounds import Bounds
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.toml_records import (
     ChangesOf,
-    ConfigurationError,
     RecordReader,
     parse_document,
     read_text,
     rename_former_keys,
     shown,
 )
-from simulation.body.plant import PlantParameters
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.lockstep import drives_of, plant_of
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, Layer, clay_of_water

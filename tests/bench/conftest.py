@@ -17,10 +17,10 @@ import pytest
 from experiments.bench.operator import BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig, on_channels
 from experiments.bench.test_rig import TestRig
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness.blocks import resting_drop_m
 from tests.bench.staged_bench import (
     SKIPPED,

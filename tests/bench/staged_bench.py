@@ -14,8 +14,7 @@ from command_line.experiments.terminal_prompt import TerminalPrompt
 from experiments.bench.lateness import Lateness
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import TestRig
-from experiments.robot.bench_errors import EndedError
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError, EndedError
 from tests.bench.bench_table import table_lines
 
 STAGES = ("wiring", "signs", "zeros", "currents", "watchdogs", "strokes", "stops", "strides")

@@ -10,9 +10,9 @@ import numpy as np
 
 from control.computing.bounded_work import finish
 from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthChoice
-from control.gait.gait import GaitParameters
 from control.geometry import FlipperGeometry
 from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
+from control.parameters.gait_parameters import GaitParameters
 from control.records import FLIPPERS, Estimate, StrideEstimate
 
 GEOMETRY, GAIT, PARAMETERS = FlipperGeometry(), GaitParameters(), AdaptationParameters()

@@ -4,23 +4,15 @@ from math import nan, radians
 
 import pytest
 
-from control.controller import (
-    DAMPING_NM,
-    DAMPING_S,
-    RAISING_S,
-    RESTING,
-    SETTLED_S,
-    SOFT_STOP_S,
-    Controller,
-    MotionParameters,
-    WalkOrder,
-)
-from control.gait.gait import GaitParameters, stride_duration_s
+from control.controller import DAMPING_NM, DAMPING_S, RAISING_S, RESTING, SETTLED_S, SOFT_STOP_S, Controller, WalkOrder
+from control.gait.gait import stride_duration_s
 from control.gait.recovery import Recovery, RecoveryParameters
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import MOVING, Mode
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.motion_parameters import MotionParameters
 from control.rate import PERIOD_S
 from control.records import DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_each
 from tests.control.synthetic_states import NO_TORQUE, states_at

@@ -7,14 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.limits import (
-    VELOCITY_FADE,
-    JointLimits,
-    JointRange,
-    LimitedTorques,
-    apply_limits,
-    limited_torque_nm,
-)
+from control.limits import VELOCITY_FADE, JointRange, LimitedTorques, apply_limits, limited_torque_nm
+from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
 from control.records import DriveState, DriveStates, Joints, Torques, same_for_all
 from tests.control.synthetic_states import NO_TORQUE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from struct import pack, unpack
 
-from control.limits import JointLimits
+from control.parameters.joint_limits import JointLimits
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.transmit_gate import GateTable, TransmitGate

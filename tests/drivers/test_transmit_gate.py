@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.limits import JointLimits
+from control.parameters.joint_limits import JointLimits
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus

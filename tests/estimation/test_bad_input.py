@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.gait.gait import Gait, GaitParameters
+from control.gait.gait import Gait
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
+from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import BodyPose, Estimate, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive

@@ -12,10 +12,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 import pytest
 
-from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters, stride_duration_s
+from control.gait.gait import SINGLE_FLIPPER, Gait, stride_duration_s
 from control.gait.recovery import OUT_M, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
+from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import (
     NO_LOAD,

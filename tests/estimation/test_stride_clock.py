@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.gait.gait import SINGLE_FLIPPER, Gait, GaitParameters
+from control.gait.gait import SINGLE_FLIPPER, Gait
 from control.geometry import FlipperGeometry
+from control.parameters.gait_parameters import GaitParameters
 from control.records import Phase
 from estimation.stride_clock import BORDERS, STROKES, Change, StrideClock
 

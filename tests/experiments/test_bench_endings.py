@@ -12,10 +12,11 @@ import pytest
 
 from control.controller import UP_RAD
 from control.modes import ENERGISED, Mode
-from control.monitors.joint_monitor import FaultBounds
+from control.parameters.fault_bounds import FaultBounds
 from control.records import Phase
 from drivers.fault_injection.failures import Failures
-from experiments.robot.bench_robot import BenchError, arm, ask_to_clear_faults, leave, move, rest, walk
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import arm, ask_to_clear_faults, leave, move, rest, walk
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.robot.prompt import AutomaticOperator
 from firmware_host.log.file_recorder import FileRecorder

@@ -10,7 +10,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from control.records import JOINTS, NEVER_S, DriveState, DriveStates, Joints, Torques
-from drivers.can.can_port import BusState
+from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
 from drivers.drives import Drives
 

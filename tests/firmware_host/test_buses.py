@@ -16,9 +16,9 @@ import pytest
 
 from control.modes import Mode, Request
 from drivers.can.bus_lock import BusRole
-from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
+from drivers.can.port_health import BusState
 from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
 from drivers.drives import Drives
 from firmware_host import buses

@@ -13,8 +13,8 @@ from control.limits import LimitedTorques
 from control.modes import ENERGISED, Mode
 from control.rate import PERIOD_S
 from control.records import JOINTS, BodyPose, DriveState, DriveStates, Joints, same_for_all
-from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockBus, MockPort
+from drivers.can.port_health import BusState
 from drivers.drive import DriveHealth
 from drivers.drives import Drives
 from firmware_host.configuration.configuration import Configuration

@@ -12,8 +12,8 @@ from control.depth.depth_choice import AdaptationParameters, Method
 from control.geometry import FlipperGeometry
 from control.records import GaitTarget, Phase
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB

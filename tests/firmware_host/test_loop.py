@@ -20,7 +20,8 @@ from firmware_host.log.recorder import HEALTHY
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rights import Peer
+from firmware_host.operator.socket_methods import Level
 from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError, SimulatedDrive
 from simulation.harness.lockstep import Lockstep

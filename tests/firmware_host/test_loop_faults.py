@@ -15,8 +15,8 @@ from control.faults import FAULT_KINDS, Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode, Request
 from control.rate import PERIOD_S
 from control.records import JOINTS, Phase
-from drivers.can.can_port import BusState
 from drivers.can.mock_bus import MockPort
+from drivers.can.port_health import BusState
 from drivers.odrive import codec
 from drivers.odrive.codec import Message
 from firmware_host.configuration.configuration import Configuration

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.faults import Blocks, Fault, FaultKind, Reaction
-from control.monitors.joint_monitor import FaultBounds
+from control.parameters.fault_bounds import FaultBounds
 from control.rate import PERIOD_S
 from firmware_host.log.recorder import HEALTHY, LogReport
 from firmware_host.loop_monitor import CRAWL_TICKS, MEAN_TICKS, LogMonitor, LoopMonitor

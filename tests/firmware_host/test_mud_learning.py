@@ -11,7 +11,7 @@ import pytest
 from control.computing.bounded_work import finished
 from control.controller import WalkOrder
 from control.faults import Fault, FaultKind
-from control.gait.gait import GaitParameters
+from control.parameters.gait_parameters import GaitParameters
 from control.records import NO_LOAD, Estimate, FlipperLoad, GaitTarget, Phase, StrideEstimate
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.mud_learning import FIRM_TICKS, LARGEST_N_M3, STORED_STRIDES, MudLearning

@@ -17,8 +17,8 @@ from drivers.pose.natnet_sockets import parse_axis
 from drivers.pose.pose_port import NoPose, PosePort, PoseReport, PoseSender, PoseSourceError
 from drivers.pose.rail_encoder import RailEncoder
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, PoseParameters
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.daemon import EXIT_FAILED, main, reopen_pose
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.pose_sources import open_pose

@@ -9,7 +9,8 @@ from control.controller import WalkOrder
 from control.geometry import FlipperGeometry
 from control.records import Joints
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
+from simulation.body.plant import STEP_S, Arm, Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay, Layer
 from simulation.mud.disturbances import Disturbances

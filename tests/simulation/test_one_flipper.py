@@ -19,9 +19,9 @@ from control.records import FLIPPERS, Phase, Rig, StrideEstimate
 from experiments.pictures.recorded_walk import numbered_walk
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.new_file import NewRobot, new_file
-from firmware_host.configuration.toml_records import ConfigurationError
 from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log.rows import TICK, rig_of, tick_kind
 from firmware_host.log_reading.lab.export import write_lab_csv

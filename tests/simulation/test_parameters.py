@@ -7,7 +7,7 @@ import pytest
 
 from control.bounds import Bounds
 from simulation.body.free_body import BodyShape
-from simulation.body.plant import PlantParameters
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture import MotionCaptureParameters
 from simulation.harness.world import SegmentText

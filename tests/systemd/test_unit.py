@@ -17,7 +17,7 @@ from drivers.can.mock_bus import MockBus
 from drivers.drive_types import make_drives
 from firmware_host import daemon
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, StatusParameters
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 

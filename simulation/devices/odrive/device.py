@@ -18,9 +18,9 @@ from random import Random
 from typing import Any, ClassVar
 
 from control.records import NEVER_S
-from drivers.can.frames import Frame
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, MalformedMessageError, Message, arbitration_id
+from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.setup import SAVE
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.late_messages import LateMessages

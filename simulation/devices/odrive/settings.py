@@ -8,6 +8,7 @@ was written by the message that also answers a question.
 from dataclasses import replace
 from struct import error
 
+from drivers.can.frames import MalformedMessageError
 from drivers.odrive import codec
 from drivers.odrive.setup import CAN, CONTROLLER, ENABLE, LAYOUTS, MOTOR, SDO_WRITE, TIMEOUT
 from simulation.devices.drive import SimulatedDriveParameters
@@ -58,7 +59,7 @@ class OdriveSettings:
             if opcode == SDO_WRITE:
                 (value,) = layout.unpack_from(data, codec.SDO_HEAD_BYTES)
                 parameters = self._write(key, float(value), parameters)
-        except (codec.MalformedMessageError, KeyError, error):
+        except (MalformedMessageError, KeyError, error):
             return b"", parameters
         value = self._value(key, parameters)
         number = value if TYPES[key] == "float" else round(value)

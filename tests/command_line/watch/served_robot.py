@@ -15,7 +15,8 @@ from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration, StatusParameters
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rights import Peer
+from firmware_host.operator.socket_methods import Level
 from firmware_host.operator.status_socket import StatusSocket
 from firmware_host.user_groups import load_rights
 from simulation.harness.lockstep import Lockstep

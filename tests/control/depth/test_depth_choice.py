@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from control.depth.depth_choice import AdaptationParameters, DepthAdaptation, DepthChoice
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Traction, step_m
-from control.gait.gait import GaitParameters
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
+from control.parameters.gait_parameters import GaitParameters
 from control.records import StrideEstimate
 from tests.control.synthetic_muds import (
     GAIT,

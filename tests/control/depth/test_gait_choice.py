@@ -11,10 +11,11 @@ from control.depth.depth_choice import AdaptationParameters, DepthChoice, GaitAd
 from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
 from control.depth.step_model import Traction, step_m
-from control.gait.gait import Gait, GaitParameters, stride_duration_s
+from control.gait.gait import Gait, stride_duration_s
 from control.geometry import FlipperGeometry
-from control.limits import JointLimits
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_limits import JointLimits
 from control.plate.integrals import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from tests.control.synthetic_muds import both, choose_now

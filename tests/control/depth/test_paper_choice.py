@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from control.depth.depth_choice import AdaptationParameters, DepthChoice, PaperAdaptationParameters, depth_grid
 from control.depth.paper_choice import PaperAdaptation
-from control.gait.gait import GaitParameters
 from control.mud_estimate import NOTHING_KNOWN
+from control.parameters.gait_parameters import GaitParameters
 from control.records import Estimate, StrideEstimate
 from tests.control.synthetic_muds import (
     GAIT,

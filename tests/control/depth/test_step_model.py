@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from control.depth import step_model
 from control.depth.step_model import BodyDrag, Traction, coast_m, step_m
-from control.gait.gait import RAMP_S, GaitParameters
+from control.gait.gait import RAMP_S
+from control.parameters.gait_parameters import GaitParameters
 
 Array = NDArray[np.float64]
 

@@ -9,19 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.gait.gait import (
-    PROTOCOLS,
-    RAMP_S,
-    SINGLE_FLIPPER,
-    Gait,
-    GaitParameters,
-    smooth_progress,
-    stride_duration_s,
-    stride_table,
-)
+from control.gait.gait import PROTOCOLS, RAMP_S, SINGLE_FLIPPER, Gait, smooth_progress, stride_duration_s, stride_table
 from control.geometry import FlipperGeometry
 from control.joint_pd import ArmMass
-from control.limits import JointLimits
+from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
 from control.records import GaitTarget, Phase
 

@@ -6,9 +6,11 @@ from math import radians
 from typing import Any
 
 from control.faults import Fault
-from control.limits import JointLimits, JointRange
-from control.monitors.joint_monitor import FaultBounds, JointMonitor, TickFacts
-from control.monitors.winding import WindingParameters
+from control.limits import JointRange
+from control.monitors.joint_monitor import JointMonitor, TickFacts
+from control.parameters.fault_bounds import FaultBounds
+from control.parameters.joint_limits import JointLimits
+from control.parameters.winding_parameters import WindingParameters
 from control.rate import PERIOD_S
 from control.records import DriveState, JointTarget
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from control.limits import JointLimits
-from control.monitors.joint_monitor import FaultBounds, JointMonitor
+from control.monitors.joint_monitor import JointMonitor
+from control.parameters.fault_bounds import FaultBounds
+from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
 from control.records import NEVER_S, DriveState
 from tests.control.monitors.monitored_joint import (

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from control.limits import JointLimits
-from control.monitors.joint_monitor import ENERGISED_S, FaultBounds, JointMonitor, TickFacts
+from control.monitors.joint_monitor import ENERGISED_S, JointMonitor, TickFacts
+from control.parameters.fault_bounds import FaultBounds
+from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
 from tests.control.monitors.monitored_joint import BOUNDS, HEALTHY, LIMITS, NOW_S, SPAN, faults_of, make_monitor
 

@@ -16,9 +16,9 @@ from control.monitors.joint_monitor import (
     MISSING_S,
     SLOW_SILENCE_S,
     TWO_MESSAGES_S,
-    FaultBounds,
     JointMonitor,
 )
+from control.parameters.fault_bounds import FaultBounds
 from control.rate import PERIOD_S
 from control.records import NEVER_S, DriveState
 from firmware_host.operator.fault_texts import exact_message

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from control.limits import JointLimits
-from control.monitors.winding import HOTTEST_C, Winding, WindingParameters
+from control.monitors.winding import HOTTEST_C, Winding
+from control.parameters.joint_limits import JointLimits
+from control.parameters.winding_parameters import WindingParameters
 from control.rate import PERIOD_S
 
 PARAMETERS = WindingParameters()

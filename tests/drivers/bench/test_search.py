@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from control.limits import JointLimits
+from control.parameters.joint_limits import JointLimits
 from drivers.bench.search import expectation_problems, id_problems, search
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus

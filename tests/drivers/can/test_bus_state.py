@@ -17,9 +17,10 @@ from can.interfaces.socketcan import socketcan
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.can.can_port import BusState, CanPort, PythonCanPort, open_port
+from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.frames import Frame, encode_frame
 from drivers.can.mock_bus import MockBus
+from drivers.can.port_health import BusState
 
 ENCODER = Frame(0x009, bytes(8))
 WARNING = Frame(0x004, bytes.fromhex("00 08 00 00 00 00 00 00"), is_error=True)

@@ -9,8 +9,8 @@ from drivers.can.can_fd import CLASSIC_INTERFACES, FD_MTU, carries_fd, fd_option
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.frames import Frame
 from drivers.moteus import codec
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness.drive_presets import with_drive_type
 from tests.folders import ROOT
 

@@ -9,8 +9,9 @@ import can
 import pytest
 
 from control.records import NEVER_S
-from drivers.can.can_port import MOST_FAILURES_PER_READ, MOST_FRAMES_PER_READ, CanPort, PythonCanPort, open_port
+from drivers.can.can_port import MOST_FAILURES_PER_READ, CanPort, PythonCanPort, open_port
 from drivers.can.frames import Frame
+from drivers.can.port_health import MOST_FRAMES_PER_READ
 from drivers.can.stamp_clock import StampClock
 
 FRAMES = [

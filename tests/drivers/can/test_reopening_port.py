@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from drivers.can.can_port import BusState
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
+from drivers.can.port_health import BusState
 from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
 
 FRAME = Frame(0x009, bytes(8))

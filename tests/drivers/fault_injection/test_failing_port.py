@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import pytest
 
 from control.records import JOINTS
-from drivers.can.can_port import BusState
-from drivers.can.frames import Frame
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.can.mock_bus import MockBus, MockPort
+from drivers.can.port_health import BusState
 from drivers.fault_injection.failing_port import FailingPort, corrupted
 from drivers.fault_injection.failures import Failures
 from drivers.odrive import codec
-from drivers.odrive.codec import AxisState, MalformedMessageError, arbitration_id
+from drivers.odrive.codec import AxisState, arbitration_id
 from drivers.odrive.parameters import OdriveParameters as DriveParameters
 
 DRIVES = {joint: DriveParameters("left" if node < 2 else "right", node) for node, joint in enumerate(JOINTS)}

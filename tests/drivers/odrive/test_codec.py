@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.can.frames import MalformedMessageError
 from drivers.odrive import codec as odrive_codec
-from drivers.odrive.codec import ERROR_NAMES, AxisState, MalformedMessageError, Message, arbitration_id, error_text
+from drivers.odrive.codec import ERROR_NAMES, AxisState, Message, arbitration_id, error_text
 
 DBC: Any = cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / "odrive-cansimple-0.6.10.dbc")
 MESSAGES = {name: value for name, value in vars(odrive_codec).items() if isinstance(value, Message)}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.limits import JointLimits
+from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
 from control.records import JOINTS, NEVER_S, DriveStates, Joints
 from drivers.can.frames import Frame

@@ -13,7 +13,7 @@ from experiments.actuator.friction import Loop
 from experiments.actuator.plan import Plan, Step
 from experiments.actuator.reading import MovedError, Reading, Side
 from experiments.actuator.simulation import bench_configuration
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON
 from experiments.trials.notebook import Notebook
 from firmware_host.configuration.configuration import Configuration

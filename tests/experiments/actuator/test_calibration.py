@@ -12,8 +12,8 @@ from experiments.actuator.calibration import KEEP, OTHER
 from experiments.actuator.friction import Loop
 from experiments.actuator.plan import Step, steps_of
 from experiments.actuator.reading import MovedError
-from experiments.robot.bench_errors import EndedError
-from experiments.robot.bench_robot import LEAVE, BenchError
+from experiments.robot.bench_errors import BenchError, EndedError
+from experiments.robot.bench_robot import LEAVE
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from tests.experiments.actuator.scripted_calibration import LOOP, PLAN, Case, ScriptedJoint, say
 

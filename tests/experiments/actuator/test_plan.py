@@ -9,7 +9,7 @@ import pytest
 from control.records import Rig
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step, in_turn, require_possible, stays_cool, steps_of
 from experiments.actuator.simulation import bench_configuration
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import simulated_configuration
 from firmware_host.configuration.configuration import Configuration
 

@@ -19,7 +19,8 @@ from experiments.actuator.simulation import (
     bench_configuration,
     simulated_bench,
 )
-from experiments.robot.bench_robot import BenchError, arm
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import arm
 from experiments.robot.lockstep_robot import LockstepRobot
 
 

@@ -13,7 +13,7 @@ from experiments.bench.stop_check import check_damping
 from experiments.bench.test_rig import TestRig
 from experiments.bench.watchdog_check import check_watchdog_times, check_what_feeds_watchdogs
 from experiments.bench.wiring_check import check_firmware, check_watchdogs
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import simulated_configuration
 from simulation.harness.lockstep import drives_of
 

@@ -14,7 +14,7 @@ from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.sign_check import check_nudge
 from experiments.bench.test_rig import TestRig
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
 from simulation.harness.blocks import on_blocks

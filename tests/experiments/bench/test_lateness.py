@@ -17,7 +17,7 @@ from experiments.bench.rig import SimulatedRig
 from experiments.bench.stop_check import OFF_TICKS, QUIET_A, check_torque_off
 from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, check_stroke
 from experiments.bench.test_rig import TestRig
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.ticker import Tick
 from simulation.devices.odrive.device import SimulatedOdrive

@@ -19,10 +19,10 @@ from experiments.bench.rig import HardwareRig, SimulatedRig, on_channels, refuse
 from experiments.bench.sign_check import check_nudge
 from experiments.bench.test_rig import TestRig
 from experiments.bench.wiring_check import check_firmware, check_ids, check_unknown_ids, check_watchdogs
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import BusParameters, Configuration, StatusParameters
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness.local_setup import write_local_setup
 from tests.bench.staged_bench import reported_of_file
 from tests.folders import ROOT

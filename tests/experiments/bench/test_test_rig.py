@@ -18,7 +18,8 @@ from experiments.bench.rig import SimulatedRig
 from experiments.bench.sign_check import MOST_NM, check_nudge, check_shown_motion, hold_gently
 from experiments.bench.stroke_tracking import lag_ticks
 from experiments.bench.test_rig import TestRig, first_lasting
-from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import CLEAR, LEAVE
 from firmware_host.configuration.configuration import Configuration
 from simulation.devices.drive import DriveError
 from tests.bench.bench_table import HEADS, table_lines

@@ -22,7 +22,7 @@ from drivers.odrive.codec import arbitration_id
 from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.test_rig import TestRig
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.blocks import on_blocks

@@ -18,7 +18,7 @@ from experiments.campaign.walk_trial import run_walk
 from experiments.trials.notebook import NAME, Notebook
 from firmware_host.catalogue.catalogue import Catalogue, CatalogueError
 from firmware_host.catalogue.entry import COLUMNS, TRIALS
-from firmware_host.configuration.toml_records import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError
 from tests.firmware_host.open_data.test_parquet import files_of_at_most
 from tests.folders import ROOT
 

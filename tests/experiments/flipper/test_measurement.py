@@ -17,7 +17,8 @@ from experiments.flipper.measurement import Plan, require_fixed_base, require_mu
 from experiments.flipper.report import FlipperReport, report_of
 from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
 from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, tables_of
-from experiments.robot.bench_robot import BenchError, leave
+from experiments.robot.bench_errors import BenchError
+from experiments.robot.bench_robot import leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.trials.estimation_methods import DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial

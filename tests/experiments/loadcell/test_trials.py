@@ -17,7 +17,7 @@ from experiments.loadcell.preparation import CellSettings, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, correlation, load_counted
 from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
 from experiments.loadcell.trials import KEEP, list_problems, measure, record
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters

@@ -23,7 +23,7 @@ from experiments.mud_fit.mud_fit import (
 )
 from experiments.reports.report_page import to_json
 from experiments.trackway.report import PAPER_TABLE, Speed
-from simulation.body.plant import PlantParameters
+from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.clay import MUDS
 
 TRUTH = {"48.5": 2000.0, "53.1": 600.0, "45.3": 3500.0}

@@ -20,7 +20,7 @@ from experiments.reports.coefficient_table import (
     gather_coefficient,
     mud_rows,
 )
-from experiments.robot.bench_robot import BenchError
+from experiments.robot.bench_errors import BenchError
 from experiments.trials.truth_file import load_truth, missing_text, truth_in
 from tests.experiments.synthetic_strides import make_estimate, make_stride
 

@@ -14,8 +14,8 @@ import pytest
 from command_line import exit_codes
 from control.controller import UP_RAD
 from control.modes import Mode
-from experiments.robot.bench_errors import RobotInUseError
-from experiments.robot.bench_robot import BenchError, arm, disarm, move, walk
+from experiments.robot.bench_errors import BenchError, RobotInUseError
+from experiments.robot.bench_robot import arm, disarm, move, walk
 from experiments.robot.daemon_robot import DaemonRobot
 from firmware_host.log_reading.log_reader import read_log
 from firmware_host.operator.status_client import CallRefusedError

@@ -9,16 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from control.controller import MotionParameters
 from control.modes import Mode
-from control.monitors.joint_monitor import FaultBounds
+from control.parameters.fault_bounds import FaultBounds
+from control.parameters.motion_parameters import MotionParameters
 from control.records import JOINTS
 from drivers.fault_injection.failures import Failures
-from experiments.robot.bench_errors import EndedError
+from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import (
     CLEAR,
     LEAVE,
-    BenchError,
     arm,
     ask_to_clear_faults,
     disarm,

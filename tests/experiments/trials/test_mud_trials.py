@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from experiments.robot.bench_errors import EndedError
-from experiments.robot.bench_robot import CLEAR, LEAVE, BenchError, leave
+from experiments.robot.bench_errors import BenchError, EndedError
+from experiments.robot.bench_robot import CLEAR, LEAVE, leave
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from experiments.trials.mud_trials import (
     KEEP,

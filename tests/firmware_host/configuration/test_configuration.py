@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from control.gait.gait import SINGLE_FLIPPER
 from control.records import JOINTS
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration, parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from tests.waiting import LONGEST_S
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import FORMER_KEYS, parse_configuration
-from firmware_host.configuration.toml_records import ConfigurationError
 from simulation.harness.world import parse_world
 from tests.waiting import LONGEST_S
 

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import pytest
 
 from control.bounds import Bounds
+from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.toml_records import (
     LARGEST_FILE_BYTES,
     ChangesOf,
-    ConfigurationError,
     RecordReader,
     parse_document,
     read_text,

@@ -13,9 +13,9 @@ from control.rate import PERIOD_S
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Level, Peer
+from firmware_host.operator.rights import Peer
 from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_methods import METHODS
+from firmware_host.operator.socket_methods import METHODS, Level
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

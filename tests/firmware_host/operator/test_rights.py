@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.configuration.toml_records import ConfigurationError
-from firmware_host.operator.rights import Level, Peer, read_peer
+from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.operator.rights import Peer, read_peer
+from firmware_host.operator.socket_methods import Level
 from firmware_host.user_groups import load_rights
 
 ANY_GROUP = grp.getgrall()[-1]

@@ -8,7 +8,8 @@ import pytest
 
 from control.joint_pd import GRAVITY_M_S2, ArmMass
 from simulation.body.bench_mount import BenchMount
-from simulation.body.plant import Plant, PlantParameters
+from simulation.body.plant import Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.track import paper_track
 
 ARM = ArmMass()

@@ -24,7 +24,8 @@ from simulation.body.free_body import (
     load_at,
     load_of_flipper,
 )
-from simulation.body.plant import STEP_S, Plant, PlantParameters
+from simulation.body.plant import STEP_S, Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.body.rail_body import DragPad
 from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.carriage import LEAST_UPRIGHT, carried_attitude, carried_twist

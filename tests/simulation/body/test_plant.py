@@ -8,7 +8,8 @@ import pytest
 
 from control.joint_pd import ArmMass
 from control.records import Joints
-from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant, PlantParameters
+from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.body.rail_body import DRAG_STIFFNESS_N_M
 from simulation.mud.carriage import Carriage
 from simulation.mud.clay import MUDS, Clay, rate_factor

@@ -10,7 +10,8 @@ from control.gait.gait import SINGLE_FLIPPER
 from control.rate import PERIOD_S
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.plant import Plant, PlantParameters
+from simulation.body.plant import Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.body.reference_sensor import StrideTruth, StrokeReference, StrokeTruth
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay

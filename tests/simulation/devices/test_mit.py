@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from control.limits import JointLimits
+from control.parameters.joint_limits import JointLimits
 from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus

@@ -9,7 +9,8 @@ from control.controller import WalkOrder
 from control.rate import PERIOD_S
 from control.records import BodyPose
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.plant import Plant, PlantParameters
+from simulation.body.plant import Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.motion_capture import (
     AT_EVERY_TICK,
     OF_THE_PAPER,

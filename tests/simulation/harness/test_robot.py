@@ -4,7 +4,7 @@ from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus, MockPort
 from drivers.odrive.codec import ESTOP, GET_VERSION, arbitration_id
-from simulation.body.plant import PlantParameters
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.robot import SimulatedRobot
 from simulation.mud.clay import MUDS

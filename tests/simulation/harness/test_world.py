@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from control.controller import WalkOrder
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.toml_records import ConfigurationError
-from simulation.body.plant import PlantParameters
+from firmware_host.configuration.file_problems import ConfigurationError
+from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.blocks import on_blocks
 from simulation.harness.lockstep import Lockstep

@@ -15,11 +15,12 @@ from control.faults import FaultKind
 from control.gait.gait import SINGLE_FLIPPER
 from control.geometry import FlipperGeometry
 from control.modes import Mode
-from control.monitors.joint_monitor import FaultBounds
+from control.parameters.fault_bounds import FaultBounds
 from control.rate import PERIOD_S
 from control.records import Joints, Phase
 from firmware_host.configuration.configuration import Configuration
-from simulation.body.plant import STEP_S, Arm, Plant, PlantParameters
+from simulation.body.plant import STEP_S, Arm, Plant
+from simulation.body.plant_parameters import PlantParameters
 from simulation.body.reference_sensor import StrideTruth, StrokeReference, snapshot_of
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
