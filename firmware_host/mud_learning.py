@@ -25,12 +25,11 @@ from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
 from control.records import NO_LOAD, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
 from estimation.mud import MudEstimator
+from estimation.stride_clock import STROKES
 from firmware_host.configuration.configuration import Configuration
 
 FIRM_TICKS = 3  # with a high load until an insertion ends: one outlier does not end it
 UNITS_PER_TICK = 1  # of bounded work
-ALL_UNITS = 10_000
-STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION)
 STORED_STRIDES = 200  # for clients of the status socket
 LARGEST_N_M3 = 1e10  # 10 kN/cm³, a thousand times the stiffest mud
 
@@ -108,9 +107,12 @@ class MudLearning:
 
     def step(self, controller: Controller, within_s: float) -> LearningReport:
         """Run the units of this tick, or all if the next stride's depth must be set within this time."""
-        if not self.estimator.work.is_empty:
-            due = controller.gait.is_choice_due(within_s, self._may_turn)
-            self.estimator.work.run(ALL_UNITS if due else self.units_per_tick)
+        work = self.estimator.work
+        if not work.is_empty:
+            if controller.gait.is_choice_due(within_s, self._may_turn):
+                work.finish()
+            else:
+                work.run(self.units_per_tick)
         return self._pop_report()
 
     def finish(self) -> LearningReport:

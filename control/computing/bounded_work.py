@@ -59,6 +59,7 @@ class WorkQueue:
                 self._waiting.popleft()
 
     def finish(self) -> None:
+        """Run all units that are left."""
         while self._waiting:
             finish(self._waiting.popleft())
 

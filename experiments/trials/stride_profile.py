@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from control.modes import Mode
 from control.records import Phase, Rig
+from estimation.stride_clock import STROKES
 from firmware_host.log_reading.log_reader import Log
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
-STROKES = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION)
 STROKE_PERIOD, REST_PERIOD, WALK_PERIOD = 2, 20, 5  # rows per row that stays
 DIGITS = 6  # after the point: a microsecond, a micrometre, a micronewton
 
