@@ -40,7 +40,7 @@ class MitAxis(DriveSignals):
         self.parameters = parameters
         self._ranges = parameters.ranges
         self._zero_rad = TURN_RAD * parameters.zero_turn
-        self._amperes_per_nm = parameters.sign / parameters.reported_constant_nm_a
+        self._amperes_per_nm = self._sign / parameters.reported_constant_nm_a
         self.settings = MitSettings(parameters)
         self._answers = AnswerCounter()
         self.reset()
@@ -91,9 +91,8 @@ class MitAxis(DriveSignals):
         asked_s = self._read_before_s  # every tick asks after it has read
         stamp_s = asked_s if NEVER_S < asked_s < now_s else now_s
         self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = stamp_s
-        sign = self.parameters.sign
-        self._angle_rad = sign * (answer.position_rad - self._zero_rad)
-        self._velocity_rad_s = sign * answer.velocity_rad_s
+        self._angle_rad = self._sign * (answer.position_rad - self._zero_rad)
+        self._velocity_rad_s = self._sign * answer.velocity_rad_s
         self._current_a = self._amperes_per_nm * answer.torque_nm
         has_registers = self._ranges.has_registers
         temperature_c = float(answer.last) if has_registers else answer.temperature_c
@@ -163,7 +162,7 @@ class MitAxis(DriveSignals):
 
     def send_torque(self, torque_nm: float) -> None:
         """Commands torque; to a drive that is to be idle zero torque is no command, but the one to leave the mode."""
-        motor_nm = self.parameters.sign * torque_nm
+        motor_nm = self._sign * torque_nm
         self.setpoints.on_command(motor_nm)
         if self._following or torque_nm != 0.0:
             self._transmit(codec.encode_torque(motor_nm, self._ranges.torque_nm))

@@ -41,7 +41,7 @@ class MoteusAxis(DriveSignals):
         super().__init__(joint, parameters.sign, outlet, SetpointMonitor(parameters.command_delay_s))
         self.parameters = parameters
         self._id = codec.command_id(parameters.node_id)
-        self._rad_per_turn = parameters.sign * TURN_RAD
+        self._rad_per_turn = self._sign * TURN_RAD
         self.settings = MoteusSettings(parameters)
         self._answers = AnswerCounter()
         self.reset()
@@ -79,7 +79,7 @@ class MoteusAxis(DriveSignals):
             self._velocity_rad_s = turns_s * self._rad_per_turn
             self._angle_stamp_s = self._measured_s(now_s)
         if current_a - current_a == 0.0:
-            self._current_a = self.parameters.sign * current_a
+            self._current_a = self._sign * current_a
             self._current_stamp_s = min(now_s, self._asked_s)
         if temperature_c != 0.0 and temperature_c == temperature_c:  # zero where no thermistor is configured
             self._temperature_c, self._temperature_stamp_s = temperature_c, now_s
@@ -88,7 +88,7 @@ class MoteusAxis(DriveSignals):
         if mode != codec.ABSENT:
             self._receive_mode(mode, fault, now_s)
         if self.closed_loop and control_nm == control_nm:
-            self.setpoints.on_report(control_nm, self.parameters.sign * self._velocity_rad_s)
+            self.setpoints.on_report(control_nm, self._sign * self._velocity_rad_s)
 
     @property
     def _asked_s(self) -> float:
@@ -173,7 +173,7 @@ class MoteusAxis(DriveSignals):
         """Commands torque; to a drive that is to be idle zero torque is no command, but a question, or a stop."""
         if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
             torque_nm = nan
-        motor_nm = self.parameters.sign * torque_nm
+        motor_nm = self._sign * torque_nm
         self.setpoints.on_command(motor_nm)
         if self._following or motor_nm != 0.0:
             self._transmit(codec.encode_torque(motor_nm))

@@ -45,8 +45,8 @@ class CanSimpleAxis(DriveSignals):
         super().__init__(joint, parameters.sign, outlet, setpoints)
         self.parameters = parameters
         self.settings = settings
-        self._rad_per_turn = parameters.sign * TURN_RAD
-        self._current_sign = parameters.sign * parameters.current_sign
+        self._rad_per_turn = self._sign * TURN_RAD
+        self._current_sign = self._sign * parameters.current_sign
         self._setpoint_nm_a = parameters.current_sign * parameters.torque_constant_nm_a
         self._torque_id = arbitration_id(parameters.node_id, codec.SET_INPUT_TORQUE)
         self._duplicates = DuplicateNodeMonitor(parameters.heartbeat_period_s)
@@ -98,7 +98,7 @@ class CanSimpleAxis(DriveSignals):
         self._current_a = self._current_sign * measured_a
         self._current_stamp_s = now_s
         if self.closed_loop:
-            self.setpoints.on_report(setpoint_a * self._setpoint_nm_a, self.parameters.sign * self._velocity_rad_s)
+            self.setpoints.on_report(setpoint_a * self._setpoint_nm_a, self._sign * self._velocity_rad_s)
 
     def _idle_current_a(self, data: bytes, measured_a: float) -> float:
         """Returns the current of an idle drive, which reports that it measures none."""
@@ -155,7 +155,7 @@ class CanSimpleAxis(DriveSignals):
     def send_torque(self, torque_nm: float) -> None:
         if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
             torque_nm = nan
-        motor_nm = self.parameters.sign * torque_nm
+        motor_nm = self._sign * torque_nm
         self.setpoints.on_command(motor_nm)
         self._outlet.send(Frame(self._torque_id, codec.SET_INPUT_TORQUE.encode(motor_nm)))
 
