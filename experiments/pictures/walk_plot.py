@@ -196,8 +196,8 @@ def _plot_coefficient(panel: Axes, walk: RecordedWalk, name: str) -> None:
         look: dict[str, Any] = {
             "color": colour,
             "markerfacecolor": colour if valid else "white",
-            "zorder": 2.1,
-        }  # above the lines
+            "zorder": 2.1,  # above the lines
+        }
         panel.plot(stamps_s, values / 1e6, "^" if at_least else "o", markersize=5, **look)
     largest = max((stride[name] / 1e6 for stride in walk.strides if np.isfinite(stride[name])), default=0.0)
     panel.set_ylim(0.0, HEADROOM * largest if largest > 0.0 else 1.0)
