@@ -15,7 +15,6 @@ matplotlib.
 
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -25,13 +24,11 @@ from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.speed.tick_pictures import plot_ticks, require_matplotlib
 from benchmarks.walks.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
 from benchmarks.walks.walk_ticks import BeforeTick, WalkTick, least_work, walk_ticks
-from benchmarks.walks.wired_walk import wire
-from benchmarks.walks.wirings import make_wiring
+from benchmarks.walks.wired_walk import open_wiring, wire
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.rate import PERIOD_S
 from firmware_host.computer.realtime import freeze_garbage
-from firmware_host.log.recorder import Recorder
 from simulation.mud.track import paper_track
 
 OTHER_FACTOR = 2.5  # with the one that is asked for, the range of a Raspberry Pi and a Jetson
@@ -43,12 +40,7 @@ def walk_once(
     """Returns the walk at its end, and its ticks."""
     folder.mkdir(parents=True)
     configuration = load_example()
-    with ExitStack() as stack:
-        wiring = make_wiring("socketcan", configuration.bus, folder)
-        for port in (*wiring.robot.values(), *wiring.loop.values()):
-            stack.callback(port.close)
-        recorder = Recorder(folder / "walk.mcap", configuration.text, {}, rig=configuration.rig)
-        stack.callback(recorder.close, timeout_s=10.0)
+    with open_wiring("socketcan", configuration, folder) as (wiring, recorder):
         walk = ScaledWalk(configuration, paper_track(), clock)
         wire(walk, configuration, wiring, recorder)
         walk.arm()

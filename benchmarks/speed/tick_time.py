@@ -33,10 +33,10 @@ from benchmarks.speed.served_walk import ServedWalk
 from benchmarks.speed.serving_time import fullest_methods
 from benchmarks.speed.tick_pictures import plot_parts, require_matplotlib
 from benchmarks.speed.timed_walk import TimedWalk
-from benchmarks.walks.wirings import VARIANTS, make_wiring
+from benchmarks.walks.wired_walk import open_wiring
+from benchmarks.walks.wirings import VARIANTS
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.recorder import Recorder
 from firmware_host.operator.status_socket import Methods
 
 BAR_US = 200.0
@@ -82,11 +82,7 @@ def _medians_us(report: dict[str, Any]) -> dict[str, float]:
 
 def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: Path) -> TimedWalk:
     folder.mkdir()
-    wiring = make_wiring(variant, configuration.bus, folder)
-    for port in (*wiring.robot.values(), *wiring.loop.values()):
-        stack.callback(port.close)
-    recorder = Recorder(folder / "walk.mcap", configuration.text, {}, rig=configuration.rig)
-    stack.callback(recorder.close, timeout_s=10.0)
+    wiring, recorder = stack.enter_context(open_wiring(variant, configuration, folder))
     walk = TimedWalk(configuration, wiring, recorder)
     walk.warm_up()
     return walk

@@ -1,9 +1,13 @@
 """Puts a lockstep of robot and loop on given wiring, with a log."""
 
-from benchmarks.walks.wirings import Wiring
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from benchmarks.walks.wirings import Wiring, make_wiring
 from drivers.drive_types import make_drives
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.recorder import Recording
+from firmware_host.log.recorder import Recorder, Recording
 from firmware_host.loop import Loop
 from simulation.devices.motion_capture import AT_EVERY_TICK, SimulatedPose
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
@@ -11,6 +15,18 @@ from simulation.harness.robot import SimulatedRobot
 from simulation.mud.track import paper_track
 
 POSE_SEED = 2
+
+
+@contextmanager
+def open_wiring(variant: str, configuration: Configuration, folder: Path) -> Iterator[tuple[Wiring, Recorder]]:
+    """Opens wiring, and a recorder whose log is in the folder; closes both at the end."""
+    with ExitStack() as stack:
+        wiring = make_wiring(variant, configuration.bus, folder)
+        for port in (*wiring.robot.values(), *wiring.loop.values()):
+            stack.callback(port.close)
+        recorder = Recorder(folder / "walk.mcap", configuration.text, {}, rig=configuration.rig)
+        stack.callback(recorder.close, timeout_s=10.0)
+        yield wiring, recorder
 
 
 def wire(walk: Lockstep, configuration: Configuration, wiring: Wiring, recorder: Recording) -> None:
