@@ -40,7 +40,7 @@ class DuplicateNodeMonitor:
         earliest_s.append(read_before_s)
         if read_s - self._contradicted_s > FORGET_S:
             self._contradictions = 0
-        self.found = self._frequent or self._contradictions >= CONTRADICTIONS
+        self._update_found()
 
     def on_reading(self, turns: float, read_s: float) -> None:
         """Counts a reading that is far from the previous one and equals the one before that."""
@@ -49,6 +49,9 @@ class DuplicateNodeMonitor:
             returned = abs(turns - self._turns_before) < SAME_TURNS
             self._contradictions = self._contradictions + 1 if returned else 0
             self._contradicted_s = read_s
-            self.found = self._frequent or self._contradictions >= CONTRADICTIONS
+            self._update_found()
         self._turns_before = self._turns
         self._turns = turns
+
+    def _update_found(self) -> None:
+        self.found = self._frequent or self._contradictions >= CONTRADICTIONS
