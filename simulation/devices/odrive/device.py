@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from math import exp, isfinite, pi
 from random import Random
-from typing import Any, ClassVar
+from typing import NamedTuple
 
 from control.records import NEVER_S
 from drivers.can.frames import Frame, MalformedMessageError
@@ -32,9 +32,28 @@ TURN_RAD = 2.0 * pi
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
 TORQUE_MODES = (codec.TORQUE_CONTROL, codec.PASSTHROUGH)
-ERROR_FLAGS = {DriveError.OVERCURRENT: 0x400, DriveError.WATCHDOG: codec.ERROR_WATCHDOG, DriveError.OVERSPEED: 0x8000}
-SLOW_MESSAGES = (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)
 BOOT_S = 1.0  # silence of a drive that restarts
+
+
+class Firmware(NamedTuple):
+    """The codes and messages that differ between firmwares."""
+
+    error_flags: Mapping[DriveError, int]
+    estop_flag: int
+    heartbeat: Message
+    slow_messages: tuple[Message, ...]
+
+
+FIRMWARE_06 = Firmware(
+    error_flags={
+        DriveError.OVERCURRENT: 0x400,
+        DriveError.WATCHDOG: codec.ERROR_WATCHDOG,
+        DriveError.OVERSPEED: 0x8000,
+    },
+    estop_flag=codec.ERROR_ESTOP,
+    heartbeat=codec.HEARTBEAT,
+    slow_messages=(codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT),
+)
 
 
 def finite(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -47,17 +66,14 @@ def finite(values: tuple[float, ...]) -> tuple[float, ...]:
 class SimulatedOdrive:
     """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
 
-    ERROR_FLAGS: ClassVar[Mapping[DriveError, int]] = ERROR_FLAGS
-    ESTOP_FLAG: ClassVar[int] = codec.ERROR_ESTOP
-    HEARTBEAT: ClassVar[Message] = codec.HEARTBEAT
-    SLOW_MESSAGES: ClassVar[tuple[Message, ...]] = SLOW_MESSAGES
-
-    def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
+    def __init__(self, parameters: SimulatedDriveParameters, random: Random, firmware: Firmware = FIRMWARE_06) -> None:
         self.parameters = parameters
+        self._firmware = firmware
         self._random = random
         self._late = LateMessages(random)
         self._settings = OdriveSettings()
-        self._ids = {message: arbitration_id(parameters.node_id, message) for message in self._PAYLOADS}
+        self._payloads = self._payload_functions()
+        self._ids = {message: arbitration_id(parameters.node_id, message) for message in self._payloads}
         self.reset(0.0)
 
     def reset(self, now_s: float) -> None:
@@ -79,8 +95,8 @@ class SimulatedOdrive:
         self._schedule: list[tuple[float, tuple[Message, ...]]] = [
             (periods.encoder_period_s, (codec.GET_ENCODER_ESTIMATES,)),
             (periods.current_period_s, (codec.GET_IQ,)),
-            (periods.heartbeat_period_s, (self.HEARTBEAT,)),
-            (periods.slow_period_s, self.SLOW_MESSAGES),
+            (periods.heartbeat_period_s, (self._firmware.heartbeat,)),
+            (periods.slow_period_s, self._firmware.slow_messages),
         ]
         # Boards are switched on at different times, so their messages do not all come in the same tick.
         self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
@@ -104,7 +120,7 @@ class SimulatedOdrive:
         if self.parameters.any_frame_feeds:
             self._fed_s = now_s
         if frame.is_remote:
-            return [self._frame(message) for message in self._PAYLOADS if message.command == command]
+            return [self._frame(message) for message in self._payloads if message.command == command]
         if command == codec.RX_SDO.command:
             return self._read_parameter(frame.data)
         with suppress(MalformedMessageError):  # a drive ignores malformed messages
@@ -126,7 +142,7 @@ class SimulatedOdrive:
         elif command == codec.CLEAR_ERRORS.command:
             self.errors = 0
         elif command == codec.ESTOP.command:
-            self._disarm(self.ESTOP_FLAG)
+            self._disarm(self._firmware.estop_flag)
         elif command == codec.REBOOT.command:
             if codec.REBOOT.decode(data)[0] == SAVE:
                 self._settings.save()
@@ -168,7 +184,7 @@ class SimulatedOdrive:
         return self.errors != 0
 
     def trip(self, error: DriveError) -> None:
-        self._disarm(self.ERROR_FLAGS[error])
+        self._disarm(self._firmware.error_flags[error])
 
     def forge(self, forgery: Forgery) -> Frame:
         return forgeries.forged_frame(self.parameters.node_id, forgery)
@@ -246,7 +262,7 @@ class SimulatedOdrive:
         return frame
 
     def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
-        return Frame(self._ids[message], self._PAYLOADS[message](self), stamp_s=stamp_s)
+        return Frame(self._ids[message], self._payloads[message](), stamp_s=stamp_s)
 
     def _encoder(self) -> bytes:
         parameters = self.parameters
@@ -283,13 +299,15 @@ class SimulatedOdrive:
     def _address(self) -> bytes:
         return codec.encode_address(self.parameters.node_id, int(self.parameters.serial_number or "0", 16))
 
-    _PAYLOADS: ClassVar[Mapping[Message, Callable[[Any], bytes]]] = {
-        codec.GET_ENCODER_ESTIMATES: _encoder,
-        codec.GET_IQ: _iq,
-        codec.HEARTBEAT: _heartbeat,
-        codec.GET_ERROR: _error,
-        codec.GET_TEMPERATURE: _temperature,
-        codec.GET_BUS_VOLTAGE_CURRENT: _bus_voltage,
-        codec.GET_VERSION: _version,
-        codec.ADDRESS: _address,
-    }
+    def _payload_functions(self) -> dict[Message, Callable[[], bytes]]:
+        """Returns what encodes each message that this firmware sends."""
+        return {
+            codec.GET_ENCODER_ESTIMATES: self._encoder,
+            codec.GET_IQ: self._iq,
+            codec.HEARTBEAT: self._heartbeat,
+            codec.GET_ERROR: self._error,
+            codec.GET_TEMPERATURE: self._temperature,
+            codec.GET_BUS_VOLTAGE_CURRENT: self._bus_voltage,
+            codec.GET_VERSION: self._version,
+            codec.ADDRESS: self._address,
+        }

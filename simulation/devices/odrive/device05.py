@@ -7,40 +7,42 @@ request for its version nor one for a parameter. A request may also be an empty 
 axis.cpp, controller.cpp, motor.cpp and foc.cpp of odriverobotics/ODrive, tag fw-v0.5.6.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from random import Random
-from typing import Any, ClassVar
 
 from drivers.can.frames import Frame
 from drivers.odrive import codec, codec05
 from drivers.odrive.codec import Message
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.motor import encoder_turns
-from simulation.devices.odrive.device import SimulatedOdrive
+from simulation.devices.odrive.device import Firmware, SimulatedOdrive
 from simulation.devices.odrive.forgeries import FORGERIES_05, forged_current, forged_frame
 
 BUS_CURRENT_OUT_OF_RANGE = 0x400000  # of the motor
 OVERSPEED = 0x1  # of the controller
 
 
-class SimulatedOdrive05(SimulatedOdrive):
-    ERROR_FLAGS: ClassVar[Mapping[DriveError, int]] = {
+FIRMWARE_05 = Firmware(
+    error_flags={
         DriveError.OVERCURRENT: codec05.ERROR_MOTOR,
         DriveError.WATCHDOG: codec05.ERROR_WATCHDOG,
         DriveError.OVERSPEED: codec05.ERROR_CONTROLLER,
-    }
-    ESTOP_FLAG = codec05.ERROR_ESTOP
-    HEARTBEAT = codec05.HEARTBEAT
-    SLOW_MESSAGES = (
+    },
+    estop_flag=codec05.ERROR_ESTOP,
+    heartbeat=codec05.HEARTBEAT,
+    slow_messages=(
         codec05.GET_MOTOR_ERROR,
         codec05.GET_ENCODER_ERROR,
         codec05.GET_CONTROLLER_ERROR,
         codec.GET_BUS_VOLTAGE_CURRENT,
-    )
+    ),
+)
 
+
+class SimulatedOdrive05(SimulatedOdrive):
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
-        self._requests = frozenset(message.command for message in self._PAYLOADS)
-        super().__init__(parameters, random)
+        super().__init__(parameters, random, FIRMWARE_05)
+        self._requests = frozenset(message.command for message in self._payloads)
 
     def reset(self, now_s: float) -> None:
         super().reset(now_s)
@@ -113,13 +115,14 @@ class SimulatedOdrive05(SimulatedOdrive):
     def _controller_error(self) -> bytes:
         return codec05.GET_CONTROLLER_ERROR.encode(OVERSPEED if self.errors & codec05.ERROR_CONTROLLER else 0)
 
-    _PAYLOADS: ClassVar[Mapping[Message, Callable[[Any], bytes]]] = {
-        codec.GET_ENCODER_ESTIMATES: _encoder,
-        codec.GET_IQ: _iq,
-        codec.GET_BUS_VOLTAGE_CURRENT: SimulatedOdrive._bus_voltage,
-        codec05.HEARTBEAT: _heartbeat,
-        codec05.GET_ENCODER_COUNT: _counts,
-        codec05.GET_MOTOR_ERROR: _motor_error,
-        codec05.GET_ENCODER_ERROR: _encoder_error,
-        codec05.GET_CONTROLLER_ERROR: _controller_error,
-    }
+    def _payload_functions(self) -> dict[Message, Callable[[], bytes]]:
+        return {
+            codec.GET_ENCODER_ESTIMATES: self._encoder,
+            codec.GET_IQ: self._iq,
+            codec.GET_BUS_VOLTAGE_CURRENT: self._bus_voltage,
+            codec05.HEARTBEAT: self._heartbeat,
+            codec05.GET_ENCODER_COUNT: self._counts,
+            codec05.GET_MOTOR_ERROR: self._motor_error,
+            codec05.GET_ENCODER_ERROR: self._encoder_error,
+            codec05.GET_CONTROLLER_ERROR: self._controller_error,
+        }
