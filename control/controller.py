@@ -13,10 +13,12 @@ from control.gait.gait import Gait
 from control.gait.joint_path import JointPath, still
 from control.gait.recovery import Recovery
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass, JointGains, VelocityPrediction, damping_torques_nm, joint_torques_nm
+from control.joint_pd import VelocityPrediction, damping_torques_nm, joint_torques_nm
 from control.modes import HELD, MOVING, Mode
 from control.monitors.stillness import Stillness
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_gains import JointGains
 from control.parameters.motion_parameters import MotionParameters
 from control.records import (
     TWO_FLIPPERS,

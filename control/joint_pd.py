@@ -4,12 +4,11 @@ The drives run in torque mode, so only this law and its limits move the robot.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import cycle
-from math import atan2, cos, inf, pi, radians, sin, sqrt
-from typing import Annotated
+from math import atan2, inf, pi, radians, sqrt
 
-from control.bounds import Bounds, Meaning
+from control.parameters.arm_mass import ArmMass
+from control.parameters.joint_gains import JointGains
 from control.rate import PERIOD_S
 from control.records import (
     DriveState,
@@ -20,52 +19,8 @@ from control.records import (
     Torques,
 )
 
-GRAVITY_M_S2 = 9.81
 LOOP_DELAY_S = 0.002 + PERIOD_S / 2.0  # the age of a position, and half of the tick for which a torque is held
 LEAST_MARGIN_RAD = radians(5.0)  # with that delay; the defaults have 19 and 22 degrees
-
-
-@dataclass(frozen=True)
-class JointGains:
-    """The configuration refuses gains that leave less than LEAST_MARGIN_RAD of phase margin."""
-
-    sweep_stiffness_nm_rad: Annotated[float, Bounds(0.0, 200.0), Meaning("PD stiffness of the sweep joints")] = 8.0
-    sweep_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0), Meaning("PD damping of the sweep joints")] = 0.06
-    adduction_stiffness_nm_rad: Annotated[
-        float, Bounds(0.0, 200.0), Meaning("PD stiffness of the adduction joints")
-    ] = 10.0
-    adduction_damping_nm_s_rad: Annotated[float, Bounds(0.0, 5.0), Meaning("PD damping of the adduction joints")] = 0.08
-
-
-# Answers to questions are a whole tick old, so the loop's delay is 1.5 ticks, 3.9 ms. The gains above then have phase
-# margins of 12 and 15 degrees before the velocity is predicted, and joints held in clay of 9 kPa oscillate; these have
-# 17 and 20, nearly those of drives that report by themselves.
-GAINS_OF_ASKED_DRIVES = JointGains(
-    sweep_stiffness_nm_rad=6.4,
-    sweep_damping_nm_s_rad=0.054,
-    adduction_stiffness_nm_rad=8.0,
-    adduction_damping_nm_s_rad=0.072,
-)
-
-
-@dataclass(frozen=True)
-class ArmMass:
-    """Mass and inertia of one flipper arm with all parts that its adduction joint lifts: a point mass on the arm."""
-
-    arm_mass_kg: Annotated[float, Bounds(0.0, 20.0), Meaning("everything that one adduction joint lifts")] = 0.08
-    center_of_mass_m: Annotated[float, Bounds(0.0, 1.0), Meaning("from the axes, along the arm")] = 0.06
-    sweep_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0), Meaning("about the sweep axis")] = (
-        0.0004  # arm and plate of PLA, rotor of a 60 mm motor
-    )
-    adduction_inertia_kg_m2: Annotated[float, Bounds(1e-5, 1.0), Meaning("about the adduction axis")] = (
-        0.0006  # the same, and the sweep motor at the axis
-    )
-
-    def gravity_torques_nm(self, sweep_rad: float, adduction_rad: float) -> tuple[float, float]:
-        """Return gravity's torques on (sweep, adduction): -∂/∂q of m g r cos α sin β."""
-        moment_nm = self.arm_mass_kg * GRAVITY_M_S2 * self.center_of_mass_m
-        sweep_nm = moment_nm * sin(sweep_rad) * sin(adduction_rad)
-        return sweep_nm, -moment_nm * cos(sweep_rad) * cos(adduction_rad)
 
 
 def phase_margin_rad(stiffness_nm_rad: float, damping_nm_s_rad: float, inertia_kg_m2: float) -> float:

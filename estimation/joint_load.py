@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
-from control.joint_pd import GRAVITY_M_S2, ArmMass
+from control.parameters.arm_mass import GRAVITY_M_S2, ArmMass
 from control.records import UNKNOWN, DriveState
 
 SATURATION = 0.98  # of the current limit: clipped currents stay slightly below it

@@ -8,10 +8,8 @@ or from a log, however many units run in a tick. Two methods share the interface
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds, Meaning
 from control.computing.bounded_work import Work, WorkQueue, finish
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, MudEstimate
@@ -26,6 +24,7 @@ from control.records import (
     Rig,
     StrideEstimate,
 )
+from estimation.estimation_parameters import EstimationParameters
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import NO_COMMANDS, FlipperDrive
 from estimation.knowledge import MudKnowledge
@@ -35,24 +34,6 @@ from estimation.strokes.fit_samples import StrideFits
 from estimation.strokes.shear import Base
 
 PAPER_DRAG_N = 2.5  # the body's drag on its rail in the paper
-Method = Literal["default", "paper"]
-
-
-@dataclass(frozen=True)
-class PaperEstimationParameters:
-    """Parameters of the method `paper` alone."""
-
-    compensation: Annotated[bool, Meaning("add the body's drag to the thrust while the body advances")] = False
-
-
-@dataclass(frozen=True)
-class EstimationParameters:
-    method: Annotated[Method, Meaning("default regresses in torque space; paper is the published method")] = "default"
-    fixed_base: Annotated[bool, Meaning("the flippers hang from a bench: all their travel shears mud")] = False
-    surface_error_m: Annotated[
-        float, Bounds(0.0001, 0.05), Meaning("std_error of the mud's nominal height at one stride")
-    ] = 0.001
-    paper: PaperEstimationParameters = PaperEstimationParameters()
 
 
 class MudReading(NamedTuple):
@@ -74,7 +55,7 @@ class MudEstimator:
         self,
         geometry: FlipperGeometry,
         drives: Sequence[FlipperDrive],
-        parameters: EstimationParameters = EstimationParameters(),
+        parameters: EstimationParameters = EstimationParameters(),  # noqa: B008 - immutable
         body_drag_n: float = PAPER_DRAG_N,
         rig: Rig = TWO_FLIPPERS,
     ) -> None:

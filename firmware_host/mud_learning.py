@@ -17,11 +17,12 @@ from typing import NamedTuple
 
 from control.computing.bounded_work import Work
 from control.controller import Controller, WalkOrder
-from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthAdaptation, DepthChoice, Method
+from control.depth.depth_choice import Adaptation, DepthAdaptation, DepthChoice
 from control.depth.gait_choice import GaitAdaptation
 from control.depth.paper_choice import PaperAdaptation
 from control.faults import Fault, FaultKind
 from control.geometry import FlipperGeometry
+from control.parameters.adaptation_parameters import AdaptationParameters, Method
 from control.parameters.gait_parameters import GaitParameters
 from control.records import NO_LOAD, BodyPose, DriveStates, Estimate, FlipperLoad, Phase, Rig, StrideEstimate
 from estimation.mud import MudEstimator

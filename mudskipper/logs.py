@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from control.records import Rig
-from estimation.mud import Method
+from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import EVENT, STRIDE, tick_kind
 from firmware_host.log_reading.log_reader import read_logs

@@ -22,7 +22,8 @@ from control.modes import Mode, Request
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE, drive_changes
-from simulation.mud.track import RandomStrength, Track
+from simulation.mud.track import Track
+from simulation.mud.unevenness import RandomStrength
 
 WALK_S = 60.0
 STRENGTHS_PA = (400.0, 4000.0)  # softer mud supports no robot, firmer mud holds a flipper that is deep in it

@@ -42,7 +42,8 @@ from firmware_host.operator.status_socket import StatusSocket
 from firmware_host.user_groups import load_rights
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water
-from simulation.mud.track import RandomStrength, Track
+from simulation.mud.track import Track
+from simulation.mud.unevenness import RandomStrength
 
 BAR_KIB = 1024.0
 WARM_UP_FRACTION = 0.2  # of the readings

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from command_line.experiments.conduct import conduct_bench
 from command_line.options.shared import DEFAULT_CONFIG
-from control.joint_pd import GRAVITY_M_S2
+from control.parameters.arm_mass import GRAVITY_M_S2
 from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan
 from experiments.actuator.run import Order, calibrate
 from firmware_host.configuration.configuration import Configuration

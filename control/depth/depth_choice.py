@@ -20,70 +20,19 @@ The drag pad's resistance k_s w d²/2 adds to the body's drag: w and d are its w
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
-from control.bounds import Bounds, Meaning
 from control.computing.bounded_work import Work, batched
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Motion, Traction, carried_m, motion_of
 from control.gait.gait import stride_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 DEPTHS_PER_UNIT, STEPS_PER_UNIT, EXTRACTIONS_PER_UNIT = 3, 4, 4  # of bounded work: less than half a tick
-Method = Literal["default", "paper", "gait"]
-
-
-@dataclass(frozen=True)
-class PaperAdaptationParameters:
-    """Parameters of the method `paper` alone."""
-
-    acceleration_s: Annotated[float, Bounds(0.01, 10.0), Meaning("time to reach the stance's speed")] = 0.1
-
-
-@dataclass(frozen=True)
-class GaitAdaptationParameters:
-    """Parameters of the method `gait` alone."""
-
-    min_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("narrowest sweep")] = 30.0
-    max_sweep_deg: Annotated[float, Bounds(1.0, 60.0), Meaning("widest sweep")] = 50.0
-    swing_duration_s: Annotated[float, Bounds(0.2, 10.0), Meaning("of the swing")] = 0.3
-
-
-@dataclass(frozen=True)
-class AdaptationParameters:
-    method: Annotated[Method, Meaning("how the next stride is chosen: depth, the paper's rule, or depth and gait")] = (
-        "default"
-    )
-    initial_depth_m: Annotated[float, Bounds(0.005, 0.2), Meaning("insertion depth of the first stride")] = 0.03
-    min_depth_m: Annotated[float, Bounds(0.005, 0.2), Meaning("shallowest insertion")] = 0.015
-    max_depth_m: Annotated[float, Bounds(0.005, 0.2), Meaning("deepest insertion")] = 0.05
-    body_drag_n: Annotated[float, Bounds(0.01, 100.0), Meaning("on the body at rest, without the pad")] = (
-        2.5  # the paper's
-    )
-    body_damping_n_s_m: Annotated[float, Bounds(0.0, 1000.0), Meaning("growth of the body's drag with its speed")] = 6.0
-    pad_width_m: Annotated[float, Bounds(0.0, 0.5), Meaning("of the pad that the body slides on, across the track")] = (
-        0.015
-    )
-    pad_depth_m: Annotated[float, Bounds(0.0, 0.5), Meaning("of the pad in the mud")] = 0.02
-    body_mass_kg: Annotated[float, Bounds(0.05, 100.0), Meaning("of the whole robot")] = 1.0
-    mobilisation_n_m: Annotated[float, Bounds(10.0, 1e5), Meaning("stiffness of a flipper with its servo")] = (
-        250.0  # logs: 300 to 700
-    )
-    motor_force_n: Annotated[float, Bounds(0.1, 100.0), Meaning("that a motor can exert at the plate")] = (
-        6.25  # 0.75 N·m at 0.12 m
-    )
-    lifting_fraction: Annotated[
-        float, Bounds(0.1, 1.0), Meaning("of the motor's torque that the mud may take in an extraction")
-    ] = 0.95
-    insertion_fraction: Annotated[
-        float, Bounds(0.1, 10.0), Meaning("of the motor's torque at which an insertion ends early")
-    ] = 0.73
-    paper: PaperAdaptationParameters = PaperAdaptationParameters()
-    gait: GaitAdaptationParameters = GaitAdaptationParameters()
 
 
 class DepthChoice(NamedTuple):

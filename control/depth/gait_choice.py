@@ -21,18 +21,11 @@ from functools import partial
 from math import floor
 
 from control.computing.bounded_work import Work
-from control.depth.depth_choice import (
-    AdaptationParameters,
-    Candidate,
-    DepthAdaptation,
-    DepthChoice,
-    GaitAdaptationParameters,
-    depth_grid,
-    make_candidate,
-)
+from control.depth.depth_choice import Candidate, DepthAdaptation, DepthChoice, depth_grid, make_candidate
 from control.gait.gait import swing_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 

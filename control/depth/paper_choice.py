@@ -16,10 +16,11 @@ from collections.abc import Sequence
 from math import inf
 
 from control.computing.bounded_work import Work, finished
-from control.depth.depth_choice import AdaptationParameters, DepthChoice, depth_grid
+from control.depth.depth_choice import DepthChoice, depth_grid
 from control.depth.forecast import GRID_M
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
+from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.plate.integrals import mean_width_m, moment_width_m
 from control.records import TWO_FLIPPERS, Estimate, Rig, StrideEstimate

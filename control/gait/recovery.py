@@ -24,16 +24,15 @@ targets fades out without a jump of position or velocity.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import copysign, cos, fsum, radians, sin
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds, Meaning
 from control.gait.gait import RAMP_S, swing_duration_s
 from control.gait.joint_path import still
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.recovery_parameters import RecoveryParameters
 from control.records import (
     TWO_FLIPPERS,
     DriveStates,
@@ -48,25 +47,6 @@ from control.records import (
 OUT_M = 0.003  # depth of the plate's lowest point up to which a flipper counts as out of the mud
 RISE_S = 0.2  # to reach the height of the swing
 AWAY_FRACTION = 0.8  # of each rocking; the rest is back
-
-
-@dataclass(frozen=True)
-class RecoveryParameters:
-    attempts: Annotated[
-        int,
-        Bounds(0, 20),
-        Meaning("to free a stuck flipper before it is a fault; 0: swing does not wait for it", "count"),
-    ] = 3
-    grace_s: Annotated[float, Bounds(0.0, 5.0), Meaning("at full torque before the first attempt")] = (
-        0.3  # joints follow late, by up to 0.2 s in simulated clay
-    )
-    pause_s: Annotated[float, Bounds(0.0, 30.0), Meaning("without pull, before each attempt")] = 0.3
-    attempt_s: Annotated[float, Bounds(0.1, 30.0), Meaning("of one attempt")] = 4.0
-    lift_rad_s: Annotated[float, Bounds(0.05, 5.0), Meaning("speed at which the adduction target rises")] = 1.0
-    rock_s: Annotated[float, Bounds(0.02, 2.0), Meaning("one movement of the sweep to and fro")] = 0.1
-    lead_deg: Annotated[
-        float, Bounds(0.5, 45.0), Meaning("of the targets ahead of the joints; times the stiffness, the full torque")
-    ] = 8.0
 
 
 def lowest_point_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) -> float:

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, hypot, nan, sqrt
 
-from control.joint_pd import GRAVITY_M_S2
 from control.monitors.joint_monitor import SATURATED_FRACTION
 from control.monitors.winding import Winding
+from control.parameters.arm_mass import GRAVITY_M_S2
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import Configuration
 

@@ -15,7 +15,7 @@ from itertools import chain
 from math import isfinite
 from typing import NamedTuple
 
-from estimation.mud import EstimationParameters
+from estimation.estimation_parameters import EstimationParameters
 from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, PlateRow, error_rows, plate_rows
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method

@@ -8,9 +8,9 @@ from dataclasses import replace
 from random import Random
 
 from control.controller import WalkOrder
-from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
 from control.parameters.fault_bounds import FaultBounds
+from control.parameters.recovery_parameters import RecoveryParameters
 from control.records import Phase
 from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT

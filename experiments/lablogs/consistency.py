@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from control.records import FLIPPERS, Estimate
-from estimation.mud import Method
+from estimation.estimation_parameters import Method
 from experiments.lablogs.lab_trial import (
     LabTrial,
     Strides,

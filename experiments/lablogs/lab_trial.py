@@ -14,7 +14,7 @@ from zlib import crc32
 import numpy as np
 
 from control.records import FLIPPERS, Estimate, StrideEstimate
-from estimation.mud import Method
+from estimation.estimation_parameters import Method
 from experiments.lablogs.recording import Recording, read_recording
 from experiments.reports.error_table import COEFFICIENTS
 from firmware_host.configuration.configuration import CaptureAxis

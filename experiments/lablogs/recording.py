@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.records import StrideEstimate
-from estimation.mud import Method
+from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
 from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from estimation.mud import Method
+from estimation.estimation_parameters import Method
 from experiments.lablogs.consistency import (
     Agreement,
     Contradictions,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from control.records import Estimate, StrideEstimate
-from estimation.mud import Method
+from estimation.estimation_parameters import Method
 from experiments.lablogs.lab_trial import (
     DELAY_S,
     MISSING_ROWS,

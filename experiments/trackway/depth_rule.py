@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple, cast, get_args
 
 from control.controller import WalkOrder
-from control.depth.depth_choice import Method
-from control.gait.recovery import RecoveryParameters
+from control.parameters.adaptation_parameters import Method
+from control.parameters.recovery_parameters import RecoveryParameters
 from experiments.trackway.walk import Walk, WalkedStride, walk_in
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.configuration import Configuration

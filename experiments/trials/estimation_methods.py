@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from estimation.mud import EstimationParameters, PaperEstimationParameters
+from estimation.estimation_parameters import EstimationParameters, PaperEstimationParameters
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log_reading.log_reader import Log
 from firmware_host.log_reading.replay import replay_log

@@ -16,8 +16,9 @@ from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import BodyPose, StrideEstimate
 from drivers.drive_types import DEFAULT
+from estimation.estimation_parameters import EstimationParameters
 from estimation.joint_load import FlipperDrive
-from estimation.mud import EstimationParameters, MudEstimator
+from estimation.mud import MudEstimator
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.trials.latency import Sample, drawn_latency_s, with_latency
 from firmware_host.configuration.configuration import Configuration

@@ -9,17 +9,18 @@ from math import radians
 from typing import Annotated, Literal
 
 from control.bounds import Bounds, Meaning
-from control.depth.depth_choice import AdaptationParameters
-from control.gait.recovery import RecoveryParameters
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
-from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.monitors.motion_monitor import JointDynamics
+from control.parameters.adaptation_parameters import AdaptationParameters
+from control.parameters.arm_mass import ArmMass
 from control.parameters.fault_bounds import FaultBounds
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_gains import JointGains
 from control.parameters.joint_limits import JointLimits
 from control.parameters.motion_parameters import MotionParameters
+from control.parameters.recovery_parameters import RecoveryParameters
 from control.parameters.winding_parameters import WindingParameters
 from control.records import Joints, Rig, same_for_each
 from drivers.can.bus_load import BitRates
@@ -27,8 +28,8 @@ from drivers.drive import DriveParameters, WatchdogEndpoints
 from drivers.fault_injection.failures import FailureParameters
 from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
+from estimation.estimation_parameters import EstimationParameters
 from estimation.joint_load import FlipperDrive
-from estimation.mud import EstimationParameters
 from firmware_host.configuration.log_parameters import LogParameters
 
 CaptureAxis = Literal["x", "y", "z"]  # of motion capture's frame

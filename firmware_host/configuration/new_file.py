@@ -9,10 +9,10 @@ from dataclasses import asdict
 from math import floor
 from typing import Any, NamedTuple
 
-from control.depth.depth_choice import AdaptationParameters
 from control.geometry import FlipperGeometry
-from control.joint_pd import GAINS_OF_ASKED_DRIVES
+from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_gains import GAINS_OF_ASKED_DRIVES
 from control.parameters.joint_limits import JointLimits
 from control.records import TWO_FLIPPERS, Rig
 from drivers.drive_types import DEFAULT, DRIVE_TYPES

@@ -12,11 +12,12 @@ from math import nan
 from pathlib import Path
 
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
 from control.modes import Mode
+from control.parameters.arm_mass import ArmMass
 from control.records import FLIPPERS, JOINTS, BodyPose, Phase, StrideEstimate
+from estimation.estimation_parameters import EstimationParameters, Method
 from estimation.joint_load import FlipperDrive
-from estimation.mud import PAPER_DRAG_N, EstimationParameters, Method, MudEstimator, MudReading
+from estimation.mud import PAPER_DRAG_N, MudEstimator, MudReading
 from estimation.mud_map import MapRow
 from estimation.recorded_states import recorded_states
 from estimation.strokes.fit_samples import FitSamples, StrideFits

@@ -11,7 +11,7 @@ neither a sideways pull nor a swing; only the joint that lifts the weight has to
 
 from math import cos
 
-from control.joint_pd import GRAVITY_M_S2, ArmMass
+from control.parameters.arm_mass import GRAVITY_M_S2, ArmMass
 
 
 class BenchMount:

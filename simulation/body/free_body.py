@@ -34,7 +34,7 @@ from math import cos, hypot, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds
-from control.joint_pd import GRAVITY_M_S2
+from control.parameters.arm_mass import GRAVITY_M_S2
 from control.records import FLIPPERS, TWO_FLIPPERS, Rig
 from simulation.body.rail_body import BodyMotion, DragPad, DryDrag, Pusher
 from simulation.mud.carriage import Carriage, Vector, cross, dot, plate_directions

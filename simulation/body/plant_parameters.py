@@ -5,7 +5,7 @@ from typing import Annotated
 
 from control.bounds import Bounds
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.records import TWO_FLIPPERS, Rig
 from simulation.body.free_body import BodyShape
 from simulation.mud.disturbances import NONE, Disturbances

@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 import tomlkit
 
 from control.bounds import Bounds
-from control.joint_pd import GAINS_OF_ASKED_DRIVES
+from control.parameters.joint_gains import GAINS_OF_ASKED_DRIVES
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 
 DRIVES = (  # types of drive, and models of motor

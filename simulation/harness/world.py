@@ -25,10 +25,12 @@ from firmware_host.configuration.toml_records import (
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.lockstep import drives_of, plant_of
-from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, Layer, clay_of_water
+from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, Clay, clay_of_water
 from simulation.mud.disturbances import DRIVE_FIELDS, NONE, Disturbances, drive_changes
+from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
-from simulation.mud.track import LEVEL, UNIFORM, RandomStrength, Ridges, Track
+from simulation.mud.track import LEVEL, UNIFORM, Track
+from simulation.mud.unevenness import RandomStrength, Ridges
 
 STRONGEST_PA = 50e3  # of a segment and of its layers: ten times the paper's stiffest mud
 SAME_POSITION_M = 1e-9

@@ -26,12 +26,11 @@ own depth, and the weight of the mud above it stays the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from math import exp, log
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds
+from simulation.mud.layer import Layer
 
 UNIT_WEIGHT_N_M3 = 17.5e3
 MATLOCK_J = 0.5
@@ -43,15 +42,6 @@ SUCTION_FADE_M = 0.01
 RATE_COEFFICIENT = 0.4
 RATE_EXPONENT = 0.4
 REFERENCE_SPEED_M_S = 0.1
-
-
-@dataclass(frozen=True)
-class Layer:
-    """Between two depths below the surface the mud has `factor` times its strength. Layers do not overlap."""
-
-    top_m: Annotated[float, Bounds(0.0, 1.0)]
-    bottom_m: Annotated[float, Bounds(0.0, 1.0)]
-    factor: Annotated[float, Bounds(0.01, 20.0)]
 
 
 class Clay(NamedTuple):

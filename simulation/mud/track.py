@@ -10,33 +10,17 @@ Each is off by default. Draws depend on their own seed only, so the ground is th
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import exp, log, pi, sin, sqrt
 from random import Random
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.stones import Stone
+from simulation.mud.unevenness import RandomStrength, Ridges
 
 COMPARTMENT_M = 0.61  # the paper's trackway of 1.83 m, in three
 CELLS_PER_LENGTH = 10
 FARTHEST_DRAW = 3.0  # standard deviations: no single cell of rock
-
-
-@dataclass(frozen=True)
-class Ridges:
-    amplitude_m: Annotated[float, Bounds(0.0, 0.01)] = 0.0  # less than the 14 mm by which a raised flipper clears mud
-    wavelength_m: Annotated[float, Bounds(0.02, 10.0)] = 0.2
-
-
-@dataclass(frozen=True)
-class RandomStrength:
-    relative_spread: Annotated[float, Bounds(0.0, 0.5)] = 0.0
-    correlation_length_m: Annotated[float, Bounds(0.01, 10.0)] = 0.1
-    seed: Annotated[int, Bounds(0, 2**31 - 1)] = 1
-
-
 LEVEL = Ridges()
 UNIFORM = RandomStrength()
 

@@ -9,9 +9,10 @@ from math import nan
 import numpy as np
 
 from control.computing.bounded_work import finish
-from control.depth.depth_choice import Adaptation, AdaptationParameters, DepthChoice
+from control.depth.depth_choice import Adaptation, DepthChoice
 from control.geometry import FlipperGeometry
 from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
+from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.records import FLIPPERS, Estimate, StrideEstimate
 

@@ -6,13 +6,15 @@ import pytest
 
 from control.controller import DAMPING_NM, DAMPING_S, RAISING_S, RESTING, SETTLED_S, SOFT_STOP_S, Controller, WalkOrder
 from control.gait.gait import stride_duration_s
-from control.gait.recovery import Recovery, RecoveryParameters
+from control.gait.recovery import Recovery
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import MOVING, Mode
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_gains import JointGains
 from control.parameters.motion_parameters import MotionParameters
+from control.parameters.recovery_parameters import RecoveryParameters
 from control.rate import PERIOD_S
 from control.records import DriveState, DriveStates, JointAngles, Joints, Phase, Torques, same_for_each
 from tests.control.synthetic_states import NO_TORQUE, states_at

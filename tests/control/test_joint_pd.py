@@ -12,8 +12,6 @@ from control.gait.joint_path import still
 from control.joint_pd import (
     LEAST_MARGIN_RAD,
     LOOP_DELAY_S,
-    ArmMass,
-    JointGains,
     damping_torques_nm,
     joint_torques_nm,
     largest_damping_nm_s_rad,
@@ -21,6 +19,8 @@ from control.joint_pd import (
     pd_torque_nm,
     phase_margin_rad,
 )
+from control.parameters.arm_mass import ArmMass
+from control.parameters.joint_gains import JointGains
 from control.records import DriveState, DriveStates, JointAngles, Joints, JointTarget, same_for_all
 from tests.control.synthetic_states import NO_TORQUE, states_at
 

@@ -2,7 +2,9 @@
 
 import pytest
 
-from control.joint_pd import ArmMass, JointGains, VelocityPrediction
+from control.joint_pd import VelocityPrediction
+from control.parameters.arm_mass import ArmMass
+from control.parameters.joint_gains import JointGains
 from control.rate import PERIOD_S
 from control.records import DriveState, Joints, same_for_all
 

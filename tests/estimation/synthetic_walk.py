@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from control.computing.bounded_work import finish
 from control.gait.gait import Gait, stride_duration_s
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.rate import PERIOD_S

@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 
 from control.gait.gait import Gait
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import BodyPose, Estimate, Phase, StrideEstimate
+from estimation.estimation_parameters import EstimationParameters, Method
 from estimation.joint_load import FlipperDrive
-from estimation.mud import EstimationParameters, Method, MudEstimator, MudReading
+from estimation.mud import MudEstimator, MudReading
 from estimation.recorded_states import recorded_states
 from estimation.strokes.depth_line import COEFFICIENTS_N_M3
 

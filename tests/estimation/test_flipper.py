@@ -20,7 +20,7 @@ from control.gait.gait import SINGLE_FLIPPER, Gait, stride_duration_s
 from control.gait.recovery import OUT_M, is_in_mud, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import NO_LOAD, DriveState, Estimate, GaitTarget, Phase, StrideEstimate

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.rate import PERIOD_S
 from control.records import DriveState
 from estimation.joint_load import (

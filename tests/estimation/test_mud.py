@@ -10,20 +10,14 @@ from math import isfinite, nan, pi, sin
 
 import pytest
 
-from control.joint_pd import ArmMass
 from control.mud_estimate import NOTHING_KNOWN
+from control.parameters.arm_mass import ArmMass
 from control.rate import PERIOD_S
 from control.records import FLIPPERS, BodyPose, Joints, Phase, StrideEstimate
+from estimation.estimation_parameters import EstimationParameters, Method, PaperEstimationParameters
 from estimation.flipper import FlipperEstimator
 from estimation.joint_load import FlipperDrive
-from estimation.mud import (
-    PAPER_DRAG_N,
-    EstimationParameters,
-    Method,
-    MudEstimator,
-    MudReading,
-    PaperEstimationParameters,
-)
+from estimation.mud import PAPER_DRAG_N, MudEstimator, MudReading
 from estimation.mud_map import PIECE_M
 from estimation.paper import PaperEstimator
 from estimation.recorded_states import recorded_states

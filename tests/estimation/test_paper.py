@@ -15,7 +15,7 @@ import pytest
 from control.gait.gait import SINGLE_FLIPPER, Gait, stride_duration_s
 from control.gait.recovery import OUT_M, lowest_point_m
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import (
@@ -29,8 +29,9 @@ from control.records import (
     StrideEstimate,
     same_for_all,
 )
+from estimation.estimation_parameters import EstimationParameters
 from estimation.joint_load import FlipperDrive
-from estimation.mud import EstimationParameters, MudEstimator
+from estimation.mud import MudEstimator
 from estimation.paper import MOBILISED_M, STEADY_FRACTION, SURFACE_FORCE_N, PaperEstimator
 from estimation.stride_estimator import GRACE_S
 from tests.estimation.synthetic_walk import update

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from control.controller import WalkOrder
-from control.depth.depth_choice import AdaptationParameters, Method
 from control.geometry import FlipperGeometry
+from control.parameters.adaptation_parameters import AdaptationParameters, Method
 from control.records import GaitTarget, Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError

@@ -12,12 +12,14 @@ from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import STEP_S, Arm, Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.harness.lockstep import Lockstep
-from simulation.mud.clay import MUDS, Clay, Layer
+from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import Disturbances
 from simulation.mud.flipper_contact import ContactForce, attitude_of, plate_size
+from simulation.mud.layer import Layer
 from simulation.mud.rigid_plate import lowest_point_m
 from simulation.mud.stones import Stone
-from simulation.mud.track import LEVEL, RandomStrength, Ridges, Track
+from simulation.mud.track import LEVEL, Track
+from simulation.mud.unevenness import RandomStrength, Ridges
 from tests.control.synthetic_states import NO_TORQUE
 
 

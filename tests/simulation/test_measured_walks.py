@@ -21,7 +21,8 @@ from control.geometry import FlipperGeometry
 from control.records import JointAngles, Phase
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import NatNetParameters
-from estimation.mud import EstimationParameters, MudEstimator
+from estimation.estimation_parameters import EstimationParameters
+from estimation.mud import MudEstimator
 from estimation.recorded_states import recorded_states
 from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
 from firmware_host.log_reading.replay import LAB_DRIVE, NO_VELOCITY

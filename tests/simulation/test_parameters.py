@@ -11,10 +11,10 @@ from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture import MotionCaptureParameters
 from simulation.harness.world import SegmentText
-from simulation.mud.clay import Layer
 from simulation.mud.disturbances import Disturbances
+from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
-from simulation.mud.track import RandomStrength, Ridges
+from simulation.mud.unevenness import RandomStrength, Ridges
 
 RECORDS = [
     *(BodyShape, MotionCaptureParameters, SimulatedDriveParameters, PlantParameters),

@@ -11,8 +11,8 @@ import pytest
 
 from control.controller import DAMPING_S, WalkOrder
 from control.gait.gait import stride_duration_s
-from control.gait.recovery import RecoveryParameters
 from control.modes import Mode, Request
+from control.parameters.recovery_parameters import RecoveryParameters
 from control.rate import PERIOD_S
 from control.records import Phase
 from drivers.can.frames import Frame

@@ -12,8 +12,8 @@ from math import isfinite
 import pytest
 
 from control.controller import WalkOrder
-from control.gait.recovery import RecoveryParameters
 from control.modes import Mode
+from control.parameters.recovery_parameters import RecoveryParameters
 from firmware_host.configuration.configuration import Configuration
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay

@@ -13,7 +13,7 @@ from command_line.init.init import answers
 from command_line.main import main
 from command_line.parser import build_parser
 from control.geometry import FlipperGeometry
-from control.joint_pd import GAINS_OF_ASKED_DRIVES, JointGains
+from control.parameters.joint_gains import GAINS_OF_ASKED_DRIVES, JointGains
 from control.records import JOINTS
 from drivers.drive_types import DRIVE_TYPES
 from firmware_host.configuration.loading import load_configuration, parse_configuration

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from control.depth.depth_choice import AdaptationParameters, DepthAdaptation, DepthChoice
+from control.depth.depth_choice import DepthAdaptation, DepthChoice
 from control.depth.forecast import GRID_M, DepthForecast
 from control.depth.step_model import BodyDrag, Traction, step_m
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
+from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.records import StrideEstimate
 from tests.control.synthetic_muds import (

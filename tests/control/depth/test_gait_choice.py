@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.depth.depth_choice import AdaptationParameters, DepthChoice, GaitAdaptationParameters, body_drag
+from control.depth.depth_choice import DepthChoice, body_drag
 from control.depth.forecast import DepthForecast
 from control.depth.gait_choice import SWEEP_STEP_DEG, WIDENING_DEG, GaitAdaptation, quickest
 from control.depth.step_model import Traction, step_m
 from control.gait.gait import Gait, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, MudEstimate
+from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.joint_limits import JointLimits
 from control.plate.integrals import stroke_moment_m4, submerged_plate

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.depth.depth_choice import AdaptationParameters, DepthChoice, PaperAdaptationParameters, depth_grid
+from control.depth.depth_choice import DepthChoice, depth_grid
 from control.depth.paper_choice import PaperAdaptation
 from control.mud_estimate import NOTHING_KNOWN
+from control.parameters.adaptation_parameters import AdaptationParameters, PaperAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.records import Estimate, StrideEstimate
 from tests.control.synthetic_muds import (

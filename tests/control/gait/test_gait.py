@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from control.gait.gait import PROTOCOLS, RAMP_S, SINGLE_FLIPPER, Gait, smooth_progress, stride_duration_s, stride_table
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S

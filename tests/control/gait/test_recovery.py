@@ -16,13 +16,15 @@ from control.controller import Controller, WalkOrder
 from control.faults import FaultKind
 from control.gait.gait import PROTOCOLS, stride_duration_s
 from control.gait.joint_path import still
-from control.gait.recovery import AWAY_FRACTION, OUT_M, Gap, Recovery, RecoveryParameters, is_in_mud, lowest_point_m
+from control.gait.recovery import AWAY_FRACTION, OUT_M, Gap, Recovery, is_in_mud, lowest_point_m
 from control.geometry import FlipperGeometry
-from control.joint_pd import ArmMass, JointGains
 from control.limits import JointRange
 from control.modes import Mode
+from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
+from control.parameters.joint_gains import JointGains
 from control.parameters.motion_parameters import MotionParameters
+from control.parameters.recovery_parameters import RecoveryParameters
 from control.rate import PERIOD_S
 from control.records import (
     DriveState,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from control.joint_pd import GRAVITY_M_S2
+from control.parameters.arm_mass import GRAVITY_M_S2
 from experiments.actuator.plan import Plan, Step
 from experiments.actuator.reading import SAMPLE_S, HeldJoint, MovedError, Sample, Side, find_motion
 from experiments.actuator.simulation import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.rate import PERIOD_S
 from control.records import JOINTS, DriveState, same_for_all
 from experiments.bench.joint_shake import FIRST_NM, HALF_TICKS, SHAKE_TICKS, UNSEEN_RAD, Shake, shake_joint

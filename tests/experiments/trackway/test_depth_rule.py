@@ -4,7 +4,7 @@ from typing import get_args
 
 import pytest
 
-from control.depth.depth_choice import Method
+from control.parameters.adaptation_parameters import Method
 from experiments.trackway.depth_rule import METHODS, chosen_by, configuration_for, constant_depth
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from control.geometry import FlipperGeometry
-from estimation.mud import EstimationParameters
+from estimation.estimation_parameters import EstimationParameters
 from experiments.trials.load_cell_truth import (
     PAPER_SPEED_M_S,
     REVERSAL_FRACTION,

@@ -12,7 +12,7 @@ from statistics import median
 import pytest
 
 from control.geometry import FlipperGeometry
-from estimation.mud import EstimationParameters
+from estimation.estimation_parameters import EstimationParameters
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.trial import SINGLE, run_trial, strides_of

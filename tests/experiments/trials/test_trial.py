@@ -8,7 +8,8 @@ from math import isfinite
 import pytest
 
 from control.records import FLIPPERS, Phase
-from estimation.mud import EstimationParameters, MudEstimator
+from estimation.estimation_parameters import EstimationParameters
+from estimation.mud import MudEstimator
 from experiments.trials.latency import Sample
 from experiments.trials.trial import (
     BENCH_CURRENT_A,

@@ -6,7 +6,7 @@ from math import cos, sin
 
 import pytest
 
-from control.joint_pd import GRAVITY_M_S2, ArmMass
+from control.parameters.arm_mass import GRAVITY_M_S2, ArmMass
 from simulation.body.bench_mount import BenchMount
 from simulation.body.plant import Plant
 from simulation.body.plant_parameters import PlantParameters

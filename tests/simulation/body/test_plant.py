@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.records import Joints
 from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters

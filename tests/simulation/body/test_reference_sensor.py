@@ -16,7 +16,8 @@ from simulation.body.reference_sensor import StrideTruth, StrokeReference, Strok
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import Disturbances
-from simulation.mud.track import Ridges, Track
+from simulation.mud.track import Track
+from simulation.mud.unevenness import Ridges
 from simulation.test_rig.load_cell import measure_shear
 
 DT_S = 0.01

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from control.joint_pd import ArmMass
+from control.parameters.arm_mass import ArmMass
 from control.records import Joints
 from experiments.robot.lockstep_robot import simulated_configuration
 from simulation.harness.joint_energy import JointEnergy, JointWork

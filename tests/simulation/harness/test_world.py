@@ -24,10 +24,12 @@ from simulation.harness.world import (
     load_world,
     parse_world,
 )
-from simulation.mud.clay import MUDS, Clay, Layer, clay_of_water
+from simulation.mud.clay import MUDS, Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE
+from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
-from simulation.mud.track import LEVEL, Ridges
+from simulation.mud.track import LEVEL
+from simulation.mud.unevenness import Ridges
 from tests.folders import EXAMPLE_WORLD
 
 EXAMPLE = EXAMPLE_WORLD

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulation.mud.clay import MUDS, Clay, Layer, clay_of_water, lateral_rise_per_m, rate_factor
+from simulation.mud.clay import MUDS, Clay, clay_of_water, lateral_rise_per_m, rate_factor
+from simulation.mud.layer import Layer
 
 STRENGTHS = st.floats(200.0, 20000.0)
 DEPTHS = st.floats(0.001, 0.15)

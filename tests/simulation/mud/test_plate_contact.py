@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from control.plate.outline import signed_area_m2
-from simulation.mud.clay import MUDS, Clay, Layer, rate_factor
+from simulation.mud.clay import MUDS, Clay, rate_factor
+from simulation.mud.layer import Layer
 from simulation.mud.mud_springs import LENGTHWAYS_YIELD_M, SIDEWAYS_YIELD_M
 from simulation.mud.plate_contact import PlateContact
 from simulation.mud.plate_panels import panels_of

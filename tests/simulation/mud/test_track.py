@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulation.mud.clay import MUDS, Clay, Layer
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
-from simulation.mud.track import COMPARTMENT_M, RandomStrength, Ridges, Track, paper_track
+from simulation.mud.track import COMPARTMENT_M, Track, paper_track
+from simulation.mud.unevenness import RandomStrength, Ridges
 
 LONG = [(400.0, Clay("any", 1000.0, (Layer(0.0, 0.01, 2.0),)))]
 

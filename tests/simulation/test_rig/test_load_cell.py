@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from simulation.mud.clay import MUDS, Clay, Layer, rate_factor
+from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.flipper_contact import NO_CONTACT, ArmMotion, FlipperContact, attitude_of
+from simulation.mud.layer import Layer
 from simulation.test_rig.load_cell import LoadCell, measure_insertion, measure_shear
 
 GEOMETRY = FlipperGeometry()
