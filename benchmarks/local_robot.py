@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from control.rate import RATE_HZ
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
@@ -57,11 +58,14 @@ class LocalRobot:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._start(robot)
 
-    def start_daemon(self) -> subprocess.Popen[bytes]:
-        return self._start("firmware_host.daemon")
+    def start_daemon(self, rate_hz: float = RATE_HZ) -> subprocess.Popen[bytes]:
+        if rate_hz == RATE_HZ:
+            return self._start("firmware_host.daemon")
+        return self._start("benchmarks.walks.daemon_at_rate", "--rate", str(rate_hz))
 
-    def _start(self, module: str) -> subprocess.Popen[bytes]:
-        command, quiet = [sys.executable, "-m", module, "--config", str(self.configuration)], subprocess.DEVNULL
+    def _start(self, module: str, *options: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", module, *options, "--config", str(self.configuration)]
+        quiet = subprocess.DEVNULL
         self._processes.append(subprocess.Popen(command, start_new_session=True, stdout=quiet, stderr=quiet))
         return self._processes[-1]
 

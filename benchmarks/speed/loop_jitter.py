@@ -41,9 +41,9 @@ JOINED: dict[str, Callable[[list[float]], float]] = {"p50": median, "p99": media
 Report = dict[str, Any]
 
 
-def time_bare_loop(seconds: float) -> Report:
+def time_bare_loop(seconds: float, period_s: float = PERIOD_S) -> Report:
     """Sleeps from deadline to deadline and does nothing else."""
-    timing, ticker, until_s = LoopTiming(), BareTicker(PERIOD_S), time.monotonic() + seconds
+    timing, ticker, until_s = LoopTiming(), BareTicker(period_s), time.monotonic() + seconds
     now_s = 0.0
     while now_s < until_s:
         tick = ticker.wait()
@@ -52,9 +52,9 @@ def time_bare_loop(seconds: float) -> Report:
     return timing.summary()
 
 
-def time_daemon(robot: LocalRobot, seconds: float) -> Report:
+def time_daemon(robot: LocalRobot, seconds: float, rate_hz: float = RATE_HZ) -> Report:
     """Returns the daemon's status after that time of walking. Raises RuntimeError where the robot does not walk."""
-    daemon = robot.start_daemon()
+    daemon = robot.start_daemon(rate_hz)
     if not robot.walk_until("stance"):
         raise RuntimeError(f"the simulated robot does not walk: {robot.call('status')['fault']}")
     robot.call("reset_timing")

@@ -43,7 +43,7 @@ from tests.folders import ROOT
 TIMEOUT_S = 240.0  # on a machine that others keep busy
 ALWAYS = {"benchmark", "reached", "verdict"}
 FOLDERS = {
-    "speed": ("tick_time", "loop_jitter", "lockstep_speed", "viewers_cost"),
+    "speed": ("tick_time", "loop_jitter", "fast_loop", "lockstep_speed", "viewers_cost"),
     "stress": (
         "soak", "daemon_kills", "configuration_fuzz", "socket_fuzz", "corrupted_logs", "log_kills", "can_fuzz",
     ),
@@ -121,6 +121,17 @@ def test_loop_jitter() -> None:
             assert set(paced) == set(LOOPS) - set(report["left_out"]) >= {"bare", "ticker"}
             assert all(set(each) == {"jitter_us", "rate_fraction", "to_ticker"} for each in paced.values())
     assert report.keys() >= {"warnings", "faults", "dropped_rows"}
+
+
+def test_fast_loop() -> None:
+    """The daemon walks at each rate, and keeps it as well as a test beside others can tell."""
+    report = report_of("fast_loop", "--seconds", "0.5")
+    for rate_hz in (1000, 4000):
+        turn = report[f"{rate_hz}"]
+        for loop in (turn["loop"], turn["bare"]):
+            assert 0.25 * rate_hz < loop["ticks"] + loop["missed_ticks"] < 1.5 * rate_hz
+            assert 0.0 <= loop["missed_fraction"] <= 1.0
+    assert report.keys() >= {"compiled", "turn_s", "warnings"}
 
 
 def test_viewers_cost(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
