@@ -9,7 +9,8 @@ from drivers.drive_types import make_drives
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder, Recording
 from firmware_host.loop import Loop
-from simulation.devices.motion_capture import AT_EVERY_TICK, SimulatedPose
+from simulation.devices.motion_capture import SimulatedPose
+from simulation.devices.motion_capture_parameters import AT_EVERY_TICK
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.harness.robot import SimulatedRobot
 from simulation.mud.track import paper_track

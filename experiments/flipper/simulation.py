@@ -9,7 +9,7 @@ from experiments.trials.mud_trials import PlannedTrial
 from experiments.trials.simulated_bed import CarriedBed, simulated_bench
 from experiments.trials.trial import BENCH_CURRENT_A, BENCH_TORQUE_NM
 from firmware_host.configuration.configuration import Configuration
-from simulation.devices.motion_capture import AT_EVERY_TICK
+from simulation.devices.motion_capture_parameters import AT_EVERY_TICK
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track

@@ -25,7 +25,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.file_recorder import FileRecorder
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.motion_capture import OF_THE_PAPER, MotionCaptureParameters
+from simulation.devices.motion_capture_parameters import OF_THE_PAPER, MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep, drives_of
 from simulation.mud.disturbances import LAB, drive_changes
 from simulation.mud.track import Track

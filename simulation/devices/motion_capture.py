@@ -7,28 +7,14 @@ a frame of that time.
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import inf
 from random import Random
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from control.bounds import Bounds
 from control.records import NEVER_S, BodyPose
 from drivers.pose.pose_port import NO_SOURCE, STALE_S, PoseReport
 from simulation.body.plant import Plant
-
-
-@dataclass(frozen=True)
-class MotionCaptureParameters:
-    rate_hz: Annotated[float, Bounds(0.0, 1000.0)] = 0.0
-    noise_m: Annotated[float, Bounds(0.0, 0.1)] = 1e-4  # standard deviation, at the scale of this track
-    latency_s: Annotated[float, Bounds(0.0, 1.0)] = 0.0
-    dropouts_per_s: Annotated[float, Bounds(0.0, 10.0)] = 0.0
-    dropout_s: Annotated[float, Bounds(0.001, 10.0)] = 0.2  # mean length
-
-
-AT_EVERY_TICK = MotionCaptureParameters()
-OF_THE_PAPER = MotionCaptureParameters(rate_hz=120.0)
+from simulation.devices.motion_capture_parameters import MotionCaptureParameters
 
 
 class CameraFrame(NamedTuple):

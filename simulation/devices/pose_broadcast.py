@@ -10,7 +10,8 @@ from drivers.pose.natnet_sockets import AXES, parse_axis, parse_version
 from drivers.pose.pose_port import PoseSender
 from firmware_host.configuration.configuration import PoseParameters
 from simulation.body.plant import Plant
-from simulation.devices.motion_capture import OF_THE_PAPER, CameraFrame, MotionCapture
+from simulation.devices.motion_capture import CameraFrame, MotionCapture
+from simulation.devices.motion_capture_parameters import OF_THE_PAPER
 from simulation.devices.natnet_server import LOOPBACK, NEWEST_VERSION, NatNetServer, RecordedPose
 from simulation.devices.rail_encoder_emulator import EmulatedRailEncoder
 

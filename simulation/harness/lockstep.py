@@ -24,7 +24,8 @@ from firmware_host.ticker import Tick
 from simulation.body.free_body import BodyShape
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters, SimulatedPose
+from simulation.devices.motion_capture import SimulatedPose
+from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.harness.robot import SimulatedRobot
 from simulation.mud.disturbances import NONE, Disturbances, drive_changes
 from simulation.mud.track import Track

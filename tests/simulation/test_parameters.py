@@ -9,7 +9,7 @@ from control.bounds import Bounds
 from simulation.body.free_body import BodyShape
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.motion_capture import MotionCaptureParameters
+from simulation.devices.motion_capture_parameters import MotionCaptureParameters
 from simulation.harness.world import SegmentText
 from simulation.mud.disturbances import Disturbances
 from simulation.mud.layer import Layer

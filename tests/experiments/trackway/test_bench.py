@@ -31,7 +31,7 @@ from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.mud_trials import Bench, InvalidTrialError, counted_entries
 from experiments.trials.notebook import Notebook
 from experiments.trials.simulated_bed import simulated_bench
-from simulation.devices.motion_capture import AT_EVERY_TICK, MotionCaptureParameters
+from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.scripted_operator import ScriptedOperator

@@ -11,14 +11,8 @@ from control.records import BodyPose
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import Plant
 from simulation.body.plant_parameters import PlantParameters
-from simulation.devices.motion_capture import (
-    AT_EVERY_TICK,
-    OF_THE_PAPER,
-    CameraFrame,
-    MotionCapture,
-    MotionCaptureParameters,
-    SimulatedPose,
-)
+from simulation.devices.motion_capture import CameraFrame, MotionCapture, SimulatedPose
+from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, OF_THE_PAPER, MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

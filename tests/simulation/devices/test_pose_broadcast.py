@@ -24,7 +24,8 @@ from drivers.pose.rail_encoder import RailEncoderParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from firmware_host.pose_sources import open_pose
 from simulation.body.plant import Plant
-from simulation.devices.motion_capture import CameraFrame, MotionCapture, MotionCaptureParameters
+from simulation.devices.motion_capture import CameraFrame, MotionCapture
+from simulation.devices.motion_capture_parameters import MotionCaptureParameters
 from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
 from simulation.devices.pose_broadcast import PoseBroadcast
 from simulation.harness.lockstep import Lockstep

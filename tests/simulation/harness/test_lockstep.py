@@ -12,7 +12,7 @@ from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.fault_texts import fault_message
 from simulation.devices.drive import DriveError
-from simulation.devices.motion_capture import MotionCaptureParameters
+from simulation.devices.motion_capture_parameters import MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import LAB
