@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
 
-from benchmarks.speed.timed_walk import BLOCK_TICKS, TimedWalk
+from benchmarks.walks.timed_walk import BLOCK_TICKS, TimedWalk
 from benchmarks.walks.wirings import Wiring, make_wiring
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame

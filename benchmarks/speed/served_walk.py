@@ -16,7 +16,7 @@ import msgpack
 
 from benchmarks.report import summary_us
 from benchmarks.speed.serving_time import READING, answer
-from benchmarks.speed.timed_walk import BLOCK_TICKS, TimedWalk
+from benchmarks.walks.timed_walk import BLOCK_TICKS, TimedWalk
 from control.rate import RATE_HZ
 from firmware_host.operator.operator_calls import OperatorCalls
 from firmware_host.operator.rights import Group, Rights

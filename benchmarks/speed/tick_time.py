@@ -32,7 +32,7 @@ from benchmarks.speed.bare_sockets import BareSockets, count_frames
 from benchmarks.speed.served_walk import ServedWalk
 from benchmarks.speed.serving_time import fullest_methods
 from benchmarks.speed.tick_pictures import plot_parts, require_matplotlib
-from benchmarks.speed.timed_walk import TimedWalk
+from benchmarks.walks.timed_walk import TimedWalk
 from benchmarks.walks.wired_walk import open_wiring
 from benchmarks.walks.wirings import VARIANTS
 from drivers.drive_types import DEFAULT

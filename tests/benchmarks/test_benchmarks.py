@@ -24,13 +24,13 @@ from benchmarks.speed import (
     served_walk,
     serving_time,
     tick_time,
-    timed_walk,
     viewers_cost,
 )
 from benchmarks.speed.paced_loops import LOOPS
-from benchmarks.speed.timed_walk import STAGES
 from benchmarks.stress import log_kills
 from benchmarks.stress.harmless_frames import is_harmless
+from benchmarks.walks import timed_walk
+from benchmarks.walks.timed_walk import STAGES
 from benchmarks.walks.wirings import VARIANTS, make_wiring
 from control.modes import Mode
 from drivers.can.frames import Frame

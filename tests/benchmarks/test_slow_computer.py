@@ -10,8 +10,8 @@ from benchmarks.report import run_benchmark
 from benchmarks.speed import slow_computer, tick_pictures
 from benchmarks.speed.slow_computer import largest_factor, summary_of, walk_slowly
 from benchmarks.speed.tick_pictures import fractions_of, plot_parts, plot_ticks
-from benchmarks.speed.timed_walk import STAGES
 from benchmarks.walks.scaled_clock import RecordedWork, ScaledClock, ScaledWalk
+from benchmarks.walks.timed_walk import STAGES
 from benchmarks.walks.walk_ticks import END_TICKS, WalkTick, least_work
 from control.rate import PERIOD_S
 from control.records import Phase
