@@ -35,12 +35,15 @@ def plan_of(options: argparse.Namespace) -> Plan:
     """Raises ValueError for an unknown mud or layer."""
     layers = LAYERS if options.layers is None else tuple(name for name in options.layers.split(",") if name)
     plan = with_layers(Plan(seeds=options.seeds), () if layers == ("none",) else layers)
-    single = _muds(options, SINGLE_WATERS) if options.setup in ("single", "both") else ()
-    walking = _muds(options, WALKING_WATERS) if options.setup in ("walking", "both") else ()
-    return replace(plan, single=single, walking=walking)
+    single = _muds(options, "single", SINGLE_WATERS)
+    walking, measuring = (_muds(options, setup, WALKING_WATERS) for setup in ("walking", "measuring"))
+    return replace(plan, single=single, walking=walking, measuring=measuring)
 
 
-def _muds(options: argparse.Namespace, waters: Sequence[float]) -> tuple[Clay, ...]:
+def _muds(options: argparse.Namespace, setup: str, waters: Sequence[float]) -> tuple[Clay, ...]:
+    """Returns the muds of one setup: none where another was asked for."""
+    if options.setup not in (setup, "all"):
+        return ()
     if options.strength:
         return tuple(Clay(f"{strength_pa:g} Pa", strength_pa) for strength_pa in options.strength)
     return tuple(clay_of_water(water) for water in options.mud or waters)

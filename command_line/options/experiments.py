@@ -44,9 +44,9 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
     _add_workers(estimation)
     estimation.add_argument(
         "--setup",
-        choices=("single", "walking", "both"),
-        default="both",
-        help="one flipper on a fixed base, the walking robot, or both (default: %(default)s)",
+        choices=("single", "walking", "measuring", "all"),
+        default="all",
+        help="one flipper on a fixed base, the walking robot, its gait for measuring, or all (default: %(default)s)",
     )
     estimation.add_argument("--seeds", type=SEEDS, default=10, metavar="N", help="trials of each mud (default: 10)")
     muds = estimation.add_mutually_exclusive_group()

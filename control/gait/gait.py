@@ -21,7 +21,10 @@ RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time,
 SINGLE_FLIPPER = GaitParameters(
     stance_speed_m_s=0.1, extraction_speed_m_s=0.1, swing_speed_m_s=0.1, swing_duration_s=0.0, pause_s=3.0
 )
-PROTOCOLS = {"walking": GaitParameters(), "single_flipper": SINGLE_FLIPPER}
+# A walk that measures k_e. A quick extraction of 85 ms accelerates the arm with more torque than the mud takes, and an
+# extraction right after the stance, of which the sweep may still catch up a part, pulls less at first (accuracy.md).
+MEASURING = GaitParameters(extraction_speed_m_s=0.2, pause_s=0.5)
+PROTOCOLS = {"walking": GaitParameters(), "measuring": MEASURING, "single_flipper": SINGLE_FLIPPER}
 
 
 class PhaseRow(NamedTuple):

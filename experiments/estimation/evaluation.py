@@ -1,9 +1,9 @@
 """The accuracy of the mud coefficients: estimates against a virtual load cell, over muds, trials and methods.
 
 After the paper's sections III-B and III-C: a single flipper on a fixed base through five muds, the walking robot
-through three muds and over their borders, in the simulator's clay with the disturbances of the authors' logs. Each
-trial is simulated once, and every method estimates from the same samples. The fields of the report are the keys of the
-summary in JSON.
+through three muds and over their borders, and once more through the three with its gait for measuring, in the
+simulator's clay with the disturbances of the authors' logs. Each trial is simulated once, and every method estimates
+from the same samples. The fields of the report are the keys of the summary in JSON.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from experiments.trials.latency import LATENCY_S
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
-from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
+from experiments.trials.trial import MEASURING_WALK, SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
 from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances
 from simulation.mud.track import Track
@@ -66,6 +66,7 @@ class Plan:
 
     single: tuple[Clay, ...] = tuple(clay_of_water(water) for water in SINGLE_WATERS)
     walking: tuple[Clay, ...] = tuple(clay_of_water(water) for water in WALKING_WATERS)
+    measuring: tuple[Clay, ...] = tuple(clay_of_water(water) for water in WALKING_WATERS)
     seeds: int = 10
     single_strides: int = 2
     walking_strides: int = 8
@@ -81,8 +82,12 @@ class Plan:
         orders = (self.walking, self.walking[::-1])
         transitions = [Part(WALKING, orders[seed % 2], self.transition_strides, seed) for seed in seeds]
         single = [Part(SINGLE, (clay,), self.single_strides, seed) for clay in self.single for seed in seeds]
-        walking = [Part(WALKING, (clay,), self.walking_strides, seed) for clay in self.walking for seed in seeds]
+        walks = [(setup, clay) for setup, muds in self._walks() for clay in muds]
+        walking = [Part(setup, (clay,), self.walking_strides, seed) for setup, clay in walks for seed in seeds]
         return (transitions if len(self.walking) > 1 else []) + single + walking
+
+    def _walks(self) -> tuple[tuple[Setup, tuple[Clay, ...]], ...]:
+        return (WALKING, self.walking), (MEASURING_WALK, self.measuring)
 
 
 class Part(NamedTuple):
@@ -164,6 +169,7 @@ class Settings:
     seeds: int
     single_strength_pa: Mapping[str, float]
     walking_strength_pa: Mapping[str, float]
+    measuring_strength_pa: Mapping[str, float]
     disturbances: Mapping[str, float]
     repeats: bool
     torque_error: float
@@ -188,6 +194,7 @@ def report_of(plan: Plan, outcome: Outcome) -> EstimationReport:
             seeds=plan.seeds,
             single_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.single},
             walking_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.walking},
+            measuring_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.measuring},
             disturbances=asdict(plan.disturbances),
             repeats=plan.repeats,
             torque_error=TORQUE_ERROR if plan.torque else 0.0,

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from control.controller import WalkOrder
-from control.gait.gait import SINGLE_FLIPPER
+from control.gait.gait import MEASURING, SINGLE_FLIPPER
 from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.gait_parameters import GaitParameters
@@ -47,6 +47,7 @@ class Setup:
 # The authors' logs hold 50 to 110 distinct states a second of a single flipper, up to 210 of the walking robot.
 SINGLE = Setup("single flipper", SINGLE_FLIPPER, fixed_base=True, row_period_s=1.0 / 100.0)
 WALKING = Setup("walking", GaitParameters(), fixed_base=False, row_period_s=1.0 / 200.0)
+MEASURING_WALK = replace(WALKING, name="measuring walk", gait=MEASURING)
 
 
 @dataclass(frozen=True)

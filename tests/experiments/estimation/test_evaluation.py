@@ -28,13 +28,13 @@ from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, 
 from experiments.reports.report_page import to_json
 from experiments.trials.latency import LATENCY_S
 from experiments.trials.parallel_trials import LocalWorkers
-from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING, Setup
+from experiments.trials.trial import MEASURING_WALK, SINGLE, TORQUE_ERROR, WALKING, Setup
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances
 from simulation.mud.track import Track
 
 STRONG = clay_of_water(47.6)
-SHORT = Plan(single=(STRONG,), walking=(STRONG,), seeds=1, single_strides=1, walking_strides=2)
+SHORT = Plan(single=(STRONG,), walking=(STRONG,), measuring=(), seeds=1, single_strides=1, walking_strides=2)
 
 
 @cache
@@ -83,10 +83,11 @@ def test_the_plan_is_every_mud_and_seed_and_a_walk_over_borders_for_each_seed() 
     assert parts[: len(transitions)] == transitions  # the longest parts first
     assert parts[0].muds == parts[1].muds[::-1]
     assert [(p.setup, p.seed, p.strides) for p in transitions] == [(WALKING, seed, 24) for seed in (1, 2, 3)]
-    for setup, muds, strides in ((SINGLE, plan.single, 2), (WALKING, plan.walking, 8)):
+    setups = ((SINGLE, plan.single, 2), (WALKING, plan.walking, 8), (MEASURING_WALK, plan.measuring, 8))
+    for setup, muds, strides in setups:
         reported = {(p.muds[0], p.seed) for p in alone if p.setup == setup and p.strides == strides}
         assert reported == {(mud, seed) for mud in muds for seed in (1, 2, 3)}
-    assert len(alone) == 3 * (5 + 3)
+    assert len(alone) == 3 * (5 + 3 + 3)
 
 
 def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> None:

@@ -99,7 +99,7 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("[drive.right_sweep]", "[drive.right_swep]", [
         "drive.right_sweep is missing: ", "drive.right_swep: there is no such joint"
     ]),
-    ('"walking"', '"galloping"', ["gait.protocol = 'galloping': must be one of walking, single_flipper"]),
+    ('"walking"', '"galloping"', ["gait.protocol = 'galloping': must be one of walking, measuring, single_flipper"]),
     ('name = "mudskipper"', 'name = "../../x"', ["robot.name = '../../x': must be 1 to 64"]),
     ('name = "mudskipper"', 'name = ""', ["robot.name = '': must be 1 to 64"]),
     (SOCKET, "a\\u0000b", ["status.socket = 'a\\x00b': must be at most 97 bytes"]),
