@@ -121,6 +121,17 @@ def rows_of(setup: str, coefficient: str, evaluated: Sequence[Evaluation]) -> di
     return {row.method: row for row in rows if (row.setup, row.coefficient) == (setup, coefficient)}
 
 
+def test_the_measuring_walk_finds_k_e_where_the_quick_one_finds_too_little() -> None:
+    """Without disturbances, in mud of 49.5 %: right after a stance an extraction pulls less."""
+    muds = (clay_of_water(49.5),)
+    plan = with_layers(Plan(single=(), walking=muds, measuring=muds, seeds=1, walking_strides=2), ())
+    evaluations = evaluate(plan, lambda done, total: None, LocalWorkers(1)).evaluated
+    quick, measuring = (rows_of(setup, "k_e", evaluations)["default"] for setup in ("walking", "measuring walk"))
+    assert quick.bias is not None and measuring.bias is not None
+    assert quick.bias < -0.08
+    assert abs(measuring.bias) < 0.06
+
+
 @pytest.mark.parametrize(
     ("setup", "coefficient"),
     [
