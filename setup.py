@@ -1,4 +1,4 @@
-"""Compiles the modules of a tick with mypyc where MUDSKIPPER_COMPILED=1 asks for it.
+"""Compiles the modules of a tick and of the simulator's step with mypyc where MUDSKIPPER_COMPILED=1 asks for it.
 
 `tool.mudskipper.compiled` in pyproject.toml lists these modules; all other metadata is there too. Both forms give the
 same digits, so the C compiler must not fuse a product and a sum into one operation with one rounding, as it otherwise

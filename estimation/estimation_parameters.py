@@ -17,6 +17,8 @@ class PaperEstimationParameters:
 
 @dataclass(frozen=True)
 class EstimationParameters:
+    """The method, and what is known of the base and of the height of the mud."""
+
     method: Annotated[Method, Meaning("default regresses in torque space; paper is the published method")] = "default"
     fixed_base: Annotated[bool, Meaning("the flippers hang from a bench: all their travel shears mud")] = False
     surface_error_m: Annotated[

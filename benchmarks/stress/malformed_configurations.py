@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 from benchmarks.example_robot import EXAMPLE
 from control.bounds import Bounds
+from control.gait.gait import PROTOCOLS
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import RecordReader
 from simulation.body.plant_parameters import PlantParameters
@@ -102,7 +103,7 @@ class Draft:
         self._document = tomllib.loads(self._text)
         self._parameters = self.parameters[self._text]
         if "protocol" in self._document.get("gait", {}):
-            self._document["gait"]["protocol"] = chance.choice(("walking", "single_flipper"))
+            self._document["gait"]["protocol"] = chance.choice(tuple(PROTOCOLS))
         self.wrong_key = self.bound = ""
 
     def _set(self, path: KeyPath, value: Any) -> str:

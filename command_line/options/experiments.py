@@ -46,7 +46,7 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
         "--setup",
         choices=("single", "walking", "measuring", "all"),
         default="all",
-        help="one flipper on a fixed base, the walking robot, its gait for measuring, or all (default: %(default)s)",
+        help="one flipper on a fixed base, the gait `walking`, the gait `measuring`, or all (default: %(default)s)",
     )
     estimation.add_argument("--seeds", type=SEEDS, default=10, metavar="N", help="trials of each mud (default: 10)")
     muds = estimation.add_mutually_exclusive_group()

@@ -16,13 +16,13 @@ from control.records import GaitTarget, Phase
 
 RAMP_S = 0.05  # to reach full speed: half the authors' 0.1 s acceleration time, for each end of a phase
 
-
 # Section II-B of the paper's experiments with a fixed base: slow everywhere, the mud relaxes between phases.
 SINGLE_FLIPPER = GaitParameters(
     stance_speed_m_s=0.1, extraction_speed_m_s=0.1, swing_speed_m_s=0.1, swing_duration_s=0.0, pause_s=3.0
 )
-# A walk that measures k_e. A quick extraction of 85 ms accelerates the arm with more torque than the mud takes, and an
-# extraction right after the stance, of which the sweep may still catch up a part, pulls less at first (accuracy.md).
+# A walk that measures k_e. The quick extraction of `walking` (89 ms at 3 cm) spends more torque on accelerating the arm
+# than on the mud. Right after a stance the sweep lags and catches up in the extraction, which takes less torque at
+# first (docs/explanation/accuracy.md).
 MEASURING = GaitParameters(extraction_speed_m_s=0.2, pause_s=0.5)
 PROTOCOLS = {"walking": GaitParameters(), "measuring": MEASURING, "single_flipper": SINGLE_FLIPPER}
 

@@ -1,4 +1,4 @@
-"""How the next stride's depth is chosen: the method, its bounds, and the body (control/depth/depth_choice.py)."""
+"""How the next stride's depth is chosen, and with the method `gait` its sweep (control/depth/depth_choice.py)."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -26,6 +26,8 @@ class GaitAdaptationParameters:
 
 @dataclass(frozen=True)
 class AdaptationParameters:
+    """The method, the depths that it may choose, and the body and motors that it predicts with."""
+
     method: Annotated[Method, Meaning("how the next stride is chosen: depth, the paper's rule, or depth and gait")] = (
         "default"
     )

@@ -8,6 +8,8 @@ from control.bounds import Bounds, Meaning
 
 @dataclass(frozen=True)
 class RecoveryParameters:
+    """The attempts to free a flipper that is stuck, and their motion."""
+
     attempts: Annotated[
         int,
         Bounds(0, 20),

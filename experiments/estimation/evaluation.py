@@ -1,9 +1,9 @@
 """The accuracy of the mud coefficients: estimates against a virtual load cell, over muds, trials and methods.
 
 After the paper's sections III-B and III-C: a single flipper on a fixed base through five muds, the walking robot
-through three muds and over their borders, and once more through the three with its gait for measuring, in the
-simulator's clay with the disturbances of the authors' logs. Each trial is simulated once, and every method estimates
-from the same samples. The fields of the report are the keys of the summary in JSON.
+through three muds and over their borders, and through the same three with the protocol `measuring`, in the simulator's
+clay with the disturbances of the authors' logs. Each trial is simulated once, and every method estimates from the same
+samples. The fields of the report are the keys of the summary in JSON.
 """
 
 from __future__ import annotations

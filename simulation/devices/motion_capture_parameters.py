@@ -8,6 +8,8 @@ from control.bounds import Bounds
 
 @dataclass(frozen=True)
 class MotionCaptureParameters:
+    """Motion capture of the body's position; a rate of 0 gives every reader a frame of that time."""
+
     rate_hz: Annotated[float, Bounds(0.0, 1000.0)] = 0.0
     noise_m: Annotated[float, Bounds(0.0, 0.1)] = 1e-4  # standard deviation, at the scale of this track
     latency_s: Annotated[float, Bounds(0.0, 1.0)] = 0.0

@@ -124,7 +124,7 @@ def test_loop_jitter() -> None:
 
 
 def test_fast_loop() -> None:
-    """The daemon walks at each rate, and keeps it as well as a test beside others can tell."""
+    """The daemon walks at each rate, within the wide bounds that a shared machine allows."""
     report = report_of("fast_loop", "--seconds", "0.5")
     for rate_hz in (1000, 4000):
         turn = report[f"{rate_hz}"]

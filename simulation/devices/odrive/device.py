@@ -300,7 +300,7 @@ class SimulatedOdrive:
         return codec.encode_address(self.parameters.node_id, int(self.parameters.serial_number or "0", 16))
 
     def _payload_functions(self) -> dict[Message, Callable[[], bytes]]:
-        """Returns what encodes each message that this firmware sends."""
+        """Returns the encoder of each message that this firmware sends."""
         return {
             codec.GET_ENCODER_ESTIMATES: self._encoder,
             codec.GET_IQ: self._iq,
