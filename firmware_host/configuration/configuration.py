@@ -132,7 +132,7 @@ class Configuration:
     failures: FailureParameters = FailureParameters()
     watchdog_endpoints: list[WatchdogEndpoints] = field(default_factory=list)  # of more firmware builds
     text: str = ""  # the file itself, which goes into every log
-    warnings: tuple[str, ...] = ()  # about keys that the file gives under their former names
+    warnings: tuple[str, ...] = ()  # about former names of keys, and about a gait that measures badly
 
     @property
     def torque_constants_nm_a(self) -> Joints[float]:

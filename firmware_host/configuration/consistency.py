@@ -19,6 +19,7 @@ from control.joint_pd import (
     largest_stiffness_nm_rad,
     phase_margin_rad,
 )
+from control.parameters.gait_parameters import GaitParameters
 from control.plate.outline import outline_problems
 from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
 from firmware_host.configuration.configuration import Configuration, PoseParameters
@@ -28,6 +29,7 @@ from firmware_host.configuration.toml_records import shown
 LONGEST_INTERFACE = 15  # IFNAMSIZ with its final zero
 LONGEST_SOCKET_PATH = 107  # sun_path of unix(7) has 108 bytes with its final zero
 LONGEST_STATUS_PATH = 97  # the operators' own socket next to it has a name with 10 bytes more
+LEAST_PAUSE_S = 0.2  # after which a slow extraction measures k_e in simulation (docs/explanation/accuracy.md)
 ROUNDING = 1e-6  # relative error of a number that a file gives with few digits
 ORDERED = (  # pairs of keys, the first of which must be at most the second
     ("faults.late_s", "faults.quiet_s"),  # milder reactions come first
@@ -55,6 +57,16 @@ def contradictions(configuration: Configuration) -> Iterator[str]:
     yield from _gain_problems(configuration)
     yield from _order_problems(configuration)
     yield from _winding_problems(configuration)
+
+
+def gait_warnings(gait: GaitParameters) -> list[str]:
+    """Return a warning for a gait that is slow enough to measure k_e, but extracts right after its stance."""
+    quick_m_s = GaitParameters().extraction_speed_m_s
+    if gait.pause_s >= LEAST_PAUSE_S or gait.extraction_speed_m_s >= quick_m_s:
+        return []
+    values = f"gait.pause_s = {gait.pause_s:g} with gait.extraction_speed_m_s = {gait.extraction_speed_m_s:g}"
+    reason = "right after a stance a slow extraction gives a k_e that is too small by more than its standard error"
+    return [f'{values}: {reason}; pause for {LEAST_PAUSE_S:g} s or more, as gait.protocol = "measuring" does']
 
 
 def _text_problems(configuration: Configuration) -> Iterator[str]:

@@ -12,7 +12,7 @@ from control.gait.gait import PROTOCOLS
 from drivers.drive import DriveParameters
 from drivers.drive_types import DEFAULT, DRIVE_TYPES
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.configuration.consistency import contradictions
+from firmware_host.configuration.consistency import contradictions, gait_warnings
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.toml_records import (
     OneOf,
@@ -58,6 +58,7 @@ def read_configuration(document: dict[str, Any], text: str = "") -> Configuratio
     _require_known_types(document)
     _require_one_shape(document)
     fields = _READER.read(document)
+    warnings += gait_warnings(fields["gait"])
     configuration = Configuration(**fields, text=text, warnings=tuple(warnings))
     problems = list(contradictions(configuration))
     if problems:
