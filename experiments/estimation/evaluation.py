@@ -192,12 +192,16 @@ def report_of(plan: Plan, outcome: Outcome) -> EstimationReport:
         boundaries=boundary_rows(outcome.transitions),
         settings=Settings(
             seeds=plan.seeds,
-            single_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.single},
-            walking_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.walking},
-            measuring_strength_pa={clay.name: round(clay.strength_pa, 1) for clay in plan.measuring},
+            single_strength_pa=_strengths_pa(plan.single),
+            walking_strength_pa=_strengths_pa(plan.walking),
+            measuring_strength_pa=_strengths_pa(plan.measuring),
             disturbances=asdict(plan.disturbances),
             repeats=plan.repeats,
             torque_error=TORQUE_ERROR if plan.torque else 0.0,
             latency_s=LATENCY_S if plan.latency else 0.0,
         ),
     )
+
+
+def _strengths_pa(muds: Sequence[Clay]) -> dict[str, float]:
+    return {clay.name: round(clay.strength_pa, 1) for clay in muds}
