@@ -20,7 +20,7 @@ from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import Rows, number, table
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.parallel_trials import Workers, run_parallel
-from experiments.trials.program import program_text
+from experiments.trials.provenance import identity, program_text
 from experiments.trials.session import Finding, Session, Show
 from firmware_host.catalogue.entry import TRIALS
 from firmware_host.operator.counted_nouns import counted
@@ -56,8 +56,8 @@ class CampaignReport:
 
 def run_campaign(campaign: Campaign, session: Session, workers: Workers | None = None) -> Finding:
     """Raises NotebookError, WorkersError, OSError."""
-    identity = {"experiment": "campaign", "program": program_text()} | campaign.identity
-    notebook = Notebook(session.folder, _flat(identity))
+    plan = {"experiment": "campaign"} | identity(__name__) | campaign.identity
+    notebook = Notebook(session.folder, _flat(plan))
     try:
         _run_trials(campaign.trials, notebook, session.show, workers)
     finally:
@@ -108,7 +108,7 @@ def _report(campaign: Campaign, entries: Mapping[str, Entry]) -> CampaignReport:
         campaign=campaign.name,
         trials=len(campaign.trials),
         seeds=campaign.seeds,
-        program=program_text(),
+        program=program_text(identity(__name__)),
         results=TRIALS,
         points=[_point_result(*each) for each in zip(campaign.points, by_point, strict=True)],
     )

@@ -273,9 +273,9 @@ def test_a_changed_file_and_a_changed_program_are_refused_in_the_same_folder(
     assert command(text=SHORT.replace("3000.0", "2000.0")) == exit_codes.REFUSED
     said = capsys.readouterr().err
     assert "strength_pa = [1000.0, 3000.0]" in said and "strength_pa = [1000.0, 2000.0]" in said and "--out" in said
-    monkeypatch.setattr(campaign_module, "program_text", lambda: "mudskipper 9")
+    monkeypatch.setattr(campaign_module, "identity", lambda _: {"version": "9"})
     assert command() == exit_codes.REFUSED
-    assert "program = mudskipper 9" in capsys.readouterr().err
+    assert "version = 9" in capsys.readouterr().err
 
 
 def test_a_robot_that_does_not_start_is_a_row_with_its_reason(tmp_path: Path) -> None:
