@@ -27,7 +27,10 @@ def estimation(options: argparse.Namespace) -> int:
     except ValueError as problem:
         return refuse(str(problem))
     return conduct(
-        options, "trials", lambda show: estimation_finding(report_of(plan, evaluate(plan, show, workers_of(options))))
+        options,
+        "trials",
+        lambda show: estimation_finding(report_of(plan, evaluate(plan, show, workers_of(options)))),
+        evaluate.__module__,
     )
 
 

@@ -44,7 +44,7 @@ def identity(*modules: str) -> Record:
 
 def program_text(record: Mapping[str, str]) -> str:
     """Return version and digest of a record, such as "mudskipper 0.2.0 (sources 0f3a…)"."""
-    return f"{PACKAGE} {record.get('version', 'before 0.3')} (sources {record.get('sources', 'unknown')})"
+    return f"{PACKAGE} {record.get('version', 'of an unknown version')} (sources {record.get('sources', 'unknown')})"
 
 
 @cache
