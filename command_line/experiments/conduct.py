@@ -28,19 +28,10 @@ from firmware_host.configuration.file_problems import ConfigurationError, why_no
 from firmware_host.operator.status_client import CallRefusedError
 
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
-NO_INPUT = {
-    "version",
-    "print_completion",
-    "command",
-    "name",
-    "function",
-    "json",
-    "out",
-    "restart",
-    "workers",
-    "cluster",
+NO_INPUT = {  # options on which no result depends
+    "version", "print_completion", "command", "name", "function", "json", "out", "restart", "workers", "cluster",
     "socket",
-}  # options on which no result depends
+}  # fmt: skip
 Result = TypeVar("Result")
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from command_line.experiments.conduct import conduct, refuse
 from command_line.experiments.workers import workers_of
+from experiments.estimation import evaluation
 from experiments.estimation.evaluation import (
     LAYERS,
     SINGLE_WATERS,
@@ -30,7 +31,7 @@ def estimation(options: argparse.Namespace) -> int:
         options,
         "trials",
         lambda show: estimation_finding(report_of(plan, evaluate(plan, show, workers_of(options)))),
-        evaluate.__module__,
+        evaluation.__name__,
     )
 
 
