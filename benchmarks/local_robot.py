@@ -77,6 +77,14 @@ class LocalRobot:
         finally:
             client.close()
 
+    def require_walk(self, rate_hz: float = RATE_HZ) -> None:
+        """Arms and walks into the first stance. Ends the benchmark with a sentence where the robot does not."""
+        if not self.walk_until("stance"):
+            fault = self.call("status")["fault"] or {"name": "", "message": "no walk begins"}
+            is_slow = fault["name"].startswith("loop_")
+            why = "this machine is too slow for" if is_slow else "the simulated robot does not walk at"
+            raise SystemExit(f"{why} {rate_hz:g} Hz: {fault['message']}")
+
     def walk_until(self, phase: str) -> bool:
         """Arms and walks; returns whether this phase, or `hold` before the walk, was reached without a fault."""
         if not self._reaches("idle"):

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 FAST_FOLDER = Path("/dev/shm")  # spares the disk
-MAY_BE_ZERO = ("seed", "first")  # the other numbers are durations, counts and factors
+MAY_BE_ZERO = ("seed", "first", "rate_hz")  # the other numbers are durations, counts and factors
 
 
 def run_benchmark(measure: Callable[..., dict[str, Any]], arguments: Sequence[str] | None = None) -> int:

@@ -53,10 +53,9 @@ def time_bare_loop(seconds: float, period_s: float = PERIOD_S) -> Report:
 
 
 def time_daemon(robot: LocalRobot, seconds: float, rate_hz: float = RATE_HZ) -> Report:
-    """Returns the daemon's status after that time of walking. Raises RuntimeError where the robot does not walk."""
+    """Returns the daemon's status after that time of walking."""
     daemon = robot.start_daemon(rate_hz)
-    if not robot.walk_until("stance"):
-        raise RuntimeError(f"the simulated robot does not walk: {robot.call('status')['fault']}")
+    robot.require_walk(rate_hz)
     robot.call("reset_timing")
     time.sleep(seconds)
     report: Report = robot.call("status")

@@ -60,8 +60,7 @@ def measure(folder: Path, *, seconds: float = 10.0, pairs: int = 8) -> dict[str,
     without, with_viewers = [], []
     try:
         robot.start_daemon()
-        if not robot.walk_until("stance"):
-            raise RuntimeError(f"the simulated robot does not walk: {robot.call('status')['fault']}")
+        robot.require_walk()
         for number in range(pairs):
             show_progress(number, pairs, "without viewers")
             without.append(time_turn(robot, seconds))

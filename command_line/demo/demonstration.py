@@ -23,8 +23,8 @@ from simulation.harness.world import load_world
 from simulation.mud.track import Track, paper_track
 
 LONGEST_WALK_S = 60.0
-START_TIMEOUT_S = 20.0
-MODE_TIMEOUT_S = 10.0
+START_TIMEOUT_S = 60.0  # of a slow or busy computer
+MODE_TIMEOUT_S = 30.0
 END_TIMEOUT_S = 15.0  # of one process, which is killed then
 POLL_S = 0.05
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

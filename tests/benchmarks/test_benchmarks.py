@@ -17,6 +17,7 @@ import pytest
 
 from benchmarks.behaviour import differences
 from benchmarks.example_robot import load_example
+from benchmarks.local_robot import LocalRobot
 from benchmarks.report import run_benchmark, show_progress, summary_us
 from benchmarks.speed import (
     campaign_speed,
@@ -26,6 +27,7 @@ from benchmarks.speed import (
     tick_time,
     viewers_cost,
 )
+from benchmarks.speed.loop_jitter import time_daemon
 from benchmarks.speed.paced_loops import LOOPS
 from benchmarks.stress import log_kills
 from benchmarks.stress.harmless_frames import is_harmless
@@ -40,7 +42,7 @@ from drivers.moteus import registers, settings
 from firmware_host.log.recorder import NullRecorder
 from tests.folders import ROOT
 
-TIMEOUT_S = 240.0  # on a machine that others keep busy
+TIMEOUT_S = 900.0  # on a machine that others keep busy
 ALWAYS = {"benchmark", "reached", "verdict"}
 FOLDERS = {
     "speed": ("tick_time", "loop_jitter", "fast_loop", "lockstep_speed", "viewers_cost"),
@@ -124,14 +126,38 @@ def test_loop_jitter() -> None:
 
 
 def test_fast_loop() -> None:
-    """The daemon walks at each rate, within the wide bounds that a shared machine allows."""
-    report = report_of("fast_loop", "--seconds", "0.5")
-    for rate_hz in (1000, 4000):
-        turn = report[f"{rate_hz}"]
-        for loop in (turn["loop"], turn["bare"]):
-            assert 0.25 * rate_hz < loop["ticks"] + loop["missed_ticks"] < 1.5 * rate_hz
-            assert 0.0 <= loop["missed_fraction"] <= 1.0
-    assert report.keys() >= {"compiled", "turn_s", "warnings"}
+    """The daemon walks at a rate that any machine holds; how many ticks it misses is not asserted."""
+    report = report_of("fast_loop", "--seconds", "0.5", "--rate-hz", "400")
+    assert report.keys() >= {"400", "compiled", "turn_s", "warnings"} and "4000" not in report
+    for loop in (report["400"]["loop"], report["400"]["bare"]):
+        assert loop["ticks"] > 0 and 0.0 <= loop["missed_fraction"] <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "sentence"),
+    [
+        ("loop_lagging", "this machine is too slow for 4000 Hz: its ticks take 150 % too long"),
+        ("drive_silent", "the simulated robot does not walk at 4000 Hz: its ticks take 150 % too long"),
+    ],
+)
+def test_a_walk_that_does_not_begin_ends_a_benchmark_with_a_sentence(fault: str, sentence: str) -> None:
+    class SlowRobot(LocalRobot):
+        """A robot whose loop does not reach its rate."""
+
+        def __init__(self) -> None:
+            return
+
+        def start_daemon(self, rate_hz: float = 0.0) -> Any:
+            return None
+
+        def walk_until(self, phase: str) -> bool:
+            return False
+
+        def call(self, method: str, **params: Any) -> Any:
+            return {"fault": {"name": fault, "message": "its ticks take 150 % too long"}}
+
+    with pytest.raises(SystemExit, match=f"^{sentence}$"):
+        time_daemon(SlowRobot(), 0.5, 4000.0)
 
 
 def test_viewers_cost(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

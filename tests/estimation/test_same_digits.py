@@ -16,6 +16,7 @@ import pytest
 from control.computing.exact_sum import exact_sum
 from tests.estimation.coefficient_digits import coefficient_digits
 from tests.folders import ROOT
+from tests.waiting import LONGEST_S
 
 OTHER_VERSIONS = [f"python3.{minor}" for minor in range(11, 16) if minor != sys.version_info.minor]
 
@@ -25,7 +26,7 @@ def test_another_python_computes_the_same_digits(version: str) -> None:
     command = [shutil.which(version) or "", "-m", "tests.estimation.coefficient_digits"]
     if not command[0] or subprocess.run([command[0], "-c", ""], capture_output=True, check=False).returncode:
         pytest.skip(f"no {version} on this computer")
-    other = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=120)
+    other = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=LONGEST_S)
     assert json.loads(other.stdout) == coefficient_digits()
 
 

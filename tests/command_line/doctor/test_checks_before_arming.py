@@ -8,11 +8,13 @@ from dataclasses import replace
 
 import pytest
 
+from command_line.doctor import doctor
 from command_line.doctor.doctor import _pose_items
 from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
+from tests.waiting import LONGEST_S
 
 
 def with_pose(configuration: Configuration, pose: PoseParameters) -> Configuration:
@@ -30,7 +32,7 @@ def test_a_source_that_does_not_open_fails(configuration: Configuration) -> None
     assert not item["ok"] and "/dev/nothing does not open" in item["text"] and item["fix"]
 
 
-def test_motion_capture_is_received(configuration: Configuration) -> None:
+def test_motion_capture_is_received(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
     with NatNetServer() as server:
         natnet = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
         looked_at = with_pose(configuration, PoseParameters("natnet", natnet=natnet))
@@ -46,6 +48,7 @@ def test_motion_capture_is_received(configuration: Configuration) -> None:
 
         streaming = threading.Thread(target=stream)
         streaming.start()
+        monkeypatch.setattr(doctor, "LISTENING_S", LONGEST_S)  # a pose ends it
         (item,) = _pose_items(looked_at)
         ended.set()
         streaming.join()

@@ -13,7 +13,7 @@ import pytest
 from command_line import exit_codes
 from command_line.live.page_server import stop_robot
 from command_line.operation import confirmation, operation
-from command_line.operation.confirmation import LONGEST_S, TORQUE_UNKNOWN, unconfirmed_drives
+from command_line.operation.confirmation import TORQUE_UNKNOWN, unconfirmed_drives
 from command_line.operation.confirmed_stop import end_motion
 from command_line.watch.orders import send_order
 from control.records import JOINTS
@@ -68,12 +68,24 @@ class Robot:
         return
 
 
+class Clock:
+    """A clock on which only waiting takes time."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+
 @pytest.fixture(autouse=True)
 def robot(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (operation, confirmation):
         monkeypatch.setattr(module, "StatusClient", Robot)
-    monkeypatch.setattr(confirmation, "CONFIRMING_S", 0.15)
-    monkeypatch.setattr(confirmation, "LONGEST_S", dict.fromkeys(LONGEST_S, 0.15))
+    monkeypatch.setattr(confirmation, "time", Clock())
 
 
 @pytest.mark.parametrize("command", ["stop", "disarm"])

@@ -12,6 +12,7 @@ import pytest
 from textual.pilot import Pilot
 
 from command_line import exit_codes
+from command_line.operation import confirmation
 from command_line.watch.feed import Feed
 from command_line.watch.lines import plain_text
 from command_line.watch.orders import send_order
@@ -64,9 +65,16 @@ def test_it_shows_a_robot_that_walks(walked: ServedRobot, short_folder: Path) ->
 @pytest.mark.parametrize(("key", "modes"), [("space", {Mode.STOPPING, Mode.HOLD}), ("d", {Mode.IDLE})])
 @pytest.mark.parametrize("before", [(), ("c",), ("question_mark",)], ids=["alone", "asked", "help"])
 def test_stop_and_disarm_act_at_once(
-    walked: ServedRobot, short_folder: Path, key: str, modes: set[Mode], before: tuple[str, ...]
+    walked: ServedRobot,
+    short_folder: Path,
+    key: str,
+    modes: set[Mode],
+    before: tuple[str, ...],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """They act also while a question is open or the help is shown."""
+    monkeypatch.setattr(confirmation, "CONFIRMING_S", LONGEST_S)  # this robot is as slow as the machine
+    monkeypatch.setattr(confirmation, "LONGEST_S", dict.fromkeys(confirmation.LONGEST_S, LONGEST_S))
 
     async def script(app: WatchApp, pilot: Pilot[int]) -> None:
         await pilot.press(*before, key)

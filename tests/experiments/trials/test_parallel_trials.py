@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.trials.parallel_trials import LocalWorkers, WorkersError, run_parallel
+from tests.waiting import wait_until
 
 
 def late(seconds: float) -> float:
@@ -52,10 +53,18 @@ def test_an_exception_of_a_trial_reaches_the_caller() -> None:
         run_parallel([partial(broken), partial(late, 0.0)], ignore, LocalWorkers(1))
 
 
-def test_a_long_trial_is_looked_at_meanwhile() -> None:
-    looks: list[float] = []
-    run_parallel([partial(late, 1.2)], ignore, LocalWorkers(1, lambda: looks.append(time.monotonic())))
-    assert len(looks) >= 3  # two while it ran, one at its end
+def test_a_long_trial_is_looked_at_meanwhile(tmp_path: Path) -> None:
+    """The trial ends only after it was looked at twice."""
+    looks = [tmp_path / "first", tmp_path / "second"]
+    run_parallel([partial(wait_for_file, looks[1])], ignore, LocalWorkers(1, lambda: next_missing(looks).touch()))
+
+
+def next_missing(paths: list[Path]) -> Path:
+    return next((path for path in paths if not path.exists()), paths[-1])
+
+
+def wait_for_file(path: Path) -> None:
+    wait_until(path.exists)
 
 
 def test_the_trials_of_a_lost_worker_are_repeated(tmp_path: Path) -> None:

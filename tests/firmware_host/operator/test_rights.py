@@ -15,6 +15,7 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.operator.rights import Peer, read_peer
 from firmware_host.operator.socket_methods import Level
 from firmware_host.user_groups import load_rights
+from tests.waiting import LONGEST_S
 
 ANY_GROUP = grp.getgrall()[-1]
 NOBODY = 65534
@@ -24,7 +25,7 @@ NOBODY = 65534
 def listener(short_folder: Path) -> Iterator[socket.socket]:
     short_folder.chmod(0o755)
     with socket.socket(socket.AF_UNIX) as listener:
-        listener.settimeout(10.0)
+        listener.settimeout(LONGEST_S)
         listener.bind(str(short_folder / "s"))
         (short_folder / "s").chmod(0o666)
         listener.listen()
