@@ -29,7 +29,7 @@ from experiments.trials.notebook import Notebook
 from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.mud.clay import MUDS, Clay
-from simulation.mud.disturbances import LAB
+from simulation.mud.disturbances import TRACKWAY
 from simulation.mud.track import COMPARTMENT_M, Track
 
 STUCK_S = 90.0  # longest walking time in one mud
@@ -101,7 +101,7 @@ class Plan:
             strength_pa={clay.name: clay.strength_pa for clay in self.muds},
             constant_strides=CONSTANT_STRIDES,
             constant_seeds=self.constant_seeds,
-            disturbances=asdict(LAB),
+            disturbances=asdict(TRACKWAY),
         )
 
 
