@@ -2,8 +2,8 @@
 
 `record DIR` writes the replay of every measured log by each method, Table I by trial, the fault matrix, the other
 simulated experiments, the rows that a lockstep walk logs, and the socket's answers during that walk. All of it is
-deterministic, so `compare OLD NEW` accepts no difference in any digit. A name that changed on purpose is given as
-`--renamed OLD=NEW`, a value that must differ (the version, say) as `--ignore NAME`.
+deterministic, so `compare OLD NEW` accepts no difference in any digit but those of `provenance`, the version and its
+sources. A name that changed on purpose is given as `--renamed OLD=NEW`, a value that must differ as `--ignore NAME`.
 
     python -m benchmarks.behaviour record /tmp/new
     python -m benchmarks.behaviour compare /tmp/old /tmp/new --renamed place_m=position_m
@@ -194,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.action == "record":
         return record(options.folder, options.data, options.only)
     names = dict(pair.split("=", 1) for pair in options.renamed)
-    return compare(options.old, options.new, names, frozenset(options.ignore))
+    return compare(options.old, options.new, names, frozenset({"provenance", *options.ignore}))
 
 
 if __name__ == "__main__":

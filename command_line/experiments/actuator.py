@@ -26,4 +26,6 @@ def run_actuator(options: argparse.Namespace) -> int:
         )
 
     order = Order(plan, apply=options.apply, configuration=options.config, seed=options.seed)
-    return conduct_bench(options, "readings", lambda session: calibrate(session, order, Path(DEFAULT_CONFIG)))
+    return conduct_bench(
+        options, "readings", lambda session: calibrate(session, order, Path(DEFAULT_CONFIG)), calibrate.__module__
+    )

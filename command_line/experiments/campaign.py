@@ -1,7 +1,6 @@
 """`mudskipper experiment campaign`: many simulated walks, which the same command continues."""
 
 import argparse
-from pathlib import Path
 
 from command_line import exit_codes
 from command_line.experiments.conduct import conduct_bench
@@ -18,7 +17,11 @@ def campaign(options: argparse.Namespace) -> int:
     except ConfigurationError as problem:  # before a folder is made
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
-    options.out = options.out or Path(f"mudskipper-{loaded.name}")
     return conduct_bench(
-        options, "walks", lambda session: run_campaign(loaded, session, workers_of(options)), needs="pyarrow"
+        options,
+        "walks",
+        lambda session: run_campaign(loaded, session, workers_of(options)),
+        run_campaign.__module__,
+        folder_name=loaded.name,
+        needs="pyarrow",
     )

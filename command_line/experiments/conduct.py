@@ -1,14 +1,13 @@
 """Runs an experiment from the command line: folder, progress and prompts before it, report and exit status after it.
 
 An interrupted experiment stops its robot first. Its folder holds the trials that it measured, and the same command
-continues from there.
+continues from there. Every report carries what computed it.
 """
 
 import argparse
 import json
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,25 +16,22 @@ from command_line import exit_codes
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from command_line.json_output import print_value, with_schema
 from command_line.screen import Progress, complain
-from experiments.reports.report_page import SUMMARY, to_json, write_report
+from experiments.reports.report_page import PAGE, to_json, write_report
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
 from experiments.robot.prompt import AutomaticOperator
-from experiments.trials.notebook import Notebook, NotebookError, anything_measured
+from experiments.trials.notebook import NotebookError, count_entries, plan_in
 from experiments.trials.parallel_trials import WorkersError
+from experiments.trials.provenance import identity, provenance
+from experiments.trials.results_folder import make_folder, remove_unused, require_unfinished, set_aside
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.operator.status_client import CallRefusedError
 
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
-NOT_COMPARED = (
-    "command",
-    "name",
-    "function",
-    "json",
-    "out",
-    "workers",
-    "cluster",
-)  # of the options of a computed experiment
+NO_INPUT = {  # options on which no result depends
+    "version", "print_completion", "command", "name", "function", "json", "out", "restart", "workers", "cluster",
+    "socket",
+}  # fmt: skip
 Result = TypeVar("Result")
 
 
@@ -44,10 +40,14 @@ def refuse(message: str) -> int:
     return exit_codes.USAGE
 
 
-def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Finding]) -> int:
-    """Run a computed experiment, which writes files only with --out. `unit` names what the progress bar counts."""
+def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Finding], *modules: str) -> int:
+    """Run a computed experiment, which writes files only with --out. `unit` names what the progress bar counts.
+
+    `modules` compute the report.
+    """
+    identity(*modules)  # reads the sources before minutes of work, in which they may change
     try:
-        notebook = _notebook_of_options(options) if options.out else None  # refused before minutes of work
+        folder = _open_folder(options, continues=False) if options.out else None
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
@@ -56,60 +56,81 @@ def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Findin
     except WorkersError as problem:
         complain(str(problem))
         return exit_codes.UNHEALTHY
-    report = with_schema(f"experiment-{options.name}", to_json(finding.report))
-    if notebook is not None:
-        _print_written(write_report(options.out, report, finding.title, finding.sections))
-        notebook.write("report", {"title": finding.title})
+    record = provenance(*modules) | {"options": _typed(options)}
+    report = with_schema(f"experiment-{options.name}", to_json(finding.report) | {"provenance": record})
+    if folder is not None:
+        _print_written(write_report(folder, report, finding.title, finding.sections))
     _print_finding(report, finding, options.json)
     return EXIT_STATUS[finding.ending]
 
 
 def conduct_bench(
-    options: argparse.Namespace, unit: str, run: Callable[[Session], Finding], needs: str = "matplotlib"
+    options: argparse.Namespace,
+    unit: str,
+    run: Callable[[Session], Finding],
+    *modules: str,
+    folder_name: str = "",
+    needs: str = "matplotlib",
 ) -> int:
     """Run an experiment that has a folder and an operator. `run` leaves the robot at rest, however it ends.
 
-    `needs` is the module of an extra that writes the results.
+    `modules` compute the report. `needs` is the module of an extra that writes the results.
     """
     if find_spec(needs) is None:  # it is reported before the hours of measuring
         raise ModuleNotFoundError(name=needs)
-    folder: Path = options.out or Path(f"mudskipper-{options.name}")
-    folder.mkdir(parents=True, exist_ok=True)
     try:
-        _require_own_folder(folder, options.name)
-        finding = _run(unit, lambda progress: run(_session(options, folder, progress)))
+        folder = _open_folder(options, folder_name)
+        status = _conduct_in(folder, options, unit, run, modules)
+    except NotebookError as problem:
+        complain(str(problem))
+        return exit_codes.REFUSED
+    if options.out is None:
+        remove_unused(folder)
+    return status
+
+
+def _conduct_in(
+    folder: Path, options: argparse.Namespace, unit: str, run: Callable[[Session], Finding], modules: Sequence[str]
+) -> int:
+    program, before = identity(*modules), count_entries(folder) if (folder / PAGE).exists() else None
+    try:
+        finding = _run(unit, lambda progress: run(_session(options, folder, progress, program)))
         title = f"{finding.title} (simulated)" if options.simulated else finding.title
-        report = with_schema(
-            f"experiment-{options.name}", to_json(finding.report) | {"simulated": bool(options.simulated)}
-        )
+        record = provenance(*modules) | {"options": _typed(options), "plan": plan_in(folder)}
+        also = {"simulated": bool(options.simulated), "provenance": record}
+        report = with_schema(f"experiment-{options.name}", to_json(finding.report) | also)
         written = write_report(folder, report, title, finding.sections, finding.logs)
     except ConfigurationError as problem:
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
-    except NotebookError as problem:
-        complain(str(problem))
-        return exit_codes.REFUSED
     except (BenchError, EndedError, CallRefusedError, WorkersError, KeyboardInterrupt, OSError) as problem:
         return _end_early(folder, problem)
+    if before == count_entries(folder):
+        print(f"{folder} had every measurement already; they are only evaluated again", file=sys.stderr)
     _print_finding(report, finding, options.json)
     _print_written(written)
     return EXIT_STATUS[finding.ending]
 
 
-def _notebook_of_options(options: argparse.Namespace) -> Notebook:
-    """Return a notebook whose plan is what was typed. Raises NotebookError for a report of other options."""
-    _require_own_folder(options.out, options.name)
-    typed = {name: value for name, value in vars(options).items() if name not in NOT_COMPARED}
-    return Notebook(options.out, json.loads(json.dumps({"experiment": options.name} | typed, default=str)))
+def _typed(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the options that a report depends on, as JSON has them."""
+    typed = {name: value for name, value in vars(options).items() if name not in NO_INPUT}
+    return dict(json.loads(json.dumps(typed, default=str)))
 
 
-def _require_own_folder(folder: Path, name: str) -> None:
-    """Raises NotebookError for the results of another experiment."""
-    earlier = name
-    with suppress(OSError, ValueError, AttributeError):
-        earlier = json.loads((folder / SUMMARY).read_bytes()).get("experiment", name)
-    if earlier != name:
-        raise NotebookError(f"{folder} has the results of experiment {earlier}: choose another folder with --out")
+def _open_folder(options: argparse.Namespace, name: str = "", continues: bool = True) -> Path:
+    """Return the folder of the results: without --out a new one. Raises NotebookError, OSError.
+
+    A finished study `continues` with other options, such as more trials.
+    """
+    if options.out is None:
+        return make_folder(f"mudskipper-{name or options.name}")
+    folder: Path = options.out.resolve() if options.restart else options.out  # the working directory moves too
+    if options.restart and (old := set_aside(folder)):
+        print(f"the earlier results are in {old} now", file=sys.stderr)
+    require_unfinished(folder, options.name, _typed(options) if continues else None)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def _run(unit: str, run: Callable[[Progress], Result]) -> Result:
@@ -120,11 +141,11 @@ def _run(unit: str, run: Callable[[Progress], Result]) -> Result:
         progress.clear()
 
 
-def _session(options: argparse.Namespace, folder: Path, progress: Progress) -> Session:
+def _session(options: argparse.Namespace, folder: Path, progress: Progress, program: Mapping[str, str]) -> Session:
     prompt = TerminalPrompt(progress.clear)
     if options.simulated:
-        return Session(folder, AutomaticOperator(prompt.report), progress.show)
-    return Session(folder, prompt, progress.show, getattr(options, "socket", None))
+        return Session(folder, AutomaticOperator(prompt.report), progress.show, program=program)
+    return Session(folder, prompt, progress.show, getattr(options, "socket", None), program)
 
 
 def _print_finding(report: dict[str, Any], finding: Finding, as_json: bool) -> None:
@@ -152,6 +173,6 @@ def _end_early(folder: Path, problem: BaseException) -> int:
         case OSError():  # such as a full disk
             message, status = why_not(problem, folder), exit_codes.UNHEALTHY
     complain(message)
-    if anything_measured(folder):
-        complain(f"the measurements so far are in {folder}; the same command continues from there")
+    if count_entries(folder):
+        complain(f"the measurements so far are in {folder}; the same command with --out {folder} continues from there")
     return status

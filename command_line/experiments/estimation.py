@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from command_line.experiments.conduct import conduct, refuse
 from command_line.experiments.workers import workers_of
+from experiments.estimation import evaluation
 from experiments.estimation.evaluation import (
     LAYERS,
     SINGLE_WATERS,
@@ -27,7 +28,10 @@ def estimation(options: argparse.Namespace) -> int:
     except ValueError as problem:
         return refuse(str(problem))
     return conduct(
-        options, "trials", lambda show: estimation_finding(report_of(plan, evaluate(plan, show, workers_of(options))))
+        options,
+        "trials",
+        lambda show: estimation_finding(report_of(plan, evaluate(plan, show, workers_of(options)))),
+        evaluation.__name__,
     )
 
 

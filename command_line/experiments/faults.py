@@ -23,4 +23,6 @@ def run_faults(options: argparse.Namespace) -> int:
         return refuse(str(problem))
     if not plan.cells:
         return refuse("none of these faults can occur in these phases")
-    return conduct(options, "cells", lambda show: faults_finding(matrix.run(plan, show, workers_of(options))))
+    return conduct(
+        options, "cells", lambda show: faults_finding(matrix.run(plan, show, workers_of(options))), matrix.__name__
+    )

@@ -18,4 +18,4 @@ def lablogs(options: argparse.Namespace) -> int:
         return refuse(f"{options.folders[0]}: holds no log: no file whose name ends with .csv, .csv.gz or .mcap")
     if unmatched := plan.unmatched():
         return refuse(f"pattern {unmatched[0]!r}: no log has such a name")
-    return conduct(options, "logs", lambda show: lablogs_finding(evaluate(plan, show)))
+    return conduct(options, "logs", lambda show: lablogs_finding(evaluate(plan, show)), Plan.__module__)

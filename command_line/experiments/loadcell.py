@@ -29,7 +29,9 @@ def loadcell(options: argparse.Namespace) -> int:
         flipper = None if options.compare is None else load_flipper(options.compare)
     except (ValueError, BenchError) as problem:
         return refuse(str(problem))
-    return conduct_bench(options, "trials", lambda session: run_loadcell(session, plan, bench, flipper))
+    return conduct_bench(
+        options, "trials", lambda session: run_loadcell(session, plan, bench, flipper), run_loadcell.__module__
+    )
 
 
 def plan_of(options: argparse.Namespace) -> TrialPlan:

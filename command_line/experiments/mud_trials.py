@@ -11,6 +11,9 @@ from experiments.trials.mud_trials import why_not_simulated
 from experiments.walk import measurement as walk
 from experiments.walk.text import run_walk as run_walk_plan
 
+FLIPPER = ("experiments.flipper.report", "experiments.flipper.simulation")  # what computes the coefficients
+WALK = ("experiments.walk.report", "experiments.walk.simulation")
+
 
 def run_flipper(options: argparse.Namespace) -> int:
     muds = tuple(dict.fromkeys(mud_name(mud) for mud in options.mud or ()))
@@ -28,7 +31,7 @@ def run_flipper(options: argparse.Namespace) -> int:
     refused = why_not_simulated(plan.muds) if options.simulated else None
     if refused:
         return refuse(refused)
-    return conduct_bench(options, "trials", lambda session: run_flipper_plan(plan, session, options.truth))
+    return conduct_bench(options, "trials", lambda session: run_flipper_plan(plan, session, options.truth), *FLIPPER)
 
 
 def run_walk(options: argparse.Namespace) -> int:
@@ -50,4 +53,4 @@ def run_walk(options: argparse.Namespace) -> int:
     refused = why_not_simulated(names) if options.simulated else None
     if refused:
         return refuse(refused)
-    return conduct_bench(options, "trials", lambda session: run_walk_plan(plan, session, options.truth))
+    return conduct_bench(options, "trials", lambda session: run_walk_plan(plan, session, options.truth), *WALK)

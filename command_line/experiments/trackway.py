@@ -31,7 +31,9 @@ def run_trackway(options: argparse.Namespace) -> int:
         seeds=options.trials or simulation.Plan.seeds,
         compartment_m=options.compartment or simulation.Plan.compartment_m,
     )
-    return conduct_bench(options, "walks", lambda session: run_simulated(plan, session, workers_of(options)))
+    return conduct_bench(
+        options, "walks", lambda session: run_simulated(plan, session, workers_of(options)), simulation.__name__
+    )
 
 
 def _run_at_bench(options: argparse.Namespace) -> int:
@@ -46,7 +48,7 @@ def _run_at_bench(options: argparse.Namespace) -> int:
     if len({mud.name for mud in muds}) < len(muds):
         return refuse("--mud: two muds have the same name; give each its own")
     plan = bench.Plan(muds, options.trials or bench.Plan.trials)
-    return conduct_bench(options, "walks", lambda session: run_at_bench(plan, session))
+    return conduct_bench(options, "walks", lambda session: run_at_bench(plan, session), bench.__name__)
 
 
 def run_sweep(options: argparse.Namespace) -> int:
@@ -61,14 +63,16 @@ def run_sweep(options: argparse.Namespace) -> int:
         plan.method_walks()
     except ValueError as problem:
         return refuse(str(problem))
-    return conduct(options, "walks", lambda show: sweep_finding(sweep.run(plan, show, workers_of(options))))
+    return conduct(
+        options, "walks", lambda show: sweep_finding(sweep.run(plan, show, workers_of(options))), sweep.__name__
+    )
 
 
 def run_mud_fit(options: argparse.Namespace) -> int:
     if not options.simulated:
         return refuse(SIMULATED_ONLY)
     plan = mud_fit.Plan(seeds=options.seeds)
-    return conduct(options, "walks", lambda show: fit_finding(mud_fit.run(plan, show)))
+    return conduct(options, "walks", lambda show: fit_finding(mud_fit.run(plan, show)), mud_fit.__name__)
 
 
 def _unique(names: list[str] | None) -> list[str]:

@@ -76,7 +76,14 @@ def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -
     option = experiment.add_argument
     option("--simulated", action="store_true", help=simulated)
     add_json(experiment)
-    option("--out", type=folder, metavar="DIR", help=out)
+    _add_out(experiment, out)
+
+
+def _add_out(experiment: argparse.ArgumentParser, text: str) -> None:
+    experiment.add_argument("--out", type=folder, metavar="DIR", help=text)
+    experiment.add_argument(
+        "--restart", action="store_true", help="begin again in that folder; its earlier results are kept as DIR-old"
+    )
 
 
 def _add_workers(experiment: argparse.ArgumentParser) -> None:
@@ -95,15 +102,17 @@ def _add_campaign(names: Commands) -> None:
     campaign.set_defaults(simulated=True)
     campaign.add_argument("file", type=Path, metavar="FILE", help="in TOML, such as examples/campaigns/strength.toml")
     add_json(campaign)
-    campaign.add_argument(
-        "--out", type=folder, metavar="DIR", help="for results (default: mudskipper-NAME of the file)"
-    )
+    _add_out(campaign, "for results; continues there (default: a new mudskipper-NAME of the file)")
     _add_workers(campaign)
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:
     """Add the options of an experiment at a robot with an operator, or in simulation without one."""
-    _add_report(experiment, "robot and muds are simulated, without prompts", "for report, logs and measurements")
+    _add_report(
+        experiment,
+        "robot and muds are simulated, without prompts",
+        "for report, logs and measurements; continues there",
+    )
     add_socket(experiment)
 
 
@@ -111,7 +120,11 @@ def _add_actuator(names: Commands) -> None:
     actuator = add(
         names, "actuator", "experiments.actuator.run_actuator", "Weights on a joint: torque constants and friction."
     )
-    _add_report(actuator, "a simulated motor holds the weights, without prompts", "for report, pictures and log")
+    _add_report(
+        actuator,
+        "a simulated motor holds the weights, without prompts",
+        "for report, pictures and log; continues there",
+    )
     add_socket(actuator)
     option = actuator.add_argument
     option("--joint", action="append", choices=JOINTS, help="repeatable (default: right_adduction, right_sweep)")
@@ -182,9 +195,7 @@ def _add_loadcell(names: Commands) -> None:
     loadcell = add(
         names, "loadcell", "experiments.loadcell.loadcell", "A mud's coefficients from a load cell on a linear stage."
     )
-    _add_report(
-        loadcell, "stage and load cell are emulated", "for report, pictures and samples; continues the trials there"
-    )
+    _add_report(loadcell, "stage and load cell are emulated", "for report, pictures and samples; continues there")
     _add_amplifier(loadcell)
     option = loadcell.add_argument
     option("--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent")
@@ -222,7 +233,7 @@ def _add_lablogs(names: Commands) -> None:
     )
     add_vertical(lablogs, default="y")
     add_json(lablogs)
-    lablogs.add_argument("--out", type=folder, metavar="DIR", help="for report, figures and numbers")
+    _add_out(lablogs, "for report, figures and numbers")
 
 
 def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:
@@ -256,7 +267,9 @@ def _add_trackway(names: Commands) -> None:
         names, "trackway", "experiments.trackway.run_trackway", "Three muds in a row, at fixed and at adapted depths."
     )
     _add_report(
-        trackway, "robot and muds are simulated; without it the daemon's robot walks", "for report, pictures and log"
+        trackway,
+        "robot and muds are simulated; without it the daemon's robot walks",
+        "for report, pictures and log; continues there",
     )
     add_socket(trackway)
     _add_workers(trackway)

@@ -7,7 +7,7 @@ its own, so that a finished joint stays as it is when another one continues.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -25,11 +25,12 @@ from experiments.reports.text_tables import text_of_tables
 from experiments.robot.bench_robot import BenchRobot, disarm, leave
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.prompt import GO_ON, AutomaticOperator, Operator
-from experiments.trials.notebook import NAME, Notebook
+from experiments.trials.notebook import Notebook, count_entries
 from experiments.trials.parallel_trials import LocalWorkers, run_parallel
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration, parse_configuration
+from firmware_host.configuration.toml_records import parse_document
 
 TRUTH = "The simulated motors themselves"
 FALLS = (
@@ -80,9 +81,9 @@ def calibrate(session: Session, order: Order, default_configuration: Path) -> Fi
 
 def _open_bench(session: Session, order: Order) -> RobotBench | SimulatedBench:
     if session.socket is not None:
-        return RobotBench(DaemonRobot(session.socket))
+        return RobotBench(DaemonRobot(session.socket), session.program)
     configuration = load_configuration(order.configuration) if order.configuration else bench_configuration()
-    return SimulatedBench(configuration, order.seed)
+    return SimulatedBench(configuration, order.seed, session.program)
 
 
 def list_remarks(joints: Sequence[str], fits: Sequence[JointFit], left_out: int) -> list[str]:
@@ -101,8 +102,8 @@ def list_remarks(joints: Sequence[str], fits: Sequence[JointFit], left_out: int)
 class RobotBench:
     """A robot and an operator."""
 
-    def __init__(self, robot: BenchRobot) -> None:
-        self._robot, self.configuration = robot, robot.configuration
+    def __init__(self, robot: BenchRobot, program: Mapping[str, str] = {}) -> None:
+        self._robot, self.configuration, self._program = robot, robot.configuration, program
 
     def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         """Return the readings by joint and step. Raises BenchError, NotebookError."""
@@ -111,7 +112,7 @@ class RobotBench:
         weights, steps = ManualWeights(operator, plan), len(steps_of(plan))
         readings: dict[str, Mapping[str, Entry]] = {}
         for number, joint in enumerate(plan.joints):
-            notebook = Notebook(folder / joint, notebook_plan(plan, joint))
+            notebook = Notebook(folder / joint, notebook_plan(plan, joint, self.configuration, self._program))
             if notebook.entries:
                 operator.report(f"{joint}: {len(notebook.entries)} of {steps} readings are done already.")
             if len(notebook.entries) < steps:
@@ -150,13 +151,15 @@ class SimulatedBench:
 
     configuration: Configuration
     seed: int
+    program: Mapping[str, str] = field(default_factory=dict)
 
     def calibrate(self, plan: Plan, folder: Path, operator: Operator, show: Show) -> Readings:
         require_possible(plan, self.configuration)
-        joints = [partial(_simulate, self.configuration.text, joint, plan, self.seed, folder) for joint in plan.joints]
+        same = {"simulated_seed": self.seed, **self.program}
+        joints = [partial(_simulate, self.configuration.text, joint, plan, same, folder) for joint in plan.joints]
 
         def show_progress() -> None:
-            show(sum(_readings_in(folder / joint / NAME) for joint in plan.joints), len(steps_of(plan)) * len(joints))
+            show(sum(count_entries(folder / joint) for joint in plan.joints), len(steps_of(plan)) * len(joints))
 
         outcomes = run_parallel(joints, _discard, LocalWorkers(meanwhile=show_progress))
         return dict(zip(plan.joints, outcomes, strict=True))
@@ -166,20 +169,15 @@ class SimulatedBench:
         return sorted(folder.glob("*.mcap"))
 
 
-def _simulate(text: str, joint: str, plan: Plan, seed: int, folder: Path) -> dict[str, Any]:
+def _simulate(text: str, joint: str, plan: Plan, same: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     configuration = parse_configuration(text)
-    notebook = Notebook(folder / joint, notebook_plan(plan, joint) | {"simulated_seed": seed})
-    robot, weights = simulated_bench(configuration, joint, plan, seed, _new_log(folder, joint))
+    notebook = Notebook(folder / joint, notebook_plan(plan, joint, configuration, same))
+    robot, weights = simulated_bench(configuration, joint, plan, same["simulated_seed"], _new_log(folder, joint))
     try:
         entries = Calibration(robot, joint, plan, weights, AutomaticOperator(_discard), notebook, _discard).run()
     finally:
         robot.close()
     return dict(entries)
-
-
-def _readings_in(notebook: Path) -> int:
-    """Return the number of lines after the plan; a repeated reading counts again."""
-    return max(0, notebook.read_bytes().count(b"\n") - 1) if notebook.exists() else 0
 
 
 def _new_log(folder: Path, joint: str) -> Path:
@@ -188,9 +186,10 @@ def _new_log(folder: Path, joint: str) -> Path:
     return next(log for log in logs if not log.exists())
 
 
-def notebook_plan(plan: Plan, joint: str) -> dict[str, Any]:
-    """Return the options that must be the same when a joint continues."""
-    return {name: value for name, value in asdict(plan).items() if name not in REVISABLE} | {"joint": joint}
+def notebook_plan(plan: Plan, joint: str, configuration: Configuration, same: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what must be the same when a joint continues."""
+    options = {name: value for name, value in asdict(plan).items() if name not in REVISABLE}
+    return {"joint": joint, **options, **same, "configuration": parse_document(configuration.text)}
 
 
 def _discard(*_: object) -> None:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Any
 
 from experiments.campaign.campaign_file import Campaign, Trial
 from experiments.campaign.points import Values
@@ -20,7 +19,7 @@ from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import Rows, number, table
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.parallel_trials import Workers, run_parallel
-from experiments.trials.program import program_text
+from experiments.trials.provenance import program_text, provenance
 from experiments.trials.session import Finding, Session, Show
 from firmware_host.catalogue.entry import TRIALS
 from firmware_host.operator.counted_nouns import counted
@@ -56,23 +55,14 @@ class CampaignReport:
 
 def run_campaign(campaign: Campaign, session: Session, workers: Workers | None = None) -> Finding:
     """Raises NotebookError, WorkersError, OSError."""
-    identity = {"experiment": "campaign", "program": program_text()} | campaign.identity
-    notebook = Notebook(session.folder, _flat(identity))
+    notebook = Notebook(session.folder, {"experiment": "campaign", **session.program} | campaign.identity)
     try:
         _run_trials(campaign.trials, notebook, session.show, workers)
     finally:
         _write(campaign, notebook, session.folder / TRIALS)
-    report = _report(campaign, notebook.entries)
+    report = _report(campaign, notebook.entries, program_text(session.program))
     text = _text(report)
     return Finding(report, f"Campaign {campaign.name}", [Section("Points", screen=text)], text)
-
-
-def _flat(tables: Mapping[str, Any], path: str = "") -> Entry:
-    """Return values by dotted key, so that a message names only those that differ."""
-    flat: Entry = {}
-    for name, value in tables.items():
-        flat |= _flat(value, f"{path}{name}.") if isinstance(value, Mapping) else {f"{path}{name}": value}
-    return flat
 
 
 def _run_trials(trials: Sequence[Trial], notebook: Notebook, show: Show, workers: Workers | None) -> None:
@@ -87,20 +77,21 @@ def _run_trials(trials: Sequence[Trial], notebook: Notebook, show: Show, workers
 
 
 def _write(campaign: Campaign, notebook: Notebook, path: Path) -> None:
-    build = build_metadata()
+    build, record = build_metadata(), provenance(__name__)
     rows = [
         notebook.entries[trial.key]
         | build
+        | {"sources": record["sources"]}
         | {"file": f"{campaign.name}, {trial.key}", "run": campaign.name, "point": trial.point, "seed": trial.seed}
         | trial.values
         for trial in campaign.trials
         if trial.key in notebook.entries
     ]
     if rows:
-        write_trials(path, rows, list(campaign.points[0]), {"campaign": campaign.name} | build)
+        write_trials(path, rows, list(campaign.points[0]), {"campaign": campaign.name} | record)
 
 
-def _report(campaign: Campaign, entries: Mapping[str, Entry]) -> CampaignReport:
+def _report(campaign: Campaign, entries: Mapping[str, Entry], program: str) -> CampaignReport:
     by_point: list[list[Entry]] = [[] for _ in campaign.points]
     for trial in campaign.trials:
         by_point[trial.point - 1].append(entries[trial.key])
@@ -108,7 +99,7 @@ def _report(campaign: Campaign, entries: Mapping[str, Entry]) -> CampaignReport:
         campaign=campaign.name,
         trials=len(campaign.trials),
         seeds=campaign.seeds,
-        program=program_text(),
+        program=program,
         results=TRIALS,
         points=[_point_result(*each) for each in zip(campaign.points, by_point, strict=True)],
     )

@@ -1,7 +1,8 @@
 """Writes the trials of a campaign as one Parquet file, which the catalogue of logs reads as its table `trials`.
 
-A row has the catalogue's columns, the number of its point, its seed, and a column for each key that differs between the
-points: world_segment_strength_pa for world.segment.strength_pa. This module needs the extra `data`.
+A row has the catalogue's columns, the number of its point, its seed, the digest of the sources that computed it, and a
+column for each key that differs between the points: world_segment_strength_pa for world.segment.strength_pa. This
+module needs the extra `data`.
 """
 
 import json
@@ -21,7 +22,7 @@ ARROW_TYPES = {
     "TIMESTAMP": pa.timestamp("us"), "BOOLEAN": pa.bool_(), "VARCHAR[]": pa.list_(pa.string()),
     MUDS: pa.list_(pa.struct(MUD)),
 }  # fmt: skip
-OWN = {"point": "INTEGER", "seed": "INTEGER"}
+OWN = {"point": "INTEGER", "seed": "INTEGER", "sources": "VARCHAR"}
 
 
 def column_of(key: str) -> str:
@@ -29,7 +30,7 @@ def column_of(key: str) -> str:
 
 
 def write_trials(path: Path, rows: Sequence[Mapping[str, Any]], keys: Sequence[str], metadata: dict[str, str]) -> None:
-    """`rows` have the catalogue's columns, `point`, `seed` and the values by key. Raises OSError."""
+    """`rows` have the catalogue's columns, `point`, `seed`, `sources` and the values by key. Raises OSError."""
     known = [pa.field(name, ARROW_TYPES[kind]) for name, kind in (COLUMNS | OWN).items()]
     columns = {field.name: pa.array([row[field.name] for row in rows], field.type) for field in known}
     columns |= {column_of(key): _varied([row[key] for row in rows]) for key in keys}

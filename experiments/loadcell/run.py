@@ -60,7 +60,8 @@ def run_loadcell(session: Session, plan: TrialPlan, bench: BenchSettings, flippe
     `flipper` is the summary of a flipper experiment to compare with.
     """
     simulated = {"simulated_seed": bench.seed} if bench.port is None else {}
-    notebook = Notebook(session.folder, notebook_plan(plan.settings) | {"bench": bench.name} | simulated)
+    same = {**notebook_plan(plan.settings), "bench": bench.name, **simulated, **session.program}
+    notebook = Notebook(session.folder, same)
     missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
     _report_progress(session, notebook, len(missing), bench.encoder is not None)
     cell = {"bench": bench.name, "port": bench.port, "baud": bench.baud, "format": bench.cell.format_name}

@@ -28,6 +28,8 @@ from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from experiments.trials.notebook import Notebook
 from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
+from experiments.trials.trial import WALKING, configuration_of
+from firmware_host.configuration.toml_records import parse_document
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import TRACKWAY
 from simulation.mud.track import COMPARTMENT_M, Track
@@ -74,6 +76,8 @@ class Plan:
             "methods": [rule.method for rule in self.rules if rule.method],
             "muds": [[clay.name, clay.strength_pa] for clay in self.muds],
             "compartment_m": self.compartment_m,
+            "disturbances": asdict(LAB),
+            "configuration": parse_document(configuration_of(WALKING).text),
         }
 
     def walks(self) -> dict[str, Callable[[], Walk]]:

@@ -43,7 +43,9 @@ AGAINST_TIME = (
 
 
 def run_simulated(plan: simulation.Plan, session: Session, workers: Workers | None = None) -> Finding:
-    return _finding(simulation.run(plan, Notebook(session.folder, plan.identity), session.show, workers))
+    return _finding(
+        simulation.run(plan, Notebook(session.folder, {**plan.identity, **session.program}), session.show, workers)
+    )
 
 
 def run_at_bench(plan: bench.Plan, session: Session) -> Finding:

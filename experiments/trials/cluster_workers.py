@@ -3,9 +3,9 @@
     dask scheduler                                           on one computer
     dask worker tcp://ADDRESS:8786 --nworkers -1 --nthreads 1    on each
 
-Every worker has to run this program's own sources, or its digits may differ: all workers are compared before the first
-trial, and each trial compares them again, because workers may join later. Dask repeats the trials of a worker that is
-lost. This module needs the extra `cluster`.
+Every worker has to have the sources that the trials import, or its digits may differ: all workers are compared before
+the first trial, and each trial compares them again, because workers may join later. Dask repeats the trials of a worker
+that is lost. This module needs the extra `cluster`.
 """
 
 import logging
@@ -18,7 +18,7 @@ from distributed import CancelledError, Client, KilledWorker, as_completed
 from distributed.comm import CommClosedError
 
 from experiments.trials.parallel_trials import Result, WorkersError
-from experiments.trials.program import program_text
+from experiments.trials.provenance import Record, identity, program_text
 
 CONNECT_S = 10.0
 MOST_SUBMITTED = 1000  # trials at the scheduler at once; more than a cluster has processors
@@ -36,11 +36,12 @@ class ClusterWorkers:
 
     def results(self, trials: Sequence[Callable[[], Result]]) -> Generator[tuple[int, Result], None, None]:
         with _connected(self._address) as client:
-            _require_this_program(client)
-            waiting, program = iter(enumerate(trials)), program_text()
+            modules = sorted({getattr(trial, "func", trial).__module__ for trial in trials})
+            _require_this_program(client, modules)
+            waiting, program = iter(enumerate(trials)), identity(*modules)
 
             def submit(most: int) -> list[Any]:
-                return [client.submit(_run, program, *each, pure=False) for each in islice(waiting, most)]
+                return [client.submit(_run, program, modules, *each, pure=False) for each in islice(waiting, most)]
 
             ended = as_completed(submit(MOST_SUBMITTED))
             for future in ended:
@@ -48,10 +49,9 @@ class ClusterWorkers:
                 ended.update(submit(1))
 
 
-def _run(program: str, index: int, trial: Callable[[], Result]) -> tuple[int, Result]:
+def _run(program: Record, modules: Sequence[str], index: int, trial: Callable[[], Result]) -> tuple[int, Result]:
     """Run a trial on a worker. Raises OtherProgramError."""
-    if program_text() != program:
-        raise OtherProgramError(_other_program("a worker", program_text(), program))
+    _require_same("a worker", identity(*modules), program)
     return index, trial()
 
 
@@ -76,7 +76,7 @@ def _connected(address: str) -> Iterator[Client]:
             raise WorkersError(f"the cluster at {address} was lost: {problem or type(problem).__name__}") from problem
 
 
-def _require_this_program(client: Client) -> None:
+def _require_this_program(client: Client, modules: Sequence[str]) -> None:
     """Raises WorkersError where there is no worker, OtherProgramError where one runs another program."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)
@@ -85,10 +85,15 @@ def _require_this_program(client: Client) -> None:
         raise WorkersError(
             f"the cluster at {address} has no workers: start some with 'dask worker {address}'"
         ) from None
-    for worker, found in client.run(program_text, on_error="return").items():
-        if found != program_text():
-            raise OtherProgramError(_other_program(f"the worker {worker}", str(found), program_text()))
+    for worker, found in client.run(identity, *modules, on_error="return").items():
+        _require_same(f"the worker {worker}", found, identity(*modules))
 
 
-def _other_program(worker: str, found: str, expected: str) -> str:
-    return f"{worker} runs {found}, and this is {expected}: install the same version of mudskipper on all workers"
+def _require_same(worker: str, found: Record | Exception, expected: Record) -> None:
+    """`found` is an exception where the worker could not answer. Raises OtherProgramError."""
+    if found != expected:
+        runs = str(found) if isinstance(found, Exception) else program_text(found)
+        raise OtherProgramError(
+            f"{worker} runs {runs}, and this is {program_text(expected)}: install the same version of mudskipper on all"
+            " workers"
+        )

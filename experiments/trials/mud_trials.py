@@ -19,6 +19,7 @@ from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.session import Session
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.toml_records import parse_document
 from simulation.mud.clay import clay_of_water
 
 MOST_ATTEMPTS = 3  # of one trial, after which Enter ends the experiment
@@ -179,14 +180,22 @@ def open_bench(
 ) -> Bench:
     """Connect to the daemon's robot, or make a simulated one in a session without a daemon.
 
-    `plan` is the notebook's: options that must be the same when an experiment continues. `instructions` say how the
-    operator prepares a trial.
+    `plan` has the options that must be the same when an experiment continues; so must be the program, and the daemon's
+    version and configuration. `instructions` say how the operator prepares a trial.
     """
-    notebook = Notebook(session.folder, plan)
+    plan = {**plan, **session.program}
     if session.socket is None:
         assert simulated is not None
+        notebook = Notebook(session.folder, plan)
         return Bench(*simulated(), session.operator, notebook)
     robot = DaemonRobot(session.socket)
+    try:
+        daemon = {"version": robot.call("hello")["version"]}
+        configuration = parse_document(robot.configuration.text)
+        notebook = Notebook(session.folder, plan | {"daemon": daemon, "configuration": configuration})
+    except BaseException:
+        robot.close()
+        raise
     return Bench(robot, PromptedBed(robot, session.operator, instructions), session.operator, notebook)
 
 

@@ -1,15 +1,18 @@
 """The measurements so far, on the disk before the experiment continues, so that an interrupted one can continue.
 
 The file has JSON lines: the plan first, then one entry per line with its key. A later entry of a key replaces the
-earlier one, and a line that was cut off costs only itself.
+earlier one, and a line that was cut off costs only itself. The plan has everything that must be the same where the
+experiment continues: options, version and sources, the configuration and the world as they were read.
 """
 
 import json
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 NAME = "notebook.jsonl"
+SHOWN_DIFFERENCES = 6
 Entry = dict[str, Any]
 
 
@@ -20,11 +23,14 @@ class NotebookError(Exception):
 class Notebook:
     """The entries, and their file."""
 
-    def __init__(self, folder: Path, plan: Entry) -> None:
-        """Begin or continue. Raises NotebookError where the folder has another plan, OSError."""
+    def __init__(self, folder: Path, plan: Mapping[str, Any]) -> None:
+        """Begin or continue. Raises NotebookError where the folder has another plan, OSError.
+
+        Tables in the plan are flattened, so that a message names only the keys that differ.
+        """
         folder.mkdir(parents=True, exist_ok=True)
         self.path = folder / NAME
-        self.plan = json.loads(json.dumps(plan))  # as it reads back
+        self.plan = json.loads(json.dumps(_flat(plan), default=str))  # as it reads back
         self.entries: dict[str, Entry] = {}
         contents = self.path.read_bytes() if self.path.exists() else b""
         if _is_unbegun(contents):
@@ -67,10 +73,10 @@ class Notebook:
     def _require_plan(self, earlier: Entry) -> None:
         different = sorted(name for name in {*earlier, *self.plan} if earlier.get(name) != self.plan.get(name))
         if different:
-            then, now = ({name: plan.get(name) for name in different} for plan in (earlier, self.plan))
+            then, now = (_list_values(plan, different) for plan in (earlier, self.plan))
             raise NotebookError(
-                f"{self.path.parent} has measurements with {_list_values(then)}, and the options ask for "
-                f"{_list_values(now)}: use the same options, or choose another folder with --out"
+                f"{self.path.parent} has measurements with {then}, and now there is {now}: continue with the same, "
+                "choose another folder with --out, or begin again with --restart, which renames this folder"
             )
 
     def _apply(self, line: Entry) -> None:
@@ -81,9 +87,16 @@ class Notebook:
             self.entries.pop(key, None)
 
 
-def anything_measured(folder: Path) -> bool:
-    """Return whether any notebook in the folder has a line after its plan."""
-    return any(notebook.read_bytes().count(b"\n") > 1 for notebook in folder.rglob(NAME))
+def count_entries(folder: Path) -> int:
+    """Count the lines after the plan in all notebooks of a folder; a repeated reading counts again."""
+    return sum(max(0, notebook.read_bytes().count(b"\n") - 1) for notebook in folder.rglob(NAME))
+
+
+def plan_in(folder: Path) -> Entry:
+    """Return the plan of a folder's first notebook; nothing where there is none."""
+    for notebook in sorted(folder.rglob(NAME)):
+        return dict((_decode(notebook.read_bytes().partition(b"\n")[0]) or {}).get("plan", {}))
+    return {}
 
 
 def _is_unbegun(contents: bytes) -> bool:
@@ -101,5 +114,14 @@ def _decode(line: bytes) -> Entry | None:
     return decoded if isinstance(decoded, dict) else None
 
 
-def _list_values(values: Entry) -> str:
-    return ", ".join(f"{name} = {value}" for name, value in values.items())
+def _flat(tables: Mapping[str, Any], path: str = "") -> Entry:
+    """Return values by dotted key."""
+    flat: Entry = {}
+    for name, value in tables.items():
+        flat |= _flat(value, f"{path}{name}.") if isinstance(value, Mapping) else {f"{path}{name}": value}
+    return flat
+
+
+def _list_values(plan: Entry, names: Sequence[str]) -> str:
+    shown = [f"{name} = {plan.get(name, '(none)')}" for name in names[:SHOWN_DIFFERENCES]]
+    return ", ".join([*shown, *(["..."] if len(names) > SHOWN_DIFFERENCES else [])])

@@ -4,7 +4,7 @@ An experiment runs in a `Session`: a folder for its results, the operator at the
 ends with a `Finding`: the report for programs, sections for the page, and a text for the screen.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum, auto
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +22,7 @@ class Session(NamedTuple):
     operator: Operator
     show: Show
     socket: Path | None = None  # of the daemon that controls the robot; None where the robot is simulated
+    program: Mapping[str, str] = {}  # version and sources, a part of every notebook's plan
 
 
 class Ending(Enum):

@@ -6,7 +6,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from errno import ENOSPC
 from pathlib import Path
@@ -14,13 +14,15 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.experiments.conduct import conduct_bench
+from command_line.experiments.conduct import conduct, conduct_bench
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from experiments.reports.report_page import Section
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
-from experiments.trials.notebook import Notebook
-from experiments.trials.session import Finding, Session
+from experiments.trials import provenance
+from experiments.trials.notebook import NAME, Notebook
+from experiments.trials.session import Finding, Session, Show
 
+STUDY = "experiments.reports.value_text"  # any module of the product
 ANSWERS = {"": "it hangs", "s": "skip it", "r": "the last one again"}
 
 
@@ -92,7 +94,9 @@ def test_the_end_of_the_input_is_reported(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def options(folder: Path, **changes: object) -> argparse.Namespace:
-    return argparse.Namespace(**({"out": folder, "json": False, "simulated": True, "name": "walk"} | changes))
+    return argparse.Namespace(
+        **({"out": folder, "restart": False, "json": False, "simulated": True, "name": "walk"} | changes)
+    )
 
 
 def found(session: Session) -> Finding:
@@ -101,7 +105,7 @@ def found(session: Session) -> Finding:
 
 
 def test_it_ends_in_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert conduct_bench(options(tmp_path / "out"), "trials", found) == exit_codes.OK
+    assert conduct_bench(options(tmp_path / "out"), "trials", found, STUDY) == exit_codes.OK
     said = capsys.readouterr()
     assert said.out == "value 1.0\n" and "report.html" in said.err
     assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["value"] == 1.0
@@ -113,22 +117,29 @@ def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.Captu
         session.operator.report("half of it")
         return found(session)
 
-    conduct_bench(options(tmp_path, json=True), "trials", run)
+    conduct_bench(options(tmp_path, json=True), "trials", run, STUDY)
     said = capsys.readouterr()
-    assert json.loads(said.out) == {
-        "schema": "experiment-walk/1",
-        "experiment": "trial",
-        "value": 1.0,
-        "simulated": True,
-    }
+    report = json.loads(said.out)
+    assert report["schema"] == "experiment-walk/1" and report["value"] == 1.0 and report["simulated"] is True
     assert said.err.splitlines()[0] == "half of it"  # standard error is no terminal, so no progress bar either
     assert not {"\033", "\r"} & set(said.err)
 
 
-def test_without_a_folder_it_makes_one_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_folder_each_run_makes_one_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    conduct_bench(options(tmp_path, out=None), "trials", found)
-    assert (tmp_path / "mudskipper-walk" / "report.html").exists()
+    for name in ("mudskipper-walk", "mudskipper-walk-2", "mudskipper-walk-3"):
+        assert conduct_bench(options(tmp_path, out=None), "trials", found, STUDY) == exit_codes.OK
+        assert (tmp_path / name / "report.html").exists()
+
+
+def test_a_new_folder_in_which_nothing_was_measured_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(session: Session) -> Finding:
+        Notebook(session.folder, {})
+        raise DaemonLostError("no daemon answers")
+
+    monkeypatch.chdir(tmp_path)
+    assert conduct_bench(options(tmp_path, out=None), "trials", run, STUDY) == exit_codes.NO_DAEMON
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -147,9 +158,9 @@ def test_measurements_remain_however_the_experiment_ends(
         Notebook(session.folder, {}).write("10 g", {"torque_nm": 0.1})
         raise problem
 
-    assert conduct_bench(options(tmp_path), "trials", run) == status
+    assert conduct_bench(options(tmp_path), "trials", run, STUDY) == status
     said = capsys.readouterr().err
-    assert message in said and "the same command continues from there" in said
+    assert message in said and "the same command" in said
     assert Notebook(tmp_path, {}).entries
 
 
@@ -158,7 +169,7 @@ def test_without_a_measurement_no_result_is_announced(tmp_path: Path, capsys: py
         Notebook(session.folder, {})
         raise DaemonLostError("no daemon answers")
 
-    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.NO_DAEMON
+    assert conduct_bench(options(tmp_path), "trials", run, STUDY) == exit_codes.NO_DAEMON
     assert capsys.readouterr().err.strip().endswith("no daemon answers")
 
 
@@ -169,5 +180,95 @@ def test_another_plan_is_refused_without_advice_to_continue(tmp_path: Path, caps
         Notebook(session.folder, {"depth_m": 0.05})
         raise AssertionError("it is refused")
 
-    assert conduct_bench(options(tmp_path), "trials", run) == exit_codes.REFUSED
+    assert conduct_bench(options(tmp_path), "trials", run, STUDY) == exit_codes.REFUSED
     assert "the same command" not in capsys.readouterr().err
+
+
+# finished, continued, begun again
+
+
+def measured_by(trials: int, calls: list[int]) -> Callable[[Session], Finding]:
+    """Return an experiment that measures what is missing, under the session's version and sources."""
+
+    def run(session: Session) -> Finding:
+        notebook = Notebook(session.folder, {"depth_m": 0.03, **session.program})
+        for number in range(trials):
+            if str(number) not in notebook.entries:
+                calls.append(number)
+                notebook.write(str(number), {})
+        return Finding({"experiment": "walk", "trials": trials}, "Trials", [], "")
+
+    return run
+
+
+def test_a_finished_experiment_is_refused_and_with_more_trials_it_continues(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    calls = list[int]()
+
+    def conduct_with(trials: int) -> int:
+        return conduct_bench(options(tmp_path, trials=trials), "trials", measured_by(trials, calls), STUDY)
+
+    assert conduct_with(2) == exit_codes.OK
+    finished = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert conduct_with(2) == exit_codes.REFUSED
+    said = capsys.readouterr().err
+    record = finished["provenance"]
+    assert record["date"] in said and record["version"] in said and "--restart" in said and "--out" in said
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")) == finished
+    assert conduct_with(3) == exit_codes.OK and calls == [0, 1, 2]
+    (tmp_path / "report.html").unlink()  # as if its end had failed
+    assert conduct_with(3) == exit_codes.OK and calls == [0, 1, 2]
+
+
+def test_another_version_and_other_sources_are_refused_and_the_same_continue(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def continued() -> int:
+        (tmp_path / "report.html").unlink(missing_ok=True)  # an experiment that is not finished
+        return conduct_bench(options(tmp_path), "trials", measured_by(1, []), STUDY)
+
+    assert continued() == continued() == exit_codes.OK
+    before = (tmp_path / NAME).read_bytes()
+    for name, value in (("software_version", "9.9"), ("source_digest", "0123")):
+        with monkeypatch.context() as patch:
+            patch.setattr(provenance, name, lambda *_, value=value: value)
+            capsys.readouterr()
+            assert continued() == exit_codes.REFUSED
+        said = capsys.readouterr().err
+        assert f"= {value}" in said and "--restart" in said and "--out" in said
+    assert continued() == exit_codes.OK and (tmp_path / NAME).read_bytes() == before
+
+
+def test_restart_begins_again_and_keeps_the_earlier_results(tmp_path: Path) -> None:
+    calls, folder = list[int](), tmp_path / "out"
+    for names in (["out"], ["out", "out-old"], ["out", "out-old", "out-old-2"]):
+        assert conduct_bench(options(folder, restart=True), "trials", measured_by(1, calls), STUDY) == exit_codes.OK
+        assert sorted(each.name for each in tmp_path.iterdir()) == names
+        assert all((tmp_path / name / "report.html").exists() and (tmp_path / name / NAME).exists() for name in names)
+    assert calls == [0, 0, 0]
+
+
+def test_restart_in_the_working_directory_leaves_its_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, calls = tmp_path / "out", list[int]()
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    for _ in range(2):
+        status = conduct_bench(options(Path(), restart=True), "trials", measured_by(1, calls), STUDY)
+        assert status == exit_codes.OK
+    assert calls == [0, 0] and (tmp_path / "out-old" / NAME).exists() and (folder / NAME).exists()
+
+
+def test_a_computed_experiment_is_not_repeated_over_its_report(tmp_path: Path) -> None:
+    def run(show: Show) -> Finding:
+        return Finding({"experiment": "walk"}, "Computed", [], "")
+
+    for changes, status in (
+        ({}, exit_codes.OK),
+        ({}, exit_codes.REFUSED),
+        ({"seeds": 2}, exit_codes.REFUSED),
+        ({"restart": True}, exit_codes.OK),
+        ({"name": "sweep"}, exit_codes.REFUSED),
+    ):
+        assert conduct(options(tmp_path / "out", **changes), "walks", run, STUDY) == status
+    assert (tmp_path / "out-old" / "report.html").exists()

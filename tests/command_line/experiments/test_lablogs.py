@@ -94,4 +94,4 @@ def test_disturbances_are_reported_for_each_coefficient(report: Any) -> None:
 @measured
 def test_the_folder_has_a_page_and_figures(written: Path) -> None:
     figures = {f"{name}.png" for name in ("strokes", "scatter", "left_right", "sensitivity")}
-    assert {path.name for path in written.iterdir()} == {"report.html", "notebook.jsonl", "summary.json", *figures}
+    assert {path.name for path in written.iterdir()} == {"report.html", "summary.json", *figures}

@@ -180,12 +180,13 @@ def test_a_folder_with_a_report_is_refused_to_other_options_and_other_experiment
     before = (tmp_path / "out" / "summary.json").read_bytes()
     capsys.readouterr()
     assert run("sweep", "--seeds", "3") == exit_codes.REFUSED
-    assert "seeds = 2, and the options ask for seeds = 3" in capsys.readouterr().err
+    assert "--restart" in capsys.readouterr().err
     for other in ("mud-fit", "trackway"):
         assert run(other) == exit_codes.REFUSED
         assert "has the results of experiment sweep" in capsys.readouterr().err
     assert (tmp_path / "out" / "summary.json").read_bytes() == before
-    assert run("sweep", "--seeds", "2", "--json") == exit_codes.OK
+    assert run("sweep", "--seeds", "3", "--restart") == exit_codes.OK
+    assert (tmp_path / "out-old" / "summary.json").read_bytes() == before
 
 
 @pytest.mark.parametrize("name", ["trackway", "sweep"])

@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 
 from command_line import exit_codes
@@ -15,6 +16,7 @@ from command_line.main import main
 from experiments.campaign import campaign as campaign_module
 from experiments.campaign.campaign_file import Campaign, load_campaign
 from experiments.campaign.walk_trial import run_walk
+from experiments.reports.report_page import PAGE
 from experiments.trials.notebook import NAME, Notebook
 from firmware_host.catalogue.catalogue import Catalogue, CatalogueError
 from firmware_host.catalogue.entry import COLUMNS, TRIALS
@@ -200,27 +202,49 @@ def test_one_and_two_workers_find_the_same_digits_and_the_catalogue_reads_them(
     assert [row[:4] for row in found] == [(1, 1, 1000.0, 2), (1, 2, 1000.0, 2), (2, 1, 3000.0, 2), (2, 2, 3000.0, 2)]
     assert all(row[4] > 0.0 and row[6] == "whole" for row in found) and found[0][5] < found[2][5]
     joined = Catalogue(tmp_path).query("SELECT file, speed_m_s FROM logs UNION ALL BY NAME SELECT * FROM trials")
-    assert set(joined.names) == {*COLUMNS, "point", "seed", "world_segment_strength_pa"} and len(joined.rows) == 4
+    assert (
+        set(joined.names) == {*COLUMNS, "point", "seed", "sources", "world_segment_strength_pa"}
+        and len(joined.rows) == 4
+    )
     assert report["points"][0]["strides"] == 4 and report["results"] == TRIALS
 
 
-def test_an_interrupted_campaign_continues_where_it_was(
-    command: Callable[..., int], tmp_path: Path, walked: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def interrupt_after(walks: int, command: Callable[..., int], monkeypatch: pytest.MonkeyPatch) -> None:
     kept = Notebook.write
 
     def interrupted(notebook: Notebook, key: str, entry: dict[str, Any]) -> None:
         kept(notebook, key, entry)
-        if len(notebook.entries) == 2:
+        if len(notebook.entries) == walks:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(Notebook, "write", interrupted)
         assert command("--workers", "1") == exit_codes.INTERRUPTED
+
+
+def test_an_interrupted_campaign_continues_where_it_was(
+    command: Callable[..., int], tmp_path: Path, walked: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupt_after(2, command, monkeypatch)
     assert len(rows(tmp_path)) == 2
+    shown: list[tuple[int, int]] = []
+    monkeypatch.setattr("command_line.screen.Progress.show", lambda _, *count: shown.append(count))
     assert command("--workers", "1") == exit_codes.OK
+    assert shown[0] == (2, 4)  # the time left is that of its own walks
     lines = (tmp_path / "out" / NAME).read_text(encoding="utf-8").splitlines()
     assert len(rows(tmp_path)) == 4 and len(lines) == 5  # the plan, and each trial once
+
+
+def test_without_a_folder_each_campaign_has_its_own(
+    tmp_path: Path, walked: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        assert main(["experiment", "campaign", str(written(tmp_path, SHORT))]) == exit_codes.OK
+    for folder in ("mudskipper-mud", "mudskipper-mud-2"):
+        metadata = pq.read_schema(tmp_path / folder / TRIALS).metadata
+        (digest,) = set(rows(tmp_path / folder, "sources"))
+        assert metadata[b"sources"].decode() == digest[0] and {b"version", b"date", b"python"} <= metadata.keys()
 
 
 def test_a_full_disk_keeps_what_was_computed(
@@ -230,7 +254,7 @@ def test_a_full_disk_keeps_what_was_computed(
     with files_of_at_most(4000):
         assert command("--workers", "1", text=text) == exit_codes.UNHEALTHY
     said = capsys.readouterr().err
-    assert "File too large" in said and "the same command continues from there" in said and "Traceback" not in said
+    assert "File too large" in said and "the same command" in said and "Traceback" not in said
     before = (tmp_path / "out" / NAME).read_text(encoding="utf-8").count("\n")
     assert before > 2
     assert command("--workers", "1", text=text) == exit_codes.OK
@@ -266,16 +290,27 @@ def test_without_a_campaign_the_table_is_empty(tmp_path: Path) -> None:
 
 
 def test_a_changed_file_and_a_changed_program_are_refused_in_the_same_folder(
-    command: Callable[..., int], walked: None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    command: Callable[..., int],
+    tmp_path: Path,
+    walked: None,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert command() == exit_codes.OK
-    capsys.readouterr()
-    assert command(text=SHORT.replace("3000.0", "2000.0")) == exit_codes.REFUSED
-    said = capsys.readouterr().err
-    assert "strength_pa = [1000.0, 3000.0]" in said and "strength_pa = [1000.0, 2000.0]" in said and "--out" in said
-    monkeypatch.setattr(campaign_module, "program_text", lambda: "mudskipper 9")
-    assert command() == exit_codes.REFUSED
-    assert "program = mudskipper 9" in capsys.readouterr().err
+    interrupt_after(2, command, monkeypatch)
+    for changed, then, now in (
+        (SHORT.replace("3000.0", "2000.0"), "strength_pa = [1000.0, 3000.0]", "strength_pa = [1000.0, 2000.0]"),
+        (f"{SHORT}[configuration.adaptation]\nmethod = 'paper'", "method = (none)", "method = paper"),
+        (f"{SHORT}[world.disturbances]\nclinging_n = 0.5", "clinging_n = (none)", "clinging_n = 0.5"),
+    ):
+        capsys.readouterr()
+        assert command(text=changed) == exit_codes.REFUSED
+        said = capsys.readouterr().err
+        assert then in said and now in said and "--out" in said and "--restart" in said
+    with monkeypatch.context() as patch:
+        patch.setattr("experiments.trials.provenance.software_version", lambda: "9")
+        assert command() == exit_codes.REFUSED
+        assert "version = 9" in capsys.readouterr().err
+    assert command() == exit_codes.OK and len(rows(tmp_path)) == 4
 
 
 def test_a_robot_that_does_not_start_is_a_row_with_its_reason(tmp_path: Path) -> None:
@@ -286,20 +321,11 @@ def test_a_robot_that_does_not_start_is_a_row_with_its_reason(tmp_path: Path) ->
     assert entry["state"] == "broken" and entry["reason"] and entry["strides"] == 0
 
 
-def test_the_time_left_of_a_continued_campaign_counts_its_own_walks(
-    command: Callable[..., int], walked: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    shown: list[tuple[int, int]] = []
-    assert command() == exit_codes.OK
-    monkeypatch.setattr("command_line.screen.Progress.show", lambda _, *count: shown.append(count))
-    assert command() == exit_codes.OK
-    assert shown == [(4, 4)]
-
-
 def test_a_lost_line_of_the_notebook_costs_one_trial(command: Callable[..., int], tmp_path: Path, walked: None) -> None:
     assert command() == exit_codes.OK
     notebook = tmp_path / "out" / NAME
     notebook.write_bytes(notebook.read_bytes()[:-20])
+    (tmp_path / "out" / PAGE).unlink()
     assert command() == exit_codes.OK
     assert len(rows(tmp_path)) == 4
     assert all(first < second for first, second in pairwise(rows(tmp_path, "point, seed")))

@@ -9,7 +9,10 @@ import pytest
 
 from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import CLEAR, LEAVE, leave
+from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.trials import mud_trials
+from experiments.trials import session as session_module
 from experiments.trials.mud_trials import (
     KEEP,
     Bench,
@@ -19,8 +22,9 @@ from experiments.trials.mud_trials import (
     Truths,
     conduct_trials,
     counted_entries,
+    open_bench,
 )
-from experiments.trials.notebook import Entry, Notebook
+from experiments.trials.notebook import Entry, Notebook, NotebookError
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
 
@@ -229,3 +233,43 @@ def test_a_robot_that_no_longer_answers_is_left_with_a_message(tmp_path: Path) -
 def test_an_experiment_without_any_result_ends_with_a_message(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match="nothing was measured"):
         counted_entries(Session(tmp_path, bed=ScriptedBed(SKIP, SKIP, SKIP)).conduct().notebook)
+
+
+class DaemonsRobot(AskedRobot):
+    """The robot of a daemon of some version and configuration."""
+
+    def __init__(self, version: str, sections: str) -> None:
+        super().__init__()
+        self.configuration = simulated_configuration(sections)
+        self.version = version
+
+    def call(self, method: str, **params: Any) -> Any:
+        return {"version": self.version} if method == "hello" else super().call(method, **params)
+
+
+def test_another_configuration_or_daemon_of_a_real_robot_is_refused_and_the_robot_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def opened(version: str = "0.2", sections: str = "") -> tuple[DaemonsRobot, Notebook | str]:
+        robot = DaemonsRobot(version, sections)
+        monkeypatch.setattr(mud_trials, "DaemonRobot", lambda socket: robot)
+        session = session_module.Session(tmp_path, ScriptedOperator(), lambda done, total: None, Path("socket"))
+        try:
+            return robot, open_bench(session, PLAN, str).notebook
+        except NotebookError as problem:
+            return robot, str(problem)
+
+    robot, notebook = opened()
+    assert isinstance(notebook, Notebook) and not robot.closed
+    notebook.write("47.6/1", {})
+    for changed, key in (
+        (opened("0.3"), "daemon.version = 0.2"),
+        (
+            opened(sections="[gains]\nsweep_stiffness_nm_rad = 9.0"),
+            "configuration.gains.sweep_stiffness_nm_rad = (none)",
+        ),
+    ):
+        robot, refused = changed
+        assert isinstance(refused, str) and key in refused and robot.closed
+    robot, notebook = opened(sections="# a comment\n")
+    assert isinstance(notebook, Notebook) and list(notebook.entries) == ["47.6/1"]
