@@ -16,7 +16,7 @@ from typing import Any
 from control.rate import RATE_HZ
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
+from operator_client.status_client import CallRefusedError, NoDaemonError, StatusClient
 from simulation.harness.drive_presets import with_drive_type
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import WATCHDOG_S

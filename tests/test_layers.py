@@ -21,6 +21,7 @@ LAYERS = [
     ("control",),
     ("estimation", "drivers"),
     ("firmware_host",),
+    ("operator_client", "logs"),
     ("simulation", "mudskipper"),
     ("experiments",),
     ("command_line",),

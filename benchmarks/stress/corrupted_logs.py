@@ -20,10 +20,10 @@ from benchmarks.stress.resources import peak_kib
 from control.rate import PERIOD_S
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_reader import Log, read_log
-from firmware_host.log_reading.log_summary import log_summary
-from firmware_host.log_reading.recovery import recover_log
+from logs.files.log_error import LogError
+from logs.files.log_reader import Log, read_log
+from logs.files.log_summary import log_summary
+from logs.recovery import recover_log
 
 BAR_S = 2.0  # for one log
 BAR_MEMORY = 40.0  # times the largest log

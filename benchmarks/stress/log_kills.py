@@ -24,8 +24,8 @@ from benchmarks.report import evaluated, run_benchmark, show_progress
 from benchmarks.stress.resources import children_of
 from drivers.drive_types import DEFAULT
 from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
-from firmware_host.log_reading.log_reader import Log, read_log
-from firmware_host.log_reading.recovery import recover_all
+from logs.files.log_reader import Log, read_log
+from logs.recovery import recover_all
 
 BAR_S = 1.0  # of rows at a log's end
 VICTIMS = ("daemon", "writer", "both", "all")  # all: the whole session, with a recovery that may be running

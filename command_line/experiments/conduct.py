@@ -24,7 +24,7 @@ from experiments.trials.notebook import Notebook, NotebookError, anything_measur
 from experiments.trials.parallel_trials import WorkersError
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
-from firmware_host.operator.status_client import CallRefusedError
+from operator_client.status_client import CallRefusedError
 
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
 NOT_COMPARED = (

@@ -7,7 +7,7 @@ from itertools import chain
 from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
 from control.faults import Blocks, FaultKind, Reaction
 from experiments.faults.failure_modes import CONSEQUENCES, FailureMode
-from firmware_host.operator.counted_nouns import counted
+from experiments.reports.counted_nouns import counted
 
 LONGEST_STOP_S = max(SOFT_STOP_S, DAMPING_S) + 0.2
 GOING_ON = ("arming", "hold", "walking", "stopping")
