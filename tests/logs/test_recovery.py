@@ -16,7 +16,6 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from benchmarks.stress.corrupted_logs import corrupt, make_sound_log, try_log
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, unfinished_files
 from firmware_host.log.rows import TICK
@@ -27,6 +26,7 @@ from logs.recovery import recover_all, recover_log
 from logs.salvage import FileBytes, NumberSet, salvage_rows
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.waiting import LONGEST_S
+from verification.stress.corrupted_logs import corrupt, make_sound_log, try_log
 
 CHUNK = 100  # ticks
 
@@ -251,7 +251,7 @@ def test_a_finished_log_is_not_reported_as_cut(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("finished", [True, False])
 def test_corrupted_logs_cost_no_row_that_is_still_there(tmp_path: Path, finished: bool) -> None:
-    """The long version is `python -m benchmarks.stress.corrupted_logs`."""
+    """The long version is `python -m verification.stress.corrupted_logs`."""
     chance = random.Random(7)
     (tmp_path / ACTIVE).mkdir()
     sound = make_sound_log(tmp_path / "sound.mcap", chance, finished)
