@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from control.fault_causes import AgedFault, Cause, group_by_cause
 from control.faults import FAULT_KINDS, Fault, FaultKind
 from control.records import FLIPPERS, JOINTS
-from firmware_host.operator.fault_texts import what_to_do
+from firmware_host.fault_texts import what_to_do
 
 BEGUN = re.compile(r"fault (\w+) \(\w+\): (.*)", re.DOTALL)
 OVER = re.compile(r"over: (\w+) ?(.*)")

@@ -8,8 +8,8 @@ from typing import Any
 
 import msgpack
 
-from firmware_host.operator.rpc import NOT_PERMITTED, REQUEST
-from firmware_host.operator.socket_file import operators_path
+from firmware_host.sockets.rpc import NOT_PERMITTED, REQUEST
+from firmware_host.sockets.socket_file import operators_path
 
 ANSWER_S = 5.0
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid

@@ -23,11 +23,11 @@ from typing import Any
 
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.rows import ROW_KINDS
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_methods import Level
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.socket_methods import Level
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from verification.example_robot import load_example

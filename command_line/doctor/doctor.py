@@ -49,8 +49,8 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.operator.reports import check_item
 from firmware_host.pose_sources import open_pose
+from firmware_host.sockets.user_groups import load_rights
 from firmware_host.software_version import is_compiled, software_version
-from firmware_host.user_groups import load_rights
 from operator_client.status_client import (
     CallRefusedError,
     DroppedError,

@@ -12,7 +12,7 @@ from command_line.init.new_file import NewRobot, drive_keys, new_file
 from command_line.init.questions import Ask, ask, number, one_of, whole_number
 from command_line.screen import complain
 from control.geometry import FlipperGeometry
-from control.plate.outline import Corner
+from control.plate_outline import Corner
 from control.records import FLIPPERS, Rig
 from drivers.drive_types import DRIVE_TYPES
 from experiments.campaign.plate_file import read_corners

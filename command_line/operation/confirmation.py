@@ -9,7 +9,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from firmware_host.operator.rpc import FOR_MEMBERS
+from firmware_host.sockets.rpc import FOR_MEMBERS
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 ANSWER_S = 2.0

@@ -16,7 +16,7 @@ from docs.generate.faults import energies, failures, faults, modes, reactions
 from docs.generate.markdown import code, table
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import Field
-from firmware_host.operator.socket_methods import METHODS, Level, Parameter, SocketMethod
+from firmware_host.sockets.socket_methods import METHODS, Level, Parameter, SocketMethod
 
 RIGHTS = {Level.ANYONE: "every user who may connect", Level.READ: "`read_group`", Level.DRIVE: "`drive_group`"}
 

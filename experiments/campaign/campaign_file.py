@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from control.bounds import Bounds
-from control.plate.outline import Corner
+from control.plate_outline import Corner
 from experiments.campaign.planned_walk import SECTIONS, one_mud, plan_walk
 from experiments.campaign.plate_file import read_corners
 from experiments.campaign.points import Tables, Values, grid_points, random_points, range_ends, with_values

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from control.plate.outline import Corner, outline_problems
+from control.plate_outline import Corner, outline_problems
 
 LARGEST_FILE_BYTES = 100_000
 

@@ -18,8 +18,8 @@ from experiments.robot.log_copies import copy_since, cut_log
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.configuration.loading import parse_configuration
+from firmware_host.lease import TAKEN_OVER
 from firmware_host.log.log_folder import run_files
-from firmware_host.operator.lease import TAKEN_OVER
 from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_logs
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient

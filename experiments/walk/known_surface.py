@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from control.plate.integrals import moment_width_m
+from control.plate_integrals import moment_width_m
 from control.records import Phase
 from estimation.paper import ADVANCED_M, STEADY_FRACTION
 from estimation.strokes.line_fit import LineFit

@@ -23,7 +23,7 @@ from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.firmware_host.served_socket import Served
+from tests.firmware_host.sockets.served_socket import Served
 from tests.waiting import LONGEST_S
 
 FIRM = Track([(5.0, MUDS["48.5"])])

@@ -10,7 +10,7 @@ import pytest
 
 from firmware_host.log.row_stream import RowStream
 from firmware_host.log.rows import TICK, TICK_KIND
-from firmware_host.operator.rights import Group, Peer, Rights
+from firmware_host.sockets.rights import Group, Peer, Rights
 from operator_client.live_rows import OPENING_S
 from operator_client.row_subscription import RETRY_S, RowSubscription
 from operator_client.status_client import NotPermittedError

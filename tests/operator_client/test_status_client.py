@@ -11,7 +11,7 @@ from typing import Any
 import msgpack
 import pytest
 
-from firmware_host.operator import rpc
+from firmware_host.sockets import rpc
 from operator_client.status_client import (
     CallRefusedError,
     DroppedError,

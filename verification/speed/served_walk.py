@@ -16,9 +16,9 @@ import msgpack
 
 from control.rate import RATE_HZ
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Group, Rights
-from firmware_host.operator.rpc import REQUEST
-from firmware_host.operator.status_socket import Methods, StatusSocket
+from firmware_host.sockets.rights import Group, Rights
+from firmware_host.sockets.rpc import REQUEST
+from firmware_host.sockets.status_socket import Methods, StatusSocket
 from verification.report import summary_us
 from verification.speed.serving_time import READING, answer
 from verification.walks.timed_walk import BLOCK_TICKS, TimedWalk

@@ -21,11 +21,11 @@ from drivers.fault_injection.failures import Failures
 from estimation.mud_map import MOST_PIECES, PIECE_M
 from firmware_host.fault_injection.failure_calls import with_failures
 from firmware_host.loop import Loop
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.socket_methods import Level
-from firmware_host.operator.status_socket import Methods
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_methods import Level
+from firmware_host.sockets.status_socket import Methods
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

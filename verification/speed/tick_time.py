@@ -28,7 +28,7 @@ from typing import Any
 
 from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.operator.status_socket import Methods
+from firmware_host.sockets.status_socket import Methods
 from verification.example_robot import load_example, load_one_flipper, require_drive
 from verification.report import evaluated, run_benchmark, show_progress, summary_us
 from verification.speed.bare_sockets import BareSockets, count_frames

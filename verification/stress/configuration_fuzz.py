@@ -22,7 +22,7 @@ from drivers.drive_types import DEFAULT
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.user_groups import load_rights
+from firmware_host.sockets.user_groups import load_rights
 from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import World, load_world
 from simulation.mud.clay import MUDS

@@ -33,8 +33,8 @@ from firmware_host.fault_injection.failure_calls import with_failures
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files, new_run_id
 from firmware_host.log.recorder import LogReport, Recorder
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.status_socket import StatusSocket
-from firmware_host.user_groups import load_rights
+from firmware_host.sockets.status_socket import StatusSocket
+from firmware_host.sockets.user_groups import load_rights
 from logs.files.log_reader import read_log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water

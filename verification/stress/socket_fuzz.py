@@ -19,11 +19,11 @@ import msgpack
 
 from control.rate import PERIOD_S
 from firmware_host.computer.realtime import freeze_garbage
+from firmware_host.lease import Lease
 from firmware_host.loop_timing import Histogram
-from firmware_host.operator.lease import Lease
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Group, Peer, Rights
-from firmware_host.operator.status_socket import MOST_CLIENTS, Methods, StatusSocket
+from firmware_host.sockets.rights import Group, Peer, Rights
+from firmware_host.sockets.status_socket import MOST_CLIENTS, Methods, StatusSocket
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

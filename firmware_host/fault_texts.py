@@ -1,4 +1,4 @@
-"""The text of each fault: what it means, what happened this time, and what to do.
+"""The text of each fault: what it means, what happened this time, and what to do; and of each refused request.
 
 A message is a template over the fault's subject and measured values. A fault that carries a `reason`, such as a
 drive's own error text or an operating system's, shows it at the end of its message.
@@ -9,6 +9,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
+from control.modes import Mode, Refusal, Request
 
 SET_UP = "see the guide to set up its type of drive (docs/how-to)"
 WIRING = f"check its power, wiring, node id and message periods; {SET_UP}"
@@ -298,3 +299,24 @@ def fault_advice(fault: Fault) -> str:
     """Return what happened, and what to do."""
     to_do = what_to_do(fault)
     return f"{fault_message(fault)} {to_do[:1].upper()}{to_do[1:]}."
+
+
+IN_MODE: dict[Mode, str] = {
+    Mode.BOOT: "not every drive was heard yet; see 'mudskipper check'",
+    Mode.IDLE: "the drives are idle; 'mudskipper arm' first",
+    Mode.ARMING: "the drives are being armed; try again in a moment",
+    Mode.HOLD: "the robot already holds its pose",
+    Mode.WALKING: "the robot walks; 'mudskipper stop' first",
+    Mode.STOPPING: "the robot is stopping; try again in a moment",
+    Mode.FAULT: "a fault is present; read 'mudskipper status', then 'mudskipper clear'",
+    Mode.DAMPING: "a fault lets the joints sink; wait until they rest",
+}
+
+
+def refusal_text(refusal: Refusal) -> str:
+    """Return why the robot refuses a request in its present mode, and what to do."""
+    if refusal.faults:
+        return " ".join(fault_message(fault) for fault in refusal.faults)
+    if refusal.request is Request.CLEAR and refusal.mode is Mode.HOLD:
+        return "nothing to clear: the robot holds its pose"
+    return IN_MODE[refusal.mode]

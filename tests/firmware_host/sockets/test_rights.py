@@ -12,9 +12,9 @@ import pytest
 
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.operator.rights import Peer, read_peer
-from firmware_host.operator.socket_methods import Level
-from firmware_host.user_groups import load_rights
+from firmware_host.sockets.rights import Peer, read_peer
+from firmware_host.sockets.socket_methods import Level
+from firmware_host.sockets.user_groups import load_rights
 
 ANY_GROUP = grp.getgrall()[-1]
 NOBODY = 65534

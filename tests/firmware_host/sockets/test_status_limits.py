@@ -9,12 +9,12 @@ from pathlib import Path
 import msgpack
 import pytest
 
-from firmware_host.operator.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.rpc import NOT_PERMITTED
-from firmware_host.operator.socket_methods import METHODS as SOCKET_METHODS
-from firmware_host.operator.status_socket import MOST_CLIENTS
-from tests.firmware_host.served_socket import (
+from firmware_host.sockets.connection import BURST, LONGEST_SENDING_S, REQUESTS_PER_S, Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.rpc import NOT_PERMITTED
+from firmware_host.sockets.socket_methods import METHODS as SOCKET_METHODS
+from firmware_host.sockets.status_socket import MOST_CLIENTS
+from tests.firmware_host.sockets.served_socket import (
     METHODS,
     OPERATOR,
     OTHER_USER,

@@ -5,10 +5,10 @@ The plate hangs under the arm. The point u outward and s up from the middle of i
     ζ(u, s) = z - u cos α sin β - s cos β         z: depth of the edge's middle
 
 so the mud's surface cuts the plate along a straight line, and the submerged part is a polygon. It is the sum, with
-their signs, of the submerged regions above the outline's edges (outline.py). Above an edge s₀(u) that region reaches up
-to s₀(u) + D(u) / cos β with D(u) = ζ(u, s₀(u)). D is linear in u, so the integrals of 1, u, s, ζ, ζu and ζs over the
-region are polynomials in the depths D₁, D₂ of the edge's two ends (zero for an end above the mud) and the width w'
-between them. With q = cos β, (ū, s̄₀) the middle of the edge's submerged part and m = ds₀/du its slope:
+their signs, of the submerged regions above the outline's edges (plate_outline.py). Above an edge s₀(u) that region
+reaches up to s₀(u) + D(u) / cos β with D(u) = ζ(u, s₀(u)). D is linear in u, so the integrals of 1, u, s, ζ, ζu and
+ζs over the region are polynomials in the depths D₁, D₂ of the edge's two ends (zero for an end above the mud) and the
+width w' between them. With q = cos β, (ū, s̄₀) the middle of the edge's submerged part and m = ds₀/du its slope:
 
     ∫dA   = w' (D₁ + D₂) / 2q                 ∫ζ dA  = w' (D₁² + D₁D₂ + D₂²) / 6q
     ∫u dA = ū ∫dA + w'² (D₂ - D₁) / 12q       ∫ζu dA = ū ∫ζ dA + w'² (D₂² - D₁²) / 24q

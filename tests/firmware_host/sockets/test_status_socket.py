@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from firmware_host.operator.rpc import LONGEST_REQUEST
-from firmware_host.operator.status_socket import MOST_CLIENTS
-from tests.firmware_host.served_socket import METHODS, Served, ask, connect, serve, unpacked
+from firmware_host.sockets.rpc import LONGEST_REQUEST
+from firmware_host.sockets.status_socket import MOST_CLIENTS
+from tests.firmware_host.sockets.served_socket import METHODS, Served, ask, connect, serve, unpacked
 
 
 def test_a_request_is_answered_by_its_number(served: Served) -> None:

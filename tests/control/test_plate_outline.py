@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from control.plate.outline import Corner, mounted_outline, outline_problems, rectangle, signed_area_m2
+from control.plate_outline import Corner, mounted_outline, outline_problems, rectangle, signed_area_m2
 
 SQUARE = ((-0.01, 0.0), (0.01, 0.0), (0.01, 0.02), (-0.01, 0.02))
 PLUS = ((0.0, 0.0), (0.01, 0.02), (0.02, 0.0), (0.02, 0.05), (0.0, 0.05))  # a notch is no fault

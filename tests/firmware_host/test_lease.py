@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_host.operator.lease import Lease
+from firmware_host.lease import Lease
 
 HALF_S = 0.5
 

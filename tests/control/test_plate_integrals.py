@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
-from control.plate.integrals import (
+from control.plate_integrals import (
     DRY,
     SubmergedPlate,
     cross_coupling,

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import msgpack
 
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.rpc import LONGEST_REQUEST, SHAPE, TOO_LONG, MalformedError, make_unpacker
-from firmware_host.operator.socket_methods import Level
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.rpc import LONGEST_REQUEST, SHAPE, TOO_LONG, MalformedError, make_unpacker
+from firmware_host.sockets.socket_methods import Level
 
 READ_BYTES = LONGEST_REQUEST
 WRITE_BYTES = 64 * 1024  # at once

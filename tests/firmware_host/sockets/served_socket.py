@@ -10,11 +10,11 @@ from typing import Any
 import msgpack
 
 from control.rate import PERIOD_S
-from firmware_host.operator.connection import Caller
-from firmware_host.operator.rights import Group, Peer, Rights
-from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_file import operators_path
-from firmware_host.operator.status_socket import StatusSocket
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Group, Peer, Rights
+from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.socket_file import operators_path
+from firmware_host.sockets.status_socket import StatusSocket
 
 
 def refuse(params: dict[str, Any], caller: Caller) -> Any:

@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple
 
-from firmware_host.operator.connection import Caller, Client
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.socket_file import SocketFile
+from firmware_host.sockets.connection import Caller, Client
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_file import SocketFile
 
 
 class Victim(NamedTuple):

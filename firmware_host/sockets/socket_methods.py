@@ -14,7 +14,7 @@ from control.records import JOINTS
 from drivers.fault_injection.failures import LONGEST_S as LONGEST_FAILURE_S
 from drivers.fault_injection.failures import SHORTEST_S as SHORTEST_FAILURE_S
 from drivers.fault_injection.failures import USUAL_S
-from firmware_host.operator.rpc import RefusedError
+from firmware_host.sockets.rpc import RefusedError
 
 LONGEST_LEASE_S, SHORTEST_LEASE_S = 10.0, 0.1
 MAX_STRIDES = 100000  # of one walk

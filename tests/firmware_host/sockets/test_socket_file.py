@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.operator.socket_file import AlreadyServedError, SocketFile
+from firmware_host.sockets.socket_file import AlreadyServedError, SocketFile
 
 
 def leave_stale_socket(path: Path) -> None:

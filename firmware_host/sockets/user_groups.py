@@ -8,7 +8,7 @@ import os
 
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.operator.rights import Group, Rights
+from firmware_host.sockets.rights import Group, Rights
 
 
 def load_rights(parameters: StatusParameters) -> Rights:

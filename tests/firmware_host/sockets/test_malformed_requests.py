@@ -9,8 +9,8 @@ from typing import Any
 import msgpack
 import pytest
 
-from firmware_host.operator.rpc import LONGEST_REQUEST, MOST_PARAMS
-from tests.firmware_host.served_socket import Served, ask, connect, is_open, serve
+from firmware_host.sockets.rpc import LONGEST_REQUEST, MOST_PARAMS
+from tests.firmware_host.sockets.served_socket import Served, ask, connect, is_open, serve
 
 NESTED: Any = []
 for _ in range(900):

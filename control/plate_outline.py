@@ -4,7 +4,8 @@ A corner is (outward, upward): along the arm from the point that `flipper_length
 corner, which hangs `drop_m` below the arm. The mounting angle turns the plate in its plane as it is drawn; then the
 lowest corner is put back to that drop. Every polygon is the signed sum of the regions above its edges, which extend
 upward without end: counter-clockwise, an edge that runs outward lies below the plate and counts +1, one that runs
-inward lies above it and counts -1, and an upright one adds nothing. So the integrals (integrals.py) are closed forms.
+inward lies above it and counts -1, and an upright one adds nothing. So the integrals
+(plate_integrals.py) are closed forms.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

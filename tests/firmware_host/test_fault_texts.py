@@ -1,7 +1,7 @@
 """Every fault has a text, and a fault without its values never stops the loop."""
 
 from control.faults import Clears, FaultKind
-from firmware_host.operator.fault_texts import FAULT_TEXTS, fault_advice, fault_message
+from firmware_host.fault_texts import FAULT_TEXTS, fault_advice, fault_message
 
 
 def test_every_fault_has_a_meaning_a_message_and_an_advice() -> None:

@@ -16,12 +16,12 @@ import pytest
 
 from control.rate import PERIOD_S
 from firmware_host.configuration.consistency import LONGEST_SOCKET_PATH, LONGEST_STATUS_PATH
-from firmware_host.operator.connection import Caller
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.socket_file import SocketFile, operators_path
-from firmware_host.operator.status_socket import ACCEPTING_S, MOST_ACCEPTS, MOST_CLIENTS, MOST_OPERATORS
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_file import SocketFile, operators_path
+from firmware_host.sockets.status_socket import ACCEPTING_S, MOST_ACCEPTS, MOST_CLIENTS, MOST_OPERATORS
 from operator_client.status_client import StatusClient
-from tests.firmware_host.served_socket import METHODS, OPERATOR, OTHER_USER, Served, connect, is_open, serve
+from tests.firmware_host.sockets.served_socket import METHODS, OPERATOR, OTHER_USER, Served, connect, is_open, serve
 
 CONNECTORS = 3000
 STOP = msgpack.packb([0, 2, "stop", {}])

@@ -10,8 +10,8 @@ import socket
 import struct
 from typing import NamedTuple
 
-from firmware_host.operator.rpc import FOR_MEMBERS, NOT_PERMITTED
-from firmware_host.operator.socket_methods import METHODS, Level
+from firmware_host.sockets.rpc import FOR_MEMBERS, NOT_PERMITTED
+from firmware_host.sockets.socket_methods import METHODS, Level
 
 CREDENTIALS = struct.Struct("iII")  # struct ucred: pid, uid, gid
 SO_PEERGROUPS = 59  # asm-generic/socket.h; Python has no name for it
