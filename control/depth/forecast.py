@@ -24,7 +24,7 @@ from math import exp, fsum, inf, isfinite, log, radians
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.parameters.gait_parameters import GaitParameters
-from control.plate.integrals import stroke_moment_m4, submerged_plate
+from control.plate_integrals import stroke_moment_m4, submerged_plate
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 SHEAR_RATIO = 0.55  # k_s over k_p before any mud gave both

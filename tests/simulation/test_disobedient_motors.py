@@ -14,10 +14,10 @@ import pytest
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
 from control.records import JOINTS
-from experiments.faults.bench import FaultBench
-from experiments.faults.injectors import Injector, damped_against_command, drive_with, failing, jammed
-from experiments.faults.phases import bench_for, enter_phase
 from simulation.harness.joint_energy import JointEnergy
+from verification.faults.bench import FaultBench
+from verification.faults.injectors import Injector, damped_against_command, drive_with, failing, jammed
+from verification.faults.phases import bench_for, enter_phase
 
 INVERTED = drive_with(commutation_error_deg=180.0)
 FROZEN = drive_with(encoder_frozen=True)

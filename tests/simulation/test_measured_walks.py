@@ -1,7 +1,7 @@
 """Poses of the authors' walks pass the whole path: NatNet frames over UDP, read tick by tick with the joints.
 
 The steps must equal those in the log. The motion in the capture is computed here from the log's own columns; that a
-reader finds it at any heading is tested with a known truth in tests/firmware_host/log_reading/lab/test_body_track.py.
+reader finds it at any heading is tested with a known truth in tests/logs/lab/test_body_track.py.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from drivers.pose.natnet_sockets import NatNetParameters
 from estimation.estimation_parameters import EstimationParameters
 from estimation.mud import MudEstimator
 from estimation.recorded_states import recorded_states
-from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reading.replay import LAB_DRIVE, NO_VELOCITY
+from logs.lab.lab_csv import LabLog, read_lab_csv
+from logs.replay import LAB_DRIVE, NO_VELOCITY
 from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
 from tests.folders import SHARED_DATA
 

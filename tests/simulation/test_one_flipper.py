@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
+from command_line.init.new_file import NewRobot, new_file
 from command_line.live.page_server import robot_facts
 from command_line.watch.history import History
 from command_line.watch.mud_panel import coefficient_lines, force_lines
@@ -21,17 +22,16 @@ from experiments.robot.lockstep_robot import LockstepRobot, simulated_configurat
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.new_file import NewRobot, new_file
-from firmware_host.log.file_recorder import FileRecorder
 from firmware_host.log.rows import TICK, rig_of, tick_kind
-from firmware_host.log_reading.lab.export import write_lab_csv
-from firmware_host.log_reading.lab_csv import read_lab_csv
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_reader import Log, read_log
-from firmware_host.log_reading.recovery import recover_log
-from firmware_host.log_reading.replay import replay_log
-from firmware_host.open_data.flat_columns import flat_columns
-from firmware_host.open_data.ros_log import write_ros_log
+from logs.export.flat_columns import flat_columns
+from logs.export.ros_log import write_ros_log
+from logs.files.log_error import LogError
+from logs.files.log_reader import Log, read_log
+from logs.lab.export import write_lab_csv
+from logs.lab.lab_csv import read_lab_csv
+from logs.recovery import recover_log
+from logs.replay import replay_log
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep, plant_of
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

@@ -4,11 +4,11 @@ from math import isnan
 
 import pytest
 
-from benchmarks.example_robot import load_example
 from control.modes import Mode
 from simulation.harness.lockstep import Lockstep, drives_of
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from verification.example_robot import load_example
 
 
 def make_walk(**changes: float) -> Lockstep:

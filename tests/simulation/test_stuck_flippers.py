@@ -18,7 +18,7 @@ from control.records import Phase
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.replay import replay_files
+from logs.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track

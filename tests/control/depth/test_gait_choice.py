@@ -17,7 +17,7 @@ from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, Mu
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.joint_limits import JointLimits
-from control.plate.integrals import stroke_moment_m4, submerged_plate
+from control.plate_integrals import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from tests.control.synthetic_muds import both, choose_now
 

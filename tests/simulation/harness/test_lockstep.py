@@ -10,7 +10,7 @@ from control.rate import RATE_HZ
 from control.records import JOINTS
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.operator.fault_texts import fault_message
+from firmware_host.fault_texts import fault_message
 from simulation.devices.drive import DriveError
 from simulation.devices.motion_capture_parameters import MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of

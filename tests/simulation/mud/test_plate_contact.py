@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.plate.outline import signed_area_m2
+from control.plate_outline import signed_area_m2
 from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.layer import Layer
 from simulation.mud.mud_springs import LENGTHWAYS_YIELD_M, SIDEWAYS_YIELD_M

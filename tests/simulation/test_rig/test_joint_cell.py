@@ -6,7 +6,7 @@ import pytest
 
 import simulation.test_rig.joint_cell
 from control.geometry import FlipperGeometry
-from control.plate.integrals import submerged_part
+from control.plate_integrals import submerged_part
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.joint_cell import ArcCurve, measure_arc
 from simulation.test_rig.load_cell import measure_insertion
