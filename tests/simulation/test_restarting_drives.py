@@ -22,7 +22,7 @@ def test_watchdogs_are_read_back_and_again_from_a_drive_that_restarted() -> None
     assert walk.run_until(lambda: walk.loop.mode is Mode.IDLE, 2.0)
     assert all(isnan(health.watchdog_s) for health in walk.loop.drives.health)
     read_settings(walk, 1.5)
-    assert [(each.watchdog_s, each.restarts) for each in walk.loop.drives.health] == [(pytest.approx(0.025), 0)] * 4
+    assert [each.watchdog_s for each in walk.loop.drives.health] == pytest.approx([0.025] * 4)
     walk.robot.restart_drive(1)
     assert walk.run_until(lambda: walk.loop.drives.health[1].restarts == 1, 1.3)
     assert walk.loop.drives.health[1].firmware == "" and isnan(walk.loop.drives.health[1].watchdog_s)

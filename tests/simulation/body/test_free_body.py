@@ -76,7 +76,7 @@ def point_in_world(state: np.ndarray, side: float, u: float, s: float) -> np.nda
     forward_m, height_m, roll_rad, pitch_rad, sweep_rad, adduction_rad = state
     along = np.array([0.0, GEOMETRY.flipper_length_m + u, s - GEOMETRY.drop_m, 1.0])
     own_m = turned(roll_rad, pitch_rad) @ plate_in_body(sweep_rad, adduction_rad, side) @ along
-    return np.array([forward_m, 0.0, height_m]) + np.asarray(own_m)
+    return np.asarray(own_m + [forward_m, 0.0, height_m])
 
 
 def body_in(state: np.ndarray, rates: np.ndarray) -> FreeBody:

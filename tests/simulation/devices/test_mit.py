@@ -105,7 +105,7 @@ def test_an_axis_reads_limits_and_watchdog_back_and_names_a_setting_that_differs
     first, second, *_ = drives.drives.health
     assert bool(first.setting_problem) is bool(found) and all(word in first.setting_problem for word in found)
     assert second.setting_problem == "" and second.firmware_supported
-    assert (second.watchdog_s, second.serial_number) == (pytest.approx(0.1), "0badcafe")
+    assert second.watchdog_s == pytest.approx(0.1) and second.serial_number == "0badcafe"
 
 
 @pytest.mark.parametrize(("range_nm", "fits"), [(4.0, True), (0.0, False)])

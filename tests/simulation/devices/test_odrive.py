@@ -4,6 +4,7 @@ from collections import Counter
 from itertools import pairwise
 from math import cos, isfinite, nan, pi, radians
 from random import Random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,8 +45,8 @@ PERIODIC = {GET_ENCODER_ESTIMATES: 500, GET_IQ: 500, HEARTBEAT: 10, GET_ERROR: 1
             GET_BUS_VOLTAGE_CURRENT: 10}  # messages a second  # fmt: skip
 
 
-def make_drive(seed: int = 1, **changes: float) -> SimulatedOdrive:
-    return SimulatedOdrive(SimulatedDriveParameters(NODE, **changes), Random(seed))  # type: ignore[arg-type]
+def make_drive(seed: int = 1, **changes: Any) -> SimulatedOdrive:
+    return SimulatedOdrive(SimulatedDriveParameters(NODE, **changes), Random(seed))
 
 
 def report(drive: SimulatedOdrive, message: Message, *values: float, now_s: float = 0.0) -> None:
@@ -59,7 +60,7 @@ def ask(drive: SimulatedOdrive, message: Message, now_s: float = 0.0) -> tuple[f
 
 
 def make_armed_drive(
-    velocity_limit_turn_s: float = 100.0, current_limit_a: float = 100.0, **changes: float
+    velocity_limit_turn_s: float = 100.0, current_limit_a: float = 100.0, **changes: Any
 ) -> SimulatedOdrive:
     drive = make_drive(**({"current_noise_a": 0.0} | changes))
     report(drive, SET_CONTROLLER_MODE, 1, 1)
@@ -288,7 +289,7 @@ def test_a_motor_with_another_constant_or_commutation_reports_the_believed_curre
 @pytest.mark.parametrize("sign", [1, -1])
 def test_cogging_has_the_stated_amplitude_and_number_per_turn_and_gives_no_energy(sign: int) -> None:
     """It needs no power, adds to the set-point, is not reported, and is where the joint is, not where it is read."""
-    cogging = {"cogging_nm": 0.02, "cogging_per_turn": 14, "sign": sign, "encoder_offset_rad": 0.01}
+    cogging: dict[str, Any] = {"cogging_nm": 0.02, "cogging_per_turn": 14, "sign": sign, "encoder_offset_rad": 0.01}
     idle, armed, torques_nm = make_drive(**cogging), make_armed_drive(**cogging), []
     for angle_rad in np.arange(1400) * TURN_RAD / 1400:
         idle.measure(angle_rad, 0.0)

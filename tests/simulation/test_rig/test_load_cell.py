@@ -54,7 +54,7 @@ def test_it_goes_from_the_surface_down_to_the_depth_and_up_until_it_is_out(sweep
     down, _, up = measure_insertion(CLAY, GEOMETRY, sweep_rad, lowered_rad(sweep_rad), 0.03, 0.1)
     steps_m = np.diff(down.depths_m)
     assert min(steps_m) > 0.0 > max(np.diff(up.depths_m))
-    assert (down.depths_m[-1], steps_m[0]) == (pytest.approx(0.03), pytest.approx(0.1 * 0.0005, rel=0.01))
+    assert (down.depths_m[-1], steps_m[0]) == pytest.approx((0.03, 0.1 * 0.0005), rel=0.01)
     assert down.forces_n[0] < 0.1 * down.forces_n[-1]
     assert up.forces_n[-1] == pytest.approx(0.0, abs=1e-3)
     upright_n = measure_insertion(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.1).down.forces_n[-1]
