@@ -76,7 +76,7 @@ class Plan:
             "methods": [rule.method for rule in self.rules if rule.method],
             "muds": [[clay.name, clay.strength_pa] for clay in self.muds],
             "compartment_m": self.compartment_m,
-            "disturbances": asdict(LAB),
+            "disturbances": asdict(TRACKWAY),
             "configuration": parse_document(configuration_of(WALKING).text),
         }
 

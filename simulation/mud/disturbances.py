@@ -18,9 +18,9 @@ Measured in the authors' raw logs, where not stated otherwise:
                  would be 0.5 to 0.8 mm at 6.5 % a millimetre: k_s goes with the square of a depth of 3 cm
     friction     dry, against the direction of motion. Half the difference between both directions at the same angle, in
                  air: 0.05 to 0.06 N·m in the sweep joints and 0.045 in the adduction joints in September 2024, 0.01 in
-                 both in June and August. It adds to the plant's own. An estimator has to withstand the larger one, which
-                 is that of LAB. TRACKWAY has the smaller one, because the speeds of Table I exclude the larger one
-                 (docs/explanation/depth.md)
+                 both in June and August. It adds to the plant's own. An estimator has to withstand the larger one,
+                 which is that of LAB. TRACKWAY has the smaller one: with the larger one no mud has the speeds of
+                 Table I (docs/explanation/depth.md)
     drives       current noise of 0.1 to 0.3 A; 50 to 210 distinct states a second; a clip of the current
 
 Infrequent messages disturb more than the estimator here, where the joints' loop is closed over the bus: with the
