@@ -34,9 +34,9 @@ class DrivenDrives:
             for number, joint in enumerate(JOINTS, 1)
         }
         self.drives = make_drives(parameters, {"a": bus.open()}, JointLimits(torque_rate_nm_s=10000.0))
-        common = {"current_noise_a": 0.0} | settings | dict(changes or {})
+        common: dict[str, Any] = {"current_noise_a": 0.0} | settings | dict(changes or {})
         self.devices = [
-            make_simulated_drive(SimulatedDriveParameters(**({"node_id": number, "type": kind} | common)), Random(1))
+            make_simulated_drive(SimulatedDriveParameters(node_id=number, type=kind, **common), Random(1))
             for number in range(1, 5)
         ]
         self.now_s = 10.0
