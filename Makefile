@@ -34,8 +34,8 @@ test-compiled: .venv/test  ## build the compiled tick and compare it with the so
 	$(BIN)/python -m pytest -v -m compiled tests/compiled $(ARGS)
 
 test-vm: .venv/test  ## run the daemon under systemd on a real kernel, in a virtual machine
-	@$(BIN)/python -m virtual_machine.installed_robot
-	$(BIN)/python -m pytest -v virtual_machine $(ARGS)
+	@$(BIN)/python -m verification.virtual_machine.installed_robot
+	$(BIN)/python -m pytest -v verification/virtual_machine $(ARGS)
 
 mutants: .venv/test  ## change what keeps the robot safe in 1200 places; its tests must notice each change
 	$(BIN)/python -m tests.mutants $(ARGS)

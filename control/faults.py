@@ -1,7 +1,7 @@
 """Faults as data: which there are, how hard the robot reacts to each, whether each blocks arming, and what ends it.
 
 The modes know reactions only, never single faults: the worst reaction wins. The texts that people read about a fault
-are made where a person reads them (firmware_host/operator/fault_texts.py).
+are made where a person reads them (firmware_host/fault_texts.py).
 """
 
 from __future__ import annotations

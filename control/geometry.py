@@ -7,7 +7,7 @@ the lower edge's middle lies at
     p = R_x(β) · [l sin α, l cos α, -h]
       = (l sin α, l cos α cos β + h sin β, l cos α sin β - h cos β)        x forward, y outward, z up
 
-from the intersection of the axes, at the height H above the mud. A plate of another shape (plate/outline.py) has its
+from the intersection of the axes, at the height H above the mud. A plate of another shape (plate_outline.py) has its
 lowest corner at that drop, and "the lower edge's middle" is the point at l along the arm and h below it. The paper
 describes this robot without its drop (figure 2); with h = 0 its force matrix is rows x and z of J / l². Drop and height
 are from the authors' controller. The published lengths disagree (0.115 m in the paper, 0.120 m in the controller):
@@ -20,7 +20,7 @@ from math import asin, atan2, cos, hypot, radians, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from control.bounds import Bounds, Meaning
-from control.plate.outline import Corner, PlateOutline, mounted_outline, rectangle
+from control.plate_outline import Corner, PlateOutline, mounted_outline, rectangle
 
 MIN_LEVER_M = 0.01  # below it the adduction joint moves the plate sideways, not down: refuse to command it
 

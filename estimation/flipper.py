@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from control.computing.bounded_work import Work, WorkQueue, finished
 from control.geometry import FlipperGeometry
-from control.plate.integrals import growth_exponent
+from control.plate_integrals import growth_exponent
 from control.records import UNKNOWN, Estimate, FlipperLoad, Phase
 from estimation.force_map import smallest_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_between

@@ -16,7 +16,7 @@ from math import isfinite
 
 from control.computing.bounded_work import Work, WorkQueue, finished
 from control.geometry import FlipperGeometry
-from control.plate.integrals import mean_width_m, moment_width_m
+from control.plate_integrals import mean_width_m, moment_width_m
 from control.records import UNKNOWN, FlipperLoad, Phase
 from estimation.force_map import paper_force_n
 from estimation.joint_load import FlipperDrive, JointLoad, motion_at

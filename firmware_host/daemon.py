@@ -41,13 +41,13 @@ from firmware_host.log.recorder import NullRecorder, Recorder, Recording, Stream
 from firmware_host.log.row_stream import stream_path
 from firmware_host.loop import Loop
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Rights
-from firmware_host.operator.socket_file import AlreadyServedError
-from firmware_host.operator.status_socket import StatusSocket
 from firmware_host.pose_sources import open_pose
+from firmware_host.sockets.rights import Rights
+from firmware_host.sockets.socket_file import AlreadyServedError
+from firmware_host.sockets.status_socket import StatusSocket
+from firmware_host.sockets.user_groups import load_rights
 from firmware_host.software_version import build_metadata
 from firmware_host.ticker import Tick, Ticker
-from firmware_host.user_groups import load_rights
 
 EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0  # then torque goes off wherever the flippers are

@@ -23,14 +23,13 @@ from drivers.drives import Drives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
+from firmware_host.fault_texts import fault_message, refusal_text
+from firmware_host.lease import Lease
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import TICK_KIND, tick_packing
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
-from firmware_host.operator.fault_texts import fault_message
-from firmware_host.operator.lease import Lease
-from firmware_host.refusal_texts import refusal_text
 from firmware_host.ticker import Tick
 
 CLEARING_S = 0.5  # for the drives to report that their errors are gone

@@ -9,10 +9,10 @@ from math import inf
 
 from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
+from firmware_host.fault_texts import fault_advice, fault_message
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, stride_row
 from firmware_host.mud_learning import LearningReport
-from firmware_host.operator.fault_texts import fault_advice, fault_message
 
 REQUEST_PERIOD_S = 1.0
 MAX_REQUESTS = 64  # texts to remember; each names its sender

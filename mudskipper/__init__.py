@@ -5,11 +5,11 @@ through the daemon's socket.
 """
 
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError
 from firmware_host.software_version import software_version
+from logs.files.log_error import LogError
 from mudskipper.client import Client
 from mudskipper.logs import OpenedLog, open_log, replay
+from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError
 
 __version__ = software_version()
 __all__ = [

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.operator.status_client import StatusClient
+from operator_client.status_client import StatusClient
 
 POLL_S = 0.05
 Report = dict[str, Any]

@@ -8,9 +8,9 @@ from control.records import Rig
 from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import EVENT, STRIDE, tick_kind
-from firmware_host.log_reading.log_reader import read_logs
-from firmware_host.log_reading.replay import Replay, configuration_of, replay_files
-from firmware_host.open_data.flat_columns import stack_rows
+from logs.export.flat_columns import stack_rows
+from logs.files.log_reader import read_logs
+from logs.replay import Replay, configuration_of, replay_files
 from mudskipper.rows import Rows
 
 Paths = str | Path | Sequence[str | Path]

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, StatusClient
+from operator_client.status_client import CallRefusedError, NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from tests.command_line.command_lines import run
 from tests.waiting import LONGEST_S

@@ -6,9 +6,9 @@ import re
 
 import pytest
 
+from command_line.init.key_reference import configuration_keys
 from command_line.json_output import EXPERIMENTS, SCHEMAS
 from docs.generate.pages import TABLES
-from firmware_host.configuration.key_reference import configuration_keys
 from tests.folders import ROOT
 
 LONGEST_README = 9000  # bytes

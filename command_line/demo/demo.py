@@ -18,13 +18,13 @@ from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, Int
 from command_line.json_output import print_json
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
 from control.modes import Mode
+from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_text
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.log.log_folder import DONE, log_files, present_path
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_reader import Log, read_log
-from firmware_host.operator.counted_nouns import counted
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError
+from logs.files.log_error import LogError
+from logs.files.log_reader import Log, read_log
+from operator_client.status_client import CallRefusedError, NoDaemonError
 from simulation.harness.world import load_world
 from simulation.mud.track import Track
 

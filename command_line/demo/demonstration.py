@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from firmware_host.operator.status_client import NoDaemonError, StatusClient
+from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.peer import end_with_parent
 from simulation.harness.world import load_world

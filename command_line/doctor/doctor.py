@@ -16,14 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from command_line import exit_codes
-from command_line.json_output import print_value
-from command_line.screen import GREEN, RED, YELLOW, coloured
-from drivers.drive_types import make_drives
-from drivers.pose.pose_port import PoseSourceError
-from firmware_host.buses import BusError, open_ports
-from firmware_host.computer.can_links import CanLink, examine_buses, read_links
-from firmware_host.computer.findings import Finding, Level, fail, ok, ok_if, warn
-from firmware_host.computer.host_checks import (
+from command_line.doctor.can_links import CanLink, examine_buses, read_links
+from command_line.doctor.findings import Finding, Level, fail, ok, ok_if, warn
+from command_line.doctor.host_checks import (
     OURS,
     Account,
     examine_clock,
@@ -36,7 +31,7 @@ from firmware_host.computer.host_checks import (
     log_space,
     this_account,
 )
-from firmware_host.computer.host_facts import (
+from command_line.doctor.host_facts import (
     UNIT,
     clock_is_synchronised,
     has_clock_chip,
@@ -44,20 +39,25 @@ from firmware_host.computer.host_facts import (
     thread_priority,
     unit_limits,
 )
+from command_line.json_output import print_value
+from command_line.screen import GREEN, RED, YELLOW, coloured
+from drivers.drive_types import make_drives
+from drivers.pose.pose_port import PoseSourceError
+from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.operator.reports import check_item
-from firmware_host.operator.status_client import (
+from firmware_host.pose_sources import open_pose
+from firmware_host.sockets.user_groups import load_rights
+from firmware_host.software_version import is_compiled, software_version
+from operator_client.status_client import (
     CallRefusedError,
     DroppedError,
     NoDaemonError,
     NotPermittedError,
     StatusClient,
 )
-from firmware_host.pose_sources import open_pose
-from firmware_host.software_version import is_compiled, software_version
-from firmware_host.user_groups import load_rights
 
 ROOT = Path("/")
 MARKS = {Level.OK: ("ok  ", GREEN), Level.WARN: ("warn", YELLOW), Level.FAIL: ("FAIL", RED)}

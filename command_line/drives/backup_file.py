@@ -12,7 +12,7 @@ import tomlkit
 from command_line.drives.joint_setup import JointSetup
 from drivers.bench.drive_setup import same
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.log.whole_files import whole_file
+from logs.files.whole_files import whole_file
 
 HEAD = "Settings of the drives, written by 'mudskipper drives setup' at {}. Restore the old ones with --restore."
 

@@ -25,7 +25,7 @@ from experiments.trials.provenance import identity, provenance
 from experiments.trials.results_folder import make_folder, remove_unused, require_unfinished, set_aside
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
-from firmware_host.operator.status_client import CallRefusedError
+from operator_client.status_client import CallRefusedError
 
 EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
 NO_INPUT = {  # options on which no result depends

@@ -4,9 +4,9 @@ import argparse
 
 from command_line.experiments.conduct import conduct, refuse
 from command_line.experiments.workers import workers_of
-from experiments.faults import matrix
-from experiments.faults.phases import PHASES
-from experiments.faults.text import faults_finding
+from verification.faults import matrix
+from verification.faults.phases import PHASES
+from verification.faults.text import faults_finding
 
 
 def run_faults(options: argparse.Namespace) -> int:

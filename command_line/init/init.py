@@ -7,18 +7,18 @@ from pathlib import Path
 
 from command_line import exit_codes
 from command_line.init.bus_scan import scan, with_found, with_identities
+from command_line.init.key_reference import Key, configuration_keys
+from command_line.init.new_file import NewRobot, drive_keys, new_file
 from command_line.init.questions import Ask, ask, number, one_of, whole_number
 from command_line.screen import complain
 from control.geometry import FlipperGeometry
-from control.plate.outline import Corner
+from control.plate_outline import Corner
 from control.records import FLIPPERS, Rig
 from drivers.drive_types import DRIVE_TYPES
+from experiments.campaign.plate_file import read_corners
 from firmware_host.buses import BusError
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.key_reference import Key, configuration_keys
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.configuration.new_file import NewRobot, drive_keys, new_file
-from firmware_host.configuration.plate_file import read_corners
 
 PRINTED = Path("-")
 RECTANGLE = "rectangle"

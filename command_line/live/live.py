@@ -1,6 +1,6 @@
 """`mudskipper live`: passes a running robot's rows on to viewers, in a process of its own.
 
-The daemon has no network. This program subscribes to its rows (firmware_host/log_reading/row_subscription.py) and
+The daemon has no network. This program subscribes to its rows (operator_client/row_subscription.py) and
 serves them to Foxglove and Lichtblick by WebSocket, or as a page for a browser with `--page`. It waits for a daemon
 that is not there yet, and for one that restarts.
 """
@@ -14,9 +14,9 @@ from typing import NoReturn, Protocol
 from command_line import exit_codes
 from command_line.screen import complain
 from firmware_host.log.row_stream import stream_path
-from firmware_host.log_reading.live_rows import LiveRow, LiveRows
-from firmware_host.log_reading.row_subscription import RowSubscription
-from firmware_host.operator.status_client import NotPermittedError
+from operator_client.live_rows import LiveRow, LiveRows
+from operator_client.row_subscription import RowSubscription
+from operator_client.status_client import NotPermittedError
 
 READ_S = 0.2
 

@@ -23,8 +23,8 @@ from control.records import TWO_FLIPPERS, Phase
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import STRIDE, TICK
-from firmware_host.log_reading.live_rows import LiveRow, LiveRows
 from firmware_host.operator.reports import known
+from operator_client.live_rows import LiveRow, LiveRows
 
 PAGE = Path(__file__).with_name("page.html")
 INTERVAL_S = 0.1  # between two messages

@@ -16,10 +16,10 @@ from control.geometry import FlipperGeometry
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import EVENT, STRIDE, TICK_KIND, rig_of
-from firmware_host.log_reading.live_rows import LiveRow, LiveRows
-from firmware_host.open_data.ros_definitions import full_definition, schema_name
-from firmware_host.open_data.ros_messages import TOPICS
-from firmware_host.open_data.standard_messages import StandardMessages
+from logs.export.ros_definitions import full_definition, schema_name
+from logs.export.ros_messages import TOPICS
+from logs.export.standard_messages import StandardMessages
+from operator_client.live_rows import LiveRow, LiveRows
 
 
 class ViewerServer:

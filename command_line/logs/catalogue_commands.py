@@ -10,11 +10,11 @@ from command_line.json_output import print_json
 from command_line.logs.refusals import UsageError, explain_errors
 from command_line.options.shared import DEFAULT_CONFIG
 from command_line.screen import complain, watched
+from experiments.reports.counted_nouns import counted
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
-from firmware_host.catalogue.entry import LogEntry
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.operator.counted_nouns import counted
+from logs.catalogue.entry import LogEntry
+from logs.files.log_error import LogError
 
 Options = argparse.Namespace
 LISTING_READS_S = 1.0  # new logs that `log list` reads; it describes the others by the summary at their end
@@ -23,7 +23,7 @@ LISTING_READS_S = 1.0  # new logs that `log list` reads; it describes the others
 def catalogued(folder: Path) -> dict[Path, LogEntry]:
     """Returns the entries of the closed logs; none, with a message, where the catalogue cannot be used."""
     try:
-        from firmware_host.catalogue.catalogue import Catalogue  # duckdb is an extra
+        from logs.catalogue.catalogue import Catalogue  # duckdb is an extra
     except ModuleNotFoundError:
         return {}
     try:
@@ -67,7 +67,7 @@ def chosen_folder(options: Options) -> Path:
 
 @explain_errors
 def index(options: Options) -> int:
-    from firmware_host.catalogue.catalogue import Catalogue
+    from logs.catalogue.catalogue import Catalogue
 
     catalogue = Catalogue(chosen_folder(options))
     stored = _update(catalogue, broken_again=True)
@@ -82,7 +82,7 @@ def index(options: Options) -> int:
 
 @explain_errors
 def query(options: Options) -> int:
-    from firmware_host.catalogue.catalogue import Catalogue
+    from logs.catalogue.catalogue import Catalogue
 
     catalogue = Catalogue(chosen_folder(options))
     _update(catalogue)

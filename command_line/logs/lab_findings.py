@@ -9,10 +9,10 @@ from command_line.screen import complain
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
-from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
-from firmware_host.log_reading.lab.findings import Finding
-from firmware_host.log_reading.lab.summary import lab_summary
-from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv
+from logs.lab.body_track import VERTICAL_AXIS
+from logs.lab.findings import Finding
+from logs.lab.lab_csv import LabLog, is_lab_csv
+from logs.lab.summary import lab_summary
 
 
 def chosen_vertical(options: argparse.Namespace) -> CaptureAxis:

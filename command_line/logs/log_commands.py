@@ -19,13 +19,13 @@ from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
-from firmware_host.log_reading.lab.summary import finding_reports, lab_summary
-from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_summary import log_summary
-from firmware_host.log_reading.replay import Replay, replay_files
-from firmware_host.log_reading.scanned_log import scan_logs
 from firmware_host.operator.reports import known, map_report, stride_report
+from logs.files.log_error import LogError
+from logs.files.log_summary import log_summary
+from logs.files.scanned_log import scan_logs
+from logs.lab.lab_csv import is_lab_csv, read_lab_csv
+from logs.lab.summary import finding_reports, lab_summary
+from logs.replay import Replay, replay_files
 
 Options = argparse.Namespace
 

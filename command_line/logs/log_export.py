@@ -9,10 +9,10 @@ from command_line import exit_codes
 from command_line.logs.refusals import UsageError, explain_errors
 from command_line.logs.unfinished import complain_of_end
 from command_line.screen import watched
-from firmware_host.log.whole_files import whole_file
-from firmware_host.log_reading.lab.export import write_lab_csv
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.scanned_log import ScannedLog, scan_logs
+from logs.files.log_error import LogError
+from logs.files.scanned_log import ScannedLog, scan_logs
+from logs.files.whole_files import whole_file
+from logs.lab.export import write_lab_csv
 
 Options = argparse.Namespace
 
@@ -61,8 +61,8 @@ def _not_written(path: Path, problem: OSError) -> LogError:
 
 
 def _write_ros(log: ScannedLog, options: Options) -> list[Path]:
-    from firmware_host.log_reading.replay import configuration_of
-    from firmware_host.open_data.ros_log import write_ros_log
+    from logs.export.ros_log import write_ros_log
+    from logs.replay import configuration_of
 
     path: Path = options.out or Path(f"{_stem(options)}-ros.mcap")
     geometry = configuration_of(options.files[0], log.configuration_text).geometry
@@ -76,7 +76,7 @@ def _write_ros(log: ScannedLog, options: Options) -> list[Path]:
 
 def _write_parquet(log: ScannedLog, options: Options) -> list[Path]:
     """The present folder is the default: the user may not be permitted to write into the log folder."""
-    from firmware_host.open_data.parquet import write_parquet  # pyarrow is slow to import, and an extra
+    from logs.export.parquet import write_parquet  # pyarrow is slow to import, and an extra
 
     folder: Path = options.out or Path()
     if folder.exists() and not folder.is_dir():

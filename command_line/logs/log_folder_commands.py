@@ -14,7 +14,6 @@ from command_line.logs.catalogue_commands import catalogued, chosen_folder, conf
 from command_line.logs.refusals import explain_errors
 from command_line.screen import QUIET_S, Progress, complain
 from experiments.reports.text_tables import number, table
-from firmware_host.catalogue.entry import LogEntry
 from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import (
     BROKEN,
@@ -30,7 +29,8 @@ from firmware_host.log.log_folder import (
     unfinished_files,
     why_not_moved,
 )
-from firmware_host.log_reading.log_error import DAMAGE, LogError
+from logs.catalogue.entry import LogEntry
+from logs.files.log_error import DAMAGE, LogError
 
 Options = argparse.Namespace
 BEING_WRITTEN = "being written"
@@ -150,7 +150,7 @@ def recover(options: Options) -> int:
 
 def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[str]]:
     """Recovers the logs and returns messages about the others. Skips files of living writers that were not named."""
-    from firmware_host.log_reading.recovery import recover_log  # slow to import, and a listing does without it
+    from logs.recovery import recover_log  # slow to import, and a listing does without it
 
     recovered, problems = [], []
     progress = Progress("", QUIET_S)

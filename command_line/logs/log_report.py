@@ -19,11 +19,11 @@ from experiments.run_report.fit_quality import fits_report
 from experiments.run_report.headline import headline_of, headline_sentences
 from experiments.run_report.run import Run, read_run, read_sources
 from experiments.run_report.sections import comparison_sections, comparison_sentences, run_sections
-from firmware_host.log.whole_files import copy_whole
-from firmware_host.log_reading.lab.summary import finding_reports
-from firmware_host.log_reading.log_error import LogError, Watch
-from firmware_host.log_reading.log_summary import log_summary
 from firmware_host.operator.reports import map_report, stride_report
+from logs.files.log_error import LogError, Watch
+from logs.files.log_summary import log_summary
+from logs.files.whole_files import copy_whole
+from logs.lab.summary import finding_reports
 
 ALSO = (".svg", ".pdf")  # of every picture, for papers
 TERMINAL = 80  # letters in a line

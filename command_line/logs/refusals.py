@@ -7,7 +7,7 @@ from functools import wraps
 from command_line import exit_codes
 from command_line.screen import complain
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.log_reading.log_error import LogError
+from logs.files.log_error import LogError
 
 Command = Callable[[argparse.Namespace], int]
 

@@ -13,7 +13,7 @@ from command_line import exit_codes
 from command_line.operation.mode_output import print_mode
 from command_line.screen import complain
 from experiments.reports.text_tables import number
-from firmware_host.operator.status_client import CallRefusedError, StatusClient
+from operator_client.status_client import CallRefusedError, StatusClient
 
 LEASE_S = 1.0
 RENEWAL_S = 0.2

@@ -9,8 +9,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from firmware_host.operator.rpc import FOR_MEMBERS
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+from firmware_host.sockets.rpc import FOR_MEMBERS
+from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 ANSWER_S = 2.0
 POLL_S = 0.05

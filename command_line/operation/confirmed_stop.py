@@ -7,7 +7,7 @@ from command_line.operation.confirmation import TORQUE_UNKNOWN, confirm, who_may
 from command_line.operation.mode_output import print_mode
 from command_line.operation.operation import with_daemon
 from command_line.screen import complain
-from firmware_host.operator.status_client import NotPermittedError, StatusClient
+from operator_client.status_client import NotPermittedError, StatusClient
 
 
 def end_motion(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from command_line.json_output import print_json, print_value
 from command_line.operation.operation import with_daemon
 from command_line.screen import complain
 from experiments.reports.text_tables import table
-from firmware_host.operator.status_client import StatusClient
+from operator_client.status_client import StatusClient
 
 
 def fail(options: argparse.Namespace) -> int:

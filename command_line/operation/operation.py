@@ -15,9 +15,9 @@ from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain
+from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
-from firmware_host.operator.counted_nouns import counted
-from firmware_host.operator.status_client import (
+from operator_client.status_client import (
     CallRefusedError,
     DroppedError,
     NoDaemonError,

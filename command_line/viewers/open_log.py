@@ -16,7 +16,7 @@ from command_line.logs.refusals import explain_errors
 from command_line.screen import complain
 from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import why_not_read
-from firmware_host.log_reading.log_error import DAMAGE, LogError
+from logs.files.log_error import DAMAGE, LogError
 
 LAYOUTS = Path(__file__).parent / "layouts"
 FOXGLOVE_PROGRAMS = ("lichtblick", "foxglove-studio", "foxglove")  # the first one that is installed

@@ -11,7 +11,7 @@ from typing import Any
 
 from command_line.watch.history import History
 from command_line.watch.row_feed import RowFeed, updated
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 ANSWER_S = 2.0
 RETRY_S = 0.5

@@ -5,7 +5,7 @@ import time
 from command_line.operation.attended_walk import MILD
 from command_line.watch.history import History
 from command_line.watch.lines import Line, Piece, length, wrapped
-from firmware_host.operator.counted_nouns import counted
+from experiments.reports.counted_nouns import counted
 
 HEIGHT = 3
 BADGES = {

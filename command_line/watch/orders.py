@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from command_line.operation.confirmation import ANSWER_S, ENDINGS, end_motion
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 
 def send_order(path: Path, method: str, **params: Any) -> str:

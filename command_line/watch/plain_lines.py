@@ -5,9 +5,9 @@ from typing import Any
 
 from command_line.watch.feed import Feed
 from command_line.watch.history import History
+from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
-from firmware_host.operator.counted_nouns import counted
 
 
 def print_lines(feed: Feed, period_s: float) -> None:

@@ -13,10 +13,10 @@ from control.modes import Mode
 from control.records import Phase
 from firmware_host.log.row_stream import stream_path
 from firmware_host.log.rows import ROW_KINDS, TICK_KIND
-from firmware_host.log_reading.live_rows import LiveRow
-from firmware_host.log_reading.row_subscription import RowSubscription
 from firmware_host.operator.reports import known
-from firmware_host.operator.status_client import NotPermittedError
+from operator_client.live_rows import LiveRow
+from operator_client.row_subscription import RowSubscription
+from operator_client.status_client import NotPermittedError
 
 MOST_PACKETS = 1000  # in one call: the daemon may send faster than this program reads
 TICK = ROW_KINDS[TICK_KIND].topic

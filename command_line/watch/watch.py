@@ -12,7 +12,7 @@ from command_line.screen import complain
 from command_line.watch.feed import Feed
 from command_line.watch.orders import send_order
 from command_line.watch.plain_lines import print_lines
-from firmware_host.operator.status_client import StatusClient
+from operator_client.status_client import StatusClient
 
 SCREEN_PERIOD_S, LINES_PERIOD_S = 0.1, 1.0
 

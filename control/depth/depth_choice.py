@@ -6,10 +6,10 @@ takes the one with the highest predicted speed
 
     S(z)/T(z)        S: the body's step at the thrust of that depth (step_model.py)      T: the stride's duration
 
-where thrust and suction lie on the safe side of the estimates (forecast.py). A body that slips makes small steps, so
-the first condition needs no bound of its own; the choice reports a slip where S is less than half an arm's length, the
-bound of the authors' optimiser. If no candidate comes out, the search takes the shallowest; if none predicts a step,
-the deepest that comes out.
+where thrust, drag and suction lie on the safe side of the estimates (forecast.py). A body that slips makes small steps,
+so the first condition needs no bound of its own; the choice reports a slip where S is less than half an arm's length,
+the bound of the authors' optimiser. If no candidate comes out, the search takes the shallowest; if none predicts a
+step, the deepest that comes out.
 
 The robot meets a boundary between two muds at the depth that suited the first one. Mud that will hold a flipper can be
 felt during the insertion: in simulated clay of 3 to 5 kPa, at 2.5 and 3 cm, the largest torque of the extraction is 1.3
@@ -78,14 +78,14 @@ def depth_grid(parameters: AdaptationParameters, geometry: FlipperGeometry, gait
 
 
 def make_candidate(geometry: FlipperGeometry, gait: GaitParameters, depth_m: float) -> Candidate:
-    motion = motion_of(gait, geometry.flipper_length_m, depth_m)
+    motion = motion_of(gait, geometry, depth_m)
     return Candidate(depth_m, gait, stride_duration_s(gait, geometry, depth_m), motion)
 
 
 def body_drag(parameters: AdaptationParameters, forecast: DepthForecast) -> BodyDrag:
     """Return the drag of body and pad in the mud of the forecast."""
     depth_m = parameters.pad_depth_m
-    pad_n = forecast.shear_at(depth_m) * parameters.pad_width_m * depth_m * depth_m / 2.0
+    pad_n = forecast.drag_shear(depth_m) * parameters.pad_width_m * depth_m * depth_m / 2.0
     return BodyDrag(parameters.body_drag_n + pad_n, parameters.body_damping_n_s_m, parameters.body_mass_kg)
 
 
@@ -147,15 +147,16 @@ class DepthAdaptation:
         The thrust is that in the middle of the sweep: a gait that reaches a depth at the ends reaches it there too.
         """
         drag = body_drag(self.parameters, self.forecast)
+        motor_n = self._flippers * self.parameters.motor_force_n
         stiffness_n_m = self._flippers * self.parameters.mobilisation_n_m
         self.forecast.gait = self.candidates[0].gait
         tractions = dict[float, Traction]()
         for depths_m in batched(self._depths_m, DEPTHS_PER_UNIT):
             for depth_m in depths_m:
-                thrust_n = self.forecast.thrust_n(depth_m)
-                if thrust_n is None:
+                yield_n = self.forecast.yield_n(depth_m)
+                if yield_n is None:
                     return []
-                tractions[depth_m] = Traction(thrust_n, stiffness_n_m)
+                tractions[depth_m] = Traction(yield_n=yield_n, motor_n=motor_n, stiffness_n_m=stiffness_n_m)
             yield
         steps_m: list[float] = []
         for candidates in batched(self.candidates, STEPS_PER_UNIT):

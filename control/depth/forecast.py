@@ -1,11 +1,12 @@
-"""Forecast of a stride at another depth, on the safe side: the flippers' thrust, and the torque of their extraction.
+"""Forecast of a stride at another depth, on the safe side: what thrust the mud withstands, and the extraction torque.
 
-The thrust of one flipper at the middle of the sweep is f_x = k_s(z) ∫ζ dA (control/plate), limited by its motor. Mud
-that yielded gives a value of k_s; mud that did not gives only a lower bound, but the insertion gives k_p, and both
-depend on the one strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log with a readable insertion (their 12.5N
-mud, 1.8 cm), and 0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to 3 cm. So the
-ratio starts between, is corrected whenever k_s and k_p are both known, and is never trusted to better than a fifth. The
-larger of both estimates counts, since each is on the safe side.
+The mud of one flipper withstands f_x = k_s(z) ∫ζ dA in the middle of the sweep (control/plate). Mud that yielded gives
+a value of k_s; mud that did not gives only a lower bound, but the insertion gives k_p, and both depend on the one
+strength of the mud: k_s = ρ k_p. ρ is 0.69 in the authors' log with a readable insertion (their 12.5N mud, 1.8 cm), and
+0.43 to 0.63 by the clay practice of Matlock and Prandtl from 0.5 to 4.5 kPa and 1.8 to 3 cm. So the ratio starts
+between, is corrected whenever k_s and k_p are both known, and is never trusted to better than a fifth. The larger of
+both estimates counts, since each is on the safe side. The same k_s holds the body back by its pad: there the safe side
+is a standard error more.
 
 The torque of an extraction is k_e(z) Φ in the pose at the rear end of the sweep, times the fraction of it at the peak:
 k_e is that of a whole stroke, and mud's force grows more slowly with depth than the law, so the peak is less than k_e Φ
@@ -23,7 +24,7 @@ from math import exp, fsum, inf, isfinite, log, radians
 from control.geometry import FlipperGeometry
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.parameters.gait_parameters import GaitParameters
-from control.plate.integrals import stroke_moment_m4, submerged_plate
+from control.plate_integrals import stroke_moment_m4, submerged_plate
 from control.records import TWO_FLIPPERS, Rig, StrideEstimate
 
 SHEAR_RATIO = 0.55  # k_s over k_p before any mud gave both
@@ -112,36 +113,38 @@ class DepthForecast:
         """Return the depth reached under load, which is more than commanded, within the flipper's reach."""
         return min(commanded_m + self._sag_m, self.geometry.deepest_m(self.gait.sweep_angle_deg))
 
-    def thrust_n(self, commanded_m: float) -> float | None:
-        """Return the thrust of all flippers; None if the mud's shear resistance is unknown."""
+    def yield_n(self, commanded_m: float) -> float | None:
+        """Return the thrust at which the mud of all flippers yields; None if its shear resistance is unknown."""
         depth_m = self.reached_m(commanded_m)
-        reported = [self._thrust_n(stride, depth_m) for stride in self._strides]
-        known = [thrust_n for thrust_n in reported if thrust_n is not None]
+        reported = [self._yield_n(stride, depth_m) for stride in self._strides]
+        known = [yield_n for yield_n in reported if yield_n is not None]
         return self._flippers * fsum(known) / len(known) if known else None
 
-    def _thrust_n(self, stride: StrideEstimate, depth_m: float) -> float | None:
+    def _yield_n(self, stride: StrideEstimate, depth_m: float) -> float | None:
         surface_m = _known(stride.surface_m)
         if depth_m <= surface_m or not self.geometry.is_reachable(0.0, depth_m):
             return 0.0
-        k_s = self._shear(stride.flipper, depth_m - surface_m)
+        ratio = (1.0 - THRUST_UNCERTAINTY * RATIO_UNCERTAINTY) * self.shear_ratio
+        k_s = self._shear(stride.flipper, depth_m - surface_m, -THRUST_UNCERTAINTY, ratio)
         if k_s is None:
             return None
         plate = submerged_plate(self.geometry, 0.0, self.geometry.adduction_rad(0.0, depth_m), surface_m)
-        return min(k_s * plate.depth_moment_m3, self.motor_force_n)
+        return k_s * plate.depth_moment_m3
 
-    def _shear(self, flipper: str, submerged_m: float) -> float | None:
-        """Return k_s less its uncertainty; None if unknown."""
+    def _shear(self, flipper: str, submerged_m: float, std_errors: float, ratio: float) -> float | None:
+        """Return k_s by itself and by `ratio` times k_p, each with so many of its standard errors; None if unknown."""
         mud_estimate = self._mud_estimate
         k_s, k_p = mud_estimate.k_s or mud_estimate.of(flipper).k_s, mud_estimate.k_p or mud_estimate.of(flipper).k_p
-        reported = None if k_s is None else _less(k_s, submerged_m)
+        reported = None if k_s is None else _shifted(k_s, submerged_m, std_errors)
         if k_p is None or (k_s is not None and not k_s.at_least):
             return reported
-        felt = (1.0 - THRUST_UNCERTAINTY * RATIO_UNCERTAINTY) * self.shear_ratio * _less(k_p, submerged_m)
+        felt = ratio * _shifted(k_p, submerged_m, std_errors)
         return felt if reported is None else max(felt, reported)
 
-    def shear_at(self, depth_m: float) -> float:
-        """Return k_s at the depth of the body's pad, the mean of the flippers; 0 if unknown."""
-        reported = [self._shear(stride.flipper, depth_m) or 0.0 for stride in self._strides]
+    def drag_shear(self, depth_m: float) -> float:
+        """Return k_s at the depth of the body's pad, on the safe side for drag: the flippers' mean, 0 if unknown."""
+        shears = [self._shear(each.flipper, depth_m, THRUST_UNCERTAINTY, self.shear_ratio) for each in self._strides]
+        reported = [shear or 0.0 for shear in shears]
         return fsum(reported) / len(reported) if reported and depth_m > 0.0 else 0.0
 
     def extraction_nm(self, commanded_m: float) -> float:
@@ -195,9 +198,9 @@ class DepthForecast:
         return -radians(self.gait.sweep_angle_deg)
 
 
-def _less(k: Coefficient, depth_m: float) -> float:
+def _shifted(k: Coefficient, depth_m: float, std_errors: float) -> float:
     value, std_error = k.at(depth_m)
-    return max(0.0, value - THRUST_UNCERTAINTY * std_error)
+    return max(0.0, value + std_errors * std_error)
 
 
 def _more(k: Coefficient, depth_m: float) -> float:

@@ -22,7 +22,7 @@ from control.geometry import FlipperGeometry
 from control.mud_estimate import MudEstimate
 from control.parameters.adaptation_parameters import AdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
-from control.plate.integrals import mean_width_m, moment_width_m
+from control.plate_integrals import mean_width_m, moment_width_m
 from control.records import TWO_FLIPPERS, Estimate, Rig, StrideEstimate
 
 NOT_REPORTED = Estimate(0.0, 0.0, 0, False)

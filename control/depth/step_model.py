@@ -4,10 +4,12 @@ The arms sweep y(t) backward while the body, which they push, goes forward by x.
 of the stiffness k until the mud yields at the thrust F, from where on the plates shear through it; then the body
 continues to slide against the drag f_r + b v of its rail or belly:
 
-    m x'' = f - (f_r + b x')       f = k (y - x - slip), and slip so that |f| ≤ F       y(t) = 2 l sin α · progress(t)
+    m x'' = f - (f_r + b x')     f = min(k (y - x - slip), F_m), slip so that |f| ≤ F     y(t) = 2 l sin α · progress(t)
 
-From the end of the stance on, F fades to zero while the plates are pulled out; the energy left in the spring throws the
-body ahead until then. Afterwards it coasts (m/b) (v - (f_r/b) ln(1 + b v/f_r)).
+Motors that reach their limit F_m first do not slip: the joints lag behind their targets and make up for it later, also
+in the extraction, while the mud holds the plates. So in firm mud a deeper stride is longer, although the motors push
+no harder. In the extraction F falls with the depth at which the plates still are; the energy left in the spring throws
+the body ahead until they are out. Afterwards it coasts (m/b) (v - (f_r/b) ln(1 + b v/f_r)).
 
 The authors' optimiser has S = 2 l min(α, √(1 - ((f_r + f_a)/2 f_s)²)) instead, with one inertial force for the whole
 stance. That balance of forces at one angle has no step at all where thrust is less than drag and inertia together,
@@ -20,6 +22,7 @@ from math import log1p, radians, sin
 from typing import NamedTuple
 
 from control.gait.gait import smooth_progress
+from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
 
 LONGEST_S = 1.0  # of a stance or an extraction: in a slower one inertia is negligible
@@ -38,31 +41,36 @@ class BodyDrag(NamedTuple):
 class Traction(NamedTuple):
     """The thrust and stiffness of all flippers together."""
 
-    thrust_n: float  # at which the mud yields, or the motors do
-    stiffness_n_m: float  # until then
+    yield_n: float  # at which the mud yields
+    motor_n: float  # that the motors can give
+    stiffness_n_m: float  # until either
 
 
 Motion = tuple[
     tuple[float, float], ...
-]  # for each time step: the plates' swept distance, the remaining fraction of thrust
+]  # for each time step: the plates' swept distance, and their depth as a fraction of the stance's
 
 
-def step_m(gait: GaitParameters, flipper_length_m: float, drag: BodyDrag, traction: Traction, depth_m: float) -> float:
+def step_m(
+    gait: GaitParameters, geometry: FlipperGeometry, drag: BodyDrag, traction: Traction, depth_m: float
+) -> float:
     """Return the step with the flippers at `depth_m`, extracted at the gait's speed."""
-    return carried_m(motion_of(gait, flipper_length_m, depth_m), drag, traction)
+    return carried_m(motion_of(gait, geometry, depth_m), drag, traction)
 
 
 @lru_cache(maxsize=256)
-def motion_of(gait: GaitParameters, flipper_length_m: float, depth_m: float) -> Motion:
+def motion_of(gait: GaitParameters, geometry: FlipperGeometry, depth_m: float) -> Motion:
     """Return the motion of the plates from the start of the stance until they are out."""
     front_rad = radians(gait.sweep_angle_deg)
-    stance_s = min(2.0 * front_rad * flipper_length_m / gait.stance_speed_m_s, LONGEST_S)
-    leaving_s = min(max(depth_m, 0.0) / gait.extraction_speed_m_s, LONGEST_S)
+    stance_s = min(2.0 * front_rad * geometry.flipper_length_m / gait.stance_speed_m_s, LONGEST_S)
+    raised_m = geometry.clearance_m + depth_m
+    extraction_s = min(raised_m / gait.extraction_speed_m_s, LONGEST_S)
     motion, time_s = list[tuple[float, float]](), 0.0
-    while time_s < stance_s + leaving_s:
+    while time_s < stance_s + extraction_s:
         time_s += STEP_S
-        swept_m = 2.0 * flipper_length_m * sin(front_rad) * smooth_progress(time_s, stance_s)[0]
-        motion.append((swept_m, min(1.0, max(0.0, 1.0 - (time_s - stance_s) / leaving_s))))
+        swept_m = 2.0 * geometry.flipper_length_m * sin(front_rad) * smooth_progress(time_s, stance_s)[0]
+        submerged_m = depth_m - raised_m * smooth_progress(time_s - stance_s, extraction_s)[0]
+        motion.append((swept_m, max(0.0, submerged_m / depth_m)))
     return tuple(motion)
 
 
@@ -70,14 +78,16 @@ def carried_m(motion: Motion, drag: BodyDrag, traction: Traction) -> float:
     """Integrate the body's motion over a stride; dry friction keeps the body from sliding back."""
     dry_n, damping_n_s_m, mass_kg = drag
     stiffness_n_m, damped = traction.stiffness_n_m, 1.0 + STEP_S * damping_n_s_m / mass_kg
-    if traction.thrust_n <= dry_n:
+    yield_n, motor_n = traction.yield_n, traction.motor_n
+    if min(yield_n, motor_n) <= dry_n:
         return 0.0
     body_m = body_m_s = slip_m = 0.0
     for swept_m, fraction in motion:
-        thrust_n = fraction * traction.thrust_n
-        wanted_n = stiffness_n_m * (swept_m - body_m - slip_m)
-        force_n = thrust_n if wanted_n > thrust_n else max(wanted_n, -thrust_n)
-        slip_m += (wanted_n - force_n) / stiffness_n_m
+        held_n = fraction * yield_n
+        force_n = min(stiffness_n_m * (swept_m - body_m - slip_m), motor_n)
+        if abs(force_n) > held_n:
+            force_n = held_n if force_n > 0.0 else -held_n
+            slip_m = swept_m - body_m - force_n / stiffness_n_m
         body_m_s = (body_m_s + STEP_S * (force_n - dry_n) / mass_kg) / damped
         body_m_s = body_m_s if body_m_s > 0.0 else 0.0
         body_m += STEP_S * body_m_s

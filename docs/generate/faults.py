@@ -7,9 +7,9 @@ from control.modes import TRANSITIONS, Mode
 from control.rate import PERIOD_S
 from docs.generate.markdown import code, table
 from drivers.fault_injection.failures import EFFECTS
-from experiments.faults.energy_bounds import STOP_TO_STOP_RAD, STOPPING, energy_bounds
 from experiments.robot.lockstep_robot import simulated_configuration
-from firmware_host.operator.fault_texts import FAULT_TEXTS
+from firmware_host.fault_texts import FAULT_TEXTS
+from verification.faults.energy_bounds import STOP_TO_STOP_RAD, STOPPING, energy_bounds
 
 REACTIONS = {
     Reaction.NONE: "nothing; the fault only prevents arming",

@@ -9,14 +9,14 @@ from dataclasses import MISSING
 from itertools import groupby
 from pathlib import Path
 
+from command_line.init.key_reference import Key, configuration_keys, is_required, toml_value
 from control.gait.gait import PROTOCOLS
 from docs.generate.command_line import commands, exit_statuses
 from docs.generate.faults import energies, failures, faults, modes, reactions
 from docs.generate.markdown import code, table
-from firmware_host.configuration.key_reference import Key, configuration_keys, is_required, toml_value
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import Field
-from firmware_host.operator.socket_methods import METHODS, Level, Parameter, SocketMethod
+from firmware_host.sockets.socket_methods import METHODS, Level, Parameter, SocketMethod
 
 RIGHTS = {Level.ANYONE: "every user who may connect", Level.READ: "`read_group`", Level.DRIVE: "`drive_group`"}
 

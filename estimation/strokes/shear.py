@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
-from control.plate.integrals import moment_width_m, stance_moment_m4, submerged_plate
+from control.plate_integrals import moment_width_m, stance_moment_m4, submerged_plate
 from control.records import UNKNOWN
 from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from control.computing.bounded_work import Work, finish
 from control.computing.exact_sum import exact_sum
 from control.geometry import FlipperGeometry
-from control.plate.integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
+from control.plate_integrals import cross_coupling, growth_exponent, mean_width_m, stroke_moment_m4, submerged_plate
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.fit_samples import FitSamples
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit, fit_through_origin

@@ -23,7 +23,7 @@ from experiments.robot.bench_robot import BenchRobot, arm, ask_to_clear_faults, 
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Show
-from firmware_host.operator.status_client import CallRefusedError
+from operator_client.status_client import CallRefusedError
 
 KEEP, OTHER = "k", "o"  # keys of answers
 MOST_FAULTS = 5  # during the attempts at one weight

@@ -18,7 +18,7 @@ from tomlkit.items import Table
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.configuration.toml_records import read_text
-from firmware_host.log.whole_files import whole_file
+from logs.files.whole_files import whole_file
 
 BACKUP = ".before"
 Changes = Mapping[tuple[str, ...], float]  # the key's path, and its new value

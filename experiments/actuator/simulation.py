@@ -27,8 +27,8 @@ from experiments.robot.lockstep_robot import LockstepRobot, simulated_configurat
 from experiments.robot.prompt import GO_ON
 from experiments.trials.trial import BENCH_CURRENT_A
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.file_recorder import FileRecorder
 from simulation.body.bench_mount import BenchMount
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.track import paper_track
 

@@ -31,8 +31,8 @@ from firmware_host.computer.realtime import prepare_loop
 from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import Loop
-from firmware_host.operator.status_client import NoDaemonError, NotPermittedError, StatusClient
 from firmware_host.ticker import Tick, Ticker
+from operator_client.status_client import NoDaemonError, NotPermittedError, StatusClient
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.harness.blocks import on_blocks
 from simulation.harness.robot import SimulatedRobot

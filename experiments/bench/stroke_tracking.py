@@ -21,7 +21,7 @@ from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, TestRig
 from experiments.robot.bench_errors import BenchError
-from firmware_host.operator.fault_texts import fault_message
+from firmware_host.fault_texts import fault_message
 
 Vector = NDArray[np.float64]
 

@@ -14,6 +14,7 @@ from experiments.campaign.campaign_file import Campaign, Trial
 from experiments.campaign.points import Values
 from experiments.campaign.trials_table import write_trials
 from experiments.campaign.walk_trial import BROKEN, run_walk
+from experiments.reports.counted_nouns import counted
 from experiments.reports.report_page import Section
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import Rows, number, table
@@ -21,9 +22,8 @@ from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.provenance import program_text, provenance
 from experiments.trials.session import Finding, Session, Show
-from firmware_host.catalogue.entry import TRIALS
-from firmware_host.operator.counted_nouns import counted
 from firmware_host.software_version import build_metadata
+from logs.catalogue.entry import TRIALS
 
 SHOWN_POINTS = 30
 

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from control.bounds import Bounds
-from control.plate.outline import Corner
+from control.plate_outline import Corner
 from experiments.campaign.planned_walk import SECTIONS, one_mud, plan_walk
+from experiments.campaign.plate_file import read_corners
 from experiments.campaign.points import Tables, Values, grid_points, random_points, range_ends, with_values
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.plate_file import read_corners
 from firmware_host.configuration.toml_records import RecordReader, parse_document, read_text, shown
 
 MOST_TRIALS = 100_000

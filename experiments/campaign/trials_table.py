@@ -13,8 +13,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from firmware_host.catalogue.entry import COLUMNS, MUDS
-from firmware_host.log.whole_files import whole_file
+from logs.catalogue.entry import COLUMNS, MUDS
+from logs.files.whole_files import whole_file
 
 MUD = [("strides", pa.int32()), *((name, pa.float64()) for name in ("k_p", "k_s", "k_e", "speed_m_s"))]
 ARROW_TYPES = {

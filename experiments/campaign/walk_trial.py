@@ -11,13 +11,13 @@ import numpy as np
 from control.modes import Mode
 from experiments.campaign.planned_walk import PlannedWalk, plan_walk
 from experiments.campaign.points import Tables
-from firmware_host.catalogue.entry import LogEntry
-from firmware_host.catalogue.log_contents import entry_of_log
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.rows import EVENT_KIND, STRIDE_KIND, TICK_KIND, row_kinds
-from firmware_host.log_reading.log_reader import Log
-from firmware_host.log_reading.tick_array import divide_ticks
+from logs.catalogue.entry import LogEntry
+from logs.catalogue.log_contents import entry_of_log
+from logs.files.log_reader import Log
+from logs.files.tick_array import divide_ticks
 from simulation.harness.lockstep import Lockstep
 
 WHOLE, BROKEN = "whole", "broken"  # a walk, and a robot that did not start

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from control.modes import Mode
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.log_reader import Log
+from logs.files.log_reader import Log
 
 POSE_M = 0.002
 INVALID_M = 0.01  # a tenth of a stance: 10 % of travel and speed, which changes the mud's resistance by 0.6 %

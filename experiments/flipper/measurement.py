@@ -23,7 +23,7 @@ from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
 from experiments.trials.stride_profile import Floats, StrideProfile, profile_of, profile_row, thinned
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.log_reader import Log
+from logs.files.log_reader import Log
 
 MUDS = ("47.6", "48.6", "49.5", "50.3", "51.2")  # the paper's, by their water content in percent
 METHODS = (DEFAULT, PAPER)

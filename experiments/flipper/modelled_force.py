@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from control.geometry import FlipperGeometry
-from control.plate.integrals import (
+from control.plate_integrals import (
     cross_coupling,
     mean_width_m,
     moment_width_m,

@@ -18,8 +18,8 @@ from estimation.estimation_parameters import Method
 from experiments.lablogs.recording import Recording, read_recording
 from experiments.reports.error_table import COEFFICIENTS
 from firmware_host.configuration.configuration import CaptureAxis
-from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
-from firmware_host.log_reading.log_error import LogError
+from logs.files.log_error import LogError
+from logs.lab.body_track import VERTICAL_AXIS
 
 METHODS: tuple[Method, ...] = ("default", "paper")
 DELAY_S = 0.005  # between current and position: the authors' drives sent a new state every 5 to 20 ms

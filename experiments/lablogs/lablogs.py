@@ -14,7 +14,7 @@ from experiments.lablogs.report import LablogsReport, report_of
 from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Show
 from firmware_host.configuration.configuration import CaptureAxis
-from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
+from logs.lab.body_track import VERTICAL_AXIS
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from control.records import StrideEstimate
 from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis
-from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
-from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
-from firmware_host.log_reading.lab.joint_signs import find_evidence
-from firmware_host.log_reading.lab.log_rows import LogRows
-from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reading.log_reader import Log, read_logs
-from firmware_host.log_reading.replay import configuration_of, replay_lab, replay_log
+from logs.files.log_reader import Log, read_logs
+from logs.lab.body_track import VERTICAL_AXIS
+from logs.lab.columns import PAPER_CONSTANT_NM_A
+from logs.lab.joint_signs import find_evidence
+from logs.lab.lab_csv import LabLog, read_lab_csv
+from logs.lab.log_rows import LogRows
+from logs.replay import configuration_of, replay_lab, replay_log
 
 Floats = NDArray[np.float64]
 

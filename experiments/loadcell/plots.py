@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from control.plate.integrals import submerged_part
+from control.plate_integrals import submerged_part
 from experiments.loadcell.analysis.coefficients import (
     COEFFICIENTS,
     AnalysedTrial,

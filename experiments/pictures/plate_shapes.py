@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from control.geometry import FlipperGeometry
-from control.plate.outline import Corner
+from control.plate_outline import Corner
 from experiments.pictures.colours import BODY, FAINT, FLIPPER_COLOURS, INK, MUD, SURFACE
 
 DEPTH_M, BELOW_M, ABOVE_M = 0.03, 0.045, 0.06  # of the drawn plates, and of the picture

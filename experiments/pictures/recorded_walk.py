@@ -18,14 +18,14 @@ from control.records import FLIPPERS, FlipperLoad, Rig, StrideEstimate
 from experiments.pictures.walk_trace import Rows, WalkTraces, drawn_rows
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import STRIDE, stride_row
-from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
-from firmware_host.log_reading.lab.findings import Finding
-from firmware_host.log_reading.lab_csv import LabLog, is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_error import LogError, Watch, unwatched
-from firmware_host.log_reading.log_reader import AnyLog, TickPass
-from firmware_host.log_reading.log_summary import begin_s, log_summary, segment_of
-from firmware_host.log_reading.replay import configuration_of, lab_estimator, lab_readings
-from firmware_host.log_reading.scanned_log import scan_logs
+from logs.files.log_error import LogError, Watch, unwatched
+from logs.files.log_reader import AnyLog, TickPass
+from logs.files.log_summary import begin_s, log_summary, segment_of
+from logs.files.scanned_log import scan_logs
+from logs.lab.body_track import VERTICAL_AXIS
+from logs.lab.findings import Finding
+from logs.lab.lab_csv import LabLog, is_lab_csv, read_lab_csv
+from logs.replay import configuration_of, lab_estimator, lab_readings
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]

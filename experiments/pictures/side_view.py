@@ -10,7 +10,7 @@ from math import cos, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from control.plate.outline import lower_hull
+from control.plate_outline import lower_hull
 
 Point = tuple[float, float]  # x, z in m
 

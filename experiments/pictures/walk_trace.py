@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.modes import Mode
-from firmware_host.log_reading.tick_array import Ticks
+from logs.files.tick_array import Ticks
 
 Rows = NDArray[np.void]
 

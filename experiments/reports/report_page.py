@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.reports.text_tables import Rows, TitledRows
-from firmware_host.log.whole_files import whole_file
 from firmware_host.software_version import software_version
+from logs.files.whole_files import whole_file
 
 FLAT: Mapping[str, Any] = {"flat": True}  # metadata of a field
 PAGE, SUMMARY = "report.html", "summary.json"

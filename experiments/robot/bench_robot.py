@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
+from experiments.reports.counted_nouns import counted
 from experiments.robot.bench_errors import BenchError, DaemonLostError, EndedError, RobotInUseError
 from experiments.robot.prompt import Operator
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.log_reader import Log
-from firmware_host.operator.counted_nouns import counted
-from firmware_host.operator.status_client import CallRefusedError
+from logs.files.log_reader import Log
+from operator_client.status_client import CallRefusedError
 
 POLL_S = 0.05
 # The longest that each may take, in s:

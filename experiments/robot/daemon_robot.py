@@ -18,11 +18,11 @@ from experiments.robot.log_copies import copy_since, cut_log
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.configuration.loading import parse_configuration
+from firmware_host.lease import TAKEN_OVER
 from firmware_host.log.log_folder import run_files
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_reader import Log, read_logs
-from firmware_host.operator.lease import TAKEN_OVER
-from firmware_host.operator.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
+from logs.files.log_error import LogError
+from logs.files.log_reader import Log, read_logs
+from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 LEASE_S = 2.0  # while torque may be on
 RESTING_LEASE_S = 10.0  # while torque is off: reading a log takes some time, and nothing has to be stopped

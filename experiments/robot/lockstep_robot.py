@@ -10,15 +10,15 @@ from drivers.drive_types import DEFAULT
 from experiments.robot.log_copies import cut_log
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading.log_reader import Log, read_log
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_methods import Level
-from firmware_host.operator.status_client import CallRefusedError
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.socket_methods import Level
+from logs.files.log_reader import Log, read_log
+from operator_client.status_client import CallRefusedError
 from simulation.harness.drive_presets import with_drive_type
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.local_setup import configuration_template
 from simulation.harness.lockstep import Lockstep
 

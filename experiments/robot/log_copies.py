@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from firmware_host.log.log_folder import present_path
-from firmware_host.log.whole_files import copy_whole
-from firmware_host.log_reading.log_reader import Log
-from firmware_host.log_reading.recovery import recover_log
-from firmware_host.log_reading.scanned_log import scan_log
+from logs.files.log_reader import Log
+from logs.files.scanned_log import scan_log
+from logs.files.whole_files import copy_whole
+from logs.recovery import recover_log
 
 
 def copy_since(segments: Sequence[Path], from_s: float, folder: Path) -> list[Path]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from firmware_host.log_reading.fault_history import BEGUN, OVER
+from logs.fault_history import BEGUN, OVER
 
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w])")
 

@@ -8,10 +8,10 @@ import numpy as np
 from control.faults import FAULT_KINDS, Reaction
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import Outcome
+from experiments.reports.counted_nouns import counted
 from experiments.run_report.mud_results import MudResult, Speed, count_outcomes, mud_results
 from experiments.run_report.run import Run
-from firmware_host.log_reading.fault_history import LoggedCause
-from firmware_host.operator.counted_nouns import counted
+from logs.fault_history import LoggedCause
 
 DOING = {Outcome.GOOD: "good", Outcome.SLIPPING: "slipped", Outcome.STUCK: "stuck"}
 

@@ -22,14 +22,14 @@ from experiments.pictures.stride_choice import Outcome, Stride, outcome_of
 from experiments.pictures.walk_trace import WalkTraces
 from experiments.reports.mud_names import mud_label
 from firmware_host.configuration.configuration import CaptureAxis
-from firmware_host.log_reading.fault_history import LoggedCause, read_causes
-from firmware_host.log_reading.lab.body_track import VERTICAL_AXIS
-from firmware_host.log_reading.lab_csv import is_lab_csv, read_lab_csv
-from firmware_host.log_reading.log_error import LogError, Watch
-from firmware_host.log_reading.log_reader import TickPass
-from firmware_host.log_reading.log_summary import begin_s, log_summary
-from firmware_host.log_reading.replay import Replay, RunningReplay, configuration_of, replay_lab
-from firmware_host.log_reading.scanned_log import ScannedLog, join_logs, scan_log
+from logs.fault_history import LoggedCause, read_causes
+from logs.files.log_error import LogError, Watch
+from logs.files.log_reader import TickPass
+from logs.files.log_summary import begin_s, log_summary
+from logs.files.scanned_log import ScannedLog, join_logs, scan_log
+from logs.lab.body_track import VERTICAL_AXIS
+from logs.lab.lab_csv import is_lab_csv, read_lab_csv
+from logs.replay import Replay, RunningReplay, configuration_of, replay_lab
 
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
 AUTHORS = "the paper's authors"

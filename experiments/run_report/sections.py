@@ -8,6 +8,7 @@ from typing import Any
 from experiments.pictures.mud_layout import MudLayout
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import choose_strides, with_strides
+from experiments.reports.counted_nouns import counted
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.shown_values import value_shown
@@ -27,8 +28,7 @@ from experiments.run_report.tables import (
     run_rows,
     stride_rows,
 )
-from firmware_host.log_reading.log_summary import log_summary
-from firmware_host.operator.counted_nouns import counted
+from logs.files.log_summary import log_summary
 
 SINCE = "Times count from the beginning of the log."
 UNCERTAINTY = (

@@ -14,7 +14,7 @@ from experiments.run_report.fit_quality import N_CM
 from experiments.run_report.headline import Headline, reaction_of
 from experiments.run_report.mud_results import MudResult, Speed, estimate_of_row
 from experiments.run_report.run import ReportedStride, Run
-from firmware_host.log_reading.fault_history import LoggedCause
+from logs.fault_history import LoggedCause
 
 Table = list[list[str]]
 CM = 0.01  # in metres

@@ -29,7 +29,7 @@ from experiments.trackway.walk import Walk
 from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.mud.clay import Clay
-from simulation.mud.disturbances import LAB
+from simulation.mud.disturbances import TRACKWAY
 
 STRENGTHS_PA = (300.0, 400.0, 500.0, 680.0, 1000.0, 1500.0, 2000.0, 2800.0, 3250.0, 4000.0, 5000.0, 6000.0)
 
@@ -112,7 +112,7 @@ def run(plan: Plan, show: Show, workers: Workers | None = None) -> SweepReport:
 
 def report_of(plan: Plan, walked: Sequence[Walked]) -> SweepReport:
     strengths = [_swept_mud(clay, [each for each in walked if each[0].clay == clay]) for clay in plan.clays()]
-    settings = Settings(plan.methods, plan.seeds, CONSTANT_STRIDES, plan.method_strides, asdict(LAB))
+    settings = Settings(plan.methods, plan.seeds, CONSTANT_STRIDES, plan.method_strides, asdict(TRACKWAY))
     return SweepReport(strengths=strengths, settings=settings)
 
 

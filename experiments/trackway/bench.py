@@ -14,6 +14,7 @@ from itertools import accumulate
 from math import isfinite, radians, sin
 from typing import NamedTuple
 
+from experiments.reports.counted_nouns import counted
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import (
     RAISING_S,
@@ -34,7 +35,6 @@ from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.operator.counted_nouns import counted
 
 PATIENCE_S = 900.0  # longest time of a whole walk
 UNSEEN_S = 2.0  # longest time without a pose, before or during a walk: the end of the track is unknown then

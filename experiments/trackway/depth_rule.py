@@ -15,7 +15,7 @@ from experiments.trackway.walk import Walk, WalkedStride, walk_in
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.configuration import Configuration
 from simulation.harness.lockstep import Lockstep, plant_of
-from simulation.mud.disturbances import LAB
+from simulation.mud.disturbances import TRACKWAY, Disturbances
 from simulation.mud.track import Track
 
 METHODS: tuple[str, ...] = get_args(Method)
@@ -62,9 +62,15 @@ def _papers_robot(configuration: Configuration) -> Configuration:
 
 
 def walk_by(
-    rule: DepthRule, track: Track, seed: int, done: Callable[[Sequence[WalkedStride]], bool], **plant: Any
+    rule: DepthRule,
+    track: Track,
+    seed: int,
+    done: Callable[[Sequence[WalkedStride]], bool],
+    disturbances: Disturbances = TRACKWAY,
+    **plant: Any,
 ) -> Walk:
-    """Walk until `done`, with the disturbances of mud and drives in the authors' logs. `plant` changes parameters."""
+    """Walk until `done`, with the disturbances of mud and drives on the trackway. `plant` changes parameters."""
     configuration = configuration_for(rule)
-    changed = plant_of(configuration, LAB, **plant)
-    return walk_in(Lockstep(configuration, track, seed, disturbances=LAB, plant=changed), track, rule.order, done)
+    changed = plant_of(configuration, disturbances, **plant)
+    lockstep = Lockstep(configuration, track, seed, disturbances=disturbances, plant=changed)
+    return walk_in(lockstep, track, rule.order, done)

@@ -31,7 +31,7 @@ from experiments.trials.session import Show
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.toml_records import parse_document
 from simulation.mud.clay import MUDS, Clay
-from simulation.mud.disturbances import LAB
+from simulation.mud.disturbances import TRACKWAY
 from simulation.mud.track import COMPARTMENT_M, Track
 
 STUCK_S = 90.0  # longest walking time in one mud
@@ -76,7 +76,7 @@ class Plan:
             "methods": [rule.method for rule in self.rules if rule.method],
             "muds": [[clay.name, clay.strength_pa] for clay in self.muds],
             "compartment_m": self.compartment_m,
-            "disturbances": asdict(LAB),
+            "disturbances": asdict(TRACKWAY),
             "configuration": parse_document(configuration_of(WALKING).text),
         }
 
@@ -105,7 +105,7 @@ class Plan:
             strength_pa={clay.name: clay.strength_pa for clay in self.muds},
             constant_strides=CONSTANT_STRIDES,
             constant_seeds=self.constant_seeds,
-            disturbances=asdict(LAB),
+            disturbances=asdict(TRACKWAY),
         )
 
 

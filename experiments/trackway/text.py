@@ -9,6 +9,7 @@ from pathlib import Path
 from statistics import fmean
 
 from experiments.pictures.recorded_walk import RecordedWalk, numbered_walk
+from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_label
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
@@ -24,9 +25,8 @@ from experiments.trials.notebook import Notebook
 from experiments.trials.parallel_trials import Workers
 from experiments.trials.session import Finding, Session
 from firmware_host.log.log_folder import first_path, run_files
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_reader import read_log, read_logs
-from firmware_host.operator.counted_nouns import counted
+from logs.files.log_error import LogError
+from logs.files.log_reader import read_log, read_logs
 
 INSTRUCTIONS = (
     "Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take your hands away: "

@@ -18,8 +18,8 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import UNKNOWN, Phase
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.log_reader import Log
-from firmware_host.operator.fault_texts import fault_message
+from firmware_host.fault_texts import fault_message
+from logs.files.log_reader import Log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import Track
 

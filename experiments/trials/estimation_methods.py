@@ -12,9 +12,9 @@ from typing import Any
 
 from estimation.estimation_parameters import EstimationParameters, PaperEstimationParameters
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.log_reader import Log
-from firmware_host.log_reading.replay import replay_log
 from firmware_host.operator.reports import stride_report
+from logs.files.log_reader import Log
+from logs.replay import replay_log
 
 DEFAULT, PAPER, COMPENSATED = "default", "paper", "paper compensated"
 Strides = list[dict[str, Any]]

@@ -14,7 +14,7 @@ from math import cos, fsum, isfinite, sin
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from control.plate.integrals import SubmergedPlate, submerged_part
+from control.plate_integrals import SubmergedPlate, submerged_part
 from control.records import UNKNOWN
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.test_rig.joint_cell import ArcCurve, measure_arc

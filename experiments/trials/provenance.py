@@ -20,8 +20,8 @@ from firmware_host.software_version import PACKAGE, build_metadata, software_ver
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = (
-    "benchmarks", "command_line", "control", "drivers", "estimation", "experiments", "firmware_host", "mudskipper",
-    "simulation",
+    "command_line", "control", "drivers", "estimation", "experiments", "firmware_host", "logs", "mudskipper",
+    "operator_client", "simulation", "verification",
 )  # fmt: skip
 DIGITS = 16
 Record = dict[str, str]

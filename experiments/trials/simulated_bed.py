@@ -22,10 +22,10 @@ from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.mud_trials import PlannedTrial, Truths
 from experiments.trials.trial import TORQUE_ERROR
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.file_recorder import FileRecorder
 from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.motion_capture_parameters import OF_THE_PAPER, MotionCaptureParameters
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep, drives_of
 from simulation.mud.disturbances import LAB, drive_changes
 from simulation.mud.track import Track

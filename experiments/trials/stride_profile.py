@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from control.modes import Mode
 from control.records import Phase, Rig
 from estimation.stride_clock import STROKES
-from firmware_host.log_reading.log_reader import Log
+from logs.files.log_reader import Log
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from control.plate.integrals import moment_width_m
+from control.plate_integrals import moment_width_m
 from control.records import Phase
 from estimation.paper import ADVANCED_M, STEADY_FRACTION
 from estimation.strokes.line_fit import LineFit
 from experiments.trials.stride_profile import StrideProfile, profile_of
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.log_reader import Log
 from firmware_host.operator.reports import estimate_report
+from logs.files.log_reader import Log
 
 KNOWN, KNOWN_COMPENSATED = "paper's law", "paper's law with drag"
 

@@ -34,7 +34,7 @@ from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
 from experiments.trials.stride_profile import profile_of, profile_of_walk, profile_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
-from firmware_host.log_reading.log_reader import Log
+from logs.files.log_reader import Log
 
 MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
 # The first is that of figure 7, called 53.8 % there; in simulation the second yields at 3 cm and not at 5 cm.

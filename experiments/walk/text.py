@@ -13,6 +13,7 @@ from experiments.flipper.text import (
     remarks_sections,
 )
 from experiments.reports.coefficient_table import error_text_rows, mud_rows
+from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
@@ -27,7 +28,6 @@ from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, run
 from experiments.walk.report import SoftMud, WalkReport, located_strides, report_of, soft_walks_of, walks_of
 from experiments.walk.simulation import walking_bench
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.operator.counted_nouns import counted
 
 TRACKWAY_INSTRUCTIONS = (
     "Torque is off. Re-mix the surface of all muds and level it to its nominal height, and put the robot so that the "

@@ -20,7 +20,7 @@ from control.joint_pd import (
     phase_margin_rad,
 )
 from control.parameters.gait_parameters import GaitParameters
-from control.plate.outline import outline_problems
+from control.plate_outline import outline_problems
 from drivers.pose.natnet_sockets import is_address, parse_axis, parse_version
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from firmware_host.configuration.drive_consistency import bus_problems, drive_problems, rig_problems

@@ -9,10 +9,10 @@ from typing import Any
 
 from drivers.fault_injection.failures import EFFECTS, Failures, begin_text, end_text
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import validated
-from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.status_socket import Methods
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.status_socket import Methods
 
 FORBIDDEN = "nothing may fail on purpose here: set failures.allowed = true in the configuration, and start again"
 OK, ALL = "ok", "all"

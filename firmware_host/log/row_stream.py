@@ -23,9 +23,9 @@ from typing import Any
 from firmware_host.log.row_records import Record, pack_record
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import RowKind
-from firmware_host.operator.rights import Group, Peer, Rights, read_peer
-from firmware_host.operator.socket_file import AlreadyServedError, SocketFile
-from firmware_host.operator.socket_methods import Level
+from firmware_host.sockets.rights import Group, Peer, Rights, read_peer
+from firmware_host.sockets.socket_file import AlreadyServedError, SocketFile
+from firmware_host.sockets.socket_methods import Level
 
 OPENING, LOST, REFUSAL = 255, 254, 253
 MOST_SUBSCRIBERS = 8

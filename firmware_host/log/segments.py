@@ -216,7 +216,7 @@ class LogSegments:
         if found <= self._tried:
             return
         self._tried |= found
-        command = [sys.executable, "-P", "-m", "firmware_host.log_reading.recovery", str(self._folder)]
+        command = [sys.executable, "-P", "-m", "logs.recovery", str(self._folder)]
         with suppress(OSError):  # the next start finds them too
             self._recovery = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 

@@ -4,7 +4,7 @@ The loop must never wait for a disk, so it hands rows over through a pipe, and t
 It ends only when its input ends: it ignores the signals meant for the loop, and while a disk refuses, it counts rows.
 Once a second it reports the state of the disk on standard output, where it never waits either. Chunks end by time and
 the file is synchronised every second, so a crash of this program costs half a second, a power cut one or two, and the
-next start recovers the rest (`firmware_host.log_reading.recovery`).
+next start recovers the rest (`logs.recovery`).
 """
 
 import json

@@ -14,9 +14,9 @@ from control.faults import Blocks, Fault, FaultKind
 from control.records import DriveState
 from drivers.drive import DriveHealth
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.fault_texts import SET_UP, fault_message, what_to_do
 from firmware_host.loop import Loop
 from firmware_host.loop_snapshot import take_snapshot
-from firmware_host.operator.fault_texts import SET_UP, fault_message, what_to_do
 from firmware_host.operator.reports import check_item
 
 HEARING = f"check its power, wiring, node id, type and message periods; {SET_UP}"

@@ -14,11 +14,10 @@ from control.fault_causes import AgedFault, group_by_cause
 from control.faults import Blocks, Fault
 from control.modes import Mode, Request
 from control.records import JOINTS
+from firmware_host.fault_texts import fault_message, what_to_do
 from firmware_host.loop import Loop
 from firmware_host.loop_snapshot import LoopSnapshot, take_snapshot
 from firmware_host.operator.arming_checks import arming_checks
-from firmware_host.operator.connection import Caller
-from firmware_host.operator.fault_texts import fault_message, what_to_do
 from firmware_host.operator.reports import (
     cause_report,
     known,
@@ -27,9 +26,10 @@ from firmware_host.operator.reports import (
     mud_estimate_report,
     stride_report,
 )
-from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
-from firmware_host.operator.status_socket import Methods
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
+from firmware_host.sockets.status_socket import Methods
 from firmware_host.software_version import is_compiled, software_version
 
 Method = Callable[[dict[str, Any], Caller], Any]

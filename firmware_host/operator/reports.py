@@ -13,7 +13,7 @@ from control.faults import FaultKind
 from control.mud_estimate import Coefficient, MudEstimate
 from control.records import Estimate, FlipperLoad, Rig, StrideEstimate
 from estimation.mud_map import Mapped, MapRow
-from firmware_host.operator.fault_texts import fault_message, what_to_do
+from firmware_host.fault_texts import fault_message, what_to_do
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name

@@ -18,7 +18,9 @@ Measured in the authors' raw logs, where not stated otherwise:
                  would be 0.5 to 0.8 mm at 6.5 % a millimetre: k_s goes with the square of a depth of 3 cm
     friction     dry, against the direction of motion. Half the difference between both directions at the same angle, in
                  air: 0.05 to 0.06 N·m in the sweep joints and 0.045 in the adduction joints in September 2024, 0.01 in
-                 both in June and August. It adds to the plant's own
+                 both in June and August. It adds to the plant's own. An estimator has to withstand the larger one,
+                 which is that of LAB. TRACKWAY has the smaller one: with the larger one no mud has the speeds of
+                 Table I (docs/explanation/depth.md)
     drives       current noise of 0.1 to 0.3 A; 50 to 210 distinct states a second; a clip of the current
 
 Infrequent messages disturb more than the estimator here, where the joints' loop is closed over the bus: with the
@@ -29,7 +31,7 @@ A stroke is a stay in the mud that reached 5 mm. When the plate has left the mud
 stroke. The draws do not depend on which disturbances are on.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, exp, hypot, sin
 from random import Random
 from typing import Annotated
@@ -80,6 +82,7 @@ LAB = Disturbances(
     sweep_friction_nm=0.05,
     adduction_friction_nm=0.045,
 )
+TRACKWAY = replace(LAB, sweep_friction_nm=0.01, adduction_friction_nm=0.01)
 
 
 # The drives' parameters that each disturbance sets.

@@ -11,7 +11,7 @@ from math import degrees, hypot
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
-from control.plate.integrals import stroke_moment_m4, submerged_plate
+from control.plate_integrals import stroke_moment_m4, submerged_plate
 from simulation.mud.clay import Clay
 from simulation.mud.flipper_contact import ArmMotion, attitude_of, contact_force, plate_size, twist_of
 from simulation.mud.plate_contact import PlateContact

@@ -17,9 +17,9 @@ from command_line import exit_codes
 from command_line.operation import confirmed_stop, operation
 from command_line.operation.confirmation import TORQUE_UNKNOWN
 from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.operator.status_client import NotPermittedError, StatusClient
-from firmware_host.operator.status_socket import Methods, StatusSocket
-from firmware_host.user_groups import load_rights
+from firmware_host.sockets.status_socket import Methods, StatusSocket
+from firmware_host.sockets.user_groups import load_rights
+from operator_client.status_client import NotPermittedError, StatusClient
 from tests.running_bench import Bench
 
 NOBODY = 65534

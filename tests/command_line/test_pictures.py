@@ -25,8 +25,8 @@ from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
 from experiments.pictures.walk_plot import MOST_DASHES, plot_walk
-from firmware_host.log_reading.lab.export import write_lab_csv
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
+from logs.lab.export import write_lab_csv
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
 from tests.command_line.command_lines import failure, refusal

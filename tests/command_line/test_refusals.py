@@ -16,7 +16,7 @@ from command_line.screen import coefficient
 from control.records import JOINTS
 from experiments.reports.text_tables import number
 from firmware_host import daemon
-from firmware_host.operator.status_client import DroppedError
+from operator_client.status_client import DroppedError
 from tests.command_line.command_lines import failure, refusal
 
 NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))

@@ -5,8 +5,8 @@ import math
 
 import tomlkit
 
+from command_line.init.key_reference import Key, configuration_keys
 from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.key_reference import Key, configuration_keys
 from firmware_host.configuration.loading import parse_configuration
 from tests.folders import EXAMPLE_CONFIGURATION
 

@@ -7,7 +7,6 @@ import json
 from hashlib import sha256
 from itertools import chain
 
-from benchmarks.example_robot import load_example, load_one_flipper
 from control.controller import WalkOrder
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import NullRecorder
@@ -15,6 +14,7 @@ from firmware_host.software_version import is_compiled
 from simulation.harness.drive_presets import DRIVES
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
+from verification.example_robot import load_example, load_one_flipper
 
 STRIDES = 4
 WALK_S = 8.0  # which ends with a rest

@@ -13,9 +13,9 @@ from pathlib import Path
 from firmware_host.configuration.log_parameters import ONE_FILE
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.segments import LogSegments
-from firmware_host.log_reading.log_reader import Log, read_logs
-from firmware_host.log_reading.replay import replay_log
 from firmware_host.loop import Loop
+from logs.files.log_reader import Log, read_logs
+from logs.replay import replay_log
 from tests.dst.starts import RecordedRobot
 
 BATCH_ROWS = 200

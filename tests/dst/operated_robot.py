@@ -17,12 +17,12 @@ import msgpack
 
 from firmware_host.daemon import Shutdown, end_safely
 from firmware_host.fault_injection.failure_calls import with_failures
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import Method, OperatorCalls
-from firmware_host.operator.rights import Group, Peer, Rights
-from firmware_host.operator.rpc import REQUEST, RefusedError
-from firmware_host.operator.socket_file import operators_path
-from firmware_host.operator.status_socket import StatusSocket
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Group, Peer, Rights
+from firmware_host.sockets.rpc import REQUEST, RefusedError
+from firmware_host.sockets.socket_file import operators_path
+from firmware_host.sockets.status_socket import StatusSocket
 from simulation.harness.joint_energy import JointEnergy
 from simulation.harness.lockstep import Lockstep
 from tests.dst.harms import Harms

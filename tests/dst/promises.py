@@ -13,9 +13,9 @@ from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode
 from control.monitors.encoder_monitor import YIELDING_NM
 from control.records import JOINTS, NEVER_S, Torques
-from experiments.faults.energy_bounds import energy_bounds
 from tests.dst.operated_robot import OperatedRobot
 from tests.dst.reachability import Reachability
+from verification.faults.energy_bounds import energy_bounds
 
 ROUNDING_NM = 1e-6  # also of a current that decays exponentially and never is zero
 ON_THE_WAY_TICKS = 3  # from a change of mode until the motor obeys

@@ -15,7 +15,7 @@ from control.gait.gait import Gait, stride_duration_s
 from control.geometry import FlipperGeometry
 from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
-from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate_integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.rate import PERIOD_S
 from control.records import DriveState, FlipperLoad, Phase, StrideEstimate
 from estimation.joint_load import FlipperDrive

@@ -22,7 +22,7 @@ from control.geometry import FlipperGeometry
 from control.joint_friction import JointFriction
 from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
-from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate_integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import NO_LOAD, DriveState, Estimate, GaitTarget, Phase, StrideEstimate
 from estimation.flipper import CLINGING_M, FlipperEstimator
 from estimation.force_map import smallest_force_n

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.log_reader import Log
+from logs.files.log_reader import Log
 from tests.experiments.synthetic_strides import CONFIGURATION
 
 

@@ -12,8 +12,8 @@ from control.modes import Mode
 from control.records import Phase
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.trials.stride_profile import StrideProfile
-from firmware_host.log_reading.log_reader import Log
-from firmware_host.log_reading.tick_array import tick_type
+from logs.files.log_reader import Log
+from logs.files.tick_array import tick_type
 
 CONFIGURATION = simulated_configuration()
 GEOMETRY = CONFIGURATION.geometry

@@ -19,8 +19,8 @@ from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm, ask_to_clear_faults, leave, move, rest, walk
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.robot.prompt import AutomaticOperator
-from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

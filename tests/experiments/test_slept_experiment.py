@@ -11,7 +11,7 @@ import pytest
 from experiments.robot import daemon_robot
 from experiments.robot.bench_errors import AccessDeniedError, RobotInUseError
 from experiments.robot.daemon_robot import DaemonRobot
-from firmware_host.operator.status_client import CallRefusedError
+from operator_client.status_client import CallRefusedError
 from tests.experiments.synthetic_strides import make_log, make_ticks
 
 ME = "uid 1 (process 2)"

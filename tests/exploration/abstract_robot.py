@@ -16,7 +16,7 @@ from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.loop import CLEARING_S, Loop
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rpc import RefusedError
+from firmware_host.sockets.rpc import RefusedError
 from firmware_host.ticker import Tick
 from tests.exploration.abstract_drives import PERIOD_S, AbstractDrives, Event
 from tests.exploration.abstract_parts import AbstractController, AbstractMonitor

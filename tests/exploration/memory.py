@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 from control.fault_latch import FaultLatch, PresentFault
 from control.faults import FaultKind
 from control.modes import Mode, Request
-from firmware_host.operator.connection import Caller
-from firmware_host.operator.lease import Lease
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.socket_methods import Level
+from firmware_host.lease import Lease
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_methods import Level
 from tests.exploration.abstract_drives import PERIOD_S, DriveMemory, Event, Obedience
 
 NOW_S = 1000.0  # of the last tick

@@ -13,8 +13,8 @@ from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, MOVING, TRANSITIONS, Health, Mode, Request
 from drivers.drives import Drives
 from firmware_host import loop as loop_module
+from firmware_host.lease import Lease
 from firmware_host.loop import Loop
-from firmware_host.operator.lease import Lease
 from tests.exploration.abstract_robot import AbstractRobot
 from tests.exploration.scopes import EVERYTHING, ONE_OF_EACH, ORDERS, quick_scopes
 from tests.exploration.search import Exploration, Scope

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.firmware_host.served_socket import Served
+from tests.firmware_host.sockets.served_socket import Served
 
 
 @pytest.fixture

@@ -26,8 +26,8 @@ from firmware_host.buses import BusError, lock_buses, open_bus, open_ports, reop
 from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.daemon import reopen_buses
-from firmware_host.operator.fault_texts import fault_message
-from firmware_host.operator.status_client import NoDaemonError, StatusClient
+from firmware_host.fault_texts import fault_message
+from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS

@@ -17,13 +17,13 @@ from drivers.odrive.codec import SET_AXIS_STATE
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
-from firmware_host.operator.status_client import StatusClient
 from firmware_host.ticker import Tick
+from operator_client.status_client import StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.firmware_host.served_socket import Served
+from tests.firmware_host.sockets.served_socket import Served
 from tests.waiting import LONGEST_S
 
 FIRM = Track([(5.0, MUDS["48.5"])])

@@ -18,10 +18,10 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.recorder import HEALTHY
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.socket_methods import Level
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_methods import Level
 from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError, SimulatedDrive
 from simulation.harness.lockstep import Lockstep

@@ -10,9 +10,9 @@ import pytest
 
 from firmware_host import software_version
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading.log_reader import read_log
-from firmware_host.log_reading.log_summary import log_summary
+from logs.files.log_reader import read_log
+from logs.files.log_summary import log_summary
+from simulation.harness.file_recorder import FileRecorder
 from tests.folders import ROOT
 
 

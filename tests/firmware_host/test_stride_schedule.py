@@ -15,7 +15,7 @@ from control.records import Phase, StrideEstimate
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.replay import replay_files
+from logs.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.folders import ROOT

@@ -12,8 +12,8 @@ import pytest
 import mudskipper
 from control.records import Phase
 from firmware_host.log.log_file import LogFile
-from firmware_host.log_reading.log_reader import read_log
-from firmware_host.log_reading.replay import replay_files
+from logs.files.log_reader import read_log
+from logs.replay import replay_files
 from tests.firmware_host.synthetic_rows import OPENING
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S

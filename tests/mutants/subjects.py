@@ -117,5 +117,5 @@ SUBJECTS = (
             "without `self._target_rad = UNKNOWN` in `def reset(self) -> None:`": "the first sample sets it",
         },
     ),
-    Subject("firmware_host.operator.lease", ("firmware_host/operator/test_lease.py",)),
+    Subject("firmware_host.lease", ("firmware_host/test_lease.py",)),
 )

@@ -43,7 +43,7 @@ def lowest_m(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float) 
     return lowest_point_m(attitude_of(geometry, sweep_rad, adduction_rad), plate_size(geometry))
 
 
-@pytest.mark.parametrize("lift_nm", [-0.2, -0.75, -1.66])
+@pytest.mark.parametrize("lift_nm", [-0.2, -1.66])
 def test_a_flipper_that_comes_down_on_a_stone_stops_there(lift_nm: float) -> None:
     """The torque is up to that of 20 A, which sinks it deeper next to the stone; 1 mm of the stone's spring is 20 N."""
     soft = [(9.0, MUDS["53.1"])]
@@ -53,9 +53,9 @@ def test_a_flipper_that_comes_down_on_a_stone_stops_there(lift_nm: float) -> Non
     assert arm.adduction_velocity_rad_s == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("sweep_nm", [-0.2, -0.75])
-def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot(sweep_nm: float) -> None:
+def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot() -> None:
     """The mud is too soft to hold the flipper; 0.75 N·m are 6 N at the plate."""
+    sweep_nm = -0.75
     stone = Stone(-0.2, -0.02, 0.01)
     plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, Clay("soup", 100.0))], [stone]))
     arm, geometry = plant.arms[0], plant.parameters.geometry
@@ -68,19 +68,6 @@ def test_a_flipper_that_sweeps_against_a_stone_is_held_and_pushes_the_robot(swee
     # F l cos α, except for the load of the mud and the arm's weight, which is 0.01 N·m on the sweep joint.
     thrust_n = -sweep_nm / (geometry.flipper_length_m * cos(arm.sweep_rad))
     assert arm.force.thrust_n == pytest.approx(thrust_n, abs=0.1)
-
-
-def test_an_arm_that_falls_on_a_stone_comes_to_rest_and_never_rises_as_high_again() -> None:
-    plant = Plant(PlantParameters(fixed_base=True), Track([(9.0, Clay("soup", 100.0))], [Stone(-1.0, 1.0, 0.005)]))
-    arm, heights_rad = plant.arms[0], []
-    arm.adduction_rad, arm.adduction_velocity_rad_s = 0.3, -3.0
-    for _ in range(3000):
-        plant.step(STEP_S, NO_TORQUE)
-        heights_rad.append(arm.adduction_rad)
-    landed = heights_rad.index(min(heights_rad))
-    assert max(heights_rad[landed:]) < 0.15
-    assert arm.adduction_velocity_rad_s == pytest.approx(0.0, abs=1e-6)
-    assert depth_m(arm) == pytest.approx(0.005, abs=0.0001)  # its own weight is 0.4 N at the plate: 20 um
 
 
 def test_a_stone_acts_in_addition_to_the_mud_and_only_at_its_position() -> None:
@@ -111,33 +98,22 @@ def test_a_reset_arm_has_met_no_stone() -> None:
     arm.reset()
     arm.adduction_rad -= 0.002
     arm.step(STEP_S, 0.0, 0.0, 0.0, 0.0)
-    assert arm.force.thrust_n == pytest.approx(0.0, abs=0.1)
-    assert arm.force.upward_n > 0.0
+    assert arm.force.thrust_n == pytest.approx(0.0, abs=0.1) and arm.force.upward_n > 0.0
 
 
-def test_ridges_lift_the_mud_under_each_flipper_by_its_own_position() -> None:
-    track = Track(
-        [(9.0, MUDS["48.5"])], ridges=Ridges(0.005, 0.48)
-    )  # flippers a quarter of a ridge to the front and the rear
-    plant = Plant(PlantParameters(), track)
-    for arm, sweep_rad in zip(plant.arms, (pi / 2.0, -pi / 2.0), strict=True):
-        arm.sweep_rad = sweep_rad
-    plant.step(STEP_S, NO_TORQUE)
-    assert [arm.surface_m for arm in plant.arms] == pytest.approx([-0.005, 0.005])
-
-
-def test_ridges_come_on_top_of_the_unevenness_from_stride_to_stride() -> None:
+def test_ridges_lift_the_mud_under_each_flipper_by_its_own_position_on_top_of_its_own_unevenness() -> None:
+    """The flippers are a quarter of a ridge to the front and the rear."""
     disturbed = PlantParameters(disturbances=Disturbances(surface_sd_m=0.001))
     level, ridged = (
         Plant(disturbed, Track([(9.0, MUDS["48.5"])], ridges=ridges), Random(3))
-        for ridges in (LEVEL, Ridges(0.004, 0.2))
+        for ridges in (LEVEL, Ridges(0.005, 0.48))
     )
     for plant in (level, ridged):
-        plant.body.forward_m = 0.05
+        for arm, sweep_rad in zip(plant.arms, (pi / 2.0, -pi / 2.0), strict=True):
+            arm.sweep_rad = sweep_rad
         plant.step(STEP_S, NO_TORQUE)
-    for plain, lifted in zip(level.arms, ridged.arms, strict=True):
-        assert plain.surface_m != 0.0
-        assert lifted.surface_m == pytest.approx(plain.surface_m - 0.004)
+    lifts_m = [plain.surface_m - lifted.surface_m for plain, lifted in zip(level.arms, ridged.arms, strict=True)]
+    assert lifts_m == pytest.approx([0.005, -0.005])
 
 
 def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> None:
@@ -181,6 +157,6 @@ def test_a_robot_walks_faster_where_buried_stones_hold_its_flippers(configuratio
         lockstep = Lockstep(configuration, Track(soft, stones))
         lockstep.arm()
         lockstep.walk(WalkOrder(0.025, adaptive=False))
-        lockstep.run_for(4.5)
+        lockstep.run_for(3.0)
         distances_m.append(lockstep.robot.plant.body_m)
     assert distances_m[1] > 2.0 * distances_m[0]

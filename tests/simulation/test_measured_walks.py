@@ -1,69 +1,56 @@
 """Poses of the authors' walks pass the whole path: NatNet frames over UDP, read tick by tick with the joints.
 
 The steps must equal those in the log. The motion in the capture is computed here from the log's own columns; that a
-reader finds it at any heading is tested with a known truth in tests/firmware_host/log_reading/lab/test_body_track.py.
+reader finds it at any heading is tested with a known truth in tests/logs/lab/test_body_track.py.
 """
 
 from __future__ import annotations
 
 import gzip
-from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
-from control.records import JointAngles, Phase
+from control.records import Phase
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import NatNetParameters
 from estimation.estimation_parameters import EstimationParameters
 from estimation.mud import MudEstimator
 from estimation.recorded_states import recorded_states
-from firmware_host.log_reading.lab_csv import LabLog, read_lab_csv
-from firmware_host.log_reading.replay import LAB_DRIVE, NO_VELOCITY
+from logs.lab.lab_csv import read_lab_csv
+from logs.replay import LAB_DRIVE, NO_VELOCITY
 from simulation.devices.natnet_server import LOOPBACK, NatNetServer, RecordedPose
 from tests.folders import SHARED_DATA
 
 Floats = NDArray[np.float64]
-SHARED = SHARED_DATA
-WALKS = sorted((SHARED / "flipper_in_mud").glob("walk_*.csv.gz"))
+WALKS = sorted((SHARED_DATA / "flipper_in_mud").glob("walk_*.csv.gz"))
 PHASES = tuple(Phase)
 INSERTION, STANCE = 2, 3  # of turtle_state
 HORIZONTAL = (1.0, 0.0, 1.0)  # the capture's y is its vertical: a body that sinks does not advance
 FROZEN_S, JUMP_M = 0.5, 0.02
 BOUND_M = 0.003
-LATENCIES_S = (0.0, 0.008)  # from exposure to arrival: none, and a usual one
 
 pytestmark = pytest.mark.skipif(not WALKS, reason="the shared measurements are not next to the repository")
 each_walk = pytest.mark.parametrize("path", WALKS, ids=lambda path: path.name.removesuffix(".csv.gz"))
-each_latency = pytest.mark.parametrize("latency_s", LATENCIES_S)
+each_latency = pytest.mark.parametrize("latency_s", [0.0, 0.008])  # from exposure to arrival: none, and a usual one
 
 
-@dataclass(frozen=True)
-class Capture:
+class Capture(NamedTuple):
     """The body's motion according to the log."""
 
     time_s: Floats
-    state: Floats
     position_m: Floats  # (n, 3)
     first: NDArray[np.int64]  # rows in which a pose is new
     lost: NDArray[np.bool_]  # rows of a pose that was held until it jumped
-    direction: Floats
-
-    @property
-    def x_m(self) -> Floats:
-        """Return the position along the stances' horizontal motion; NaN where the capture was lost."""
-        x_m: Floats = np.where(self.lost, np.nan, self.position_m @ self.direction)
-        return x_m
-
-    @property
-    def insertions(self) -> NDArray[np.int64]:
-        return np.flatnonzero((self.state[1:] == INSERTION) & (self.state[:-1] != INSERTION)) + 1
+    direction: Floats  # the stances' horizontal motion
+    x_m: Floats  # along that; NaN where the capture was lost
+    insertions: NDArray[np.int64]  # rows in which one begins
 
 
 @cache
@@ -80,11 +67,13 @@ def capture_of(path: Path) -> Capture:
     lost = np.repeat((time_s[ends - 1] - time_s[first] > FROZEN_S) & (leaps_m > JUMP_M), ends - first)
     inside = (state[1:] == STANCE) & (state[:-1] == STANCE) & ~lost[1:] & ~lost[:-1]
     path_m = np.diff(position_m, axis=0)[inside].sum(axis=0) * HORIZONTAL
-    return Capture(time_s, state, position_m, first, lost, path_m / np.linalg.norm(path_m))
+    direction = path_m / np.linalg.norm(path_m)
+    x_m = np.where(lost, np.nan, position_m @ direction)
+    insertions = np.flatnonzero((state[1:] == INSERTION) & (state[:-1] != INSERTION)) + 1
+    return Capture(time_s, position_m, first, lost, direction, x_m, insertions)
 
 
-@dataclass(frozen=True)
-class Walked:
+class Walked(NamedTuple):
     """The estimates that the robot would have had."""
 
     x_m: Floats  # of each row
@@ -102,55 +91,38 @@ def walked(path: Path, latency_s: float) -> Walked:
     parameters = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
     estimator = MudEstimator(FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters())
     positions_m, ends, steps_m = [], [], []
+    rows = zip(*(each.tolist() for each in (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a)), strict=True)
     with closing(server), closing(NatNetPort(parameters, (x, y, z))) as port:
-        connect(server, port)
-        for row, (now_s, phase, angles_rad, currents_a) in enumerate(rows_of(lab)):
+        for now_s in (-2.0, -1.0):  # connects before the log begins
+            port.read(now_s)
+            server.step(now_s)
+        for row, (now_s, phase, angles_rad, currents_a) in enumerate(rows):
             server.step(now_s)
             body = port.read(now_s)
-            reading = estimator.update(now_s, phase, recorded_states(now_s, angles_rad, NO_VELOCITY, currents_a), body)
+            states = recorded_states(now_s, angles_rad, NO_VELOCITY, currents_a)
+            strides = estimator.update(now_s, PHASES[phase], states, body).strides
             positions_m.append(body.x_m)
-            ends += [row for stride in reading.strides if stride.flipper == "left"]
-            steps_m += [stride.step_m for stride in reading.strides if stride.flipper == "left"]
+            ends += [row for stride in strides if stride.flipper == "left"]
+            steps_m += [stride.step_m for stride in strides if stride.flipper == "left"]
         assert port.malformed == 0
     return Walked(np.array(positions_m), np.array(ends), np.array(steps_m))
 
 
-def connect(server: NatNetServer, port: NatNetPort) -> None:
-    """Connect the port to the server before the log begins."""
-    for now_s in (-2.0, -1.0):
-        port.read(now_s)
-        server.step(now_s)
-
-
-def rows_of(lab: LabLog) -> Iterator[tuple[float, Phase, JointAngles, list[float]]]:
-    columns = (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a)
-    for now_s, phase, angles_rad, currents_a in zip(*(column.tolist() for column in columns), strict=True):
-        yield now_s, PHASES[phase], angles_rad, currents_a
-
-
 @each_latency
 @each_walk
-def test_steps_from_insertion_to_insertion_are_those_of_the_capture(path: Path, latency_s: float) -> None:
-    """No step is missing if the capture has both ends, and none is invented if it lacks one."""
-    capture, starts = capture_of(path), capture_of(path).insertions
-    true_m, reported_m = np.diff(capture.x_m[starts]), np.diff(walked(path, latency_s).x_m[starts])
-    assert len(true_m) >= 2
+def test_steps_are_those_of_the_capture(path: Path, latency_s: float) -> None:
+    """From insertion to insertion no step is missing if the capture has both ends, and none is invented if it lacks
+    one. The estimator's steps are those between the ticks in which its strides close, when swing begins.
+    """
+    capture, known = capture_of(path), walked(path, latency_s)
+    true_m, reported_m = np.diff(capture.x_m[capture.insertions]), np.diff(known.x_m[capture.insertions])
     seen = np.isfinite(true_m)
+    assert min(len(true_m), len(known.ends)) >= 2
     assert not np.any(np.isfinite(reported_m[~seen]))
     assert np.all(np.abs(reported_m - true_m)[seen & np.isfinite(reported_m)] < BOUND_M)
     if latency_s == 0.0:
         assert np.all(np.isfinite(reported_m[seen]))
-
-
-@each_latency
-@each_walk
-def test_the_estimator_s_steps_are_those_of_the_capture(path: Path, latency_s: float) -> None:
-    """The steps are those between the ticks in which its strides close, when swing begins."""
-    capture, known = capture_of(path), walked(path, latency_s)
-    assert len(known.ends) >= 2
-    true_m = np.diff(capture.x_m[known.ends])
-    assert np.all(np.isfinite(true_m))
-    assert np.all(np.abs(known.steps_m[1:] - true_m) < BOUND_M)
+    assert np.all(np.abs(known.steps_m[1:] - np.diff(capture.x_m[known.ends])) < BOUND_M)
 
 
 @each_walk
@@ -165,6 +137,5 @@ def test_the_position_is_that_of_the_capture_at_all_times(path: Path) -> None:
 def test_a_lost_capture_gives_no_pose() -> None:
     """In one walk it repeats two old positions for 6.6 s."""
     for path in WALKS:
-        capture = capture_of(path)
-        assert not np.any(np.isfinite(walked(path, 0.0).x_m[capture.lost])), path.name
+        assert not np.any(np.isfinite(walked(path, 0.0).x_m[capture_of(path).lost])), path.name
     assert any(np.any(capture_of(path).lost) for path in WALKS)

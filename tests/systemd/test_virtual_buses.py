@@ -12,7 +12,7 @@ import pytest
 from firmware_host.configuration.loading import load_configuration
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
-from virtual_machine.installed_robot import GUIDE, installation
+from verification.virtual_machine.installed_robot import GUIDE, installation
 
 SYSTEMD = ROOT / "systemd"
 BUSES = {"vcan0", "vcan1"}

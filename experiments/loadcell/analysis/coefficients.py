@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from control.plate.integrals import submerged_part
+from control.plate_integrals import submerged_part
 from estimation.strokes.origin_fit import MIN_BATCHES, student_factor
 from experiments.loadcell.analysis.contact import Profile, StrokeError
 from experiments.loadcell.analysis.curve_fit import Array

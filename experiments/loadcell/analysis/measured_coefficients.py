@@ -9,7 +9,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from control.plate.integrals import submerged_part
+from control.plate_integrals import submerged_part
 from experiments.loadcell.analysis.coefficients import (
     RESIDUAL_FRACTION,
     RESIDUAL_NOISES,

@@ -13,7 +13,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
 from tests.waiting import LONGEST_S
 
 

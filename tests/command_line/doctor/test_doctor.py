@@ -12,9 +12,9 @@ import pytest
 
 from command_line import exit_codes
 from command_line.doctor.doctor import examine_all, examine_daemon
+from command_line.doctor.findings import Level
 from command_line.main import main
 from control.records import JOINTS
-from firmware_host.computer.findings import Level
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from tests.running_bench import Bench

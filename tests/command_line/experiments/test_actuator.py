@@ -22,7 +22,7 @@ from experiments.robot.prompt import AutomaticOperator
 from experiments.trials.notebook import Notebook
 from experiments.trials.session import Ending, Session
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.log.file_recorder import FileRecorder
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.command_line.experiments.test_conduct import typed

@@ -10,9 +10,9 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.faults import matrix as faults
-from experiments.faults.evaluation import Cell
-from experiments.faults.matrix import FaultsReport, Plan, report_of
+from verification.faults import matrix as faults
+from verification.faults.evaluation import Cell
+from verification.faults.matrix import FaultsReport, Plan, report_of
 
 CELL = Cell("drive_quiet", "drive_quiet", "hold", 1, "left_sweep", "damping", bound_ticks=5, reaction_ticks=4,
             peak_torque_nm=0.31, travel_rad=0.2, ok=True)  # fmt: skip

@@ -10,15 +10,15 @@ import pytest
 
 from command_line import exit_codes
 from command_line.init.init import answers
+from command_line.init.new_file import NewRobot, new_file
 from command_line.main import main
 from command_line.parser import build_parser
 from control.geometry import FlipperGeometry
 from control.parameters.joint_gains import GAINS_OF_ASKED_DRIVES, JointGains
 from control.records import JOINTS
 from drivers.drive_types import DRIVE_TYPES
+from experiments.campaign.plate_file import read_corners
 from firmware_host.configuration.loading import load_configuration, parse_configuration
-from firmware_host.configuration.new_file import NewRobot, new_file
-from firmware_host.configuration.plate_file import read_corners
 
 PLATES = Path(__file__).resolve().parents[3] / "examples" / "plates"
 

@@ -11,7 +11,7 @@ import pytest
 
 from command_line.live.page_server import PageServer, Viewer, Viewers, robot_facts
 from firmware_host.log.rows import EVENT, STRIDE, TICK
-from firmware_host.log_reading.live_rows import LiveRow
+from operator_client.live_rows import LiveRow
 
 ADDRESS = "127.0.0.1"
 MESSAGE: dict[str, Any] = {"tick": {"stamp_s": 1.0}, "strides": [], "events": []}

@@ -15,9 +15,9 @@ from websockets.sync.client import ClientConnection, connect
 from command_line.live.viewer_server import ViewerServer
 from control.records import JOINTS
 from firmware_host.log.rows import ROW_KINDS, TICK
-from firmware_host.log_reading.live_rows import LiveRow, LiveRows
-from firmware_host.open_data.ros_definitions import schema_name
-from firmware_host.open_data.ros_messages import TOPICS
+from logs.export.ros_definitions import schema_name
+from logs.export.ros_messages import TOPICS
+from operator_client.live_rows import LiveRow, LiveRows
 from tests.command_line.command_lines import failure
 
 SUBPROTOCOL = "foxglove.sdk.v1"

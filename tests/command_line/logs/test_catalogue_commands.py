@@ -14,8 +14,8 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from firmware_host.catalogue.catalogue import VERSION, VERSION_KEY, catalogue_path
 from firmware_host.log.log_folder import DONE
+from logs.catalogue.catalogue import VERSION, VERSION_KEY, catalogue_path
 from tests.command_line.command_lines import failure
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S

@@ -12,8 +12,8 @@ import mudskipper
 from command_line import exit_codes
 from experiments.lablogs.lablogs import Plan, evaluate
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log_reading.lab_csv import read_lab_csv
-from firmware_host.log_reading.replay import Replay
+from logs.lab.lab_csv import read_lab_csv
+from logs.replay import Replay
 from tests.command_line.command_lines import run
 from tests.lab_logs import SETTINGS, lab_columns, write_lab_log
 

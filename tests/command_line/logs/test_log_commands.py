@@ -23,7 +23,7 @@ from firmware_host.configuration.log_parameters import ONE_FILE
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.segments import LogSegments
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
 from tests.command_line.command_lines import run
 from tests.recorded_walks import record_walks
 from tests.waiting import LONGEST_S

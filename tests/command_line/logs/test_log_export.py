@@ -15,11 +15,11 @@ import pytest
 from command_line import exit_codes
 from command_line.logs import log_export
 from command_line.main import main
-from firmware_host.log_reading.log_reader import read_log
-from firmware_host.log_reading.scanned_log import ScannedLog, scan_logs
+from logs.files.log_reader import read_log
+from logs.files.scanned_log import ScannedLog, scan_logs
 from tests.command_line.command_lines import failure, refusal
-from tests.firmware_host.open_data.test_parquet import files_of_at_most
 from tests.folders import ROOT
+from tests.logs.export.test_parquet import files_of_at_most
 from tests.waiting import LONGEST_S
 
 LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
@@ -141,7 +141,7 @@ def test_a_log_that_is_cut_off_during_a_replay_is_replayed_up_to_there(
         return scanned
 
     log.write_bytes(contents)
-    monkeypatch.setattr("firmware_host.log_reading.replay.scan_logs", scan_before_cut)
+    monkeypatch.setattr("logs.replay.scan_logs", scan_before_cut)
     assert main(["replay", str(log)]) == exit_codes.OK
     cut = capsys.readouterr()
     assert cut.out.split("\n")[2].split()[:8] == expected.out.split("\n")[2].split()[:8]

@@ -14,7 +14,7 @@ from command_line import exit_codes, main
 from command_line.logs import log_folder_commands as log_care
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks
 from tests.folders import EXAMPLE_CONFIGURATION
 

@@ -17,8 +17,8 @@ from command_line.main import main
 from experiments.reports.report_page import Section
 from experiments.run_report import run as run_module
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading.log_reader import Log, read_log
+from logs.files.log_reader import Log, read_log
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

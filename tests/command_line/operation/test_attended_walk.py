@@ -16,7 +16,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.operation import attended_walk
-from firmware_host.operator.status_client import StatusClient
+from operator_client.status_client import StatusClient
 from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 

@@ -17,7 +17,7 @@ from command_line.operation.confirmation import TORQUE_UNKNOWN, unconfirmed_driv
 from command_line.operation.confirmed_stop import end_motion
 from command_line.watch.orders import send_order
 from control.records import JOINTS
-from firmware_host.operator.status_client import NotPermittedError
+from operator_client.status_client import NotPermittedError
 
 SOCKET = Path("/none")
 Report = dict[str, Any]

@@ -6,7 +6,7 @@ import json
 
 from command_line import exit_codes
 from drivers.fault_injection.failures import Failures
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
 from tests.running_bench import Bench
 
 

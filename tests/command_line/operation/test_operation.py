@@ -17,8 +17,8 @@ from command_line.operation.confirmation import TORQUE_UNKNOWN
 from command_line.options import shared
 from control.modes import Mode
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
-from firmware_host.log_reading.log_reader import read_log
-from firmware_host.log_reading.replay import replay_files
+from logs.files.log_reader import read_log
+from logs.replay import replay_files
 from simulation.harness.peer import WATCHDOG_S
 from tests.command_line.command_lines import refusal, run
 from tests.running_bench import Bench

@@ -16,8 +16,8 @@ from command_line.viewers import rerun_blueprint
 from command_line.viewers.open_log import LAYOUTS
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import TEXT
-from firmware_host.open_data.ros_definitions import DEFINITIONS
-from firmware_host.open_data.ros_messages import TOPICS
+from logs.export.ros_definitions import DEFINITIONS
+from logs.export.ros_messages import TOPICS
 from tests.folders import ROOT
 
 FIELDS = {kind.topic: {field.name: field for field in kind.fields} for kind in ROW_KINDS}

@@ -13,12 +13,12 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration, StatusParameters
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.socket_methods import Level
-from firmware_host.operator.status_socket import StatusSocket
-from firmware_host.user_groups import load_rights
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_methods import Level
+from firmware_host.sockets.status_socket import StatusSocket
+from firmware_host.sockets.user_groups import load_rights
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

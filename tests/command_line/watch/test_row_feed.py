@@ -14,8 +14,8 @@ from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.row_stream import RowStream, stream_path
 from firmware_host.log.rows import TICK, TICK_KIND
-from firmware_host.operator.connection import Caller
-from firmware_host.user_groups import load_rights
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.user_groups import load_rights
 from tests.command_line.watch.served_robot import ServedRobot
 
 SAME = ("mode", "phase", "stride", "depth_m", "body_x_m", "loads")

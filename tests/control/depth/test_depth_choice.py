@@ -59,7 +59,7 @@ def duration_s(depth_m: float) -> float:
 def predicted_m(thrust_n: float, k_s: float, depth_m: float) -> float:
     """Return the predicted step of a body whose pad of 1.5 cm drags 2 cm deep through the same mud."""
     drag = BodyDrag(2.5 + k_s * 0.015 * 0.02**2 / 2.0, 6.0, 1.0)
-    return step_m(GAIT, 0.12, drag, Traction(thrust_n, 2.0 * 250.0), depth_m)
+    return step_m(GAIT, GEOMETRY, drag, Traction(thrust_n, 2.0 * MOTOR_FORCE_N, 2.0 * 250.0), depth_m)
 
 
 def forecast(mud_estimate: MudEstimate, strides: list[StrideEstimate], commanded_m: float = 0.03) -> DepthForecast:
@@ -69,7 +69,7 @@ def forecast(mud_estimate: MudEstimate, strides: list[StrideEstimate], commanded
 
 
 def steps_m(reported: DepthForecast) -> dict[float, float]:
-    return {z: predicted_m(reported.thrust_n(z) or 0.0, reported.shear_at(0.02), z) for z in DEPTHS_M}
+    return {z: predicted_m(reported.yield_n(z) or 0.0, reported.drag_shear(0.02), z) for z in DEPTHS_M}
 
 
 def same_depth(depth_m: float) -> object:
@@ -157,7 +157,7 @@ class TestTheFastestDepth:
     def test_a_heavier_body_or_more_drag_is_carried_deeper(self) -> None:
         plain = chosen(estimated(SOFT, LOOSE)).depth_m
         for burden in (
-            AdaptationParameters(body_drag_n=4.0),
+            AdaptationParameters(body_drag_n=6.0),
             AdaptationParameters(body_mass_kg=2.5),
             AdaptationParameters(body_damping_n_s_m=20.0),
             AdaptationParameters(pad_width_m=0.1),
@@ -229,10 +229,11 @@ class TestUncertainty:
         )
         assert uncertain.depth_m <= sure.depth_m
 
-    @given(shears, suctions, exponents, st.tuples(*[st.floats(0.0, 1.0)] * 2), st.floats(0.02, 0.05))
+    @given(shears, suctions, exponents, st.tuples(*[st.floats(0.0, 1.0)] * 2), st.floats(0.01, 0.015))
     def test_suction_at_another_depth_is_as_uncertain_as_its_depth_law(
         self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float], depth_m: float
     ) -> None:
+        """The law is known above all candidates, so the deeper one is the less certain one."""
         sure, uncertain = (
             chosen(estimated(reported(k_s), reported(k_e, 0.0, depth_m, exponent, m))) for m in sorted(pair)
         )
@@ -363,11 +364,13 @@ class TestMuds:
     CLAYS = [Clay(strength_pa) for strength_pa in np.geomspace(300.0, 6000.0, 25)]
 
     def test_the_softer_the_clay_the_deeper_the_stride(self) -> None:
-        depths_m = [chosen(clay.mud_estimate()).depth_m for clay in self.CLAYS]
+        """Above 3.7 kPa the motors are the limit at every depth, and a longer hold of the mud is worth more."""
+        depths_m = [chosen(clay.mud_estimate()).depth_m for clay in self.CLAYS if clay.strength_pa < 3.7e3]
         assert depths_m == sorted(depths_m, reverse=True)
         assert depths_m[0] == same_depth(0.05)
-        assert depths_m[-1] == 0.015
+        assert depths_m[-1] == same_depth(0.0225)
         assert len(set(depths_m)) > 8
+        assert chosen(self.CLAYS[-1].mud_estimate()).depth_m == 0.015
 
     def test_the_depth_is_nearly_the_best_by_the_clay_itself(self) -> None:
         """The clay's law is no power of depth: strides of 3 to 4 cm predict 4 % too much thrust at 2 cm, and a step
@@ -379,8 +382,8 @@ class TestMuds:
                 continue
             speeds = {}
             for z in DEPTHS_M:
-                thrust_n = 2.0 * min(clay.thrust_n(z), MOTOR_FORCE_N)
-                comes_out = clay.k_e(z) * lift_m4(z) < ALLOWED_NM
+                thrust_n = 2.0 * clay.thrust_n(z)
+                comes_out = clay.k_e(z) * lift_m4(z) < LIFTING_NM
                 speeds[z] = predicted_m(thrust_n, clay.k_s(0.02), z) / duration_s(z) if comes_out else 0.0
             taken = next(speed for z, speed in speeds.items() if abs(z - choice.depth_m) < 1e-9)
             assert taken > 0.94 * max(speeds.values())

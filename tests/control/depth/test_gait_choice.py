@@ -17,7 +17,7 @@ from control.mud_estimate import NOTHING_KNOWN, Coefficient, FlipperEstimate, Mu
 from control.parameters.adaptation_parameters import AdaptationParameters, GaitAdaptationParameters
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.joint_limits import JointLimits
-from control.plate.integrals import stroke_moment_m4, submerged_plate
+from control.plate_integrals import stroke_moment_m4, submerged_plate
 from control.records import Estimate, StrideEstimate
 from tests.control.synthetic_muds import both, choose_now
 
@@ -80,8 +80,9 @@ def brute_force(
                 continue
             if forecast.extraction_nm(depth_m) >= PARAMETERS.lifting_fraction * LIFTING_NM:
                 continue
-            traction = Traction(forecast.thrust_n(depth_m) or 0.0, 2.0 * PARAMETERS.mobilisation_n_m)
-            carried_m = step_m(gait, GEOMETRY.flipper_length_m, drag, traction, depth_m)
+            yield_n, motor_n = forecast.yield_n(depth_m) or 0.0, 2.0 * PARAMETERS.motor_force_n
+            traction = Traction(yield_n, motor_n, 2.0 * PARAMETERS.mobilisation_n_m)
+            carried_m = step_m(gait, GEOMETRY, drag, traction, depth_m)
             found.append((carried_m / stride_duration_s(gait, GEOMETRY, depth_m), depth_m, deg))
     return sorted(found, reverse=True)
 

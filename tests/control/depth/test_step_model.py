@@ -1,12 +1,12 @@
 """The predicted step against the same equation of motion, integrated a thousand times as finely by numpy.
 
-The reference has the traction force as its state: it grows with k times the speed between arms and body, up to what the
-mud withstands. There the plates shear through.
+The reference has the stretch of mud and servo as its state: it grows with the speed between arms and body, up to what
+the mud withstands. There the plates shear through. A motor at its limit lets the stretch grow.
 """
 
 from functools import cache
 from itertools import product
-from math import cos, pi, radians, sin
+from math import cos, inf, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -17,51 +17,69 @@ from numpy.typing import NDArray
 from control.depth import step_model
 from control.depth.step_model import BodyDrag, Traction, coast_m, step_m
 from control.gait.gait import RAMP_S
+from control.geometry import FlipperGeometry
 from control.parameters.gait_parameters import GaitParameters
 
 Array = NDArray[np.float64]
 
-LENGTH_M = 0.120
+GEOMETRY = FlipperGeometry()
+LENGTH_M, CLEARANCE_M = 0.120, 0.0145
 WALKING = GaitParameters()
 CAREFUL = GaitParameters(sweep_angle_deg=20.0, stance_speed_m_s=0.3, extraction_speed_m_s=0.15)
 RAIL = BodyDrag(2.5, 6.0, 1.0)
 FINE_S = 1e-5
 
-THRUSTS_N = (2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5)
+YIELDS_N = (2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.5, 20.0)
+MOTORS_N = (11.0, 1e3)
 STIFFNESSES_N_M = (300.0, 500.0, 3000.0)
 DRAGS = [BodyDrag(*drag, 1.0) for drag in product((2.5, 5.0), (0.0, 6.0, 20.0))] + [BodyDrag(2.5, 6.0, 2.5)]
 DEPTHS_M = (0.015, 0.05)
-CASES = list(product(THRUSTS_N, STIFFNESSES_N_M, DRAGS, DEPTHS_M))
+CASES = [  # a servo of 3000 N/m would be at its limit after 4 mm, which the arms travel in less than one coarse step
+    case
+    for case in product(YIELDS_N, MOTORS_N, STIFFNESSES_N_M, DRAGS, DEPTHS_M)
+    if case[1] > 100.0 or case[2] < 1000.0
+]
 
 
 def stance_duration_s(gait: GaitParameters) -> float:
     return 2.0 * radians(gait.sweep_angle_deg) * LENGTH_M / gait.stance_speed_m_s
 
 
-def top_speed_m_s(gait: GaitParameters) -> float:
-    """Return the arms' top speed, at which they cover the sweep with a ramp of half a cosine at either end."""
-    return 2.0 * LENGTH_M * sin(radians(gait.sweep_angle_deg)) / (stance_duration_s(gait) - RAMP_S)
-
-
-def arm_speed_m_s(gait: GaitParameters, time_s: float) -> float:
-    to_an_end_s = min(time_s, stance_duration_s(gait) - time_s)
+def ramped_m_s(length_m: float, duration_s: float, time_s: float) -> float:
+    """Return the speed at `time_s` on a path that begins and ends with a ramp of half a cosine."""
+    ramp_s, to_an_end_s = min(RAMP_S, duration_s / 2.0), min(time_s, duration_s - time_s)
     if to_an_end_s <= 0.0:
         return 0.0
-    return top_speed_m_s(gait) * (1.0 - cos(pi * min(to_an_end_s / RAMP_S, 1.0))) / 2.0
+    return length_m / (duration_s - ramp_s) * (1.0 - cos(pi * min(to_an_end_s / ramp_s, 1.0))) / 2.0
+
+
+def swept_m(gait: GaitParameters) -> float:
+    return 2.0 * LENGTH_M * sin(radians(gait.sweep_angle_deg))
+
+
+def top_speed_m_s(gait: GaitParameters) -> float:
+    return ramped_m_s(swept_m(gait), stance_duration_s(gait), stance_duration_s(gait) / 2.0)
 
 
 @cache
 def finely_m(gait: GaitParameters) -> Array:
     """Return the steps of all CASES at once."""
-    flat = [(thrust, stiffness, *drag, depth) for thrust, stiffness, drag, depth in CASES]
-    withstands, stiffness, dry, damping, mass, depth = np.array(flat).T
-    stance_s, leaving_s = stance_duration_s(gait), depth / gait.extraction_speed_m_s
-    force, speed, path = np.zeros((3, len(flat)))
-    for i in range(int((stance_s + leaving_s.max()) / FINE_S) + 1):
+    flat = [(yield_n, motor, stiffness, *drag, depth) for yield_n, motor, stiffness, drag, depth in CASES]
+    withstands, motor, stiffness, dry, damping, mass, depth = np.array(flat).T
+    stance_s = stance_duration_s(gait)
+    extraction_s = {z: (z + CLEARANCE_M) / gait.extraction_speed_m_s for z in DEPTHS_M}
+    stretch, speed, path = np.zeros((3, len(flat)))
+    submerged = depth.copy()
+    for i in range(int((stance_s + max(extraction_s.values())) / FINE_S) + 1):
         time_s = (i + 0.5) * FINE_S
-        fades = np.minimum(np.maximum(1.0 - (time_s - stance_s) / leaving_s, 0.0), 1.0)
-        force += FINE_S * stiffness * (arm_speed_m_s(gait, time_s) - speed)
-        force = np.minimum(np.maximum(force, -withstands * fades), withstands * fades)
+        for z, duration_s in extraction_s.items():
+            submerged[depth == z] -= FINE_S * ramped_m_s(z + CLEARANCE_M, duration_s, time_s - stance_s)
+        held = withstands * np.maximum(submerged, 0.0) / depth
+        stretch += FINE_S * (ramped_m_s(swept_m(gait), stance_s, time_s) - speed)
+        force = np.minimum(stiffness * stretch, motor)
+        shears = np.abs(force) > held
+        force = np.clip(force, -held, held)
+        stretch = np.where(shears, force / stiffness, stretch)
         speed = np.maximum(speed + FINE_S * (force - dry - damping * speed) / mass, 0.0)
         path += FINE_S * speed
     while speed.any():
@@ -71,20 +89,24 @@ def finely_m(gait: GaitParameters) -> Array:
 
 
 def coarsely_m(gait: GaitParameters) -> Array:
-    return np.array([step_m(gait, LENGTH_M, drag, Traction(*traction), depth_m) for *traction, drag, depth_m in CASES])
+    return np.array([step_m(gait, GEOMETRY, drag, Traction(*traction), depth_m) for *traction, drag, depth_m in CASES])
 
 
-def predicted_m(thrust_n: float, stiffness_n_m: float = 500.0, drag: BodyDrag = RAIL, depth_m: float = 0.03) -> float:
-    return step_m(WALKING, LENGTH_M, drag, Traction(thrust_n, stiffness_n_m), depth_m)
+def predicted_m(
+    yield_n: float, stiffness_n_m: float = 500.0, drag: BodyDrag = RAIL, depth_m: float = 0.03, motor_n: float = inf
+) -> float:
+    return step_m(WALKING, GEOMETRY, drag, Traction(yield_n, motor_n, stiffness_n_m), depth_m)
 
 
 class TestAgainstFineSteps:
-    """Steps of 10 ms shift an event by less than one of them: the tolerance is that time at the arms' top speed."""
+    """Steps of 10 ms shift an event by less than one of them, and a stride has two: the limit of the motors, and the
+    mud that lets go. The tolerance is that time at the arms' top speed.
+    """
 
     @pytest.mark.parametrize("gait", [WALKING, CAREFUL])
     def test_the_step_is_that_of_the_equation_of_motion(self, gait: GaitParameters) -> None:
         off_m = np.abs(coarsely_m(gait) - finely_m(gait))
-        assert off_m.max() < step_model.STEP_S * top_speed_m_s(gait)
+        assert off_m.max() < 2.0 * step_model.STEP_S * top_speed_m_s(gait)
 
     @pytest.mark.parametrize("gait", [WALKING, CAREFUL])
     def test_what_differs_is_the_size_of_the_steps_alone(
@@ -93,7 +115,7 @@ class TestAgainstFineSteps:
         monkeypatch.setattr(step_model, "STEP_S", 0.001)
         monkeypatch.setattr(step_model, "motion_of", step_model.motion_of.__wrapped__)  # its cache has the coarse steps
         off_m = np.abs(coarsely_m(gait) - finely_m(gait))
-        assert off_m.max() < 0.001 * top_speed_m_s(gait)
+        assert off_m.max() < 2.0 * 0.001 * top_speed_m_s(gait)
 
     def test_the_cases_hold_steps_of_every_length(self) -> None:
         fractions = finely_m(WALKING) / LENGTH_M
@@ -131,6 +153,20 @@ class TestLimits:
 
     def test_soft_traction_in_firm_mud_throws_the_body_ahead_of_the_arms(self) -> None:
         assert predicted_m(50.0, 500.0) > 1.1 * predicted_m(50.0, 10000.0)
+
+    def test_the_weaker_of_mud_and_motor_must_exceed_the_dry_drag(self) -> None:
+        assert predicted_m(50.0, motor_n=2.5) == predicted_m(2.5, motor_n=50.0) == 0.0
+        assert predicted_m(50.0, motor_n=2.6) > 0.0
+
+    def test_motors_stronger_than_the_mud_change_nothing(self) -> None:
+        assert predicted_m(8.0, motor_n=8.01) == predicted_m(8.0)
+
+    def test_with_motors_at_their_limit_a_deeper_stride_in_firm_mud_is_longer(self) -> None:
+        """The arms make up for their lag until the mud lets go of the plates; mud that yields cuts the lag off."""
+        drag = RAIL._replace(dry_n=7.0)
+        lagging_m = [predicted_m(800.0 * z, 500.0, drag, z, motor_n=12.5) for z in np.arange(0.02, 0.05, 0.005)]
+        assert lagging_m == sorted(lagging_m) and lagging_m[-1] > 1.1 * lagging_m[0]
+        assert predicted_m(20.0, 500.0, drag, motor_n=12.5) > predicted_m(12.5, 500.0, drag)
 
     def test_a_heavier_drag_never_makes_the_step_longer(self) -> None:
         steps_m = [predicted_m(8.0, drag=RAIL._replace(dry_n=dry_n)) for dry_n in np.arange(0.5, 9.0, 0.5)]

@@ -21,7 +21,7 @@ from control.monitors.joint_monitor import (
 from control.parameters.fault_bounds import FaultBounds
 from control.rate import PERIOD_S
 from control.records import NEVER_S, DriveState
-from firmware_host.operator.fault_texts import exact_message
+from firmware_host.fault_texts import exact_message
 from tests.control.monitors.monitored_joint import (
     BOUNDS,
     CURRENT_LIMIT_A,

@@ -16,7 +16,6 @@ from can.interfaces.socketcan import constants
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.walks.wirings import CanSocket, open_bus, open_pair
 from control.records import JOINTS, NEVER_S
 from drivers.can.can_port import CanPort, PythonCanPort, open_port
 from drivers.can.frames import Frame, encode_frame
@@ -29,6 +28,7 @@ from drivers.odrive import codec05
 from drivers.odrive.codec import arbitration_id
 from firmware_host.configuration.configuration import Configuration
 from tests.drivers.can.test_can_port import stamps_are_right
+from verification.walks.wirings import CanSocket, open_bus, open_pair
 
 ENCODER = Frame(0x009, bytes(range(8)))
 OFF = Frame(0x040, bytes(8), is_error=True)

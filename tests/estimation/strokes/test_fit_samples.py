@@ -9,7 +9,7 @@ import statsmodels.api as sm
 
 from estimation.strokes.fit_samples import FitSamples
 from experiments.reports.error_table import COEFFICIENTS
-from firmware_host.log_reading.replay import replay_files
+from logs.replay import replay_files
 
 
 def test_three_points_by_hand() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from control.computing.bounded_work import finish
 from control.geometry import FlipperGeometry
-from control.plate.outline import Corner
+from control.plate_outline import Corner
 from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.shear import Base, find_shear
 from estimation.strokes.stroke import Batch

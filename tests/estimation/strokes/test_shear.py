@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from control.plate.integrals import stance_moment_m4, submerged_plate
+from control.plate_integrals import stance_moment_m4, submerged_plate
 from estimation.strokes.origin_fit import MIN_BATCHES, fit_through_origin
 from estimation.strokes.shear import (
     HELD,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from control.computing.bounded_work import finish
 from control.geometry import FlipperGeometry
-from control.plate.integrals import cross_coupling, stroke_moment_m4, submerged_plate
+from control.plate_integrals import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import Estimate
 from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit
 from estimation.strokes.scatter_memory import ScatterMemory

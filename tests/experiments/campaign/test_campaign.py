@@ -18,11 +18,11 @@ from experiments.campaign.campaign_file import Campaign, load_campaign
 from experiments.campaign.walk_trial import run_walk
 from experiments.reports.report_page import PAGE
 from experiments.trials.notebook import NAME, Notebook
-from firmware_host.catalogue.catalogue import Catalogue, CatalogueError
-from firmware_host.catalogue.entry import COLUMNS, TRIALS
 from firmware_host.configuration.file_problems import ConfigurationError
-from tests.firmware_host.open_data.test_parquet import files_of_at_most
+from logs.catalogue.catalogue import Catalogue, CatalogueError
+from logs.catalogue.entry import COLUMNS, TRIALS
 from tests.folders import ROOT
+from tests.logs.export.test_parquet import files_of_at_most
 
 SHORT = """
 seeds = 2

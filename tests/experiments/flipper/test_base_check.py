@@ -7,7 +7,7 @@ import pytest
 from control.modes import Mode
 from control.records import Phase
 from experiments.flipper.base_check import INVALID_M, load_remarks, moved_text, pose_remarks, surface_remarks
-from firmware_host.log_reading.log_reader import Log
+from logs.files.log_reader import Log
 from tests.experiments.synthetic_strides import (
     CONFIGURATION,
     RIGHT_ADDUCTION,

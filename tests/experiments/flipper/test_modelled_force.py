@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from control.plate.integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
+from control.plate_integrals import cross_coupling, stance_moment_m4, stroke_moment_m4, submerged_plate
 from control.records import Phase
 from estimation.force_map import smallest_force_n
 from experiments.flipper.modelled_force import misfit_n, modelled_forces

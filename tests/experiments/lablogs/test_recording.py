@@ -11,9 +11,9 @@ from control.records import Phase
 from experiments.lablogs.lab_trial import LabTrial, read_trial
 from experiments.lablogs.recording import LabRecording, OwnRecording, read_recording
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.lab.columns import PAPER_CONSTANT_NM_A
-from firmware_host.log_reading.lab_csv import LabLog
-from firmware_host.log_reading.replay import replay_files
+from logs.lab.columns import PAPER_CONSTANT_NM_A
+from logs.lab.lab_csv import LabLog
+from logs.replay import replay_files
 from tests.recorded_walks import record_walks
 
 ROW_S = 0.001

@@ -15,11 +15,11 @@ from experiments.pictures.recorded_walk import read_walk
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
 from firmware_host.log.rows import EVENT, EVENT_KIND
-from firmware_host.log_reading.lab.export import write_lab_csv
-from firmware_host.log_reading.lab_csv import read_lab_csv
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_reader import read_log
-from firmware_host.log_reading.replay import replay_files
+from logs.files.log_error import LogError
+from logs.files.log_reader import read_log
+from logs.lab.export import write_lab_csv
+from logs.lab.lab_csv import read_lab_csv
+from logs.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track, paper_track

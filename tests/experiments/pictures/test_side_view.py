@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
-from control.plate.integrals import submerged_plate
+from control.plate_integrals import submerged_plate
 from experiments.pictures.side_view import Point, view_from_side
 from simulation.mud.flipper_contact import attitude_of, plate_size
 from simulation.mud.rigid_plate import lowest_point_m

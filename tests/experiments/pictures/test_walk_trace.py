@@ -14,8 +14,8 @@ from experiments.pictures.stride_choice import choose_strides, duration_s, momen
 from experiments.pictures.walk_trace import DRAWN, WalkTraces, drawn_rows, rows_drawn, rows_of_curve
 from experiments.run_report.headline import headline_of
 from experiments.run_report.run import read_run, read_sources
-from firmware_host.log_reading.log_error import unwatched
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_error import unwatched
+from logs.files.log_reader import read_log
 
 BIN = 64
 

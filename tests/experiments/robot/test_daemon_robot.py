@@ -17,8 +17,8 @@ from control.modes import Mode
 from experiments.robot.bench_errors import BenchError, RobotInUseError
 from experiments.robot.bench_robot import arm, disarm, move, walk
 from experiments.robot.daemon_robot import DaemonRobot
-from firmware_host.log_reading.log_reader import read_log
-from firmware_host.operator.status_client import CallRefusedError
+from logs.files.log_reader import read_log
+from operator_client.status_client import CallRefusedError
 from tests.command_line.command_lines import run_process
 from tests.running_bench import Bench
 from tests.waiting import LONGEST_S

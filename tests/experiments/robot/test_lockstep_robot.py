@@ -28,9 +28,9 @@ from experiments.robot.bench_robot import (
     walk,
 )
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from firmware_host.log.file_recorder import FileRecorder
-from firmware_host.log_reading.log_reader import read_log
-from firmware_host.operator.status_client import CallRefusedError
+from logs.files.log_reader import read_log
+from operator_client.status_client import CallRefusedError
+from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

@@ -18,8 +18,8 @@ from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, first_path, run_files, segment_path
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.log_reader import read_log, read_logs
-from firmware_host.log_reading.replay import replay_files
+from logs.files.log_reader import read_log, read_logs
+from logs.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.firmware_host.synthetic_rows import OPENING, make_ticks

@@ -11,7 +11,7 @@ from experiments.reports.error_table import COEFFICIENTS
 from experiments.run_report.comparison import ComparedRun
 from experiments.run_report.headline import headline_of
 from experiments.run_report.run import MudsFrom, ReportedStride, Run
-from firmware_host.log_reading.replay import Replay
+from logs.replay import Replay
 
 STD_ERROR = 0.04e6
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from experiments.run_report.event_groups import EventGroup, group_events
 from experiments.run_report.tables import cause_rows
-from firmware_host.log_reading.fault_history import read_causes
+from logs.fault_history import read_causes
 
 
 def events(*texts: str) -> list[dict[str, object]]:

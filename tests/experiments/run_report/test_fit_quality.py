@@ -13,7 +13,7 @@ from experiments.run_report.fit_plot import MOST_DRAWN, MOST_MUDS, drawn_muds, d
 from experiments.run_report.fit_quality import fits_report, quality_of, quality_rows
 from experiments.run_report.run import ReportedStride, Run, read_run, read_sources
 from experiments.run_report.tables import estimate_rows
-from firmware_host.log_reading.log_error import unwatched
+from logs.files.log_error import unwatched
 from tests.experiments.run_report.synthetic_runs import estimates, run_of, stride
 
 K = 1e6

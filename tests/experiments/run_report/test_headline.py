@@ -18,9 +18,9 @@ from experiments.run_report.headline import headline_of, headline_sentences, rea
 from experiments.run_report.run import Run, read_run, read_sources
 from experiments.run_report.tables import coefficient_cell, counts_cell, mud_rows
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.log_reading.fault_history import LoggedCause
-from firmware_host.log_reading.log_error import unwatched
-from firmware_host.log_reading.log_reader import read_log
+from logs.fault_history import LoggedCause
+from logs.files.log_error import unwatched
+from logs.files.log_reader import read_log
 from tests.experiments.run_report.synthetic_runs import estimates, run_of, stride
 from tests.recorded_walks import record_walks
 

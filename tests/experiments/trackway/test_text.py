@@ -13,7 +13,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_folder import DONE, first_path, log_files
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
 from tests.recorded_walks import walk_and_hold

@@ -28,7 +28,7 @@ from experiments.trackway.walk import (
 )
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.recorder import Recorder
-from firmware_host.log_reading.log_reader import Log, read_log
+from logs.files.log_reader import Log, read_log
 from simulation.devices.motion_capture_parameters import MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import Clay

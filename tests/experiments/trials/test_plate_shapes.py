@@ -13,10 +13,10 @@ import pytest
 
 from control.geometry import FlipperGeometry
 from estimation.estimation_parameters import EstimationParameters
+from experiments.campaign.plate_file import read_corners
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.trial import SINGLE, run_trial, strides_of
-from firmware_host.configuration.plate_file import read_corners
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track

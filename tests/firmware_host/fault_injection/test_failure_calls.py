@@ -13,11 +13,11 @@ from drivers.fault_injection.failures import FailureParameters, Failures
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
-from firmware_host.operator.connection import Caller
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_methods import Level
-from firmware_host.operator.status_socket import Methods
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.socket_methods import Level
+from firmware_host.sockets.status_socket import Methods
 
 MIA = Caller(1, Peer(7, 1000, frozenset()), Level.DRIVE)
 

@@ -33,7 +33,7 @@ from firmware_host.log.recorder import (
 from firmware_host.log.row_records import pack_record
 from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS, STRIDE, TICK, TICK_KIND
 from firmware_host.log.schema import RowKind
-from firmware_host.log_reading.log_reader import read_log
+from logs.files.log_reader import read_log
 from tests.waiting import LONGEST_S, wait_until
 
 CONFIGURATION = '[robot]\nname = "Ünïcode"\n'

@@ -10,9 +10,9 @@ import pytest
 
 from firmware_host.log.row_stream import PACKET_BYTES, RowStream, packets, stream_path
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
-from firmware_host.log_reading.live_rows import LiveRows
-from firmware_host.operator.rights import Group, Peer, Rights
-from firmware_host.operator.status_client import NoDaemonError, NotPermittedError
+from firmware_host.sockets.rights import Group, Peer, Rights
+from operator_client.live_rows import LiveRows
+from operator_client.status_client import NoDaemonError, NotPermittedError
 
 OWN = Rights(Group("own", os.getegid()), Group("own", os.getegid()), os.geteuid())
 RIGHTS_OF_OTHERS = Rights(Group("readers", 77777), Group("operators", 77778), 77779)

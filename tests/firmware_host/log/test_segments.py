@@ -18,8 +18,8 @@ from firmware_host.log import log_file, log_folder
 from firmware_host.log import segments as log_segments
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files, unfinished_files
 from firmware_host.log.segments import LogSegments
-from firmware_host.log_reading.log_error import LogError
-from firmware_host.log_reading.log_reader import read_log, read_logs
+from logs.files.log_error import LogError
+from logs.files.log_reader import read_log, read_logs
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 
 BY_TIME = replace(ONE_FILE, segment_s=1.0)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.speed.serving_time import CALLER, READING, answer, every_fault, fullest_methods
 from estimation.mud_map import MOST_PIECES, PIECE_M
-from firmware_host.operator.socket_methods import FAULTS_PER_ANSWER, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
-from firmware_host.operator.status_socket import Methods
+from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
+from firmware_host.sockets.status_socket import Methods
+from verification.speed.serving_time import CALLER, READING, answer, every_fault, fullest_methods
 
-LONGEST_BYTES = 24 * 1024  # the time of an answer grows with its length: benchmarks.speed.serving_time
+LONGEST_BYTES = 24 * 1024  # the time of an answer grows with its length: verification.speed.serving_time
 
 
 @pytest.fixture(scope="module")

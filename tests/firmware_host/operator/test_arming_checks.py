@@ -10,8 +10,8 @@ from control.faults import FAULT_KINDS, Blocks, FaultKind, Reaction
 from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.fault_texts import fault_message, what_to_do
 from firmware_host.operator.arming_checks import arming_checks
-from firmware_host.operator.fault_texts import fault_message, what_to_do
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

@@ -11,11 +11,11 @@ from control.faults import FaultKind
 from control.modes import Mode
 from control.rate import PERIOD_S
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.operator.connection import Caller
 from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.operator.rights import Peer
-from firmware_host.operator.rpc import RefusedError
-from firmware_host.operator.socket_methods import METHODS, Level
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.rpc import RefusedError
+from firmware_host.sockets.socket_methods import METHODS, Level
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track

@@ -1,8 +1,9 @@
 """The reference sensor records the strokes of arms that a test moves, and of whole walks."""
 
 from dataclasses import replace
-from math import isfinite, isnan, radians, sin
+from math import isnan, radians, sin
 
+import numpy as np
 import pytest
 
 from control.controller import WalkOrder
@@ -12,7 +13,7 @@ from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import Plant
 from simulation.body.plant_parameters import PlantParameters
-from simulation.body.reference_sensor import StrideTruth, StrokeReference, StrokeTruth
+from simulation.body.reference_sensor import StrideTruth, StrokeReference
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.disturbances import Disturbances
@@ -21,7 +22,9 @@ from simulation.mud.unevenness import Ridges
 from simulation.test_rig.load_cell import measure_shear
 
 DT_S = 0.01
-STRIDE = (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
+INSERTION, STANCE, EXTRACTION, SWING = Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.SWING
+STROKES = (INSERTION, STANCE, EXTRACTION)
+SOFT = Track([(1.0, MUDS["53.1"])])
 
 
 def make_plant(depth_m: float = 0.03) -> Plant:
@@ -36,68 +39,63 @@ def watch(reference: StrokeReference, plant: Plant, *phases: Phase) -> list[Stri
     return [truth for phase in phases for truth in reference.step(DT_S, plant, phase)]
 
 
-def is_unseen(stroke: StrokeTruth) -> bool:
-    return all(isnan(value) for value in stroke)
-
-
-def test_a_stride_of_each_flipper_closes_when_swing_begins() -> None:
+@pytest.mark.parametrize(
+    "strokes",
+    [
+        STROKES,
+        (SWING, *STROKES),
+        tuple(each for stroke in STROKES for each in (stroke, Phase.PAUSE)),
+        (*STROKES, Phase.RECOVERY),  # a recovery is no stroke
+    ],
+)
+def test_a_stride_of_each_flipper_closes_once_when_swing_or_the_next_insertion_begins(
+    strokes: tuple[Phase, ...],
+) -> None:
     reference, plant = StrokeReference(), make_plant()
-    assert watch(reference, plant, Phase.SWING, *STRIDE[:3]) == []
-    closed = watch(reference, plant, Phase.SWING)
+    assert watch(reference, plant, *strokes) == []
+    closed = watch(reference, plant, SWING)
     assert [(truth.flipper, truth.index) for truth in closed] == [("left", 0), ("right", 0)]
-    assert watch(reference, plant, Phase.SWING) == []
-    assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [1, 1]
-
-
-def test_pauses_between_the_strokes_do_not_close_a_stride() -> None:
-    pause = Phase.PAUSE
-    phases = (Phase.INSERTION, pause, Phase.STANCE, pause, Phase.EXTRACTION, pause)
-    reference, plant = StrokeReference(), make_plant()
-    assert watch(reference, plant, *phases) == []
-    assert len(watch(reference, plant, Phase.SWING)) == 2
-
-
-def test_a_stride_with_a_recovery_closes_once_and_the_recovery_is_no_stroke() -> None:
-    strides = []
-    for phases in (STRIDE[:3], (*STRIDE[:3], Phase.RECOVERY)):
-        reference, plant = StrokeReference(), make_plant()
-        assert watch(reference, plant, *phases) == []
-        strides.append(watch(reference, plant, Phase.SWING))
-        assert watch(reference, plant, Phase.SWING) == []
-    assert len(strides[0]) == len(strides[1]) == 2
-    assert repr(strides[0]) == repr(strides[1])
-
-
-def test_an_insertion_closes_a_stride_too() -> None:
-    reference, plant = StrokeReference(), make_plant()
-    assert len(watch(reference, plant, *STRIDE[:3], Phase.INSERTION)) == 2
+    assert watch(reference, plant, SWING) == []
+    assert [truth.index for truth in watch(reference, plant, *STROKES, INSERTION)] == [1, 1]
+    fresh = StrokeReference()
+    assert repr(watch(fresh, plant, *STROKES, SWING)) == repr(closed)
 
 
 @pytest.mark.parametrize(
     "phases",
     [
-        (Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION, Phase.REST, Phase.SWING),
-        (Phase.INSERTION, Phase.STANCE, Phase.SWING),
-        (Phase.INSERTION, Phase.STANCE, Phase.REST, Phase.EXTRACTION, Phase.SWING),
-        (Phase.STANCE, Phase.EXTRACTION, Phase.SWING),
+        (*STROKES, Phase.REST, SWING),
+        (INSERTION, STANCE, SWING),
+        (INSERTION, STANCE, Phase.REST, EXTRACTION, SWING),
+        (STANCE, EXTRACTION, SWING),
     ],
 )
 def test_strides_that_are_cut_short_do_not_count(phases: tuple[Phase, ...]) -> None:
     reference, plant = StrokeReference(), make_plant()
     assert watch(reference, plant, *phases) == []
-    assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [0, 0]
+    assert [truth.index for truth in watch(reference, plant, *STROKES, SWING)] == [0, 0]
+
+
+def test_a_reset_reference_sensor_counts_from_zero() -> None:
+    reference, plant = StrokeReference(), make_plant()
+    watch(reference, plant, *STROKES, SWING, INSERTION, STANCE)
+    reference.reset()
+    assert watch(reference, plant, EXTRACTION, SWING) == []
+    assert [truth.index for truth in watch(reference, plant, *STROKES, SWING)] == [0, 0]
 
 
 def test_means_are_those_of_the_part_in_the_mud_and_the_depth_is_the_greatest() -> None:
     reference, plant = StrokeReference(), make_plant()
     arm, geometry = plant.arms[0], plant.parameters.geometry
-    for sweep_rad, depth_m in ((0.9, -0.01), (0.2, 0.01), (0.4, 0.04), (0.6, 0.02)):
-        arm.sweep_rad, arm.adduction_rad = sweep_rad, geometry.adduction_rad(sweep_rad, depth_m)
-        watch(reference, plant, Phase.INSERTION)
-    left, _ = watch(reference, plant, *STRIDE[1:])
-    assert left.insertion.sweep_rad == pytest.approx(0.4)
-    expected_rad = sum(geometry.adduction_rad(*pose) for pose in ((0.2, 0.01), (0.4, 0.04), (0.6, 0.02))) / 3.0
-    assert left.insertion.adduction_rad == pytest.approx(expected_rad)
+    poses = [
+        (sweep_rad, geometry.adduction_rad(sweep_rad, depth_m))
+        for sweep_rad, depth_m in ((0.9, -0.01), (0.2, 0.01), (0.4, 0.04), (0.6, 0.02))
+    ]
+    for arm.sweep_rad, arm.adduction_rad in poses:
+        watch(reference, plant, INSERTION)
+    left, _ = watch(reference, plant, STANCE, EXTRACTION, SWING)
+    mean_rad = np.mean(poses[1:], axis=0)
+    assert (left.insertion.sweep_rad, left.insertion.adduction_rad) == pytest.approx(mean_rad)
     assert left.insertion.deepest_m == pytest.approx(0.04)
     assert isnan(left.insertion.slip_m)
 
@@ -106,26 +104,22 @@ def test_the_speed_is_that_of_the_edge_through_the_mud_the_body_s_included() -> 
     reference, plant = StrokeReference(), make_plant()
     arm, geometry = plant.arms[1], plant.parameters.geometry
     arm.sweep_velocity_rad_s, arm.adduction_velocity_rad_s, plant.body.forward_m_s = 0.4, -0.8, 0.1
-    jacobian = geometry.jacobian(arm.sweep_rad, arm.adduction_rad)
-    velocity_m_s = (
-        0.4 * jacobian.x_sweep - 0.8 * jacobian.x_adduction + 0.1,
-        0.4 * jacobian.y_sweep - 0.8 * jacobian.y_adduction,
-        0.4 * jacobian.z_sweep - 0.8 * jacobian.z_adduction,
-    )
-    _, right = watch(reference, plant, *STRIDE)
-    assert right.insertion.speed_m_s == pytest.approx(sum(part**2 for part in velocity_m_s) ** 0.5)
-    assert right.extraction.speed_m_s == pytest.approx(right.insertion.speed_m_s)
+    jacobian = np.reshape(geometry.jacobian(arm.sweep_rad, arm.adduction_rad), (3, 2))
+    speed_m_s = np.linalg.norm(jacobian @ [0.4, -0.8] + [0.1, 0.0, 0.0])
+    _, right = watch(reference, plant, *STROKES, SWING)
+    assert right.insertion.speed_m_s == pytest.approx(speed_m_s)
+    assert right.extraction.speed_m_s == pytest.approx(speed_m_s)
 
 
 def test_in_stance_only_backward_slip_counts() -> None:
     reference, plant = StrokeReference(), make_plant()
-    watch(reference, plant, Phase.INSERTION)
+    watch(reference, plant, INSERTION)
     length_m = plant.parameters.geometry.flipper_length_m
     for slip_m_s in (0.1, 0.3, 0.019, -0.5):
         plant.arms[0].sweep_velocity_rad_s = -(slip_m_s + 0.2) / length_m
         plant.body.forward_m_s = 0.2
-        watch(reference, plant, Phase.STANCE)
-    left, right = watch(reference, plant, Phase.EXTRACTION, Phase.SWING)
+        watch(reference, plant, STANCE)
+    left, right = watch(reference, plant, EXTRACTION, SWING)
     assert left.stance.speed_m_s == pytest.approx(0.1 * 0.25 + 0.3 * 0.75)  # weighted by distance
     assert left.stance.slip_m == pytest.approx(DT_S * 0.4)
     assert isnan(right.stance.speed_m_s)  # it went forward with the body
@@ -133,18 +127,17 @@ def test_in_stance_only_backward_slip_counts() -> None:
 
 
 def test_a_flipper_in_the_air_has_no_strokes_to_repeat() -> None:
-    reference, plant = StrokeReference(), make_plant(-0.01)
-    left, right = watch(reference, plant, *STRIDE)
-    assert all(is_unseen(stroke) for stroke in (left.insertion, left.stance, left.extraction, right.stance))
+    left, right = watch(StrokeReference(), make_plant(-0.01), *STROKES, SWING)
+    assert np.isnan([*left.insertion, *left.stance, *left.extraction, *right.stance]).all()
 
 
 def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
     reference, plant = StrokeReference(), make_plant()
     arm = plant.arms[0]
     arm.clay, arm.history.surface_m = Clay("remoulded", 1234.0), 0.002
-    watch(reference, plant, Phase.INSERTION)
+    watch(reference, plant, INSERTION)
     arm.clay, arm.history.surface_m = Clay("next", 2000.0), -0.001
-    left, right = watch(reference, plant, Phase.STANCE, Phase.EXTRACTION, Phase.SWING)
+    left, right = watch(reference, plant, STANCE, EXTRACTION, SWING)
     assert (left.clay, left.surface_m) == (Clay("remoulded", 1234.0), 0.002)
     assert (right.clay, right.surface_m) == (MUDS["48.5"], 0.0)
     assert left.insertion.deepest_m == pytest.approx(0.028)
@@ -152,84 +145,57 @@ def test_clay_and_surface_are_those_that_the_flipper_met_first() -> None:
 
 def test_depths_and_surface_are_those_of_the_ridge_that_the_flipper_met() -> None:
     """The body is a quarter of a ridge ahead, so a crest of 4 mm lies under a flipper that points straight out."""
-    reference, plant = StrokeReference(), make_plant()
+    plant = make_plant()
     plant.track = Track([(1.0, MUDS["48.5"])], ridges=Ridges(0.004, 0.2))
     for arm in plant.arms:
         arm.track = plant.track
         arm.step(1e-9, 0.05, 0.0, 0.0, 0.0)  # so short that nothing moves
-    left, _ = watch(reference, plant, *STRIDE)
+    left, _ = watch(StrokeReference(), plant, *STROKES, SWING)
     assert left.surface_m == pytest.approx(-0.004)
     assert left.insertion.deepest_m == pytest.approx(0.03 + 0.004)
 
 
-def test_a_reset_reference_sensor_counts_from_zero() -> None:
-    reference, plant = StrokeReference(), make_plant()
-    watch(reference, plant, *STRIDE, Phase.INSERTION, Phase.STANCE)
-    reference.reset()
-    assert watch(reference, plant, Phase.EXTRACTION, Phase.SWING) == []
-    assert [truth.index for truth in watch(reference, plant, *STRIDE)] == [0, 0]
-
-
-def observe_walk(lockstep: Lockstep, strides: int) -> list[StrideTruth]:
-    """Walk at 3 cm depth; return the truths of this number of strides of each flipper."""
+def observe_walk(lockstep: Lockstep, strides: int) -> tuple[list[StrideTruth], list[float]]:
+    """Walk at 3 cm depth; return the truths of this number of strides of each flipper, and the left one's thrust in
+    the middle of its stances.
+    """
     lockstep.arm()
     lockstep.walk(WalkOrder(0.03, adaptive=False))
-    reference = StrokeReference()
-    truths: list[StrideTruth] = []
+    reference, arm = StrokeReference(), lockstep.robot.plant.arms[0]
+    truths, thrusts_n = list[StrideTruth](), list[float]()
     while len(truths) < 2 * strides:
         lockstep.step()
-        truths += reference.step(PERIOD_S, lockstep.robot.plant, lockstep.loop.target.phase)
+        phase = lockstep.loop.target.phase
+        truths += reference.step(PERIOD_S, lockstep.robot.plant, phase)
+        if phase is STANCE and abs(arm.sweep_rad) < 0.2:
+            thrusts_n.append(arm.force.thrust_n)
     lockstep.loop.learning.finish()  # the strides that have just ended
-    return truths
+    return truths, thrusts_n
 
 
-Observed = tuple[Lockstep, list[StrideTruth]]
-
-
-@pytest.fixture(scope="module")
-def walk_in_soft_mud(configuration: Configuration) -> Observed:
-    lockstep = Lockstep(configuration, Track([(1.0, MUDS["53.1"])]))
-    return lockstep, observe_walk(lockstep, 4)
-
-
-def test_a_walk_has_the_strides_that_the_loop_closes(walk_in_soft_mud: Observed) -> None:
-    lockstep, truths = walk_in_soft_mud
+def test_a_walk_has_the_strides_that_the_loop_closes_and_in_soft_mud_slip_and_advance_make_up_the_sweep(
+    configuration: Configuration,
+) -> None:
+    lockstep = Lockstep(configuration, SOFT)
+    truths, _ = observe_walk(lockstep, 3)
     closed = [(stride.estimate.flipper, stride.estimate.index) for stride in lockstep.loop.learning.strides]
     assert [(truth.flipper, truth.index) for truth in truths] == closed
     assert all(truth.insertion.deepest_m == pytest.approx(0.03, abs=0.002) for truth in truths)
-
-
-def test_in_soft_mud_slip_and_advance_make_up_the_sweep(
-    configuration: Configuration, walk_in_soft_mud: Observed
-) -> None:
-    lockstep, both = walk_in_soft_mud
-    truths = [truth for truth in both if truth.flipper == "left"]
-    steps_m = lockstep.robot.plant.body_m / len(truths)
     arc_m = 2.0 * configuration.geometry.flipper_length_m * sin(radians(configuration.gait.sweep_angle_deg))
-    assert truths[-1].stance.slip_m + steps_m == pytest.approx(arc_m, abs=0.02)  # the body still coasts in extraction
+    advance_m = lockstep.robot.plant.body_m / 3.0
+    assert truths[-1].stance.slip_m + advance_m == pytest.approx(arc_m, abs=0.02)  # the body coasts in extraction
 
 
 def test_a_load_cell_that_repeats_a_stance_measures_the_flipper_s_load(configuration: Configuration) -> None:
     lockstep = Lockstep(
         replace(configuration, gait=replace(SINGLE_FLIPPER, pause_s=0.3)),
-        Track([(1.0, MUDS["53.1"])]),
+        SOFT,
         disturbances=Disturbances(surface_sd_m=0.0015, remoulding=1.0),
         fixed_base=True,
     )
-    thrusts_n: list[float] = []
-    arm = lockstep.robot.plant.arms[0]
-    step = lockstep.step
-
-    def recording_step() -> None:
-        step()
-        if lockstep.loop.target.phase is Phase.STANCE and abs(arm.sweep_rad) < 0.2:
-            thrusts_n.append(arm.force.thrust_n)
-
-    lockstep.step = recording_step  # type: ignore[method-assign]
-    first = next(truth for truth in observe_walk(lockstep, 1) if truth.flipper == "left")
+    (first, _), thrusts_n = observe_walk(lockstep, 1)
     stance = first.stance
-    assert isfinite(stance.speed_m_s)
     shear_n = measure_shear(
         first.clay, configuration.geometry, stance.sweep_rad, stance.adduction_rad, stance.deepest_m, stance.speed_m_s
     )
-    assert sum(thrusts_n) / len(thrusts_n) == pytest.approx(shear_n, rel=0.1)
+    assert np.mean(thrusts_n) == pytest.approx(shear_n, rel=0.1)

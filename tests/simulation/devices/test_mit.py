@@ -1,409 +1,226 @@
-"""The simulated drive in MIT mode, and the axis that commands it, on one bus."""
+"""The simulated drive in MIT mode, and the axis that commands it: what no drive of another type has."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-from math import isnan, pi
-from random import Random
-from typing import Any
+from math import isnan
 
 import pytest
 
-from control.parameters.joint_limits import JointLimits
-from control.records import JOINTS
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus
-from drivers.drive_types import make_drives
 from drivers.mit import codec
-from drivers.mit.axis import MitAxis
 from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS
-from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import CONTROL_MODE, REGISTERS, TIMEOUT, TMAX
-from simulation.devices.drive import DriveError, SimulatedDriveParameters
-from simulation.devices.mit.device import BOOT_S, SimulatedMit
+from simulation.devices.drive import DriveError
+from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.mit.registers import write_frame
+from tests.drivers.bench.simulated_bus import simulated
+from tests.simulation.devices.driven_drives import DrivenDrives
 
-IDEAL = SimulatedDriveParameters(7, type="mit", current_noise_a=0.0)
 STEP_NM = MODELS["DM4310"].torque_step_nm
-TICK_S = 0.0026
-
-
-class Bench:
-    def __init__(self, **changes: Any) -> None:
-        self.drive = SimulatedMit(replace(IDEAL, **changes), Random(1))
-        self.model = MODELS[changes.get("model", "DM4310")]
-        self.now_s = 0.0
-
-    def send(self, data: bytes, identifier: int = 7) -> list[Frame]:
-        return self.drive.receive(Frame(identifier, data), self.now_s)
-
-    def ask(self, data: bytes = codec.LEAVE) -> Answer:
-        (frame,) = self.send(data)
-        assert frame.arbitration_id == codec.feedback_id(7, self.model)
-        return codec.decode_answer(frame.data, self.model)
-
-    def command(self, torque_nm: float) -> Answer:
-        return self.ask(codec.encode_torque(torque_nm, self.model.torque_nm))
-
-    def torque_after(self, wait_s: float) -> float:
-        self.now_s += wait_s
-        return self.drive.torque_nm(self.now_s)
+DAMIAO, CUBEMARS = "mit", "mit:AK80-9"
+both_makes = pytest.mark.parametrize("name", [DAMIAO, CUBEMARS])
 
 
 @pytest.fixture
-def bench() -> Bench:
-    return Bench()
+def drive() -> SimulatedMit:
+    made = simulated("mit", 7, current_noise_a=0.0)
+    assert isinstance(made, SimulatedMit)
+    return made
 
 
-def test_it_sends_nothing_but_one_answer_to_each_command(bench: Bench) -> None:
-    for _ in range(100):
-        bench.torque_after(0.001)
-        assert list(bench.drive.cyclic_frames(bench.now_s)) == []
-    assert len(bench.send(codec.LEAVE)) == 1
-    assert bench.send(codec.LEAVE, identifier=8) == [] == bench.send(codec.LEAVE, identifier=23)
+def ask(drive: SimulatedMit, data: bytes = codec.LEAVE, now_s: float = 0.0) -> Answer:
+    (frame,) = drive.receive(Frame(7, data), now_s)
+    assert frame.arbitration_id == codec.feedback_id(7, MODELS["DM4310"])
+    return codec.decode_answer(frame.data, MODELS["DM4310"])
 
 
-def test_it_follows_torque_only_in_the_mode_and_answers_with_the_values_of_before(bench: Bench) -> None:
-    bench.command(0.5)
-    assert bench.torque_after(0.001) == 0.0
-    assert bench.ask(codec.ENTER).status == codec.DISABLED
-    assert bench.torque_after(0.001) == pytest.approx(0.5, abs=STEP_NM)  # the drive stored the command
-    answer = bench.command(0.2)
+def test_it_sends_nothing_but_one_answer_to_each_command_with_the_values_of_before(drive: SimulatedMit) -> None:
+    assert list(drive.cyclic_frames(0.1)) == []
+    assert drive.receive(Frame(8, codec.LEAVE), 0.1) == [] == drive.receive(Frame(23, codec.LEAVE), 0.1)
+    ask(drive, codec.encode_torque(0.5, 10.0))
+    assert ask(drive, codec.ENTER).status == codec.DISABLED
+    assert drive.torque_nm(0.001) == pytest.approx(0.5, abs=STEP_NM)  # the drive stored the command
+    answer = ask(drive, codec.encode_torque(0.0, 10.0))
     assert answer.status == codec.ENABLED and answer.torque_nm == pytest.approx(0.5, abs=1.5 * STEP_NM)
-    assert bench.torque_after(0.001) == pytest.approx(0.2, abs=STEP_NM)
-    bench.ask(codec.LEAVE)
-    assert bench.torque_after(0.001) == 0.0
+    assert drive.torque_nm(0.002) == pytest.approx(0.5 * STEP_NM)  # no code is zero
 
 
-def test_the_code_of_zero_is_followed_as_half_a_step(bench: Bench) -> None:
-    bench.ask(codec.ENTER)
-    bench.command(0.0)
-    assert bench.torque_after(0.001) == pytest.approx(0.5 * STEP_NM)
+def test_an_expired_watchdog_is_not_fed_by_questions_and_latched_until_errors_are_cleared(drive: SimulatedMit) -> None:
+    ask(drive, codec.ENTER)
+    for tick in range(102):
+        drive.receive(Frame(codec.REGISTER_ID, codec.encode_read(7, TIMEOUT)), 0.001 * tick)
+        torque_nm = drive.torque_nm(0.001 * tick)
+    assert torque_nm == 0.0 and drive.failed
+    for data, status in (
+        (codec.ENTER, codec.LOST_COMMANDS),
+        (codec.CLEAR, codec.LOST_COMMANDS),
+        (codec.ENTER, codec.DISABLED),
+        (codec.LEAVE, codec.ENABLED),
+    ):
+        assert ask(drive, data, 0.11).status == status  # of before the command
 
 
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_a_sign_turns_angle_velocity_and_torque_alike(sign: int) -> None:
-    bench = Bench(sign=sign, zero_turn=0.25)
-    bench.drive.measure(0.5, 2.0)
-    bench.ask(codec.ENTER)
-    answer = bench.command(0.4)
-    assert answer.position_rad == pytest.approx(0.5 * pi + sign * 0.5, abs=1e-3)
-    assert answer.velocity_rad_s == pytest.approx(sign * 2.0, abs=0.02)
-    assert bench.torque_after(0.001) == pytest.approx(sign * 0.4, abs=STEP_NM)
+def test_without_commands_a_cubemars_is_limp_reports_nothing_and_follows_the_next_command() -> None:
+    drives = DrivenDrives(CUBEMARS)
+    drives.arm()
+    drives.wait(0.2)
+    assert not drives.devices[0].energised and not drives.devices[0].failed
+    drives.tick(0.5, count=2)
+    assert drives.torque_nm() == pytest.approx(0.5, abs=0.01) and drives.state.error_flags == 0
 
 
-def test_without_commands_a_damiao_leaves_the_mode_until_its_errors_are_cleared(bench: Bench) -> None:
-    bench.ask(codec.ENTER)
-    bench.command(0.5)
-    assert bench.torque_after(0.0999) > 0.4
-    assert bench.torque_after(0.0002) == 0.0
-    assert bench.ask().status == codec.LOST_COMMANDS and bench.drive.failed
-    bench.ask(codec.ENTER)
-    assert bench.torque_after(0.001) == 0.0
-    bench.ask(codec.CLEAR)
-    assert bench.ask(codec.ENTER).status == codec.DISABLED
-    assert bench.ask(codec.LEAVE).status == codec.ENABLED
+def test_a_drive_whose_watchdog_expired_is_not_commanded_back() -> None:
+    drives = DrivenDrives(DAMIAO)
+    drives.arm()
+    drives.devices[0].trip(DriveError.WATCHDOG)
+    drives.tick(0.2, count=5)
+    assert drives.axis.health.watchdog_expired and not drives.axis.closed_loop
 
 
-def test_questions_for_registers_do_not_feed_the_watchdog(bench: Bench) -> None:
-    bench.ask(codec.ENTER)
-    bench.command(0.5)
-    for _ in range(101):
-        bench.send(codec.encode_read(7, TIMEOUT), codec.REGISTER_ID)
-        torque_nm = bench.torque_after(0.001)
-    assert torque_nm == 0.0
+def test_gains_are_followed_as_the_firmware_does(drive: SimulatedMit) -> None:
+    ask(drive, codec.ENTER)
+    ask(drive, bytes.fromhex("8000800333000800"))  # kp of 0x333 / 4095 of 500
+    drive.measure(0.01, 0.0)
+    assert drive.torque_nm(0.001) == pytest.approx(-100.0 * 0.01, abs=0.03)
 
 
-def test_a_watchdog_that_is_off_never_trips() -> None:
-    bench = Bench(watchdog_s=0.0)
-    bench.ask(codec.ENTER)
-    bench.command(0.2)
-    assert bench.torque_after(60.0) == pytest.approx(0.2, abs=STEP_NM)
-
-
-def test_without_commands_a_cubemars_is_limp_and_reports_nothing() -> None:
-    bench = Bench(model="AK80-9")
-    bench.ask(codec.ENTER)
-    bench.command(0.5)
-    assert bench.drive.energised
-    assert abs(bench.torque_after(0.2)) < 1e-9 and not bench.drive.energised
-    answer = bench.command(0.5)
-    assert (answer.status, answer.fault) == (0, 0)
-    assert bench.torque_after(0.001) == pytest.approx(0.5, abs=bench.model.torque_step_nm)
-
-
-@pytest.mark.parametrize(("model", "status", "fault"), [("DM4310", 0xA, 30), ("AK80-9", 0, 2)])
-def test_a_fault_ends_torque_and_is_reported(model: str, status: int, fault: int) -> None:
-    bench = Bench(model=model)
-    bench.ask(codec.ENTER)
-    bench.command(0.5)
-    bench.drive.trip(DriveError.OVERCURRENT)
-    assert bench.torque_after(0.001) == 0.0
-    answer = bench.ask()
-    assert (answer.status, answer.last) == (status, fault)
-
-
-def test_a_restart_is_silent_and_ends_outside_of_the_mode(bench: Bench) -> None:
-    bench.ask(codec.ENTER)
-    bench.drive.restart(bench.now_s)
-    bench.now_s += 0.99 * BOOT_S
-    assert bench.send(codec.LEAVE) == []
-    bench.now_s += 0.02 * BOOT_S
-    assert bench.ask().status == codec.DISABLED
-
-
-def test_gains_are_followed_as_the_firmware_does(bench: Bench) -> None:
-    bench.ask(codec.ENTER)
-    bench.ask(bytes.fromhex("8000800333000800"))  # kp of 0x333 / 4095 of 500
-    bench.drive.measure(0.01, 0.0)
-    assert bench.torque_after(0.001) == pytest.approx(-100.0 * 0.01, abs=0.03)
-
-
-def test_malformed_frames_are_ignored(bench: Bench) -> None:
-    random = Random(2)
-    for _ in range(500):
-        identifier = random.choice([7, codec.REGISTER_ID, random.randrange(0x800)])
-        bench.send(random.randbytes(random.randint(0, 8)), identifier)
-        assert not isnan(bench.torque_after(0.001))
-
-
-class Robot:
-    """Four axes on one bus with their simulated drives."""
-
-    def __init__(self, changes: Mapping[str, Any] | None = None, **settings: Any) -> None:
-        bus = MockBus()
-        self.far = bus.open()
-        parameters = {joint: MitParameters("a", index + 1, **settings) for index, joint in enumerate(JOINTS)}
-        self.drives = make_drives(parameters, {"a": bus.open()}, JointLimits())
-        given: dict[str, Any] = {name: settings[name] for name in ("model", "torque_range_nm") if name in settings}
-        self.devices = [
-            SimulatedMit(replace(IDEAL, **({"node_id": index + 1} | given | dict(changes or {}))), Random(index))
-            for index in range(4)
-        ]
-        self.now_s = 10.0
-
-    @property
-    def axis(self) -> MitAxis:
-        axis = self.drives.axes[0]
-        assert isinstance(axis, MitAxis)
-        return axis
-
-    def tick(self, idle: bool = True, torque_nm: float = 0.0, count: int = 1) -> None:
-        for _ in range(count):
-            self.now_s += TICK_S
-            self.drives.read(self.now_s)
-            if idle:
-                self.drives.request_settings(self.now_s)
-            self.drives.send((torque_nm,) * 4, 0.1)  # type: ignore[arg-type]
-            self.exchange()
-
-    def exchange(self) -> None:
-        for frame in self.far.receive():
-            for device in self.devices:
-                for answer in device.receive(frame, self.now_s):
-                    self.far.send(answer)
-        for device in self.devices:
-            device.torque_nm(self.now_s)
-
-    def follow_another(self, torque_nm: float) -> None:
-        """Lets the first drive obey a command that is not on the bus."""
-        self.devices[0].receive(self.devices[0].forge_torque(torque_nm), self.now_s)
-        self.devices[0].torque_nm(self.now_s)
-
-    def arm(self) -> None:
-        self.drives.arm(self.now_s, at_once=True)
-        self.drives.arm(self.now_s + 1.0)
-        self.exchange()
-        self.tick(idle=False, count=2)
-
-
-def test_an_axis_reads_back_limits_and_watchdog() -> None:
-    robot = Robot({"serial_number": "0badcafe"})
-    robot.tick(count=3 * len(REGISTERS))
-    for health in robot.drives.health:
-        assert health.watchdog_s == pytest.approx(0.1) and health.firmware_supported
-        assert health.serial_number == "0badcafe" and health.setting_problem == ""
-    assert robot.drives.malformed_frames == robot.drives.unknown_frames == robot.drives.refused_commands == 0
+# registers
 
 
 @pytest.mark.parametrize(
     ("register", "value", "found"),
     [
-        (21, 3.14, "PMAX (register 21) is 3.14 and that of model = 'DM4310' is 12.5: correct the key, or set"),
-        (22, 45.0, "VMAX (register 22) is 45 and that of model = 'DM4310' is 30: correct the key, or set"),
-        (TMAX, 28.0, "TMAX (register 23) is 28 and that of model = 'DM4310' is 10: correct the key, or set"),
-        (CONTROL_MODE, 2, "CTRL_MODE (register 10) is 2: set 1"),
+        (21, 3.14, ("PMAX", "3.14", "12.5")),
+        (22, 45.0, ("VMAX", "45", "30")),
+        (TMAX, 28.0, ("TMAX", "28", "10")),
+        (CONTROL_MODE, 2, ("CTRL_MODE", "2", "1")),
+        (CONTROL_MODE, 1, ()),
     ],
 )
-def test_a_setting_that_differs_is_named_with_what_was_found_and_what_to_do(
-    register: int, value: float, found: str
+def test_an_axis_reads_limits_and_watchdog_back_and_names_a_setting_that_differs(
+    register: int, value: float, found: tuple[str, ...]
 ) -> None:
-    robot = Robot()
-    robot.devices[0].receive(write_frame(1, register, value), 10.0)
-    robot.tick(count=3 * len(REGISTERS))
-    assert found in robot.axis.health.setting_problem
-    assert robot.drives.axes[1].health.setting_problem == ""
+    drives = DrivenDrives(DAMIAO, {"serial_number": "0badcafe"})
+    drives.devices[0].receive(write_frame(1, register, value), 10.0)
+    drives.tick(count=3 * len(REGISTERS))
+    first, second, *_ = drives.drives.health
+    assert bool(first.setting_problem) is bool(found) and all(word in first.setting_problem for word in found)
+    assert second.setting_problem == "" and second.firmware_supported
+    assert second.watchdog_s == pytest.approx(0.1) and second.serial_number == "0badcafe"
 
 
-def test_the_range_of_torque_may_be_configured_and_is_then_compared() -> None:
-    robot = Robot(torque_range_nm=4.0)
-    robot.tick(count=3 * len(REGISTERS))
-    assert robot.axis.health.setting_problem == ""
-    other = Robot({"torque_range_nm": 0.0}, torque_range_nm=4.0)
-    other.tick(count=3 * len(REGISTERS))
-    assert "TMAX (register 23) is 10 and that of torque_range_nm = 4 is 4" in other.axis.health.setting_problem
+@pytest.mark.parametrize(("range_nm", "fits"), [(4.0, True), (0.0, False)])
+def test_the_range_of_torque_may_be_configured_and_is_then_compared(range_nm: float, fits: bool) -> None:
+    drives = DrivenDrives(DAMIAO, {"torque_range_nm": range_nm}, torque_range_nm=4.0)
+    drives.tick(count=3 * len(REGISTERS))
+    assert (drives.axis.health.setting_problem == "") is fits
 
 
 def test_the_watchdog_of_a_cubemars_stays_unknown() -> None:
-    robot = Robot(model="AK80-9")
-    robot.tick(count=300)
-    health = robot.axis.health
-    assert isnan(health.watchdog_s) and "AK80-9 reports none" in health.watchdog_advice
-    assert health.firmware_supported and robot.drives.unknown_frames == 0
+    drives = DrivenDrives(CUBEMARS)
+    drives.tick(count=300)
+    health = drives.axis.health
+    assert isnan(health.watchdog_s) and health.watchdog_advice
+    assert health.firmware_supported and drives.drives.unknown_frames == 0
 
 
-@pytest.mark.parametrize("model", ["DM4310", "AK80-9"])
-def test_an_idle_drive_is_commanded_to_leave_the_mode_in_every_tick(model: str) -> None:
-    robot = Robot(model=model)
-    robot.tick(count=3)
-    robot.devices[0].energised = True
-    robot.tick()
-    assert not robot.devices[0].energised
+# other programs
 
 
-@pytest.mark.parametrize("model", ["DM4310", "AK80-9"])
-def test_arming_enters_at_zero_torque_and_disarming_leaves(model: str) -> None:
-    robot = Robot(model=model)
-    robot.tick(count=30)
-    robot.devices[0]._command = replace_torque(robot, 5.0)
-    robot.arm()
-    assert all(device.energised for device in robot.devices)
-    assert abs(robot.devices[0].torque_nm(robot.now_s)) < MODELS[model].torque_step_nm
-    robot.tick(idle=False, torque_nm=0.3, count=2)
-    state = robot.drives.read(robot.now_s)[0]
-    assert state.closed_loop and robot.drives.refused_commands == 0
-    assert 0.083 * state.current_a == pytest.approx(0.3, abs=2.0 * MODELS[model].torque_step_nm)
-    robot.drives.disarm(robot.now_s, at_once=True)
-    robot.exchange()
-    assert not any(device.energised for device in robot.devices)
-    robot.tick(count=2)
-    assert not robot.axis.closed_loop
+@both_makes
+def test_an_idle_drive_is_commanded_to_leave_the_mode_in_every_tick(name: str) -> None:
+    drives = DrivenDrives(name)
+    drives.tick(count=3)
+    drives.devices[0].energised = True
+    drives.tick()
+    assert not drives.devices[0].energised
 
 
-def replace_torque(robot: Robot, torque_nm: float) -> Any:
-    """Return the stored command of a drive with another torque."""
-    return robot.devices[0]._command._replace(torque_nm=torque_nm)
-
-
-def test_a_drive_whose_watchdog_expired_is_not_commanded_back() -> None:
-    robot = Robot()
-    robot.tick(count=30)
-    robot.arm()
-    robot.devices[0].trip(DriveError.WATCHDOG)
-    robot.tick(idle=False, torque_nm=0.2, count=2)
-    health = robot.axis.health
-    assert health.watchdog_expired and health.errors == "watchdog expired" and not robot.axis.closed_loop
-    robot.tick(idle=False, count=2)
-    robot.axis.clear_errors()
-    robot.exchange()
-    robot.tick(idle=False, count=2)
-    assert robot.axis.state.error_flags == 0 and not robot.devices[0].energised
-
-
-@pytest.mark.parametrize("model", ["DM4310", "AK80-9"])
-def test_a_restart_while_armed_ends_following(model: str) -> None:
-    robot = Robot(model=model)
-    robot.tick(count=30)
-    robot.arm()
-    robot.devices[0].restart(robot.now_s)
-    robot.tick(idle=False, count=round((BOOT_S + 0.1) / TICK_S))
-    assert robot.axis.health.restarts == 1
-    assert not robot.axis.closed_loop and not robot.devices[0].energised
-
-
+@both_makes
 @pytest.mark.parametrize(("data", "counted"), [(codec.ENTER, 1), (codec.SET_ZERO, 1), (codec.LEAVE, 0)])
-@pytest.mark.parametrize("model", ["DM4310", "AK80-9"])
-def test_commands_of_another_program_are_counted(model: str, data: bytes, counted: int) -> None:
-    robot = Robot(model=model)
-    robot.tick(count=3)
-    robot.far.send(Frame(1, data))
-    robot.tick()
-    assert robot.axis.health.foreign_commands == counted
-    assert robot.drives.axes[1].health.foreign_commands == 0
+def test_commands_of_another_program_are_counted(name: str, data: bytes, counted: int) -> None:
+    drives = DrivenDrives(name)
+    drives.tick(count=3)
+    drives.far.send(Frame(1, data))
+    drives.tick()
+    assert [axis.health.foreign_commands for axis in drives.drives.axes] == [counted, 0, 0, 0]
 
 
-@pytest.mark.parametrize("model", ["DM4310", "AK80-9"])
-def test_a_drive_that_another_program_makes_leave_the_mode_is_idle(model: str) -> None:
+def test_a_register_that_another_program_writes_counts_for_its_drive() -> None:
+    drives = DrivenDrives(DAMIAO)
+    drives.tick(count=3)
+    drives.far.send(write_frame(2, TMAX, 3.0))
+    drives.tick()
+    assert [axis.health.foreign_commands for axis in drives.drives.axes] == [0, 1, 0, 0]
+
+
+@both_makes
+def test_a_drive_that_another_program_makes_leave_the_mode_is_idle(name: str) -> None:
     """No answer of a CubeMars states it."""
-    robot = Robot(model=model)
-    robot.tick(count=30)
-    robot.arm()
-    assert robot.axis.closed_loop
-    robot.far.send(Frame(1, codec.LEAVE))
-    robot.devices[0].energised = False
-    robot.tick(idle=False, torque_nm=0.2, count=2)
-    assert not robot.axis.closed_loop and not robot.devices[0].energised
-    assert robot.drives.axes[1].closed_loop
+    drives = DrivenDrives(name)
+    drives.arm()
+    drives.far.send(Frame(1, codec.LEAVE))
+    drives.devices[0].energised = False
+    drives.tick(0.2, count=2)
+    assert not drives.devices[0].energised
+    assert [axis.closed_loop for axis in drives.drives.axes] == [False, True, True, True]
 
 
-@pytest.mark.parametrize("model", ["DM4310", "AK80-9", "AK80-64"])
+@pytest.mark.parametrize("name", [DAMIAO, CUBEMARS, "mit:AK80-64"])
 @pytest.mark.parametrize("every", [2, 10])
-def test_commands_of_another_program_that_are_not_seen_show_in_the_measured_torque(model: str, every: int) -> None:
-    robot = Robot(model=model)
-    robot.tick(count=30)
-    robot.arm()
+def test_commands_of_another_program_that_are_not_seen_show_in_the_measured_torque(name: str, every: int) -> None:
+    drives = DrivenDrives(name)
+    drives.arm()
+    device = drives.devices[0]
+
+    def follow_another() -> None:
+        device.receive(device.forge_torque(1.0), drives.now_s)  # not on the bus
+        drives.torque_nm()
+
     for number in range(200):
-        robot.tick(idle=False, torque_nm=0.2)
-        assert not robot.axis.health.setpoint_problem
+        drives.tick(0.2)
+        assert not drives.axis.health.setpoint_problem
         if number % 40 == 7:  # a single outlier now and then is none
-            robot.devices[0].receive(robot.devices[0].forge_torque(1.0), robot.now_s)
+            follow_another()
     for number in range(100):
-        robot.tick(idle=False, torque_nm=0.2)
+        drives.tick(0.2)
         if number % every == 0:
-            robot.follow_another(1.0)
-    assert "N·m where 0.2 N·m was commanded" in robot.axis.health.setpoint_problem
-    assert not robot.drives.axes[1].health.setpoint_problem
+            follow_another()
+    assert [bool(axis.health.setpoint_problem) for axis in drives.drives.axes] == [True, False, False, False]
 
 
 def test_torque_that_is_missing_for_a_while_is_no_other_programs_command() -> None:
     """A supply that sags, or the speed, may limit the torque; the joint's monitor finds what lasts."""
-    robot = Robot({"motor_current_limit_a": 1.0})
-    robot.tick(count=30)
-    robot.arm()
+    drives = DrivenDrives(DAMIAO, {"motor_current_limit_a": 1.0})
+    drives.arm()
     for _ in range(4):
-        robot.tick(idle=False, torque_nm=0.4, count=30)
-        robot.tick(idle=False, torque_nm=0.05, count=30)
-        assert not robot.axis.health.setpoint_problem
+        drives.tick(0.4, count=30)
+        drives.tick(0.05, count=30)
+        assert not drives.axis.health.setpoint_problem
 
 
-def test_a_register_that_another_program_writes_counts_for_its_drive() -> None:
-    robot = Robot()
-    robot.tick(count=3)
-    robot.far.send(write_frame(2, TMAX, 3.0))
-    robot.tick()
-    assert [axis.health.foreign_commands for axis in robot.drives.axes] == [0, 1, 0, 0]
+# ids
 
 
 def test_more_answers_than_questions_are_a_second_drive() -> None:
-    robot = Robot()
-    robot.devices.append(SimulatedMit(replace(IDEAL, node_id=1), Random(9)))
-    robot.tick(count=20)
-    assert [axis.health.duplicate_id for axis in robot.drives.axes] == [True, False, False, False]
+    drives = DrivenDrives(DAMIAO)
+    drives.devices.append(simulated("mit", 1))
+    drives.tick(count=20)
+    assert [axis.health.duplicate_id for axis in drives.drives.axes] == [True, False, False, False]
 
 
 def test_old_cubemars_that_all_answer_under_id_0_are_distinguished_by_their_first_byte() -> None:
-    robot = Robot(model="AK80-9")
+    drives = DrivenDrives(CUBEMARS)
     for index in range(4):
         answer = Answer(index + 1, 0, 0.1 * index, 0.0, 0.0, 30.0, 0)
-        robot.far.send(Frame(0, codec.encode_answer(answer, MODELS["AK80-9"])))
-    states = robot.drives.read(robot.now_s)
+        drives.far.send(Frame(0, codec.encode_answer(answer, MODELS["AK80-9"])))
+    states = drives.drives.read(drives.now_s)
     assert [state.angle_rad for state in states] == pytest.approx([0.0, 0.1, 0.2, 0.3], abs=1e-3)
-    assert robot.drives.malformed_frames == robot.drives.unknown_frames == 0
+    assert drives.drives.malformed_frames == drives.drives.unknown_frames == 0
 
 
 def test_answers_of_another_node_or_another_length_are_malformed() -> None:
-    robot = Robot()
-    robot.far.send(Frame(17, codec.encode_answer(Answer(2, 0, 0.0, 0.0, 0.0, 30.0, 30), MODELS["DM4310"])))
-    robot.far.send(Frame(17, bytes(6)))
-    robot.drives.read(robot.now_s)
-    assert robot.drives.malformed_frames == 2 and not robot.axis.state.heard
+    drives = DrivenDrives(DAMIAO)
+    drives.far.send(Frame(17, codec.encode_answer(Answer(2, 0, 0.0, 0.0, 0.0, 30.0, 30), MODELS["DM4310"])))
+    drives.far.send(Frame(17, bytes(6)))
+    drives.drives.read(drives.now_s)
+    assert drives.drives.malformed_frames == 2 and not drives.state.heard

@@ -12,103 +12,82 @@ from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.motion_capture import CameraFrame, MotionCapture, SimulatedPose
-from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, OF_THE_PAPER, MotionCaptureParameters
+from simulation.devices.motion_capture_parameters import OF_THE_PAPER, MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 
 TRACK = Track([(1.0, MUDS["48.5"])])
 EXACT = MotionCaptureParameters(rate_hz=120.0, noise_m=0.0)
+SPEED_M_S = 0.3
 
 
-def make_plant(x_m: float = 0.0, speed_m_s: float = 0.0) -> Plant:
-    plant = Plant(PlantParameters(), TRACK)
-    plant.body.forward_m, plant.body.forward_m_s = x_m, speed_m_s
-    return plant
+@pytest.fixture
+def plant() -> Plant:
+    return Plant(PlantParameters(), TRACK)
 
 
 def frames_of(
-    parameters: MotionCaptureParameters, seconds: float, speed_m_s: float = 0.0, seed: int = 1
+    capture: MotionCapture, plant: Plant, ticks: int, period_s: float = PERIOD_S
 ) -> list[tuple[float, CameraFrame]]:
     """Return the arrival times and frames of a body that moves at constant speed."""
-    capture, arrived = MotionCapture(parameters, seed), []
-    for tick in range(round(seconds / PERIOD_S)):
-        plant = make_plant(speed_m_s * tick * PERIOD_S, speed_m_s)
-        arrived += [(tick * PERIOD_S, frame) for frame in capture.step(tick * PERIOD_S, plant)]
+    arrived = []
+    for now_s in (tick * period_s for tick in range(ticks)):
+        plant.body.forward_m, plant.body.forward_m_s = SPEED_M_S * now_s, SPEED_M_S
+        arrived += [(now_s, frame) for frame in capture.step(now_s, plant)]
     return arrived
 
 
-def test_frames_come_at_their_rate_at_any_tick_and_report_the_body_s_position() -> None:
-    arrived = frames_of(EXACT, 2.0, speed_m_s=0.3)
+def test_frames_come_at_their_rate_at_any_tick_and_report_the_body_s_position(plant: Plant) -> None:
+    arrived = frames_of(MotionCapture(EXACT, 1), plant, 760)
     assert len(arrived) == 240
     assert np.diff([frame.exposed_s for _, frame in arrived]) == pytest.approx(1.0 / 120.0)
     for arrival_s, frame in arrived:
         assert -1e-9 <= arrival_s - frame.exposed_s < PERIOD_S
-        assert frame.x_m == pytest.approx(0.3 * frame.exposed_s, abs=1e-12)
+        assert frame.x_m == pytest.approx(SPEED_M_S * frame.exposed_s, abs=1e-12)
 
 
-def test_at_a_rate_of_zero_every_tick_has_its_frame_with_noise_as_stated() -> None:
-    arrived = frames_of(MotionCaptureParameters(noise_m=0.002), 10.0)
+def test_at_a_rate_of_zero_every_tick_has_its_frame_with_noise_as_stated(plant: Plant) -> None:
+    arrived = frames_of(MotionCapture(MotionCaptureParameters(noise_m=0.002), 1), plant, 3800)
     assert [arrival_s for arrival_s, _ in arrived] == [frame.exposed_s for _, frame in arrived]
     assert len(arrived) == 3800
-    assert np.std([frame.x_m for _, frame in arrived]) == pytest.approx(
-        0.002, rel=0.05
-    )  # standard error of 3800 draws: 1.2 %
+    noise_m = [frame.x_m - SPEED_M_S * frame.exposed_s for _, frame in arrived]
+    assert np.std(noise_m) == pytest.approx(0.002, rel=0.05)  # standard error of 3800 draws: 1.2 %
 
 
-def test_frames_arrive_late_by_the_latency_and_in_order() -> None:
-    arrived = frames_of(MotionCaptureParameters(rate_hz=120.0, latency_s=0.03), 1.0)
-    late_s = [arrival_s - frame.exposed_s for arrival_s, frame in arrived]
+def test_frames_arrive_late_by_the_latency_and_in_order_with_the_same_noise(plant: Plant) -> None:
+    late = frames_of(MotionCapture(MotionCaptureParameters(rate_hz=120.0, latency_s=0.03), 1), plant, 380)
+    late_s = [arrival_s - frame.exposed_s for arrival_s, frame in late]
     assert 0.03 <= min(late_s) <= max(late_s) < 0.03 + 2.0 * PERIOD_S
-    assert len(arrived) == pytest.approx(120 - 0.03 * 120, abs=1)
+    assert len(late) == pytest.approx(120 - 0.03 * 120, abs=1)
+    prompt, other = (frames_of(MotionCapture(OF_THE_PAPER, seed), plant, 380) for seed in (1, 2))
+    assert [frame for _, frame in late] == [frame for _, frame in prompt][: len(late)]
+    assert prompt != other
 
 
-def test_drop_outs_are_bursts_of_the_stated_length_and_frequency() -> None:
+def test_drop_outs_are_bursts_of_the_stated_length_and_frequency(plant: Plant) -> None:
     parameters = MotionCaptureParameters(rate_hz=100.0, dropouts_per_s=0.5, dropout_s=0.2)
-    capture, plant = MotionCapture(parameters, 1), make_plant()
-    exposed_s = [frame.exposed_s for step in range(100000) for frame in capture.step(step * 0.01, plant)]
-    gaps_s = np.diff(exposed_s)
+    arrived = frames_of(MotionCapture(parameters, 1), plant, 100000, 0.01)
+    gaps_s = np.diff([frame.exposed_s for _, frame in arrived])
     bursts_s = gaps_s[gaps_s > 0.015] - 0.01
-    seen_s = 1000.0 - bursts_s.sum()
-    assert len(bursts_s) / seen_s == pytest.approx(0.5, rel=0.15)  # standard error of 450 bursts: 5 %
+    assert len(bursts_s) / (1000.0 - bursts_s.sum()) == pytest.approx(0.5, rel=0.15)  # standard error of 450: 5 %
     assert np.mean(bursts_s) == pytest.approx(0.2 + 0.005, rel=0.15)  # plus half a frame on average
 
 
-def test_noise_is_the_same_for_the_same_seed_and_disabled_noise_draws_nothing() -> None:
-    assert frames_of(OF_THE_PAPER, 1.0) == frames_of(OF_THE_PAPER, 1.0) != frames_of(OF_THE_PAPER, 1.0, seed=2)
-    late = frames_of(MotionCaptureParameters(rate_hz=120.0, latency_s=0.01), 1.0)
-    prompt = frames_of(OF_THE_PAPER, 1.0)
-    assert [frame for _, frame in late] == [frame for _, frame in prompt][: len(late)]
+def test_a_camera_that_is_held_up_misses_frames_and_keeps_its_rate(plant: Plant) -> None:
+    capture = MotionCapture(EXACT, 1)
+    counts = [len(list(capture.step(now_s, plant))) for now_s in (0.0, 5.0, 5.001, 5.009)]
+    assert counts == [1, 1, 0, 1]
 
 
-def test_a_camera_that_is_held_up_misses_frames_and_keeps_its_rate() -> None:
-    capture, plant = MotionCapture(EXACT, 1), make_plant()
-    assert len(list(capture.step(0.0, plant))) == 1
-    assert len(list(capture.step(5.0, plant))) == 1
-    assert list(capture.step(5.001, plant)) == []
-    assert len(list(capture.step(5.009, plant))) == 1
-
-
-def test_a_reset_deletes_frames_in_transit_and_restarts_the_noise() -> None:
-    capture, plant = MotionCapture(MotionCaptureParameters(rate_hz=120.0, latency_s=0.01), 1), make_plant()
-    first = [frame.x_m for tick in range(100) for frame in capture.step(tick * PERIOD_S, plant)]
+def test_a_reset_deletes_frames_in_transit_and_restarts_the_noise(plant: Plant) -> None:
+    capture = MotionCapture(MotionCaptureParameters(rate_hz=120.0, latency_s=0.01), 1)
+    first = frames_of(capture, plant, 100)
     capture.reset()
-    assert [frame.x_m for tick in range(100) for frame in capture.step(tick * PERIOD_S, plant)] == first
+    assert frames_of(capture, plant, 100) == first
 
 
-def test_between_frames_the_pose_repeats_and_its_stamp_is_when_it_was_read() -> None:
-    plant = make_plant(speed_m_s=0.3)
-    pose = SimulatedPose(plant, EXACT, 1)
-    read = []
-    for tick in range(380):
-        plant.body.forward_m = 0.3 * tick * PERIOD_S
-        read.append(pose.read(tick * PERIOD_S))
-    assert len({pose.stamp_s for pose in read}) == len({pose.x_m for pose in read}) == 120
-    assert all(tick * PERIOD_S - pose.stamp_s < 1.0 / 120.0 for tick, pose in enumerate(read))
-
-
-def test_a_pose_that_is_lost_for_six_frames_is_none() -> None:
-    plant = make_plant()
+def test_a_pose_that_is_lost_for_six_frames_is_none(plant: Plant) -> None:
     pose = SimulatedPose(plant, MotionCaptureParameters(rate_hz=1.0, noise_m=0.0), 1)
     assert pose.read(0.0) == pose.read(0.049) == BodyPose(0.0, 0.0)
     assert isnan(pose.read(0.051).x_m)
@@ -116,13 +95,12 @@ def test_a_pose_that_is_lost_for_six_frames_is_none() -> None:
 
 
 def test_the_loop_gets_120_positions_a_second_from_such_cameras(configuration: Configuration) -> None:
-    seen: dict[MotionCaptureParameters, set[float]] = {AT_EVERY_TICK: set(), OF_THE_PAPER: set()}
-    for parameters, positions_m in seen.items():
-        lockstep = Lockstep(configuration, TRACK, motion_capture=parameters)
-        lockstep.arm()
-        lockstep.walk(WalkOrder(0.03))
-        for _ in range(380):
-            lockstep.step()
-            positions_m.add(lockstep.loop.body.x_m)
-    assert len(seen[AT_EVERY_TICK]) == 380
-    assert len(seen[OF_THE_PAPER]) in (120, 121)  # its second may begin between two frames
+    lockstep = Lockstep(configuration, TRACK, motion_capture=OF_THE_PAPER)
+    lockstep.arm()
+    lockstep.walk(WalkOrder(0.03))
+    poses = set()
+    for _ in range(190):
+        lockstep.step()
+        poses.add(lockstep.loop.body)
+        assert lockstep.now_s - lockstep.loop.body.stamp_s < 1.0 / 120.0
+    assert len(poses) in (60, 61)  # its half second may begin between two frames

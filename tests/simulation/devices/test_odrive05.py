@@ -1,6 +1,6 @@
 """The simulated drive with firmware 0.5, held against its firmware's source: what differs from 0.6."""
 
-from random import Random
+from math import pi
 from typing import Any
 
 import pytest
@@ -8,19 +8,16 @@ import pytest
 from drivers.can.frames import Frame
 from drivers.odrive import codec, codec05
 from drivers.odrive.codec import AxisState, Message, arbitration_id
-from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
+from simulation.devices.drive import DriveError, Forgery
 from simulation.devices.odrive.device import BOOT_S
 from simulation.devices.odrive.device05 import SimulatedOdrive05
+from tests.drivers.bench.simulated_bus import simulated
 
 NODE = 3
 ANSWERED = [
     codec05.HEARTBEAT, codec05.GET_MOTOR_ERROR, codec05.GET_ENCODER_ERROR, codec05.GET_CONTROLLER_ERROR,
     codec05.GET_ENCODER_COUNT, codec.GET_ENCODER_ESTIMATES, codec.GET_IQ, codec.GET_BUS_VOLTAGE_CURRENT,
 ]  # fmt: skip
-
-
-def make_drive(**changes: Any) -> SimulatedOdrive05:
-    return SimulatedOdrive05(SimulatedDriveParameters(NODE, **({"current_noise_a": 0.0} | changes)), Random(1))
 
 
 def report(drive: SimulatedOdrive05, message: Message, *values: float, now_s: float = 0.0) -> None:
@@ -33,27 +30,24 @@ def ask(drive: SimulatedOdrive05, message: Message, now_s: float = 0.0) -> tuple
     return message.decode(answer.data)
 
 
-def make_armed_drive(**changes: Any) -> SimulatedOdrive05:
-    drive = make_drive(**changes)
-    report(drive, codec.SET_CONTROLLER_MODE, 1, 1)
-    report(drive, codec.SET_LIMITS, 100.0, 100.0)
-    report(drive, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
+def make_drive(armed: bool = False, **changes: Any) -> SimulatedOdrive05:
+    drive = simulated("odrive05", NODE, **({"current_noise_a": 0.0} | changes))
+    assert isinstance(drive, SimulatedOdrive05)
+    drive.reset(0.0)
+    if armed:
+        report(drive, codec.SET_CONTROLLER_MODE, 1, 1)
+        report(drive, codec.SET_LIMITS, 100.0, 100.0)
+        report(drive, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP)
     return drive
 
 
-@pytest.mark.parametrize("message", ANSWERED)
-def test_requests_are_answered_as_remote_frames_and_as_empty_data_frames(message: Message) -> None:
-    identifier = arbitration_id(NODE, message)
-    for request in (Frame(identifier, is_remote=True), Frame(identifier)):
-        (answer,) = make_drive().receive(request, 0.0)
-        assert answer.arbitration_id == identifier and len(answer.data) == 8
-
-
-def test_no_other_request_is_answered() -> None:
-    drive, answered = make_drive(), {message.command for message in ANSWERED}
-    for command in set(range(32)) - answered - codec05.COMMANDS:
+def test_requests_are_answered_as_remote_frames_and_as_empty_data_frames_and_no_others() -> None:
+    drive = make_drive()
+    answered = {message.command for message in ANSWERED}
+    for command in set(range(32)) - codec05.COMMANDS:
         for request in (Frame(NODE << 5 | command, is_remote=True), Frame(NODE << 5 | command)):
-            assert drive.receive(request, 0.0) == []
+            answers = [(answer.arbitration_id, len(answer.data)) for answer in drive.receive(request, 0.0)]
+            assert answers == ([(NODE << 5 | command, 8)] if command in answered else [])
     assert drive.receive(Frame(NODE << 5 | codec.RX_SDO.command, bytes(4)), 0.0) == []
 
 
@@ -73,52 +67,39 @@ def test_the_position_is_zero_until_the_first_closed_loop_and_the_counts_are_tru
     drive.torque_nm(0.0)
     report(drive, codec.SET_AXIS_STATE, AxisState.IDLE)
     turns, turns_s = ask(drive, codec.GET_ENCODER_ESTIMATES)
-    assert turns * 8192 == counts == round((0.25 - 1.0 / 6.283185307) * 8192)
+    assert turns * 8192 == counts == round((0.25 - 0.5 / pi) * 8192)
     assert in_turn == counts % 8192
-    assert turns_s == pytest.approx(2.0 / 6.283185307)
+    assert turns_s == pytest.approx(1.0 / pi)
     drive.restart(1.0)
     assert ask(drive, codec.GET_ENCODER_ESTIMATES, 1.0 + BOOT_S) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("armed", [False, True])
-def test_the_watchdog_runs_in_every_state_and_any_frame_feeds_it(armed: bool) -> None:
-    drive = make_armed_drive() if armed else make_drive()
+def test_the_watchdog_runs_in_every_state_any_frame_feeds_it_and_it_prevents_closed_loop(armed: bool) -> None:
+    drive = make_drive(armed)
     for step in range(1, 10):
         drive.receive(Frame(NODE << 5 | step, is_remote=True), 0.09 * step)
         drive.torque_nm(0.09 * step)
     assert not drive.failed and drive.energised is armed
     drive.torque_nm(0.92)
-    assert drive.failed and not drive.energised
+    report(drive, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=0.92)
     assert ask(drive, codec05.HEARTBEAT, 0.92) == (codec05.ERROR_WATCHDOG, AxisState.IDLE, 0, 0, 0)
-
-
-def test_a_watchdog_that_expired_prevents_closed_loop_until_errors_are_cleared() -> None:
-    drive = make_drive()
-    drive.torque_nm(0.2)
-    report(drive, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=0.2)
-    assert not drive.energised
-    report(drive, codec05.CLEAR_ERRORS, now_s=0.2)
-    report(drive, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=0.2)
-    assert drive.energised and not drive.failed
-
-
-def test_a_watchdog_that_is_off_never_expires() -> None:
-    drive = make_armed_drive(watchdog_s=0.0)
-    drive.torque_nm(100.0)
+    report(drive, codec05.CLEAR_ERRORS, now_s=0.92)
+    report(drive, codec.SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=0.92)
     assert drive.energised and not drive.failed
 
 
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_an_idle_drive_repeats_its_last_current_and_the_set_point_of_its_newest_command(direction: int) -> None:
-    drive = make_armed_drive(encoder_direction=direction)
-    report(drive, codec.SET_INPUT_TORQUE, 0.166)
-    drive.torque_nm(0.0)
-    assert ask(drive, codec.GET_IQ) == pytest.approx((2.0 * direction, 2.0 * direction))
-    report(drive, codec.SET_AXIS_STATE, AxisState.IDLE)
-    assert drive.torque_nm(0.0) == 0.0
-    assert ask(drive, codec.GET_IQ) == pytest.approx((2.0 * direction, 2.0 * direction))
-    report(drive, codec.SET_INPUT_TORQUE, 0.0)
-    assert ask(drive, codec.GET_IQ) == pytest.approx((0.0, 2.0 * direction))
+    drive, measured_a = make_drive(armed=True, encoder_direction=direction), 2.0 * direction
+    for message, value, setpoint_a in (
+        (codec.SET_INPUT_TORQUE, 0.166, measured_a),
+        (codec.SET_AXIS_STATE, AxisState.IDLE, measured_a),
+        (codec.SET_INPUT_TORQUE, 0.0, 0.0),
+    ):
+        report(drive, message, value)
+        drive.torque_nm(0.0)
+        assert ask(drive, codec.GET_IQ) == pytest.approx((setpoint_a, measured_a))
 
 
 @pytest.mark.parametrize(
@@ -127,29 +108,26 @@ def test_an_idle_drive_repeats_its_last_current_and_the_set_point_of_its_newest_
         (DriveError.OVERCURRENT, codec05.ERROR_MOTOR, (1, 0, 0)),
         (DriveError.OVERSPEED, codec05.ERROR_CONTROLLER, (0, 0, 1)),
         (DriveError.WATCHDOG, codec05.ERROR_WATCHDOG, (0, 0, 0)),
+        (None, codec05.ERROR_ESTOP, (0, 0, 0)),
     ],
 )
 def test_an_error_ends_torque_and_its_part_has_an_error_word(
-    error: DriveError, flags: int, parts: tuple[int, int, int]
+    error: DriveError | None, flags: int, parts: tuple[int, int, int]
 ) -> None:
-    drive = make_armed_drive()
-    drive.trip(error)
+    drive = make_drive(armed=True)
+    if error is None:
+        drive.receive(drive.forge(Forgery.EMERGENCY_STOP), 0.0)
+    else:
+        drive.trip(error)
     assert ask(drive, codec05.HEARTBEAT) == (flags, AxisState.IDLE, *parts)
     words = (codec05.GET_MOTOR_ERROR, codec05.GET_ENCODER_ERROR, codec05.GET_CONTROLLER_ERROR)
     assert tuple(bool(ask(drive, word)[0]) for word in words) == tuple(map(bool, parts))
-
-
-def test_an_emergency_stop_is_latched_with_the_flag_of_this_firmware() -> None:
-    drive = make_armed_drive()
-    drive.receive(drive.forge(Forgery.EMERGENCY_STOP), 0.0)
-    assert ask(drive, codec05.HEARTBEAT)[:2] == (codec05.ERROR_ESTOP, AxisState.IDLE)
 
 
 def test_a_drive_that_restarts_is_not_fed_meanwhile() -> None:
     drive = make_drive()
     drive.restart(0.0)
     drive.receive(Frame(NODE << 5 | 0xA, is_remote=True), 0.5)
-    drive.torque_nm(BOOT_S + 0.09)
-    assert not drive.failed
-    drive.torque_nm(BOOT_S + 0.11)
-    assert drive.failed
+    for wait_s, failed in ((0.09, False), (0.11, True)):
+        drive.torque_nm(BOOT_S + wait_s)
+        assert drive.failed is failed

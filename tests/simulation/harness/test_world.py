@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from control.controller import WalkOrder
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from simulation.body.plant_parameters import PlantParameters
@@ -24,15 +23,14 @@ from simulation.harness.world import (
     load_world,
     parse_world,
 )
-from simulation.mud.clay import MUDS, Clay, clay_of_water
+from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL
 from simulation.mud.unevenness import Ridges
-from tests.folders import EXAMPLE_WORLD
+from tests.folders import EXAMPLE_WORLD as EXAMPLE
 
-EXAMPLE = EXAMPLE_WORLD
 SHORTEST = """\
 [[segment]]
 start_m = 0
@@ -92,79 +90,64 @@ def test_the_shortest_world_is_one_segment_and_nothing_else() -> None:
     world = parse_world(SHORTEST)
     assert [segment.clay for segment in world.track.segments] == [Clay("2000 Pa", 2000.0)]
     assert (world.track.stones, world.track.ridges) == ((), LEVEL)
-    assert world.track.clay_at(0.3) == Clay("2000 Pa", 2000.0)
     assert (world.disturbances, world.robot_changes, world.drive_changes) == (NONE, {}, {})
 
 
-def test_a_mud_by_its_water_is_the_paper_s() -> None:
-    clay = parse_world(SHORTEST + SECOND).track.clay_at(0.7)
-    assert clay.name == "48.5"
-    assert clay.strength_pa == pytest.approx(MUDS["48.5"].strength_pa)
+@pytest.mark.parametrize(
+    ("added", "key", "bound"),
+    [
+        ("[ridge]\n", "ridge", ""),
+        ("[robot]\nflipper_length_m = 0.1\n", "robot.flipper_length_m", ""),  # as the robot's configuration says
+        ("[robot]\nfixed_base = true\n", "robot.fixed_base", ""),
+        ("[drives]\nnode_id = 3\n", "drives.node_id", ""),
+        ("[ridges]\namplitude_m = 0.5\n", "ridges.amplitude_m", "0.01"),
+        ("[random_strength]\nrelative_spread = -0.1\n", "random_strength.relative_spread", "0.0"),
+        ("[disturbances]\nremoulding = 1.5\n", "disturbances.remoulding", "1.0"),
+        ("[drives]\nencoder_counts = true\n", "drives.encoder_counts", "True"),
+        (STONE.replace("0.3", "0.2"), "stone 1.end_m", "start_m = 0.2"),
+        (STONE.replace("0.02", "-0.02"), "stone 1.top_m", "0.0"),
+        (STONE.replace("end_m = 0.3\n", ""), "stone 1.end_m is missing", ""),
+        (STONE + STONE, "stone 2.start_m", "0.3"),
+        ("[ridges]\namplitude_m = 0.01\n" + STONE.replace("0.02", "0.005"), "stone 1.top_m", "ridges.amplitude_m"),
+        ("stone = 3\n", "stone", "[[stone]]"),
+        (
+            "[disturbances]\nsample_period_s = 0.004\n[drives]\nencoder_period_s = 0.002\n",
+            "drives.encoder_period_s",
+            "disturbances.sample_period_s",
+        ),
+        (SECOND.replace("48.5", "60"), "segment 2.water_percent", "56.0"),
+        (SECOND.replace("48.5", "43.9"), "segment 2.water_percent", "44.0"),
+        (SECOND.replace("water_percent = 48.5", "strength_pa = -5"), "segment 2.strength_pa", "50.0"),
+        (SECOND.replace("48.5", "'wet'"), "segment 2.water_percent", "'wet'"),
+        (SECOND + "strength_pa = 900", "segment 2.water_percent", "strength_pa = 900"),
+        (SECOND.replace("water_percent = 48.5", ""), "segment 2", "strength_pa"),
+        (SECOND.replace("0.5", "0.4"), "segment 2.start_m", "overlap"),
+        (SECOND.replace("0.5", "0.6"), "segment 2.start_m", "gap"),
+        (SECOND.replace("1.0", "0.5"), "segment 2.end_m", "start_m = 0.5"),
+        (SECOND.replace("1.0", "1" + "0" * 400), "segment 2.end_m", ""),  # beyond all floats
+        (LAYER.replace("0.02", "0.005"), "segment 1.layer 1.bottom_m", "top_m = 0.01"),
+        (LAYER.replace("3.0", "0"), "segment 1.layer 1.factor", "0.01"),
+        (LAYER + LAYER, "segment 1.layer 2.top_m", "0.02"),
+        (SECOND + LAYER.replace("3.0", "20"), "segment 2.layer 1.factor", "17.9"),
+    ],
+)
+def test_an_invalid_value_is_refused_with_key_and_bound(added: str, key: str, bound: str) -> None:
+    (reported,) = problems_of(added + SHORTEST if added.startswith("stone =") else SHORTEST + added)
+    assert reported.split(":")[0].split(" = ")[0] == key
+    assert bound in reported
 
 
 @pytest.mark.parametrize(
-    ("added", "reported"),
+    "text",
     [
-        ("[ridge]\n", "ridge: there is no such key"),
-        ("[ridges]\namplitude = 1\n", "ridges.amplitude: there is no such key"),
-        ("[robot]\nflipper_length_m = 0.1\n", "robot.flipper_length_m: there is no such key"),
-        ("[robot]\nfixed_base = true\n", "robot.fixed_base: there is no such key"),
-        ("[drives]\nnode_id = 3\n", "drives.node_id: there is no such key"),
-        ("[ridges]\namplitude_m = 0.5\n", "ridges.amplitude_m = 0.5: must be at most 0.01"),
-        ("[ridges]\namplitude_m = nan\n", "ridges.amplitude_m = nan: should be a finite number"),
-        ("[random_strength]\nrelative_spread = -0.1\n", "random_strength.relative_spread = -0.1: must be at least 0.0"),
-        ("[random_strength]\nseed = 1.5\n", "random_strength.seed = 1.5: should be a valid integer"),
-        ("[disturbances]\nremoulding = 1.5\n", "disturbances.remoulding = 1.5: must be at most 1.0"),
-        ("[robot]\nrail_drag_n = 'much'\n", "robot.rail_drag_n = 'much': should be a valid number"),
-        ("[drives]\nencoder_counts = true\n", "drives.encoder_counts = True: should be a valid integer"),
-        (STONE.replace("0.3", "0.2"), "stone 1.end_m = 0.2: must be more than start_m = 0.2"),
-        (STONE.replace("0.02", "-0.02"), "stone 1.top_m = -0.02: must be at least 0.0"),
-        (STONE.replace("end_m = 0.3\n", ""), "stone 1.end_m is missing"),
-        (STONE + STONE, "stone 2.start_m = 0.2: must be more than 0.3, where stone 1 ends"),
-        (
-            "[ridges]\namplitude_m = 0.01\n" + STONE.replace("0.02", "0.005"),
-            "stone 1.top_m = 0.005: must be at least 0.01, ridges.amplitude_m",
-        ),
-        ("stone = 3\n", "stone = 3: must be tables, each under [[stone]]"),
-        (
-            "[disturbances]\nsample_period_s = 0.004\n[drives]\nencoder_period_s = 0.002\n",
-            "drives.encoder_period_s = 0.002: cannot be combined with disturbances.sample_period_s = 0.004",
-        ),
-        (SECOND.replace("48.5", "60"), "segment 2.water_percent = 60: must be at most 56.0"),
-        (SECOND.replace("48.5", "43.9"), "segment 2.water_percent = 43.9: must be at least 44.0"),
-        (
-            SECOND.replace("water_percent = 48.5", "strength_pa = -5"),
-            "segment 2.strength_pa = -5: must be at least 50.0",
-        ),
-        (SECOND.replace("48.5", "'wet'"), "segment 2.water_percent = 'wet': should be a valid number"),
-        (
-            SECOND + "strength_pa = 900",
-            "segment 2.water_percent = 48.5: cannot be combined with strength_pa = 900; remove one of them",
-        ),
-        (SECOND.replace("water_percent = 48.5", ""), "segment 2: water_percent or strength_pa is missing"),
-        (SECOND.replace("0.5", "0.4"), "segment 2.start_m = 0.4: must be 0.5, where segment 1 ends, without overlap"),
-        (SECOND.replace("0.5", "0.6"), "segment 2.start_m = 0.6: must be 0.5, where segment 1 ends, without gap"),
-        (SECOND.replace("1.0", "0.5"), "segment 2.end_m = 0.5: must be more than start_m = 0.5"),
-        (LAYER.replace("0.02", "0.005"), "segment 1.layer 1.bottom_m = 0.005: must be more than top_m = 0.01"),
-        (LAYER.replace("3.0", "0"), "segment 1.layer 1.factor = 0: must be at least 0.01"),
-        (LAYER + LAYER, "segment 1.layer 2.top_m = 0.01: must be at least 0.02, where layer 1 ends"),
-        (SECOND + LAYER.replace("3.0", "20"), "segment 2.layer 1.factor = 20: must be at most 17.9 in mud of 2800 Pa"),
+        SHORTEST.replace("start_m = 0", "start_m = 0.1"),
+        "[ridges]\namplitude_m = 0.002\n",
+        "segment = []\n",
+        "[segment]\nstart_m = 0\n",
     ],
 )
-def test_an_invalid_value_is_refused_with_key_value_and_bound(added: str, reported: str) -> None:
-    before = added + SHORTEST if added.startswith("stone =") else SHORTEST + added
-    assert problems_of(before) == [reported]
-
-
-def test_a_track_begins_at_its_beginning() -> None:
-    (reported,) = problems_of(SHORTEST.replace("start_m = 0", "start_m = 0.1"))
-    assert reported == "segment 1.start_m = 0.1: must be 0, where the track begins, without gap"
-
-
-def test_a_world_without_mud_is_refused() -> None:
-    assert problems_of("[ridges]\namplitude_m = 0.002\n") == ["segment is missing"]
-    assert problems_of("segment = []\n") == ["segment = []: must be at least one"]
-    assert "must be tables, each under [[segment]]" in problems_of("[segment]\nstart_m = 0\n")[0]
+def test_a_world_without_a_beginning_or_without_mud_is_refused(text: str) -> None:
+    assert all("segment" in problem for problem in problems_of(text))
 
 
 def test_all_problems_of_any_kind_are_reported_at_once() -> None:
@@ -175,10 +158,8 @@ def test_all_problems_of_any_kind_are_reported_at_once() -> None:
         + LAYER.replace("0.02", "0.0")
         + STONE.replace("0.3", "0.1")
     )
-    reported = problems_of(wrong)
-    for key in ("depth_m", "segment 1.strength_pa", "segment 2.start_m", "segment 2.layer 1.bottom_m", "stone 1.end_m"):
-        assert sum(message.startswith((f"{key} ", f"{key}:")) for message in reported) == 1
-    assert len(reported) == 5
+    keys = ["depth_m", "segment 1.strength_pa", "segment 2.layer 1.bottom_m", "segment 2.start_m", "stone 1.end_m"]
+    assert sorted(reported.split(":")[0].split(" = ")[0] for reported in problems_of(wrong)) == keys
 
 
 def test_the_strongest_mud_may_be_reached_by_a_layer_and_not_surpassed() -> None:
@@ -187,15 +168,12 @@ def test_the_strongest_mud_may_be_reached_by_a_layer_and_not_surpassed() -> None
     assert problems_of(firm + LAYER.replace("3.0", "2.01"))
 
 
-def test_a_file_that_is_no_world_is_reported_by_its_name_or_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("contents", [None, b"\xff\xfe", b"[[segment]\n"])
+def test_a_file_that_is_no_world_is_reported_by_its_name(tmp_path: Path, contents: bytes | None) -> None:
     path = tmp_path / "world.toml"
-    with pytest.raises(ConfigurationError, match=r"world\.toml: No such file"):
-        load_world(path)
-    path.write_bytes(b"\xff\xfe")
-    with pytest.raises(ConfigurationError, match=r"world\.toml: not UTF-8 text \(at line 1\)"):
-        load_world(path)
-    path.write_text("[[segment]\n", encoding="utf-8")
-    with pytest.raises(ConfigurationError, match=r"world\.toml: not a TOML file: .*line 1"):
+    if contents is not None:
+        path.write_bytes(contents)
+    with pytest.raises(ConfigurationError, match=str(path)):
         load_world(path)
 
 
@@ -244,29 +222,19 @@ def test_a_base_is_fixed_where_the_configuration_fixes_it(configuration: Configu
     assert free.plant(configuration).free_body
     with pytest.raises(ConfigurationError) as caught:
         free.plant(on_a_bench)
-    assert caught.value.problems == ["robot.free_body = true: the configuration says estimation.fixed_base = true"]
+    assert "robot.free_body" in str(caught.value) and "estimation.fixed_base" in str(caught.value)
 
 
 def test_a_lockstep_runs_in_a_world(configuration: Configuration) -> None:
     world = parse_world(
-        SHORTEST.replace("2000", "20000")
-        + "[robot]\nbody_mass_kg = 2.0\n[drives]\nencoder_counts = 4096\n[disturbances]\ncurrent_noise_a = 0.3\n"
+        SHORTEST + "[robot]\nbody_mass_kg = 2.0\n[drives]\nencoder_counts = 4096\n"
+        "[disturbances]\ncurrent_noise_a = 0.3\n"
     )
-    lockstep = Lockstep(
-        configuration, world.track, plant=world.plant(configuration), drives=world.drives(configuration)
-    )
+    drives = world.drives(configuration)
+    lockstep = Lockstep(configuration, world.track, plant=world.plant(configuration), drives=drives)
     plant = lockstep.robot.plant
     assert (plant.track, plant.parameters.body_mass_kg) == (world.track, 2.0)
     assert plant.parameters.disturbances == world.disturbances
     for joint, drive in zip(configuration.drive.values(), lockstep.robot.drives, strict=False):
         assert (drive.parameters.encoder_counts, drive.parameters.current_noise_a) == (4096, 0.3)
         assert drive.parameters.torque_constant_nm_a == joint.torque_constant_nm_a
-    lockstep.arm()
-    lockstep.walk(WalkOrder(0.03))
-    lockstep.run_for(1.0)
-    assert plant.arms[0].clay == Clay("20000 Pa", 20000.0)
-
-
-def test_a_whole_number_beyond_all_floats_is_refused_by_its_key() -> None:
-    reported = problems_of(SHORTEST + SECOND.replace("1.0", "1" + "0" * 400))
-    assert [problem.split(" = ")[0] for problem in reported] == ["segment 2.end_m"]

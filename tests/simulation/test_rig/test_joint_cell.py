@@ -2,13 +2,14 @@
 
 from math import cos, degrees, radians, sin
 
+import numpy as np
 import pytest
 
 import simulation.test_rig.joint_cell
 from control.geometry import FlipperGeometry
-from control.plate.integrals import submerged_part
+from control.plate_integrals import submerged_part
 from simulation.mud.clay import clay_of_water
-from simulation.test_rig.joint_cell import ArcCurve, measure_arc
+from simulation.test_rig.joint_cell import measure_arc
 from simulation.test_rig.load_cell import measure_insertion
 
 GEOMETRY = FlipperGeometry()
@@ -16,24 +17,19 @@ CLAY = clay_of_water(51.2)
 SWEEP_RAD = radians(30.0)
 
 
-def stiffness(curve: ArcCurve) -> float:
-    _, moments_m4, moments_nm = curve
-    products = [a * b for a, b in zip(moments_m4, moments_nm, strict=True)]
-    return sum(products) / sum(a * a for a in moments_m4)
+def stiffness(depth_m: float) -> float:
+    """Return the slope of the joint's moment in mud over the submerged volume's."""
+    _, moments_m4, moments_nm = map(np.array, measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.0, depth_m, 0.15).down)
+    return float(moments_m4 @ moments_nm / (moments_m4 @ moments_m4))
 
 
-def test_nothing_is_read_in_free_air() -> None:
-    down, up = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.002, 0.03, 0.1)
-    for depth_m, moment_m4, moment_nm in [*zip(*down, strict=True), *zip(*up, strict=True)]:
-        if depth_m < -0.005:  # even the lowest corner is out of the mud
-            assert (moment_m4, moment_nm) == (0.0, 0.0)
-
-
-def test_mud_pushes_an_inserted_plate_up_and_an_extracted_one_down() -> None:
-    down, up = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.0, 0.03, 0.1, hold_s=0.1)
+def test_mud_pushes_an_inserted_plate_up_and_an_extracted_one_down_and_air_does_neither() -> None:
+    down, up = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.002, 0.03, 0.1, hold_s=0.1)
     assert down.depths_m[-1] == pytest.approx(0.03)
     assert min(down.moments_nm[-100:]) > 0.0
     assert max(nm for z, nm in zip(up.depths_m, up.moments_nm, strict=True) if 0.0 < z < 0.02) < 0.0
+    air = {row[1:] for curve in (down, up) for row in zip(*curve, strict=True) if row[0] < -0.005}
+    assert air == {(0.0, 0.0)}  # even the lowest corner is out of the mud
 
 
 def test_a_depth_beyond_the_arm_s_reach_ends_at_its_reach() -> None:
@@ -42,24 +38,19 @@ def test_a_depth_beyond_the_arm_s_reach_ends_at_its_reach() -> None:
     assert down.depths_m[-1] == pytest.approx(GEOMETRY.deepest_m(degrees(SWEEP_RAD)) - 0.002)
 
 
-@pytest.mark.parametrize("depth_m", [0.02, 0.05])
-def test_steps_are_fine_enough(depth_m: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    coarse = stiffness(measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.0, depth_m, 0.15).down)
+def test_steps_are_fine_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    coarse = stiffness(0.05)
     monkeypatch.setattr(simulation.test_rig.joint_cell, "STEP_M", 2e-5)
-    assert stiffness(measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.0, depth_m, 0.15).down) == pytest.approx(coarse, rel=3e-3)
+    assert stiffness(0.05) == pytest.approx(coarse, rel=3e-3)
 
 
 @pytest.mark.parametrize(("depth_m", "more"), [(0.03, 0.04), (0.04, 0.13), (0.05, 0.31)])
 def test_pushed_straight_down_in_its_mean_attitude_the_same_plate_reads_more(depth_m: float, more: float) -> None:
     """Its face is pressed through the mud. (The increase is the same in all muds, to 1 %.)"""
     lift_rad = sum(GEOMETRY.adduction_rad(SWEEP_RAD, depth_m * (i + 0.5) / 50.0) for i in range(50)) / 50.0
-    curve = measure_insertion(CLAY, GEOMETRY, SWEEP_RAD, lift_rad, depth_m, 0.15).down
-    rows = [row for row in zip(*curve, strict=True) if row[0] > 0.0]
-    per_outward, q = -cos(SWEEP_RAD) * sin(lift_rad), cos(lift_rad)
-    volumes_m3 = [GEOMETRY.plate_thickness_m * submerged_part(GEOMETRY, z, per_outward, q).area_m2 for z, _ in rows]
-    straight = sum(v * n for v, (_, n) in zip(volumes_m3, rows, strict=True)) / sum(v * v for v in volumes_m3)
-    arc = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.0, depth_m, 0.15).down
-    below = ArcCurve(
-        *(list(each) for each in zip(*[row for row in zip(*arc, strict=True) if row[0] > 0.0], strict=True))
-    )
-    assert straight / stiffness(below) == pytest.approx(1.0 + more, abs=0.01)
+    depths_m, forces_n = map(np.array, measure_insertion(CLAY, GEOMETRY, SWEEP_RAD, lift_rad, depth_m, 0.15).down)
+    wet, per_outward, q = depths_m > 0.0, -cos(SWEEP_RAD) * sin(lift_rad), cos(lift_rad)
+    areas_m2 = np.array([submerged_part(GEOMETRY, z, per_outward, q).area_m2 for z in depths_m[wet].tolist()])
+    volumes_m3 = GEOMETRY.plate_thickness_m * areas_m2
+    straight = volumes_m3 @ forces_n[wet] / (volumes_m3 @ volumes_m3)
+    assert straight / stiffness(depth_m) == pytest.approx(1.0 + more, abs=0.01)

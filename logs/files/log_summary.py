@@ -1,0 +1,64 @@
+"""What `mudskipper log info` prints of a log, and when and in which segment of its run it begins."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from logs.files.log_reader import AnyLog
+from logs.files.tick_array import Ticks
+
+
+def log_summary(log: AnyLog) -> dict[str, Any]:
+    """At rest the log has fewer rows than ticks ran."""
+    ends = log.ends
+    duration_s = float(ends["stamp_s"][-1] - ends["stamp_s"][0]) if len(ends) else 0.0
+    ticks = _ticks_run(ends)
+    return {
+        "robot": log.metadata.get("robot", ""),
+        "run": log.metadata.get("run_id", ""),
+        "segment": segment_of(log) if log.metadata.get("segment") else None,
+        "started": _start_time(log),
+        "duration_s": round(duration_s, 3),
+        "rate_hz": round((ticks - 1) / duration_s, 2) if duration_s > 0.0 else None,
+        "rows": log.rows,
+        "ticks": ticks,
+        "missed_ticks": int(ends["missed_ticks"][-1]) if len(ends) else 0,
+        "strides": len(log.strides),
+        "events": len(log.events),
+        "complete": log.complete,
+        "recovered": log.metadata.get("recovered") == "true",
+        "version": log.metadata.get("version", ""),
+        "commit": log.metadata.get("commit", ""),
+        "unknown_fields": list(log.unknown_fields),
+        "missing_fields": list(log.missing_fields),
+    }
+
+
+def _ticks_run(ends: Ticks) -> int:
+    """Returns the number of ticks from the first row to the last one, without those that were missed."""
+    if not len(ends):
+        return 0
+    first, last = ends[0], ends[-1]
+    return int(last["tick"]) - int(first["tick"]) + 1 - (int(last["missed_ticks"]) - int(first["missed_ticks"]))
+
+
+def segment_of(log: AnyLog) -> int:
+    """Returns the number of the first segment in the run; 0 where none is given."""
+    number = log.metadata.get("segment", "")
+    return int(number) if number.isdecimal() else 0
+
+
+def begin_s(log: AnyLog) -> float:
+    """Returns the time of the first row by the log's own clock; 0 where there is none."""
+    stamps_s = [*log.ends["stamp_s"][:1], *(row["stamp_s"] for row in (*log.strides[:1], *log.events[:1]))]
+    return float(min(stamps_s, default=0.0))
+
+
+def _start_time(log: AnyLog) -> str:
+    """Returns the universal time of the first row, to the second; empty where it is not known."""
+    if not (log.rows or log.strides or log.events) or "wall_minus_monotonic_ns" not in log.metadata:
+        return ""
+    try:
+        wall_s = begin_s(log) + int(log.metadata["wall_minus_monotonic_ns"]) / 1e9
+        return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="seconds")
+    except (ValueError, OverflowError, OSError):  # beyond what a date can be
+        return ""

@@ -1,0 +1,163 @@
+"""Reads the CSV logs of the paper's authors into this project's conventions.
+
+The authors logged mirrored motors with signs that differ from file to file, so `lab.joint_signs` finds them. What the
+reader notices is in `findings`: rows that it drops, samples that it invalidates, and facts that the reader of a report
+must know. A log in which every number would be wrong is refused.
+"""
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from control.records import FLIPPERS, UNKNOWN, Phase
+from firmware_host.configuration.configuration import CaptureAxis
+from logs.files.log_error import LogError
+from logs.lab.body_track import VERTICAL_AXIS, read_body_track
+from logs.lab.columns import (
+    CURRENT_COLUMNS,
+    DEPTH_COLUMN,
+    PHASE_OF_STATE,
+    POSITION_COLUMNS,
+    READ_COLUMNS,
+)
+from logs.lab.csv_table import STATE, TIME, CsvTable, read_table
+from logs.lab.findings import Finding, FindingKind
+from logs.lab.joint_signs import orient
+from logs.lab.log_rows import LogRows
+from logs.lab.row_order import drop_backward_rows
+from logs.lab.signal_checks import AT_PEAK, check_ranges, check_swapped_joints, drop_stuck_signals
+from logs.lab.zero_checks import check_zero
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Truths = NDArray[np.bool_]
+
+CLIPPED_ROWS = 200  # half a second of rows at the largest current makes it a limit
+MOST_UNKNOWN = 0.5  # of the rows' states; beyond it this is another column
+
+
+class LabLog(NamedTuple):
+    """One run: n rows, joints in the order of JOINTS. The joints of an absent flipper are NaN."""
+
+    stamp_s: Floats
+    phase: Integers  # of control.records.Phase
+    angle_rad: Floats  # (n, 4)
+    current_a: Floats  # (n, 4)
+    body_x_m: Floats  # along the horizontal direction of the stances; NaN where motion capture did not see the body
+    gait: dict[str, float]  # the operator's settings; `insertion_angle` is the commanded depth in m
+    flippers: tuple[str, ...]  # the ones that moved
+    current_limit_a: float  # at which the drives clipped; infinite where they did not
+    commanded_depth_m: Floats  # NaN where the log does not have it
+    body_height_m: Floats  # above the origin of the capture; NaN where unknown
+    body_pitch_rad: Floats  # of the nose upward, since the first known pose; NaN where unknown
+    missing_settings: tuple[str, ...] = ()  # that the head names without a value
+    findings: tuple[Finding, ...] = ()
+
+
+def is_lab_csv(path: Path) -> bool:
+    """Returns whether a file's name is that of a CSV, compressed or not."""
+    return path.name.endswith((".csv", ".csv.gz"))
+
+
+def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
+    """Reads a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
+    table = drop_backward_rows(path, read_table(path, READ_COLUMNS))
+    _refuse_missing(path, table)
+    phase, found = _read_phases(path, table)
+    rows = LogRows(path, table.column[TIME], table.line, phase)
+    angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
+    flippers = _find_flippers(angle_rad)
+    _blank_absent(angle_rad, current_a, flippers)
+    commanded_m = _commanded_depth(table)
+    current_limit_a = _find_limit_a(current_a)
+    found += _check_joints(rows, angle_rad, current_a, commanded_m, table.gait.get("extraction_height", UNKNOWN))
+    track, found_in_track = read_body_track(rows, table, vertical)
+    return LabLog(
+        stamp_s=rows.time_s,
+        phase=phase,
+        angle_rad=angle_rad,
+        current_a=current_a,
+        body_x_m=track.advance_m,
+        gait=table.gait,
+        flippers=flippers,
+        current_limit_a=current_limit_a,
+        commanded_depth_m=commanded_m,
+        body_height_m=track.height_m,
+        body_pitch_rad=track.pitch_rad,
+        missing_settings=table.missing_settings,
+        findings=(*table.findings, *found, *found_in_track),
+    )
+
+
+def _check_joints(
+    rows: LogRows, angle_rad: Floats, current_a: Floats, commanded_m: Floats, extraction_m: float
+) -> list[Finding]:
+    """Orients the joints' signals and invalidates wrong samples, in place. Raises LogError where all are wrong."""
+    found = check_ranges(rows, angle_rad, current_a)
+    check_swapped_joints(rows, angle_rad)
+    found += drop_stuck_signals(rows, angle_rad, current_a)
+    found += orient(rows, angle_rad, current_a)
+    return [*found, *check_zero(rows, angle_rad, commanded_m, extraction_m)]
+
+
+def _refuse_missing(path: Path, table: CsvTable) -> None:
+    """Refuses a file without the positions and currents of at least one flipper. Raises LogError."""
+    needed = [(*POSITION_COLUMNS[i : i + 2], *CURRENT_COLUMNS[i : i + 2]) for i in range(0, len(POSITION_COLUMNS), 2)]
+    if not any(set(names) <= table.column.keys() for names in needed):
+        missing = ", ".join(name for names in needed for name in names if name not in table.column)
+        raise LogError(f"{path}: there is no column {missing}; positions and currents of one flipper are needed")
+
+
+def _stack(table: CsvTable, names: tuple[str, ...]) -> Floats:
+    """Returns the columns side by side, NaN for those that the file does not have."""
+    absent = np.full(len(table.line), np.nan)
+    return np.column_stack([table.column.get(name, absent) for name in names])
+
+
+def _commanded_depth(table: CsvTable) -> Floats:
+    depth_m = table.column.get(DEPTH_COLUMN)
+    return np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)) if depth_m is None else depth_m
+
+
+def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
+    """Returns the phase of each row; a state that is not known is a pause. Raises LogError where most are unknown."""
+    state = table.column[STATE]
+    known = np.isin(state, list(PHASE_OF_STATE))
+    phase_from_lowest = np.array([PHASE_OF_STATE[number] for number in sorted(PHASE_OF_STATE)], dtype=np.int64)
+    phase = np.full(len(state), Phase.PAUSE, dtype=np.int64)
+    phase[known] = phase_from_lowest[state[known].astype(np.int64) - min(PHASE_OF_STATE)]
+    if np.all(known):
+        return phase, []
+    first, count = int(np.argmin(known)), int(np.count_nonzero(~known))
+    text = (
+        f"the state {state[first]:g} is not known; {count} of {len(state)} rows have such a state and count as a pause"
+    )
+    found = Finding(FindingKind.UNKNOWN_STATE, STATE, float(table.column[TIME][first]), int(table.line[first]), text)
+    if count > MOST_UNKNOWN * len(state):
+        raise LogError(f"{path}: {found}")
+    return phase, [found]
+
+
+def _find_flippers(angle_rad: Floats) -> tuple[str, ...]:
+    """Returns the flippers that moved."""
+    joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
+    return tuple(name for number, name in enumerate(FLIPPERS) if joint_moved[2 * number : 2 * number + 2].any())
+
+
+def _blank_absent(angle_rad: Floats, current_a: Floats, flippers: tuple[str, ...]) -> None:
+    """Replaces the zeros that the authors logged for absent motors."""
+    for number, name in enumerate(FLIPPERS):
+        if name not in flippers:
+            angle_rad[:, 2 * number : 2 * number + 2] = UNKNOWN
+            current_a[:, 2 * number : 2 * number + 2] = UNKNOWN
+
+
+def _find_limit_a(current_a: Floats) -> float:
+    """Returns the largest current if one joint shows it in many rows: then the drive clipped it."""
+    size_a = np.nan_to_num(np.abs(current_a))
+    peak_a = float(size_a.max(initial=0.0))
+    at_peak = size_a >= AT_PEAK * peak_a
+    return peak_a if peak_a > 0.0 and int(at_peak.sum(axis=0).max()) >= CLIPPED_ROWS else math.inf

@@ -1,0 +1,109 @@
+"""Checks the zero of the adduction: in swing the flipper's edge is above the mud, in stance it is in it.
+
+The commanded depth is that of the authors' controller, whose geometry is not published in full. Between it and this
+project's geometry lie up to 24 mm at 70 mm, because the motor is not stiff and mud resists, and 9 mm the other way.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from control.geometry import FlipperGeometry
+from control.records import FLIPPERS, Phase
+from logs.lab.columns import POSITION_COLUMNS
+from logs.lab.findings import Finding, FindingKind
+from logs.lab.log_rows import LogRows
+
+Floats = NDArray[np.float64]
+
+GEOMETRY = FlipperGeometry()  # of the authors' robot
+DEPTH_TOLERANCE_M = 0.015  # the edge's height with the arm level: a zero that differs by this much is at the surface
+HIGHEST_SWING_M = 0.030  # above the surface, twice the height with the arm level
+LEAST_DEPTH_FRACTION = 1.0 / 3.0  # of the commanded depth; stiff mud and a weak motor reach two thirds
+EXTRACTION_HEIGHT_M = 0.03  # above the level arm's edge, in logs that do not have the setting; the authors' largest
+SHORTEST_ROWS = 20  # of a swing
+
+
+class Excursion(NamedTuple):
+    """Depths of one flipper's edge in m, negative above the surface."""
+
+    swing_m: float  # highest of the swings' medians: the swing in which no mud held it
+    deepest_m: float  # in insertion and stance
+    swing_row: int
+    deepest_row: int
+    commanded_m: float  # the largest; NaN where unknown
+
+
+def check_zero(rows: LogRows, angle_rad: Floats, commanded_m: Floats, extraction_m: float) -> list[Finding]:
+    """Refuses an adduction whose zero is wrong, invalidates one that may be, and reports an unexpected depth.
+
+    `extraction_m` is the set height of the extraction, NaN where unknown. Raises LogError.
+    """
+    limit_m = GEOMETRY.clearance_m + DEPTH_TOLERANCE_M + (extraction_m if extraction_m >= 0.0 else EXTRACTION_HEIGHT_M)
+    findings = []
+    for number in range(len(FLIPPERS)):
+        excursion = _measure(rows, angle_rad[:, 2 * number], angle_rad[:, 2 * number + 1], commanded_m)
+        if excursion is not None:
+            column = POSITION_COLUMNS[2 * number + 1]
+            _refuse_zero(rows, column, excursion)
+            findings += _report_depth(rows, column, excursion)
+            if excursion.swing_m < -limit_m:
+                findings.append(_report_zero(rows, column, excursion, limit_m))
+                angle_rad[:, 2 * number + 1] = np.nan
+    return findings
+
+
+def _measure(rows: LogRows, sweep_rad: Floats, adduction_rad: Floats, commanded_m: Floats) -> Excursion | None:
+    """Returns the excursion of a flipper that swung and pushed; None for one that did not."""
+    depth_m = edge_depth_m(sweep_rad, adduction_rad)
+    pushing = np.isin(rows.phase, (Phase.INSERTION, Phase.STANCE)) & np.isfinite(depth_m)
+    swings = [
+        each for each in rows.strokes(Phase.SWING) if np.count_nonzero(np.isfinite(depth_m[each])) > SHORTEST_ROWS
+    ]
+    if not np.any(pushing) or not swings:
+        return None
+    medians_m = [float(np.nanmedian(depth_m[each])) for each in swings]
+    highest = int(np.argmin(medians_m))
+    deepest = int(np.argmax(np.where(pushing, depth_m, -np.inf)))
+    known = np.isfinite(commanded_m)
+    commanded = float(np.max(commanded_m[known])) if np.any(known) else np.nan
+    return Excursion(medians_m[highest], float(depth_m[deepest]), swings[highest].start, deepest, commanded)
+
+
+def edge_depth_m(sweep_rad: Floats, adduction_rad: Floats) -> Floats:
+    """Returns the depth of the lower edge below the nominal surface, as FlipperGeometry.depth_m does for one sample."""
+    tilted_drop_m = GEOMETRY.drop_m * np.cos(adduction_rad)
+    lowered_m: Floats = GEOMETRY.flipper_length_m * np.cos(sweep_rad) * np.sin(adduction_rad)
+    return tilted_drop_m - lowered_m - GEOMETRY.axis_height_m
+
+
+def _refuse_zero(rows: LogRows, column: str, excursion: Excursion) -> None:
+    swing_mm, deepest_mm = 1e3 * excursion.swing_m, 1e3 * excursion.deepest_m
+    if swing_mm > 0.0:
+        text = f"the edge is {swing_mm:.0f} mm below the surface in every swing: the zero of the adduction is wrong"
+        raise rows.refusal(FindingKind.DEPTH, column, excursion.swing_row, text)
+    least_m = LEAST_DEPTH_FRACTION * np.nan_to_num(excursion.commanded_m)
+    if excursion.swing_m < -HIGHEST_SWING_M and excursion.deepest_m < least_m:
+        place = f"{-swing_mm:.0f} mm above the surface in swing and at most {deepest_mm:.0f} mm below it"
+        command = f", commanded {1e3 * excursion.commanded_m:.0f} mm" * bool(np.isfinite(excursion.commanded_m))
+        text = f"the edge is {place}{command}: the zero of the adduction is wrong"
+        raise rows.refusal(FindingKind.DEPTH, column, excursion.deepest_row, text)
+
+
+def _report_zero(rows: LogRows, column: str, excursion: Excursion, limit_m: float) -> Finding:
+    height = f"{-1e3 * excursion.swing_m:.0f} mm above the surface in swing, expected up to {1e3 * limit_m:.0f} mm"
+    text = f"the edge is {height}: the zero of the adduction is not certain, and its angles are left out"
+    return rows.finding(FindingKind.DEPTH, column, excursion.swing_row, text)
+
+
+def _report_depth(rows: LogRows, column: str, excursion: Excursion) -> list[Finding]:
+    deepest_mm, commanded_mm = 1e3 * excursion.deepest_m, 1e3 * excursion.commanded_m
+    if excursion.deepest_m <= 0.0:
+        text = f"the edge never reaches the surface; its lowest point is {-deepest_mm:.0f} mm above it"
+        return [rows.finding(FindingKind.DEPTH, column, excursion.deepest_row, text)]
+    below_m, above_m = excursion.commanded_m * LEAST_DEPTH_FRACTION, excursion.commanded_m + DEPTH_TOLERANCE_M
+    if excursion.deepest_m < below_m or excursion.deepest_m > above_m:
+        text = f"the greatest depth is {deepest_mm:.0f} mm, commanded are {commanded_mm:.0f} mm"
+        return [rows.finding(FindingKind.DEPTH, column, excursion.deepest_row, text)]
+    return []

@@ -1,0 +1,473 @@
+"""The plate's closed forms against a dense grid, exact polygon clipping, and a derivation in sympy."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from fractions import Fraction
+from math import cos, hypot, pi, radians, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import assume, example, given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from control.geometry import FlipperGeometry
+from control.plate_integrals import (
+    DRY,
+    SubmergedPlate,
+    cross_coupling,
+    growth_exponent,
+    mean_width_m,
+    moment_width_m,
+    stance_moment_m4,
+    stroke_moment_m4,
+    submerged_part,
+    submerged_plate,
+)
+
+AUTHORS = FlipperGeometry()
+Array = NDArray[np.float64]
+
+geometries = st.builds(
+    FlipperGeometry,
+    flipper_length_m=st.floats(0.05, 0.5),
+    drop_m=st.floats(0.0, 0.2),
+    axis_height_m=st.floats(0.0, 0.2),
+    plate_width_m=st.floats(0.005, 0.2),
+    plate_thickness_m=st.floats(0.001, 0.02),
+    plate_height_m=st.floats(0.005, 0.2),
+)
+TRAPEZOID = ((-0.0075, 0.0), (0.0075, 0.0), (0.0175, 0.07), (-0.0175, 0.07))
+ARROW = ((-0.02, 0.0), (0.0, 0.03), (0.02, 0.0), (0.0, 0.07))  # its lower edge has a notch
+
+
+@st.composite
+def polygons(draw: st.DrawFn) -> tuple[tuple[float, float], ...]:
+    """Draw corners around a centre at any radius, so that plates have notches, in either order."""
+    corners = draw(st.integers(3, 9))
+    turns = sorted(draw(st.lists(st.integers(0, 71), min_size=corners, max_size=corners, unique=True)))
+    radii_m = draw(st.lists(st.floats(0.005, 0.05), min_size=corners, max_size=corners))
+    points = [(r * cos(pi * turn / 36.0), r * sin(pi * turn / 36.0)) for turn, r in zip(turns, radii_m, strict=True)]
+    lowest_m = min(s for _, s in points)
+    lifted = tuple((u, s - lowest_m) for u, s in points)
+    return lifted if draw(st.booleans()) else lifted[::-1]
+
+
+shapes = st.builds(
+    FlipperGeometry, plate_corners_m=st.one_of(st.just(()), polygons()), plate_angle_deg=st.floats(-45.0, 45.0)
+)
+sweeps = st.floats(-pi / 3, pi / 3)
+adductions = st.floats(-1.2, 1.2)  # the plate stands up: cos β > 0
+
+
+class Pose(NamedTuple):
+    """A pose whose edge's middle is `fraction` of the plate's extent in depth below the surface (above: negative)."""
+
+    geometry: FlipperGeometry
+    sweep_rad: float
+    adduction_rad: float
+    fraction: float
+
+    @property
+    def surface_m(self) -> float:
+        g, lean = self.geometry, abs(cos(self.sweep_rad) * sin(self.adduction_rad))
+        extent_m = g.plate_width_m * lean + g.plate_height_m * cos(self.adduction_rad)
+        return g.depth_m(self.sweep_rad, self.adduction_rad) - self.fraction * extent_m
+
+    def plate(self) -> SubmergedPlate:
+        return submerged_plate(self.geometry, self.sweep_rad, self.adduction_rad, self.surface_m)
+
+
+poses = st.builds(Pose, geometries, sweeps, adductions, st.floats(-0.8, 1.5))
+AWRY = radians(-40.0)  # so far that the plate's edge is far from level
+CORNER = Pose(AUTHORS, 0.3, AWRY, -0.05)
+TOP_CORNER_DRY = Pose(AUTHORS, 0.3, AWRY, 0.8)
+WHOLE = Pose(AUTHORS, 0.3, AWRY, 1.4)
+DRY_POSE = Pose(AUTHORS, 0.3, AWRY, -0.7)
+LEVEL = Pose(AUTHORS, 0.3, 0.0, 0.4)
+
+
+# a grid over the plate, in the world's frame
+
+
+def grid_points(pose: Pose, u: Array, s: Array) -> Array:
+    """Return the depths of the plate's points below the surface, by rotation matrices."""
+    g, ca, sa = pose.geometry, cos(pose.sweep_rad), sin(pose.sweep_rad)
+    cb, sb = cos(pose.adduction_rad), sin(pose.adduction_rad)
+    sweep_about_z = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
+    adduction_about_x = np.array([[1.0, 0.0, 0.0], [0.0, cb, -sb], [0.0, sb, cb]])
+    in_arm = np.stack([np.zeros_like(u), g.flipper_length_m + u, s - g.drop_m])
+    z = np.tensordot(adduction_about_x @ sweep_about_z, in_arm, axes=1)[2]
+    depths: Array = -z - g.axis_height_m - pose.surface_m
+    return depths
+
+
+def corner_depths(pose: Pose) -> list[float]:
+    """Return the depths of the edge's inner and outer end and of the top's inner and outer end."""
+    half, top = pose.geometry.plate_width_m / 2.0, pose.geometry.plate_height_m
+    ends = np.array([-half, half, -half, half]), np.array([0.0, 0.0, top, top])
+    return [float(depth) for depth in grid_points(pose, *ends)]
+
+
+def grid_integrals(pose: Pose, cells: int = 150) -> tuple[Array, Array]:
+    """Integrate by the midpoint rule, and bound the error.
+
+    A cell that the waterline cuts may be wrong by all that it can hold; in the others the rule is exact except for the
+    curvature of ζu and ζs, which are quadratic with second derivatives below 2.
+    """
+    g = pose.geometry
+    du, ds = g.plate_width_m / cells, g.plate_height_m / cells
+    lines_u, lines_s = du * np.arange(cells + 1) - g.plate_width_m / 2.0, ds * np.arange(cells + 1)
+    corners = grid_points(pose, *np.meshgrid(lines_u, lines_s))
+    around = np.stack([corners[:-1, :-1], corners[1:, :-1], corners[:-1, 1:], corners[1:, 1:]])
+    u, s = np.meshgrid(lines_u[:-1] + du / 2.0, lines_s[:-1] + ds / 2.0)
+    depth = grid_points(pose, u, s)
+    wet, cut = depth > 0.0, (around.min(axis=0) < 0.0) & (around.max(axis=0) > 0.0)
+    one, far_u, far_s, deep = np.ones_like(u), np.abs(u) + du, s + ds, np.maximum(around.max(axis=0), 0.0)
+    values = np.stack([one, u, s, depth, depth * u, depth * s])
+    largest = np.stack([one, far_u, far_s, deep, deep * far_u, deep * far_s])
+    cell_m2, area_m2 = du * ds, g.plate_width_m * g.plate_height_m
+    curvature = np.array([0, 0, 0, 0, 1, 1]) * 2.0 * area_m2 * (du * du + ds * ds) / 24.0
+    error = cell_m2 * 2.0 * (largest * cut).sum(axis=(1, 2)) + curvature
+    return cell_m2 * (values * wet).sum(axis=(1, 2)), error + 1e-12 * area_m2  # 22500 roundings
+
+
+@pytest.mark.parametrize(
+    ("pose", "wet_corners"), [(CORNER, 1), (LEVEL, 2), (TOP_CORNER_DRY, 3), (WHOLE, 4), (DRY_POSE, 0)]
+)
+def test_the_named_poses_are_what_they_are_called(pose: Pose, wet_corners: int) -> None:
+    assert sum(depth > 0.0 for depth in corner_depths(pose)) == wet_corners
+
+
+@given(poses)
+@example(CORNER)
+@example(Pose(AUTHORS, 0.3, -AWRY, -0.05))  # the inner corner
+@example(TOP_CORNER_DRY)
+@example(WHOLE)
+@example(LEVEL)
+@example(DRY_POSE)
+def test_the_closed_forms_are_the_integrals_over_a_dense_grid(pose: Pose) -> None:
+    integrals, error = grid_integrals(pose)
+    assert np.all(np.abs(np.array(pose.plate()) - integrals) <= error)
+
+
+def test_the_grid_is_fine_enough_to_notice_a_wrong_form() -> None:
+    for pose in (LEVEL, TOP_CORNER_DRY, WHOLE):
+        integrals, error = grid_integrals(pose)
+        assert np.all(error[[0, 2, 3, 5]] < 0.02 * integrals[[0, 2, 3, 5]])
+
+
+# exact fractions
+
+Point = tuple[Fraction, Fraction]
+
+
+def clipped(corners: Sequence[Point], height: Callable[[Point], Fraction]) -> list[Point]:
+    """Return the part of a polygon where a linear function is not negative (Sutherland and Hodgman)."""
+    kept: list[Point] = []
+    for before, here in zip([corners[-1], *corners[:-1]], corners, strict=True):
+        a, b = height(before), height(here)
+        if (a < 0) != (b < 0):
+            fraction = a / (a - b)
+            kept.append((before[0] + fraction * (here[0] - before[0]), before[1] + fraction * (here[1] - before[1])))
+        if b >= 0:
+            kept.append(here)
+    return kept
+
+
+def exact_integrals(
+    geometry: FlipperGeometry, depth_m: float, per_outward: float, per_upward: float
+) -> tuple[Fraction, ...]:
+    """Return the integrals of 1, u, s, ζ, ζu, ζs without rounding: a fan of signed triangles, each with the rule of its
+    edges' midpoints, which is exact for quadratics.
+    """
+    corners = [(Fraction(u), Fraction(s)) for u, s in geometry.plate.corners]
+
+    def zeta(point: Point) -> Fraction:
+        return Fraction(depth_m) + Fraction(per_outward) * point[0] - Fraction(per_upward) * point[1]
+
+    polygon = clipped(corners, zeta)
+    sums = [Fraction(0)] * 6
+    for b, c in zip(polygon[1:], polygon[2:], strict=False):
+        a = polygon[0]
+        area = ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])) / 2
+        for p, q in ((a, b), (b, c), (c, a)):
+            u, s = (p[0] + q[0]) / 2, (p[1] + q[1]) / 2
+            z = zeta((u, s))
+            values = (Fraction(1), u, s, z, z * u, z * s)
+            sums = [total + area * value / 3 for total, value in zip(sums, values, strict=True)]
+    return tuple(sums)
+
+
+def rounding_scale(geometry: FlipperGeometry, depth_m: float, per_outward: float, q: float) -> Array:
+    """Return the size of the terms of the closed forms, each of which is rounded by a fraction of 1e-16.
+
+    The forms let the plate reach up to the waterline and subtract the part above its top.
+    """
+    half = max(abs(u) for u, _ in geometry.plate.corners)
+    deep = abs(depth_m) + abs(per_outward) * half + geometry.plate.height_m * q
+    up, wide = deep / q, 2.0 * half
+    return wide * up * np.array([1.0, wide, up, deep, deep * wide, deep * up])
+
+
+@given(st.one_of(geometries, shapes), st.floats(-0.3, 0.3), st.floats(-0.9, 0.9), st.floats(0.3, 1.0))
+@example(FlipperGeometry(plate_corners_m=TRAPEZOID), 0.03, 0.0, 1.0)
+@example(FlipperGeometry(plate_corners_m=TRAPEZOID), 0.03, 1.0 / 7.0, 1.0)  # the surface along an edge
+@example(FlipperGeometry(plate_corners_m=ARROW), 0.02, 0.2, 0.9)  # cut into two parts
+@example(FlipperGeometry(plate_corners_m=ARROW, plate_angle_deg=20.0), 0.05, -0.2, 0.9)
+@example(AUTHORS, 0.0, 0.5, 0.8)  # one corner under
+@example(AUTHORS, 0.0, -0.5, 0.8)
+@example(AUTHORS, 0.2, 0.5, 0.8)  # all under
+@example(AUTHORS, 0.0625, 0.5, 0.875)  # one corner out
+@example(AUTHORS, 0.03, 0.0, 1.0)  # level
+@example(AUTHORS, 0.0, 0.0, 1.0)  # edge on the surface
+def test_the_closed_forms_are_exact(
+    geometry: FlipperGeometry, depth_m: float, per_outward: float, per_upward: float
+) -> None:
+    plate = submerged_part(geometry, depth_m, per_outward, per_upward)
+    exact = np.array([float(value) for value in exact_integrals(geometry, depth_m, per_outward, per_upward)])
+    tolerance = 50.0 * np.finfo(float).eps * rounding_scale(geometry, depth_m, per_outward, per_upward)
+    assert np.all(np.abs(np.array(plate) - exact) <= tolerance)
+
+
+# the mechanics, derived
+
+ALPHA, BETA, LENGTH, DROP, U, S, AXIS = sympy.symbols("alpha beta l h u s H", real=True)
+ROTATION = sympy.Matrix([[1, 0, 0], [0, sympy.cos(BETA), -sympy.sin(BETA)], [0, sympy.sin(BETA), sympy.cos(BETA)]])
+POSITION = ROTATION * sympy.Matrix([(LENGTH + U) * sympy.sin(ALPHA), (LENGTH + U) * sympy.cos(ALPHA), S - DROP])
+NORMAL = POSITION.diff(U).cross(POSITION.diff(S))  # of two unit vectors in the plate
+
+
+def is_zero(expression: sympy.Expr) -> bool:
+    return bool(sympy.simplify(expression) == 0)
+
+
+def test_the_depth_of_a_point_is_the_docstrings() -> None:
+    edge = POSITION.subs({U: 0, S: 0})
+    by_plate = -edge[2] - AXIS - U * sympy.cos(ALPHA) * sympy.sin(BETA) - S * sympy.cos(BETA)
+    assert is_zero(-POSITION[2] - AXIS - by_plate)
+
+
+def test_the_normal_is_a_unit_vector_that_points_forward() -> None:
+    assert is_zero(NORMAL.dot(NORMAL) - 1)
+    assert is_zero(NORMAL[0] - sympy.cos(ALPHA))
+
+
+def test_a_load_along_the_normal_turns_the_joints_by_its_arm_and_by_its_drop_times_the_sine() -> None:
+    below_arm = DROP - S
+    assert is_zero(NORMAL.dot(POSITION.diff(ALPHA)) - (LENGTH + U))
+    assert is_zero(NORMAL.dot(POSITION.diff(BETA)) + below_arm * sympy.sin(ALPHA))
+
+
+def test_the_path_within_the_plates_plane_per_radian_is_the_docstrings_root() -> None:
+    across = NORMAL.dot(POSITION.diff(BETA))
+    square = POSITION.diff(BETA).dot(POSITION.diff(BETA)) - across**2
+    assert is_zero(square - sympy.cos(ALPHA) ** 2 * ((LENGTH + U) ** 2 + (DROP - S) ** 2))
+
+
+WIDTH, NEAR, FAR, MIDDLE, Q = sympy.symbols("w D_1 D_2 m q", positive=True)
+OUTWARD = sympy.Symbol("t", real=True)  # outward from the middle of the wet part
+COLUMN = (NEAR + FAR) / 2 + (FAR - NEAR) * OUTWARD / WIDTH  # depth of the edge there
+
+
+def column_integral(integrand: sympy.Expr) -> sympy.Expr:
+    """Integrate over the columns of a wet part whose edge's ends are NEAR and FAR deep, MIDDLE outward."""
+    in_column = sympy.integrate(sympy.expand(integrand), (S, 0, COLUMN / Q))
+    return sympy.integrate(sympy.expand(in_column), (OUTWARD, -WIDTH / 2, WIDTH / 2))
+
+
+def test_the_docstrings_integrals_are_those_of_columns_up_to_the_waterline() -> None:
+    zeta, u = COLUMN - Q * S, MIDDLE + OUTWARD
+    area, moment = column_integral(sympy.Integer(1)), column_integral(zeta)
+    mean_square = NEAR**2 + NEAR * FAR + FAR**2
+    assert is_zero(area - WIDTH * (NEAR + FAR) / (2 * Q))
+    assert is_zero(column_integral(u) - MIDDLE * area - WIDTH**2 * (FAR - NEAR) / (12 * Q))
+    assert is_zero(column_integral(S) - WIDTH * mean_square / (6 * Q**2))
+    assert is_zero(moment - WIDTH * mean_square / (6 * Q))
+    assert is_zero(column_integral(zeta * u) - MIDDLE * moment - WIDTH**2 * (FAR**2 - NEAR**2) / (24 * Q))
+    assert is_zero(column_integral(zeta * S) - WIDTH * (NEAR + FAR) * (NEAR**2 + FAR**2) / (24 * Q**2))
+
+
+@given(poses)
+@example(CORNER)
+@example(TOP_CORNER_DRY)
+def test_cross_coupling_is_the_ratio_of_the_torques_of_the_triangles_pressure(pose: Pose) -> None:
+    """The sums run element by element over the grid; the weighted sums are divided, so their errors add."""
+    values, error = grid_integrals(pose)
+    g, plate, sine = pose.geometry, pose.plate(), sin(pose.sweep_rad)
+    sweep = g.flipper_length_m * values[3] + values[4]
+    adduction = -sine * (g.drop_m * values[3] - values[5])
+    sweep_error = g.flipper_length_m * error[3] + error[4]
+    adduction_error = abs(sine) * (g.drop_m * error[3] + error[5])
+    ratio = cross_coupling(g, plate, pose.sweep_rad)
+    if stance_moment_m4(g, plate) > 0.0:
+        assert abs(ratio * sweep - adduction) <= abs(ratio) * sweep_error + adduction_error
+    else:
+        assert ratio == pytest.approx(-sine * g.drop_m / g.flipper_length_m)  # of the edge's middle
+
+
+# moments, units and limits
+
+
+@given(st.floats(0.001, 0.069), geometries)
+def test_an_upright_level_plate_has_the_papers_moments(depth_m: float, geometry: FlipperGeometry) -> None:
+    g = FlipperGeometry(geometry.flipper_length_m, geometry.drop_m, 0.0, plate_width_m=geometry.plate_width_m)
+    plate = submerged_plate(g, 0.0, 0.0, g.drop_m - depth_m)
+    l, b, t = g.flipper_length_m, g.plate_width_m, g.plate_thickness_m  # noqa: E741
+    assert stance_moment_m4(g, plate) == pytest.approx(l * b * depth_m**2 / 2.0, rel=1e-12)
+    arm_m = sqrt(l * l + (g.drop_m - depth_m / 2.0) ** 2)
+    assert stroke_moment_m4(g, plate, 0.0) == pytest.approx(t * b * depth_m * arm_m, rel=1e-12)
+
+
+def test_the_authors_plate_has_the_moments_worked_out_in_the_reference() -> None:
+    """Section 2.5 of the physics: at 3 cm and sweep 0, S1 |n_x| is 12.4 cm³ and the volume 3.28 cm³; at 5 cm, 40.6
+    and 6.39. At sweep 30° and 3 cm, 11.3 and 3.44. The table has three digits.
+    """
+    worked = [(0.0, 0.03, 12.4, 3.28), (30.0, 0.03, 11.3, 3.44), (0.0, 0.05, 40.6, 6.39), (30.0, 0.05, 47.2, 7.0)]
+    for sweep_deg, depth_m, moment_cm3, volume_cm3 in worked:
+        sweep_rad = radians(sweep_deg)
+        plate = submerged_plate(AUTHORS, sweep_rad, AUTHORS.adduction_rad(sweep_rad, depth_m))
+        assert 1e6 * plate.depth_moment_m3 * cos(sweep_rad) == pytest.approx(moment_cm3, rel=0.005)
+        assert 1e6 * plate.area_m2 * AUTHORS.plate_thickness_m == pytest.approx(volume_cm3, rel=0.005)
+
+
+@given(geometries, sweeps, adductions, st.floats(0.0, 0.5))
+def test_a_plate_above_the_mud_is_dry(
+    geometry: FlipperGeometry, sweep: float, adduction: float, clearance_m: float
+) -> None:
+    lowest_m = geometry.depth_m(sweep, adduction) + abs(cos(sweep) * sin(adduction)) * geometry.plate_width_m / 2.0
+    plate = submerged_plate(geometry, sweep, adduction, lowest_m + clearance_m + 1e-9)
+    assert plate == DRY
+    assert stance_moment_m4(geometry, plate) == stroke_moment_m4(geometry, plate, sweep) == 0.0
+
+
+@given(geometries, sweeps, adductions, st.floats(0.0, 1.0))
+def test_a_plate_wholly_under_is_a_rectangle_at_its_middles_depth(
+    geometry: FlipperGeometry, sweep: float, adduction: float, deeper_m: float
+) -> None:
+    g, q = geometry, cos(adduction)
+    lean = abs(cos(sweep) * sin(adduction)) * g.plate_width_m / 2.0
+    depth_m = g.plate_height_m * q + lean + 1e-9 + deeper_m
+    plate = submerged_plate(g, sweep, adduction, g.depth_m(sweep, adduction) - depth_m)
+    area_m2, middle_m = g.plate_width_m * g.plate_height_m, depth_m - g.plate_height_m * q / 2.0
+    lost = 200.0 * np.finfo(float).eps * rounding_scale(g, depth_m, sin(adduction), q)
+    assert plate.area_m2 == pytest.approx(area_m2, abs=lost[0])
+    assert plate.area_outward_m3 == pytest.approx(0.0, abs=lost[1])
+    assert plate.area_upward_m3 == pytest.approx(area_m2 * g.plate_height_m / 2.0, abs=lost[2])
+    assert plate.depth_moment_m3 == pytest.approx(area_m2 * middle_m, abs=lost[3])
+
+
+@given(poses, st.floats(1e-6, 0.05))
+@example(CORNER, 1e-6)
+@example(TOP_CORNER_DRY, 1e-6)
+def test_the_moments_grow_with_depth_by_the_wet_area(pose: Pose, deeper_m: float) -> None:
+    """d/dδ ∫ζ dA = ∫dA, so the mean slope lies between the areas before and after; and the area grows by the
+    waterline's length over the depth's slope along the plate, at most by the diagonal over cos β.
+    """
+    g, q, shallow = pose.geometry, cos(pose.adduction_rad), pose.plate()
+    deep = submerged_plate(g, pose.sweep_rad, pose.adduction_rad, pose.surface_m - deeper_m)
+    depth_m = g.depth_m(pose.sweep_rad, pose.adduction_rad) - pose.surface_m + deeper_m
+    lost = 100.0 * np.finfo(float).eps * rounding_scale(g, depth_m, sin(pose.adduction_rad), q)
+    longest_m = hypot(g.plate_width_m, g.plate_height_m)
+    assert -lost[0] <= deep.area_m2 - shallow.area_m2 <= deeper_m * longest_m / q + lost[0]
+    grown_m3 = deep.depth_moment_m3 - shallow.depth_moment_m3
+    assert deeper_m * shallow.area_m2 - lost[3] <= grown_m3 <= deeper_m * deep.area_m2 + lost[3]
+
+
+@given(geometries, sweeps, adductions, st.floats(-0.8, 1.5))
+def test_a_mirrored_sweep_has_the_same_moments_and_the_opposite_cross_coupling(
+    geometry: FlipperGeometry, sweep: float, adduction: float, fraction: float
+) -> None:
+    front, back = (Pose(geometry, side * sweep, adduction, fraction) for side in (1.0, -1.0))
+    assert front.plate() == back.plate()
+    ratios = [cross_coupling(geometry, pose.plate(), pose.sweep_rad) for pose in (front, back)]
+    assert ratios[0] == -ratios[1]
+
+
+def vanishes(value: float) -> bool:
+    """Return whether a value is so small that its powers round."""
+    return 0.0 < abs(value) < 1e-6
+
+
+@given(poses, st.sampled_from([0.25, 2.0, 16.0]))
+def test_moments_scale_with_the_fourth_power_of_length(pose: Pose, times: float) -> None:
+    """The factors are powers of two, which do not round."""
+    lengths_m = {name: value for name, value in asdict(pose.geometry).items() if isinstance(value, float)}
+    assume(not any(vanishes(value) for value in (*pose[1:], *lengths_m.values())))
+    larger = FlipperGeometry(plate_corners_m=(), **{name: times * length_m for name, length_m in lengths_m.items()})
+    small, large = pose.plate(), pose._replace(geometry=larger).plate()
+    assert stance_moment_m4(larger, large) == times**4 * stance_moment_m4(pose.geometry, small)
+    stroke_m4 = stroke_moment_m4(pose.geometry, small, pose.sweep_rad)
+    assert stroke_moment_m4(larger, large, pose.sweep_rad) == times**4 * stroke_m4
+    assert cross_coupling(larger, large, pose.sweep_rad) == cross_coupling(pose.geometry, small, pose.sweep_rad)
+
+
+GOLDEN = {  # sweep, adduction, surface: the integrals and the joints' moments, from before plates had other shapes
+    (0.0, -0.41903952430809965, 0.0): (
+        (0.0008210358914259373, 5.799752855866767e-07, 1.3611165291637947e-05)
+        + (1.243352949040879e-05, 1.7399258567600304e-08, 1.38694984745305e-07),
+        (1.509422797416655e-06, 4.1133240858223993e-07, -0.0),
+    ),
+    (-0.5, -0.9384752447687668, 0.0): (
+        (0.001749942070584595, 7.181121205595786e-10, 6.124595213426096e-05)
+        + (5.13001108731797e-05, 6.452289276210746e-08, 1.373171939551732e-06),
+        (6.2205361975436705e-06, 7.428849539509415e-07, 0.09185630457408762),
+    ),
+    (0.5, -0.1533572654973197, 0.0): (
+        (2.7020059975460703e-05, 1.5798153989542406e-07, 2.438546844615212e-08)
+        + (2.409927578608387e-08, 1.8098840804507695e-10, 1.6312106536506102e-11),
+        (3.072901502375141e-09, 1.2812733117940217e-08, -0.18545012678838574),
+    ),
+    (0.3, -0.4, -0.04): (
+        (0.0017374861395913546, 1.2358814228663515e-07, 6.0387292194893406e-05)
+        + (5.944043250142077e-05, 3.3779924376656716e-08, 1.4226581351233621e-06),
+        (7.166631824547149e-06, 8.036161486330695e-07, -0.06388889926988872),
+    ),
+}
+
+
+@pytest.mark.parametrize("pose", GOLDEN)
+def test_the_papers_rectangle_keeps_its_moments_to_the_last_digit(pose: tuple[float, float, float]) -> None:
+    integrals, moments = GOLDEN[pose]
+    plate, sweep_rad = submerged_plate(AUTHORS, *pose), pose[0]
+    assert plate == integrals
+    assert moments == (
+        stance_moment_m4(AUTHORS, plate),
+        stroke_moment_m4(AUTHORS, plate, sweep_rad),
+        cross_coupling(AUTHORS, plate, sweep_rad),
+    )
+
+
+# other shapes
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 17.0, -45.0])
+@given(depth_m=st.floats(-0.05, 0.15), per_outward=st.floats(-0.9, 0.9), per_upward=st.floats(0.3, 1.0))
+def test_a_rectangle_given_by_its_corners_has_the_integrals_of_one_given_by_its_sides(
+    angle_deg: float, depth_m: float, per_outward: float, per_upward: float
+) -> None:
+    corners = ((0.0125, 0.0), (0.0125, 0.07), (-0.0125, 0.07), (-0.0125, 0.0))
+    by_corners = FlipperGeometry(plate_corners_m=corners, plate_angle_deg=angle_deg)
+    by_sides = FlipperGeometry(plate_angle_deg=angle_deg)
+    one, other = (submerged_part(each, depth_m, per_outward, per_upward) for each in (by_corners, by_sides))
+    lost = 50.0 * np.finfo(float).eps * rounding_scale(by_sides, depth_m, per_outward, per_upward)
+    assert np.all(np.abs(np.array(one) - np.array(other)) <= lost)
+
+
+@pytest.mark.parametrize("geometry", [AUTHORS, FlipperGeometry(plate_width_m=0.04, plate_height_m=0.03)])
+@given(depth_m=st.floats(0.001, 0.1))
+def test_a_level_rectangle_has_its_own_width_at_every_depth(geometry: FlipperGeometry, depth_m: float) -> None:
+    assert mean_width_m(geometry, depth_m) == moment_width_m(geometry, depth_m) == geometry.plate_width_m
+    assert growth_exponent(geometry, depth_m) == 1.0
+
+
+def test_the_widths_of_a_triangle_and_of_a_trapezoid_are_those_of_their_areas() -> None:
+    triangle = FlipperGeometry(plate_corners_m=((0.0, 0.0), (0.02, 0.06), (-0.02, 0.06)))
+    assert mean_width_m(triangle, 0.03) == pytest.approx(0.01)  # half of 2 cm
+    assert moment_width_m(triangle, 0.03) == pytest.approx(0.02 / 3.0)  # z³/6 · 2/3 in place of w z²/2
+    assert growth_exponent(triangle, 0.03) == pytest.approx(2.0)
+    trapezoid = FlipperGeometry(plate_corners_m=TRAPEZOID)
+    assert mean_width_m(trapezoid, 0.035) == pytest.approx((0.015 + 0.025) / 2.0)
+    assert 1.0 < growth_exponent(trapezoid, 0.035) < 2.0

@@ -1,0 +1,148 @@
+"""The status socket answers valid requests, rejects others, and never blocks the loop."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+
+import msgpack
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from firmware_host.sockets.rpc import LONGEST_REQUEST
+from firmware_host.sockets.status_socket import MOST_CLIENTS
+from tests.firmware_host.sockets.served_socket import METHODS, Served, ask, connect, serve, unpacked
+
+
+def test_a_request_is_answered_by_its_number(served: Served) -> None:
+    client = connect(served)
+    assert ask(served, client, msgpack.packb([0, 7, "echo", {"a": 1}])) == [[1, 7, None, {"a": 1}]]
+
+
+def test_params_may_be_inside_a_list(served: Served) -> None:
+    client = connect(served)
+    assert ask(served, client, msgpack.packb([0, 7, "echo", [{"a": 1}]])) == [[1, 7, None, {"a": 1}]]
+    assert ask(served, client, msgpack.packb([0, 8, "echo", []])) == [[1, 8, None, {}]]
+
+
+def test_a_refusal_and_an_unknown_method_are_answers(served: Served) -> None:
+    client = connect(served)
+    assert ask(served, client, msgpack.packb([0, 1, "refuse", {}])) == [[1, 1, "not now", None]]
+    ((_, _, error, _),) = ask(served, client, msgpack.packb([0, 2, "dance", {}]))
+    assert "no method 'dance'" in error and "echo" in error
+
+
+def test_requests_sent_together_are_answered_one_a_tick_in_order(served: Served) -> None:
+    client = connect(served)
+    client.sendall(b"".join(msgpack.packb([0, n, "echo", {}]) for n in range(5)))
+    answered = []
+    for _ in range(8):
+        served.tick()
+        client.setblocking(False)
+        try:
+            answered.append(len(list(unpacked(client.recv(65536)))))
+        except BlockingIOError:
+            answered.append(0)
+    assert sum(answered) == 5 and max(answered) == 1
+
+
+def test_an_endless_request_is_rejected(served: Served) -> None:
+    client = connect(served)
+    client.setblocking(False)
+    header = b"\xdb" + (2 * LONGEST_REQUEST).to_bytes(4, "big")
+    client.send(header)
+    for _ in range(50):
+        try:
+            client.send(b"x" * 8192)
+        except (BlockingIOError, BrokenPipeError, ConnectionResetError):
+            break
+        served.tick()
+    serve(served)
+    assert served.counters["malformed_requests"] == 1
+
+
+def test_a_client_that_does_not_fetch_its_answers_is_dropped(served: Served) -> None:
+    client = connect(served)
+    client.sendall(b"".join(msgpack.packb([0, n, "long", {}]) for n in range(20)))
+    serve(served, 60)
+    with pytest.raises((BrokenPipeError, ConnectionResetError)):
+        for _ in range(100):
+            client.sendall(b"\xc0")
+            served.tick()
+    assert served.counters["dropped_slow_clients"] == 1
+
+
+def test_a_newcomer_replaces_the_client_that_was_silent_for_longest(served: Served) -> None:
+    clients = [connect(served) for _ in range(MOST_CLIENTS)]
+    serve(served, MOST_CLIENTS + 2)
+    assert ask(served, clients[0], msgpack.packb([0, 1, "echo", {}]))
+    late = connect(served)
+    assert ask(served, late, msgpack.packb([0, 2, "echo", {}])) == [[1, 2, None, {}]]
+    assert clients[1].recv(1) == b""
+    assert ask(served, clients[0], msgpack.packb([0, 3, "echo", {}]))
+
+
+def test_a_request_counts_although_its_client_has_disconnected(served: Served) -> None:
+    done: list[str] = []
+    served.methods = METHODS | {"disarm": lambda params, caller: done.append("disarm")}
+    busy, gone = connect(served), connect(served)
+    serve(served, 3)
+    busy.sendall(b"".join(msgpack.packb([0, number, "echo", {}]) for number in range(5)))
+    gone.sendall(msgpack.packb([0, 1, "long", {}]) + msgpack.packb([0, 2, "disarm", {}]))
+    gone.close()
+    serve(served, 30)
+    assert done == ["disarm"]
+    assert served.counters["clients"] == 1
+
+
+def test_a_client_that_stopped_sending_still_gets_a_long_answer(served: Served) -> None:
+    client = connect(served)
+    client.sendall(msgpack.packb([0, 1, "long", {}]))
+    client.shutdown(socket.SHUT_WR)
+    serve(served, 10)  # before it fetches anything
+    client.setblocking(False)
+    received = bytearray()
+    for _ in range(50):
+        served.tick()
+        with contextlib.suppress(BlockingIOError):
+            received += client.recv(65536)
+    ((_, _, _, result),) = unpacked(bytes(received))
+    assert len(result) == 300_000
+    assert served.counters["clients"] == 0
+
+
+def test_a_method_with_a_bug_answers_so_and_is_reported(served: Served) -> None:
+    said: list[str] = []
+    served.report_bug = said.append
+    served.methods = {"broken": lambda params, caller: params["missing"]}
+    ((_, _, error, _),) = ask(served, connect(served), msgpack.packb([0, 1, "broken", {}]))
+    assert "bug" in error and said == ["broken failed: KeyError: 'missing'"]
+
+
+VALID = [msgpack.packb([0, number, "echo", {"a": number}]) for number in range(4)]
+ODD = st.one_of(
+    st.binary(max_size=200),
+    st.builds(lambda data, index: data[: index % len(data)], st.sampled_from(VALID), st.integers(0, 99)),
+    st.builds(
+        lambda data, index, byte: data[: index % len(data)] + bytes([byte]) + data[index % len(data) + 1 :],
+        st.sampled_from(VALID),
+        st.integers(0, 99),
+        st.integers(0, 255),
+    ),
+)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(ODD, max_size=4), st.integers(0, 4), st.integers(0, 200))
+def test_valid_requests_are_answered_before_any_garbage(served: Served, odd: list[bytes], valid: int, cut: int) -> None:
+    client, reference = connect(served), connect(served)
+    data = b"".join(VALID[:valid] + odd)
+    answers = ask(served, client, data[:cut]) if cut else []
+    with contextlib.suppress(BrokenPipeError):
+        answers += ask(served, client, data[cut:])
+    assert [[1, n, None, {"a": n}] for n in range(valid)] == answers[:valid]
+    assert ask(served, reference, VALID[1]) == [[1, 1, None, {"a": 1}]]
+    client.close()
+    reference.close()
+    serve(served, 6)

@@ -1,0 +1,187 @@
+"""The catalogue knows every closed log of a folder, reads each once, and cannot be changed by a query."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED, preserve
+from logs.catalogue import catalogue as catalogue_module
+from logs.catalogue.catalogue import VERSION, VERSION_KEY, Catalogue, CatalogueError, catalogue_path
+from logs.catalogue.entry import COLUMNS, LogEntry
+from logs.files.log_error import unwatched
+from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
+from tests.folders import ROOT
+from tests.logs.export.test_parquet import files_of_at_most
+
+WALK = ROOT / "tests/fixtures/walk_0_1.mcap"
+
+
+def make_log(folder: Path, name: str, *events: str) -> Path:
+    log = LogFile(folder / ACTIVE / name, OPENING)
+    log.write([*make_ticks(0, 39), *map(make_event, events)])
+    return log.finish()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / DONE).mkdir()
+    (tmp_path / DONE / "walk.mcap").write_bytes(WALK.read_bytes())
+    make_log(tmp_path, "rest.mcap", "fault drive_silent (drives_idle): gone", "fault drive_version (none): unknown")
+    return tmp_path
+
+
+def updated(folder: Path) -> dict[str, LogEntry]:
+    catalogue = Catalogue(folder)
+    assert catalogue.update(unwatched) == 0
+    return {entry.file: entry for entry in catalogue.entries()}
+
+
+@pytest.fixture
+def readings(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the list of files that the catalogue reads, in order."""
+    read: list[str] = []
+    plain: Callable[..., LogEntry] = catalogue_module._read_entry
+
+    def noted(path: Path, *arguments: object) -> LogEntry:
+        read.append(path.name)
+        return plain(path, *arguments)
+
+    monkeypatch.setattr(catalogue_module, "_read_entry", noted)
+    return read
+
+
+def test_an_entry_says_what_the_log_contains(folder: Path) -> None:
+    entries = updated(folder)
+    walk, rest = entries[f"{DONE}/walk.mcap"], entries[f"{DONE}/rest.mcap"]
+    assert (walk.robot, walk.walks, walk.strides, walk.stuck_strides, walk.state) == ("test", 1, 6, 0, "whole")
+    assert walk.started is not None and walk.started.isoformat() == "2026-11-22T14:50:21"
+    assert walk.distance_m == pytest.approx(0.36, abs=0.01) and walk.speed_m_s == pytest.approx(0.067, abs=0.001)
+    (mud,) = walk.muds
+    assert mud.strides == 6 and mud.k_p == pytest.approx(1.3e6, rel=0.05)
+    assert walk.configuration_sha256.startswith("5a798700")
+    assert (rest.robot, rest.run, rest.walks, rest.speed_m_s) == ("mudskipper-1", "run", 0, None)
+    assert rest.faults == ("drive_silent",)
+
+
+def test_a_log_is_read_once_and_added_when_it_is_closed(folder: Path, readings: list[str]) -> None:
+    living = LogFile(folder / ACTIVE / "now.mcap", OPENING)
+    updated(folder)
+    assert sorted(readings) == ["rest.mcap", "walk.mcap"]
+    readings.clear()
+    living.write(make_ticks(0, 10))
+    living.finish()
+    assert f"{DONE}/now.mcap" in updated(folder)
+    assert readings == ["now.mcap"]
+
+
+def test_a_log_that_moved_is_known_and_a_deleted_one_forgotten(folder: Path, readings: list[str]) -> None:
+    updated(folder)
+    preserve(folder / DONE / "walk.mcap")
+    (folder / DONE / "rest.mcap").unlink()
+    readings.clear()
+    assert list(updated(folder)) == [f"{PRESERVED}/walk.mcap"]
+    assert readings == []
+
+
+def test_a_broken_log_is_an_entry_with_its_reason(folder: Path) -> None:
+    (folder / DONE / "cut.mcap").write_bytes(WALK.read_bytes()[:-100])
+    (folder / DONE / "text.mcap").write_text("no log", encoding="utf-8")
+    entries = updated(folder)
+    assert entries[f"{DONE}/cut.mcap"].state == entries[f"{DONE}/text.mcap"].state == "broken"
+    assert entries[f"{DONE}/cut.mcap"].strides == 6
+    assert "MCAP" in entries[f"{DONE}/text.mcap"].reason and str(folder) not in entries[f"{DONE}/text.mcap"].reason
+
+
+def test_broken_logs_are_read_again_on_demand(folder: Path, readings: list[str]) -> None:
+    (folder / DONE / "text.mcap").write_text("no log", encoding="utf-8")
+    updated(folder)
+    readings.clear()
+    assert Catalogue(folder).update(unwatched, broken_again=True) == 0
+    assert readings == ["text.mcap"]
+
+
+def test_a_catalogue_of_a_newer_version_is_refused_and_left(folder: Path) -> None:
+    path = catalogue_path(folder)
+    duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{VERSION + 1}'}})")
+    before = path.read_bytes()
+    with pytest.raises(CatalogueError, match="update mudskipper"):
+        Catalogue(folder)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("contents", [b"", b"PAR1 garbage PAR1"])
+def test_a_damaged_catalogue_is_made_again(folder: Path, contents: bytes) -> None:
+    known = updated(folder)
+    catalogue_path(folder).write_bytes(contents)
+    assert updated(folder) == known == updated(folder)
+
+
+def test_an_interrupted_update_keeps_what_it_read(folder: Path, readings: list[str]) -> None:
+    def interrupt(what: str, done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Catalogue(folder).update(interrupt)
+    assert Catalogue(folder).update(unwatched, longest_s=-1.0) == 1
+    updated(folder)
+    assert readings == ["rest.mcap", "walk.mcap"]
+
+
+def test_a_catalogue_that_cannot_be_stored_can_be_queried(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogue_module, "catalogue_path", lambda _: Path("/proc/mudskipper/catalogue.parquet"))
+    catalogue = Catalogue(folder)
+    with pytest.raises(OSError, match="/proc/mudskipper"):
+        catalogue.update(unwatched)
+    assert catalogue.query("SELECT count(*) FROM logs").rows == [(2,)]
+
+
+def test_a_full_disk_leaves_the_catalogue_before(folder: Path) -> None:
+    updated(folder)
+    before = catalogue_path(folder).read_bytes()
+    make_log(folder, "new.mcap")
+    with files_of_at_most(100), pytest.raises(OSError, match="^File too large$"):
+        Catalogue(folder).update(unwatched)
+    assert catalogue_path(folder).read_bytes() == before
+    assert f"{DONE}/new.mcap" in updated(folder)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
+def test_root_writes_into_no_folder_of_another_user(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    os.chown(folder, 12345, 12345)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    updated(folder)
+    assert not (folder / "catalogue.parquet").exists()
+    assert len(list((tmp_path / "cache" / "mudskipper").iterdir())) == 1
+
+
+def test_queries_see_every_column(folder: Path) -> None:
+    catalogue = Catalogue(folder)
+    catalogue.update(unwatched)
+    assert catalogue.query("SELECT * FROM logs").names == list(COLUMNS) == list(LogEntry._fields)
+    strides = catalogue.query("SELECT m.strides FROM logs, unnest(muds) AS t(m) WHERE NOT list_contains(faults, 'x')")
+    assert strides.rows == [(6,)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "all the logs", "SELECT depth FROM logs", "SELECT 1; SELECT 2", "DROP TABLE logs", "DELETE FROM logs",
+        "SET threads = 1", "COPY logs TO '/tmp/logs.csv'", "ATTACH '/tmp/other.db'", "SELECT * FROM '/etc/passwd'",
+        "SELECT * FROM read_text('/etc/passwd')", "SELECT * FROM glob('/*')",
+    ],
+)  # fmt: skip
+def test_what_is_no_select_on_the_logs_is_one_message(folder: Path, text: str) -> None:
+    catalogue = Catalogue(folder)
+    catalogue.update(unwatched)
+    with pytest.raises(CatalogueError) as refused:
+        catalogue.query(text)
+    assert "\n" not in str(refused.value)
+    assert catalogue.query("SELECT count(*) FROM logs").rows == [(2,)]

@@ -1,0 +1,290 @@
+"""Whole, cut and damaged logs are read as far as possible, or refused with one sentence."""
+
+from __future__ import annotations
+
+import random
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE, STRIDE_KIND, TICK, TICK_KIND
+from firmware_host.log.schema import RowKind
+from logs.files.log_error import LogError
+from logs.files.log_reader import Log, read_log
+from logs.files.log_summary import log_summary
+from tests.firmware_host.synthetic_rows import encode_row
+
+WALL_NS = 1_700_000_000_000_000_000  # 2023-11-14 22:13:20 UTC
+OPENING: dict[str, Any] = {
+    "configuration_text": "[robot]\n",
+    "metadata": {"robot": "mudskipper-1"},
+    "wall_minus_monotonic_ns": WALL_NS,
+}
+TICKS = 1000  # six chunks
+
+
+def make_tick(number: int) -> bytes:
+    return encode_row(
+        TICK,
+        stamp_s=number / 380,
+        angle_rad=[number + joint / 10 for joint in range(4)],
+        tick=number,
+        missed_ticks=number // 100,
+        stride=-1,
+        limited=number % 2,
+    )
+
+
+def make_log(path: Path, ticks: int = TICKS) -> Path:
+    """Write a finished log with ticks, two strides and three events."""
+    rows = [(TICK_KIND, make_tick(number)) for number in range(ticks)]
+    strides = [encode_row(STRIDE, stamp_s=1.0, index=index, flipper=index) for index in range(2)]
+    events = [encode_row(EVENT, stamp_s=1.0, text=text) for text in ("walk", "mud", "stop")]
+    rows[ticks // 2 : ticks // 2] = [(STRIDE_KIND, row) for row in strides]
+    rows[ticks // 3 : ticks // 3] = [(EVENT_KIND, row) for row in events]
+    log = LogFile(path, OPENING)
+    log.write(rows)
+    log.finish()
+    return path
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_log(tmp_path_factory.mktemp("logs") / "run.mcap")
+
+
+@pytest.fixture(scope="module")
+def whole(path: Path) -> Log:
+    return read_log(path)
+
+
+def read_bytes(tmp_path: Path, contents: bytes) -> Log:
+    changed = tmp_path / "changed.mcap"
+    changed.write_bytes(contents)
+    return read_log(changed)
+
+
+def holds_first_rows_of(log: Log, whole: Log) -> bool:
+    return (
+        log.ticks.tobytes() == whole.ticks[: len(log.ticks)].tobytes()
+        and log.strides == whole.strides[: len(log.strides)]
+        and log.events == whole.events[: len(log.events)]
+    )
+
+
+def test_ticks_are_an_array_with_the_fields_of_the_table(whole: Log) -> None:
+    assert whole.ticks.dtype.names == tuple(field.name for field in TICK.fields)
+    assert whole.ticks["angle_rad"].shape == (TICKS, 4)
+    for number in (0, 1, TICKS - 1):
+        expected = TICK.decode(make_tick(number))
+        assert {name: np.array(whole.ticks[number][name]).tolist() for name in expected} == {
+            name: list(value) if isinstance(value, tuple) else value for name, value in expected.items()
+        }
+
+
+def test_strides_and_events_are_dictionaries(whole: Log) -> None:
+    assert [(stride["index"], stride["flipper"]) for stride in whole.strides] == [(0, 0), (1, 1)]
+    assert [event["text"] for event in whole.events] == ["walk", "mud", "stop"]
+
+
+def test_the_summary_tells_what_happened(whole: Log) -> None:
+    missed = (TICKS - 1) // 100
+    assert log_summary(whole) == {
+        "robot": "mudskipper-1",
+        "run": "",
+        "segment": None,
+        "started": "2023-11-14T22:13:20+00:00",
+        "duration_s": pytest.approx((TICKS - 1) / 380, abs=0.001),
+        "rate_hz": pytest.approx(380 * (TICKS - 1 - missed) / (TICKS - 1), abs=0.01),
+        "rows": TICKS,
+        "ticks": TICKS - missed,
+        "missed_ticks": missed,
+        "strides": 2,
+        "events": 3,
+        "complete": True,
+        "recovered": False,
+        "version": "",
+        "commit": "",
+        "unknown_fields": [],
+        "missing_fields": [],
+    }
+
+
+def test_a_log_without_rows_is_a_log(tmp_path: Path) -> None:
+    LogFile(tmp_path / "empty.mcap", OPENING).finish()
+    log = read_log(tmp_path / "empty.mcap")
+    assert (len(log.ticks), log.complete, log.configuration_text) == (0, True, "[robot]\n")
+    summary = log_summary(log)
+    assert (summary["started"], summary["rows"], summary["ticks"], summary["rate_hz"]) == ("", 0, 0, None)
+
+
+def test_a_long_log_costs_about_as_much_as_its_bare_messages(tmp_path: Path) -> None:
+    """Measured: 0.5 to 0.8 of it. A reader that unpacked each row by itself would take many times as much."""
+    path = make_log(tmp_path / "long.mcap", 20 * 380)
+    assert len(read_log(path).ticks) == 20 * 380
+    assert least_cost_s(lambda: read_log(path)) < 2.0 * least_cost_s(lambda: bare_messages(path))
+
+
+def bare_messages(path: Path) -> int:
+    with path.open("rb") as file:
+        return sum(1 for _ in make_reader(file).iter_messages(log_time_order=False))
+
+
+def least_cost_s(do: Callable[[], object]) -> float:
+    """Return the least processor time of three calls."""
+    costs_s = []
+    for _ in range(3):
+        begun_s = time.process_time()
+        do()
+        costs_s.append(time.process_time() - begun_s)
+    return min(costs_s)
+
+
+def test_an_unfinished_log_is_read_up_to_its_cut(path: Path, whole: Log, tmp_path: Path) -> None:
+    contents = path.read_bytes()
+    lengths = [*range(len(MCAP0_MAGIC), len(contents), 499), *range(len(contents) - 40, len(contents))]
+    counts = []
+    for length in lengths:
+        log = read_bytes(tmp_path, contents[:length])
+        assert not log.complete
+        assert holds_first_rows_of(log, whole)
+        counts.append(len(log.ticks))
+    assert counts == sorted(counts)
+    assert (counts[0], counts[-1]) == (0, TICKS)
+
+
+def chunk_places(path: Path) -> list[int]:
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    return [chunk.chunk_start_offset for chunk in summary.chunk_indexes]
+
+
+def test_a_tail_of_zeros_after_a_power_cut_is_a_cut(path: Path, whole: Log, tmp_path: Path) -> None:
+    log = read_bytes(tmp_path, path.read_bytes()[: chunk_places(path)[3]] + bytes(4096))
+    assert not log.complete
+    assert len(log.ticks) > TICKS / 3
+    assert holds_first_rows_of(log, whole)
+
+
+def test_a_chunk_that_no_longer_looks_like_one_is_missed(path: Path, tmp_path: Path) -> None:
+    damaged = bytearray(path.read_bytes())
+    damaged[chunk_places(path)[3]] = 0x7F
+    with pytest.raises(LogError, match=r"changed\.mcap: damaged: only \d+ of its \d+ rows can be found"):
+        read_bytes(tmp_path, bytes(damaged))
+
+
+def test_damage_is_refused_or_leaves_the_rows_intact(path: Path, whole: Log, tmp_path: Path) -> None:
+    """After one flipped bit in any byte, all rows are right or the file is refused."""
+    chance = random.Random(2)
+    contents = path.read_bytes()
+    refused = 0
+    for _ in range(600):
+        damaged = bytearray(contents)
+        damaged[chance.randrange(len(damaged))] ^= 1 << chance.randrange(8)
+        try:
+            log = read_bytes(tmp_path, bytes(damaged))
+        except LogError as error:
+            refused += 1
+            assert "changed.mcap: damaged" in str(error)
+            continue
+        assert holds_first_rows_of(log, whole)
+        assert len(log.ticks) == TICKS or not log.complete
+    assert refused > 300
+
+
+def test_garbage_after_a_good_beginning_is_refused_or_a_cut(path: Path, tmp_path: Path) -> None:
+    chance = random.Random(3)
+    beginning = path.read_bytes()[:2000]
+    for _ in range(200):
+        try:
+            log = read_bytes(tmp_path, beginning + chance.randbytes(500))
+        except LogError:
+            continue
+        assert not log.complete
+
+
+@pytest.mark.parametrize("contents", [b"", b"time,turtle_state\n", MCAP0_MAGIC[:-1]])
+def test_a_file_that_is_no_log_is_refused_at_its_first_byte(contents: bytes, tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"changed\.mcap: damaged at byte 0: .* MCAP"):
+        read_bytes(tmp_path, contents)
+
+
+def write_foreign(
+    path: Path,
+    rows: list[bytes],
+    *,
+    kind: RowKind = TICK,
+    topic: str = "",
+    ros_text: str = "",
+    compression: CompressionType = CompressionType.LZ4,
+) -> Path:
+    """Write a valid MCAP file with one channel, as another program might."""
+    with path.open("wb") as file:
+        writer = Writer(file, compression=compression)
+        writer.start(profile="ros2", library="another")
+        text = (ros_text or kind.definition).encode()
+        schema = writer.register_schema(kind.schema_name, "ros2msg", text)
+        channel = writer.register_channel(topic or kind.topic, "cdr", schema)
+        for row in rows:
+            writer.add_message(channel, 0, row, 0)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def test_a_row_of_the_wrong_length_is_named_by_its_number(tmp_path: Path) -> None:
+    path = write_foreign(tmp_path / "short.mcap", [make_tick(0), make_tick(1)[:-1]])
+    with pytest.raises(LogError, match=r"short\.mcap: row 2 of /tick has \d+ bytes"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("kind", [STRIDE, EVENT])
+def test_a_row_that_ends_early_is_named_by_its_number(kind: RowKind, tmp_path: Path) -> None:
+    path = write_foreign(tmp_path / "short.mcap", [encode_row(kind), encode_row(kind)[:10]], kind=kind)
+    with pytest.raises(LogError, match=rf"short\.mcap: row 2 of {kind.topic} is damaged"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("ros_text", ["Header header\n", "string name\nfloat64 stamp_s\n", "float64[2] stamp_s\n"])
+def test_a_layout_that_this_version_cannot_decode_is_refused(tmp_path: Path, ros_text: str) -> None:
+    path = write_foreign(tmp_path / "new.mcap", [make_tick(0)], ros_text=ros_text)
+    with pytest.raises(LogError, match="the version of mudskipper that wrote it") as refusal:
+        read_log(path)
+    assert "recover" not in str(refusal.value)  # it would not help
+
+
+def test_other_comments_are_no_other_layout(tmp_path: Path) -> None:
+    ros_text = "".join(f"{line.split('#')[0]} # new words\n" for line in TICK.definition.splitlines())
+    assert len(read_log(write_foreign(tmp_path / "run.mcap", [make_tick(0)], ros_text=ros_text)).ticks) == 1
+
+
+def test_channels_of_others_are_passed_over(tmp_path: Path) -> None:
+    log = read_log(write_foreign(tmp_path / "more.mcap", [b"anything"], topic="/camera"))
+    assert (len(log.ticks), log.complete) == (0, True)
+
+
+def test_a_log_that_a_tool_has_compressed_again_is_read(tmp_path: Path) -> None:
+    path = write_foreign(tmp_path / "zstd.mcap", [make_tick(0)], compression=CompressionType.ZSTD)
+    assert len(read_log(path).ticks) == 1
+
+
+def test_a_row_before_its_channel_is_refused(tmp_path: Path) -> None:
+    message = struct.pack("<BQHIQQ", 5, 22, 7, 0, 0, 0)
+    with pytest.raises(LogError, match="damaged before byte 39: a row of channel 7, which was not described"):
+        read_bytes(tmp_path, MCAP0_MAGIC + message)
+
+
+def test_a_log_read_from_a_moment_on_holds_all_that_came_after(path: Path) -> None:
+    whole, late = read_log(path), read_log(path, from_s=2.0)
+    assert len(late.ticks) < 0.7 * len(whole.ticks)
+    after = whole.ticks[whole.ticks["stamp_s"] >= 2.0]
+    assert len(after) and late.ticks[late.ticks["stamp_s"] >= 2.0]["tick"].tolist() == after["tick"].tolist()
+    assert late.metadata == whole.metadata and late.complete

@@ -1,0 +1,328 @@
+"""A log whose writer was killed is recovered with every row on the disk, and other programs can open it."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+
+from firmware_host.log.log_file import LogFile
+from firmware_host.log.log_folder import ACTIVE, DONE, unfinished_files
+from firmware_host.log.rows import TICK
+from logs import salvage as log_salvage
+from logs.files.log_error import LogError, Watch
+from logs.files.log_reader import read_log
+from logs.recovery import recover_all, recover_log
+from logs.salvage import FileBytes, NumberSet, salvage_rows
+from tests.firmware_host.synthetic_rows import OPENING, make_ticks
+from tests.waiting import LONGEST_S
+from verification.stress.corrupted_logs import corrupt, make_sound_log, try_log
+
+CHUNK = 100  # ticks
+
+
+def make_file(path: Path, chunks: int = 5) -> LogFile:
+    """Write chunks of ticks, each of them flushed, and leave the log open."""
+    log = LogFile(path, OPENING)
+    for chunk in range(chunks):
+        log.write(make_ticks(chunk * CHUNK, (chunk + 1) * CHUNK))
+        log.flush()
+    return log
+
+
+def make_cut_log(folder: Path, name: str = "run-0000.mcap") -> Path:
+    """Write a log as SIGKILL leaves it, without index and lock."""
+    log = make_file(folder / ACTIVE / name)
+    log._file.close()
+    return log.path
+
+
+def test_every_row_comes_back_and_the_file_moves_to_done(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    recovered = recover_log(path)
+    assert recovered.path == tmp_path / DONE / path.name
+    assert (recovered.rows, recovered.lost) == (5 * CHUNK, 0)
+    assert unfinished_files(tmp_path) == []
+    log = read_log(recovered.path)
+    assert log.complete and log.ticks["tick"].tolist() == list(range(5 * CHUNK))
+    assert log.metadata["recovered"] == "true" and log.metadata["run_id"] == "run"
+    assert log.metadata["wall_minus_monotonic_ns"] == str(OPENING["wall_minus_monotonic_ns"])
+    assert log.configuration_text == OPENING["configuration_text"]
+    assert log.events[-1]["text"].startswith("recovered: 500 rows; ")
+
+
+def test_readers_of_other_projects_open_a_recovered_log(tmp_path: Path) -> None:
+    path = recover_log(make_cut_log(tmp_path)).path
+    with AnyReader([path]) as bag:
+        assert bag.message_count == sum(1 for _ in bag.messages()) == 5 * CHUNK + 1
+    with path.open("rb") as file:
+        messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        assert [row.decoded_message.tick for row in messages if row.channel.topic == "/tick"] == list(range(5 * CHUNK))
+
+
+def test_damage_in_the_middle_costs_what_it_touches(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = bytearray(path.read_bytes())
+    third = contents.split(b"\x03\x00\x00\x00lz4")[:3]
+    contents[sum(map(len, third)) + 100] ^= 0x10
+    path.write_bytes(contents)
+    recovered = recover_log(path)
+    log = read_log(recovered.path)
+    assert (recovered.rows, recovered.lost, len(log.ticks)) == (4 * CHUNK, CHUNK, 4 * CHUNK)
+    assert log.ticks["tick"][-1] == 5 * CHUNK - 1
+    assert f"{CHUNK} lost in damaged places" in log.events[-1]["text"]
+    assert log.metadata["rows_lost"] == str(CHUNK)
+
+
+def test_rows_of_a_log_without_its_beginning_come_back(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = bytearray(path.read_bytes())
+    contents[:200] = bytes(200)
+    path.write_bytes(contents)
+    assert len(read_log(recover_log(path).path).ticks) == 5 * CHUNK
+
+
+def test_a_log_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
+    log = make_file(tmp_path / ACTIVE / "run-0000.mcap")
+    with pytest.raises(BlockingIOError):
+        recover_log(log.path)
+    complaints: list[str] = []
+    assert not recover_all(tmp_path, complaints.append) and not complaints
+    log.finish()
+    assert len(read_log(tmp_path / DONE / "run-0000.mcap").ticks) == 5 * CHUNK
+
+
+def test_a_recovery_that_was_cut_off_is_done_again(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    path = path.rename(path.with_name(path.name + ".broken"))
+    path.with_name("run-0000.mcap.part").write_bytes(b"half")
+    recover_all(tmp_path, print)
+    assert unfinished_files(tmp_path) == []
+    assert len(read_log(tmp_path / DONE / "run-0000.mcap").ticks) == 5 * CHUNK
+
+
+def test_a_recovery_cut_off_at_its_very_end_recovers_nothing_twice(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = path.read_bytes()
+    done = recover_log(path).path
+    before = done.read_bytes()
+    path.with_name(path.name + ".broken").write_bytes(contents)
+    recover_all(tmp_path, print)
+    assert (unfinished_files(tmp_path), done.read_bytes()) == ([], before)
+
+
+def test_a_whole_file_that_was_not_renamed_is_only_renamed(tmp_path: Path) -> None:
+    log = make_file(tmp_path / "run-0000.mcap")
+    path = log.finish()
+    (tmp_path / ACTIVE).mkdir()
+    before = path.read_bytes()
+    recovered = recover_log(path.rename(tmp_path / ACTIVE / path.name))
+    assert (recovered.note, recovered.path.read_bytes()) == ("is whole", before)
+
+
+def test_an_empty_file_goes(tmp_path: Path) -> None:
+    (tmp_path / ACTIVE).mkdir()
+    (tmp_path / ACTIVE / "x.mcap").touch()
+    recover_all(tmp_path, print)
+    assert unfinished_files(tmp_path) == []
+
+
+def test_a_disk_without_room_keeps_the_broken_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = make_cut_log(tmp_path)
+
+    def refuse(log: LogFile) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(LogFile, "finish", refuse)
+    complaints: list[str] = []
+    recover_all(tmp_path, complaints.append)
+    assert complaints == [f"{path}: cannot be recovered: No space left on device"]
+    monkeypatch.undo()
+    assert [entry.name for entry in unfinished_files(tmp_path)] == [path.name + ".broken"]
+    recover_all(tmp_path, complaints.append)
+    assert len(read_log(tmp_path / DONE / path.name).ticks) == 5 * CHUNK
+
+
+def test_the_program_recovers_a_folder(tmp_path: Path) -> None:
+    make_cut_log(tmp_path)
+    command = [sys.executable, "-m", "logs.recovery", str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=True)
+    assert "recovered: 500 rows;" in ended.stderr and ended.stdout == ""
+    assert unfinished_files(tmp_path) == []
+
+
+def test_a_log_of_the_older_layout_is_recovered_where_it_lies(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    path = path.rename(tmp_path / path.name)
+    recover_all(tmp_path, print)
+    assert read_log(path).complete and unfinished_files(tmp_path) == []
+
+
+def recompress(path: Path, cut_bytes: int = 0, ros_text: str = "", topics: tuple[str, ...] = ("/tick",)) -> Path:
+    """Write a log with another program's compression, or with other topics or another layout of its rows."""
+    ticks = [payload for _, payload in make_ticks(0, 300)]
+    with path.open("wb") as file:
+        compression = CompressionType.LZ4 if ros_text or len(topics) > 1 else CompressionType.ZSTD
+        writer = Writer(file, compression=compression, chunk_size=10_000)
+        writer.start(profile="ros2", library="another")
+        writer.add_metadata("mudskipper", {"run_id": "run"})
+        schema = writer.register_schema(TICK.schema_name, "ros2msg", (ros_text or TICK.definition).encode())
+        channels = [writer.register_channel(topic, "cdr", schema) for topic in topics]
+        for number, payload in enumerate(ticks):
+            for channel in channels:
+                writer.add_message(channel, 0, payload, 0, number)
+        writer.finish()  # type: ignore[no-untyped-call]
+    path.write_bytes(path.read_bytes()[: path.stat().st_size - cut_bytes])
+    return path
+
+
+def test_a_cut_log_that_another_program_compressed_is_left_as_it_is(tmp_path: Path) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes=2000)
+    before, rows = path.read_bytes(), len(read_log(path).ticks)
+    with pytest.raises(LogError, match="left as it is: another program has compressed it"):
+        recover_log(path)
+    assert rows > 100 and path.read_bytes() == before
+
+
+def test_a_log_is_never_replaced_by_one_with_fewer_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes=2000)
+    before = path.read_bytes()
+    monkeypatch.setattr(log_salvage, "FOREIGN_SIGNATURE", b"none such")
+    with pytest.raises(LogError, match=r"left as it is: only 0 of the \d+ rows"):
+        recover_log(path)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("cut_bytes", [0, 2000])
+def test_a_log_that_this_version_cannot_decode_is_left_as_it_is(tmp_path: Path, cut_bytes: int) -> None:
+    path = recompress(tmp_path / "run.mcap", cut_bytes, ros_text="std_msgs/Header header\n")
+    before = path.read_bytes()
+    with pytest.raises(LogError, match="left as it is: .* whose type is unknown"):
+        recover_log(path)
+    assert path.read_bytes() == before
+
+
+def test_rows_of_other_programs_are_counted_as_lost(tmp_path: Path) -> None:
+    path = recompress(tmp_path / "run.mcap", 2000, topics=("/camera", "/tick"))
+    recovered = recover_log(path)
+    assert recovered.rows > 100 and 0 <= recovered.lost - recovered.rows <= 1
+    assert f"{recovered.lost} of other programs left out" in recovered.note
+    log = read_log(path)
+    assert len(log.ticks) == recovered.rows and log.metadata["rows_lost"] == str(recovered.lost)
+
+
+def test_a_finished_log_of_the_same_name_with_fewer_rows_takes_nothing_away(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    other = make_file(tmp_path / "other.mcap", chunks=1).finish()
+    (tmp_path / DONE).mkdir()
+    other = other.rename(tmp_path / DONE / path.name)
+    with pytest.raises(LogError, match="has its name and fewer rows"):
+        recover_log(path)
+    assert path.exists() and len(read_log(other).ticks) == CHUNK
+
+
+def test_a_summary_that_looks_like_a_row_is_none(tmp_path: Path) -> None:
+    path = make_file(tmp_path / "run.mcap").finish()
+    contents = bytearray(path.read_bytes())
+    contents[contents.rfind(b"/tick") - 17] += 1  # makes a message of a channel in the summary
+    path.write_bytes(contents)
+    with pytest.raises(LogError, match="damaged"):
+        read_log(path)
+    assert recover_log(path).rows == 5 * CHUNK
+
+
+def test_a_finished_log_is_not_reported_as_cut(tmp_path: Path) -> None:
+    path = make_file(tmp_path / "run.mcap").finish()
+    contents = bytearray(path.read_bytes())
+    contents[contents.find(b"\x03\x00\x00\x00lz4") + 200] ^= 0x10
+    path.write_bytes(contents)
+    assert recover_log(path).note == f"recovered: {4 * CHUNK} rows, {CHUNK} lost in damaged places"
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_corrupted_logs_cost_no_row_that_is_still_there(tmp_path: Path, finished: bool) -> None:
+    """The long version is `python -m verification.stress.corrupted_logs`."""
+    chance = random.Random(7)
+    (tmp_path / ACTIVE).mkdir()
+    sound = make_sound_log(tmp_path / "sound.mcap", chance, finished)
+    wrong = []
+    for number in range(150):
+        contents, first, how = corrupt(sound, chance)
+        _, complaint = try_log(tmp_path / ACTIVE / f"{number}.mcap", sound, contents, first)
+        wrong += [f"{number} {how}: {complaint}"] * bool(complaint)
+    assert wrong == []
+
+
+def test_a_length_of_2_to_the_60_costs_no_memory(tmp_path: Path) -> None:
+    path = make_cut_log(tmp_path)
+    contents = bytearray(path.read_bytes())
+    start = contents.find(b"\x03\x00\x00\x00lz4") - 12  # the uncompressed size of the first chunk
+    contents[start : start + 8] = (1 << 60).to_bytes(8, "little")
+    path.write_bytes(contents)
+    with pytest.raises(LogError, match="cannot hold 1152921504606846976"):
+        read_log(path)
+    assert recover_log(path).rows == 4 * CHUNK
+
+
+@pytest.mark.parametrize("block_bytes", [40, 997, 1 << 18])
+def test_blocks_of_any_size_recover_the_same_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block_bytes: int
+) -> None:
+    """A signature may lie across the end of a block."""
+    monkeypatch.setattr(log_salvage, "BLOCK_BYTES", block_bytes)
+    recovered = recover_log(make_cut_log(tmp_path))
+    assert (recovered.rows, read_log(recovered.path).ticks["tick"].tolist()) == (5 * CHUNK, list(range(5 * CHUNK)))
+
+
+def test_a_log_that_is_cut_off_during_its_recovery_stays_for_another_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, found = make_cut_log(tmp_path), log_salvage.Salvage.found_rows
+    half = path.stat().st_size // 2
+
+    def cut_before_the_second_pass(salvage: log_salvage.Salvage, *watch: Watch) -> Iterator[tuple[int, bytes]]:
+        broken = path.with_name(path.name + ".broken")
+        if broken.exists():
+            os.truncate(broken, half)
+        return found(salvage, *watch)
+
+    monkeypatch.setattr(log_salvage.Salvage, "found_rows", cut_before_the_second_pass)
+    with pytest.raises(LogError, match="was changed while it was read: nothing was recovered"):
+        recover_log(path)
+    monkeypatch.undo()
+    (broken,) = unfinished_files(tmp_path)
+    assert broken.name == path.name + ".broken"
+    assert 0 < recover_log(broken).rows < 5 * CHUNK
+
+
+def test_the_memory_of_a_recovery_does_not_grow_with_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_salvage, "BLOCK_BYTES", 4096)
+    peaks = []
+    for chunks in (10, 80):
+        path = make_file(tmp_path / f"{chunks}.mcap", chunks).path
+        tracemalloc.start()
+        with path.open("rb") as file:
+            assert salvage_rows(path, FileBytes(file)).rows == chunks * CHUNK
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]
+
+
+def test_a_set_of_ranges_is_a_set() -> None:
+    chance = random.Random(3)
+    ranges, numbers = NumberSet(), set[int]()
+    for _ in range(500):
+        number = chance.randrange(120)
+        assert ranges.add(number) == (number not in numbers)
+        numbers.add(number)
+        assert ranges.missing == max(numbers) + 1 - len(numbers)

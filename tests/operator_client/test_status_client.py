@@ -1,0 +1,104 @@
+"""The client matches answers to requests, and distinguishes a closed connection from an absent daemon."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import pytest
+
+from firmware_host.sockets import rpc
+from operator_client.status_client import (
+    CallRefusedError,
+    DroppedError,
+    NoDaemonError,
+    NotPermittedError,
+    StatusClient,
+)
+
+Ends = tuple[StatusClient, socket.socket]
+
+
+@pytest.fixture
+def ends(short_folder: Path) -> Iterator[Ends]:
+    """Yield a client and the other end of its connection."""
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(short_folder / "s"))
+        listener.listen()
+        client = StatusClient(short_folder / "s", timeout_s=0.2)
+        connection, _ = listener.accept()
+        with connection:
+            yield client, connection
+        client.close()
+
+
+def answer(ends: Ends, *messages: Any) -> Any:
+    """Return the client's result for these messages, which arrive before its request."""
+    client, connection = ends
+    connection.sendall(b"".join(msgpack.packb(message) for message in messages))
+    return client.call("status")
+
+
+def test_an_answer_to_an_earlier_request_is_skipped(ends: Ends) -> None:
+    """An answer stays unread if Ctrl-C interrupts its request."""
+    assert answer(ends, [rpc.RESPONSE, 0, None, "old"], [rpc.RESPONSE, 1, None, "new"]) == "new"
+
+
+def test_a_refusal_has_the_daemon_s_message(ends: Ends) -> None:
+    with pytest.raises(CallRefusedError, match="^arm first$"):
+        answer(ends, [rpc.RESPONSE, 1, "arm first", None])
+
+
+def test_a_refusal_for_missing_rights_has_its_own_type(ends: Ends) -> None:
+    with pytest.raises(NotPermittedError, match="^join$"):
+        answer(ends, [rpc.RESPONSE, 1, f"{rpc.NOT_PERMITTED}join", None])
+
+
+def test_a_rejection_without_a_number_answers_the_current_request(ends: Ends) -> None:
+    with pytest.raises(CallRefusedError, match=r"a request is \[0"):
+        answer(ends, [rpc.RESPONSE, None, rpc.SHAPE, None])
+
+
+@pytest.mark.parametrize("message", [5, None, [1, 2], "x" * 5000, {"a": 1}])
+def test_a_malformed_answer_means_another_program(ends: Ends, message: Any) -> None:
+    with pytest.raises(NoDaemonError, match="no mudskipper daemon"):
+        answer(ends, message)
+
+
+def test_a_silent_daemon_is_distinguished_from_an_absent_one(ends: Ends) -> None:
+    with pytest.raises(DroppedError, match="does not answer: 'systemctl status"):
+        answer(ends)
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_a_connection_that_the_daemon_closed_is_reported(ends: Ends, before: int) -> None:
+    client, connection = ends
+    for _ in range(before):
+        answer(ends, [rpc.RESPONSE, 1, None, "new"])
+    connection.close()
+    with pytest.raises(DroppedError, match="closed the connection: it is ending, or made room"):
+        client.call("status")
+
+
+def test_a_message_before_the_connection_closes_is_read(ends: Ends) -> None:
+    client, connection = ends
+    connection.sendall(msgpack.packb([rpc.RESPONSE, None, f"{rpc.NOT_PERMITTED}join", None]))
+    connection.close()
+    with pytest.raises(NotPermittedError, match="^join$"):
+        client.call("status")
+
+
+def test_a_full_queue_is_waited_for(short_folder: Path) -> None:
+    """The queue may be full only for a moment."""
+    with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as before:
+        listener.bind(str(short_folder / "s"))
+        listener.listen(0)
+        before.connect(str(short_folder / "s"))
+        begin_s = time.monotonic()
+        with pytest.raises(NoDaemonError):
+            StatusClient(short_folder / "s", timeout_s=0.1)
+        assert time.monotonic() - begin_s >= 0.09

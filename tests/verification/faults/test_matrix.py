@@ -1,0 +1,326 @@
+"""Every fault occurs once in a simulated robot and the reaction passes; the evaluation of a cell can also fail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from itertools import cycle
+from random import Random
+from typing import Any
+
+import pytest
+
+import verification.faults.cell
+from control.faults import FaultKind
+from control.modes import Mode, Request
+from control.rate import PERIOD_S
+from drivers.can import stamp_clock
+from drivers.fault_injection.failures import EFFECTS, FailureKind
+from experiments.trials.parallel_trials import run_parallel
+from simulation.harness.drive_presets import DRIVES
+from verification.faults.bench import FaultBench
+from verification.faults.cell import FORBIDDEN_TICKS, run_cell
+from verification.faults.evaluation import Cell, problems
+from verification.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
+from verification.faults.loop_injectors import bug_in, nothing
+from verification.faults.matrix import FAULTS, CellKey, Plan, report_of
+from verification.faults.motor_energy import REACTING_TICKS
+from verification.faults.phases import PHASES, bench_for, enter_phase
+from verification.faults.protocol_differences import BY_TYPE, differences, mode_of
+
+
+def one_cell_of_each_fault() -> list[CellKey]:
+    """Choose a phase for each fault, preferably an early one, and a type of drive that can have the fault."""
+    phases = cycle(("hold", "idle", "stance", "hold", "arming"))
+    firsts = {mode.fault: mode for mode in reversed(FAILURE_MODES)}.values()
+    return [CellKey(mode.name, next((p for _ in PHASES if (p := next(phases)) in mode.phases), mode.phases[0]), 1,
+                    "mit" if mode.name in differences("odrive") else "odrive")
+            for mode in firsts]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def cells() -> Sequence[Cell]:
+    """Run the cells; each lasts for twice the time in which the loop must notice that a drive takes torque again."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verification.faults.cell, "AFTER_S", 2.0 * FORBIDDEN_TICKS * PERIOD_S)
+        return run_parallel([partial(run_cell, *key) for key in one_cell_of_each_fault()], lambda done, of: None)
+
+
+def test_every_kind_of_fault_has_a_failure_mode() -> None:
+    assert set(FaultKind) <= set(FAULTS)
+
+
+def test_the_whole_matrix_has_every_phase() -> None:
+    keys = Plan().cells
+    assert len(keys) >= 300 and len(set(keys)) == len(keys)
+    assert {key.phase for key in keys} == set(PHASES)
+    assert {mode.fault for mode in FAILURE_MODES} - set(FaultKind) == {
+        "none",
+        "wrong_motor",
+        "foreign_torque",
+        "degraded",
+        "daemon_killed",
+        "daemon_hung",
+        "bug_in_the_tick",
+    }
+
+
+def test_the_robot_reacts_to_every_fault_as_its_kind_demands(cells: Sequence[Cell]) -> None:
+    assert [(cell.mode_name, cell.phase, cell.why) for cell in cells if not cell.ok] == []
+    assert {cell.fault for cell in cells} == set(FAULTS)
+
+
+def test_a_fault_that_stops_the_robot_leaves_it_without_torque(cells: Sequence[Cell]) -> None:
+    stopped = [cell for cell in cells if cell.reaction in ("soft_stop", "damping", "drives_idle")]
+    assert len(stopped) > 20
+    assert all(cell.zero_torque_ticks is not None and cell.disarmed for cell in stopped)
+    assert any(cell.peak_torque_nm > 0.0 for cell in stopped)
+
+
+def test_every_component_that_can_be_slow_lossy_or_full_of_garbage_has_a_failure_mode() -> None:
+    degradable = {
+        (part, kind)
+        for part, kinds in EFFECTS.items()
+        for kind in (FailureKind.SLOW, FailureKind.INTERMITTENT, FailureKind.GARBAGE)
+        if kind in kinds
+    }
+    named = {tuple(mode.how.split()) for mode in FAILURE_MODES if mode.fault == "degraded"}
+    assert degradable - named == {("loop", "slow"), ("clock", "garbage")}  # these have faults of their own
+
+
+def test_a_cell_follows_from_its_name_phase_and_seed() -> None:
+    first, again, other = (run_cell("drive_quiet", "hold", seed) for seed in (1, 1, 2))
+    assert first == again
+    assert first.peak_torque_nm != other.peak_torque_nm
+
+
+@pytest.mark.parametrize(("faults", "phases"), [(("fog",), PHASES), (FAULTS, ("midnight",))])
+def test_an_unknown_fault_or_phase_is_refused(faults: tuple[str, ...], phases: tuple[str, ...]) -> None:
+    with pytest.raises(ValueError, match="must be one of"):
+        Plan(faults, phases)
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_the_differences_of_a_type_of_drive_name_failure_modes_and_faults(drive: str) -> None:
+    table = differences(drive)
+    assert set(table) <= set(BY_NAME) and all(difference.why for difference in table.values())
+    for name in table:
+        mode = mode_of(name, drive)
+        assert {*mode.instead, *mode.also} <= set(FaultKind) and mode.why == table[name].why
+
+
+def test_a_failure_that_a_drive_cannot_have_is_reported_and_has_no_cell() -> None:
+    plan = Plan(drive="mit:AK80-9")
+    assert "watchdog_off" not in {key.mode_name for key in plan.cells}
+    assert plan.differences["watchdog_off"].startswith("does not exist: ")
+    assert "watchdog_off" in {key.mode_name for key in Plan(drive="mit").cells}
+
+
+def test_a_failure_that_shows_as_another_has_the_bounds_of_that_one() -> None:
+    mode = mode_of("watchdog_off", "moteus")
+    assert mode.kind is FaultKind.FOREIGN_COMMANDS and mode_of("watchdog_off", "odrive").kind is FaultKind.WATCHDOG_OFF
+    assert Plan(drive="moteus").differences["watchdog_off"].startswith("shown as foreign_commands and also ")
+
+
+def test_a_push_ends_with_the_fault_that_the_protocol_shows_at_the_latest() -> None:
+    name = "encoder_stuck, at zero speed"
+    bounds = [run_cell(name, "stance", 1, drive).pushed_bound_ticks for drive in ("odrive", "moteus")]
+    assert bounds == [
+        REACTING_TICKS + kind.bound_ticks for kind in (FaultKind.ENCODER_STUCK, FaultKind.JOINT_NOT_FOLLOWING)
+    ]
+    assert mode_of(name, "moteus").pushes_until in set(FaultKind)
+
+
+def test_a_failure_that_a_drive_cannot_show_is_injected_and_its_energy_bounded() -> None:
+    cell = run_cell("voltage_under", "hold", 1, "mit")
+    assert (cell.ok, cell.reported, cell.bound_ticks) == (True, [], None) and cell.energy_j <= cell.energy_bound_j
+    assert Plan(drive="mit").differences["voltage_under"].startswith("any reaction, or none: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "drive"),
+    [
+        ("position_silent", "mit"),
+        ("drive_error, by another program's stop", "mit:AK80-9"),
+        ("torque_missing", "mit"),
+        ("drive_silent", "mit:AK80-9"),
+    ],
+)
+def test_a_drive_in_mit_mode_shows_a_failure_as_its_protocol_can(name: str, drive: str) -> None:
+    assert run_cell(name, "hold", 1, drive).why == []
+
+
+def test_damping_in_stiff_mud_gives_no_energy_to_joints_whose_drives_answer_a_tick_late() -> None:
+    """With velocities that did not know the torque sent since, 1.7 J in three seconds."""
+    cell = run_cell("encoder_jump", "recovery", 1, "mit")
+    assert cell.why == [] and cell.energy_j < 0.1
+
+
+def test_the_phase_of_arming_waits_for_joints_that_move_while_idle() -> None:
+    """A robot that is armed by force waits for no watchdog: its arms may still sink when the drives are ready."""
+    bench, random = bench_for("arming", Random(1), drive="mit:AK80-9"), Random(1)
+    request, refused = bench.loop.request, [True, False]
+
+    def refused_once(*arguments: Any, **options: Any) -> str | None:
+        return "a joint moves" if refused.pop(0) else request(*arguments, **options)
+
+    vars(bench.loop)["request"] = refused_once
+    enter_phase(bench, "arming", random)
+    bench.step()
+    assert refused == [] and bench.loop.mode in (Mode.ARMING, Mode.HOLD)
+
+
+def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "none, wall clock +0.01 s"
+    assert run_cell(name, "stance", 1).ok
+    monkeypatch.setattr(stamp_clock, "STEP_S", 10.0)
+    assert not run_cell(name, "stance", 1).ok
+
+
+@pytest.mark.parametrize(
+    ("name", "phase"),
+    [
+        ("none", "stance"),
+        ("drive_late", "hold"),
+        ("drive_energised", "idle"),
+        ("drive_error, by its watchdog", "hold"),
+        ("drive_error, by another program's stop", "hold"),
+        ("foreign_commands", "idle"),
+        ("setpoint_mismatch, every second command", "hold"),
+        ("bus_refuses", "hold"),
+        ("loop_overrun", "hold"),
+        ("loop_lagging", "hold"),
+        ("loop_stalled", "idle"),
+        ("daemon_hung", "hold"),
+        ("current_stale", "recovery"),  # in clay of 9 kPa, in which the pose is held without oscillation
+        ("arming_failed", "arming"),
+        ("watchdog_unknown", "idle"),
+        ("watchdog_off", "idle"),
+        ("watchdog_off", "stance"),
+        ("encoder_stuck, at zero speed", "stance"),
+    ],
+)
+def test_moteus_react_to_what_differs_from_drives_that_report_by_themselves(name: str, phase: str) -> None:
+    cell = run_cell(name, phase, 1, "moteus")
+    assert cell.why == []
+
+
+def test_torque_of_another_program_must_end_with_that_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A moteus starts again with each foreign command; the torque of other drives must end once they are idle."""
+    name = "foreign_commands"
+    assert run_cell(name, "hold", 1, "moteus").ok
+    monkeypatch.setitem(BY_TYPE, "moteus", {})
+    assert "torque or closed loop came back by itself" in run_cell(name, "hold", 1, "moteus").why
+
+
+# the evaluation
+
+
+def run_mode(monkeypatch: pytest.MonkeyPatch, mode: FailureMode, phase: str = "hold") -> Cell:
+    monkeypatch.setitem(BY_NAME, mode.name, mode)
+    return run_cell(mode.name, phase, 1)
+
+
+def test_a_missing_fault_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = run_mode(monkeypatch, replace(BY_NAME["drive_quiet"], inject=nothing))
+    assert not cell.ok and "no reaction" in cell.why and "torque at the end" in cell.why
+
+
+def test_an_escaped_exception_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = run_mode(monkeypatch, replace(BY_NAME["clock_step"], inject=bug_in("controller.step")))
+    assert "an exception escaped: DeliberateBugError: controller.step" in cell.why
+
+
+def test_a_fault_in_the_control_group_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = run_mode(monkeypatch, replace(BY_NAME["none"], inject=BY_NAME["voltage_low"].inject))
+    assert cell.why == ["without a failure it reported voltage_low"]
+
+
+LOW_SUPPLY = BY_NAME["voltage_under"]
+
+
+@contextmanager
+def arming_again(bench: FaultBench, joint: str) -> Iterator[None]:
+    """Request torque in every step, also after the fault."""
+
+    def ask() -> None:
+        bench.loop.request(Request.ARM, bench.now_s)
+
+    bench._acts.append(ask)
+    with LOW_SUPPLY.inject(bench, joint):
+        yield
+
+
+@pytest.mark.parametrize("phase", ["idle", "hold"])
+def test_a_robot_that_arms_again_fails_the_cell(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = run_mode(monkeypatch, replace(LOW_SUPPLY, inject=arming_again), phase)
+    assert "torque or closed loop came back by itself" in cell.why
+
+
+GOOD = Cell("drive_quiet", "drive_quiet", "hold", 1, "left_sweep", "damping", 5, 4, 4, ["drive_quiet"], "fault", 0.3,
+            zero_torque_ticks=100)  # fmt: skip
+
+
+def test_a_good_cell_has_no_problem() -> None:
+    assert list(problems(GOOD, BY_NAME["drive_quiet"])) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"reaction_ticks": 6}, "6 ticks"),
+        ({"reaction_ticks": None}, "no reaction"),
+        ({"reported_ticks": 6}, "reported after 6"),
+        ({"reported": []}, "no event"),
+        ({"disarmed": False}, "by itself"),
+        ({"rows_lost": 1}, "1 row"),
+        ({"damping_torque_nm": 0.41}, "while damping"),
+        ({"zero_torque_ticks": None}, "torque at the end"),
+        ({"mode": "hold"}, "mode hold"),
+        ({"stop_s": 3.3}, "3.3 s"),
+        ({"exception": "KeyError: 1"}, "KeyError"),
+        ({"energy_j": 0.51, "energy_bound_j": 0.5}, "0.51 J"),
+        ({"pushed_ticks": 6, "pushed_bound_ticks": 5}, "end stop"),
+    ],
+)
+def test_every_deviation_fails_the_cell(change: dict[str, Any], word: str) -> None:
+    (message,) = problems(replace(GOOD, **change), BY_NAME["drive_quiet"])
+    assert word in message
+
+
+def test_the_summary_of_a_fault_has_its_slowest_cell(cells: Sequence[Cell]) -> None:
+    cell = next(cell for cell in cells if cell.fault == "drive_quiet")
+    slower = replace(cell, reaction_ticks=99, ok=False)
+    (row,) = report_of(Plan(), [cell, slower]).faults
+    assert (row.cells, row.ok, row.slowest_ticks) == (2, 1, 99)
+
+
+# the bench
+
+
+def make_bench() -> FaultBench:
+    return bench_for("hold", Random(1))
+
+
+def test_a_stalled_loop_misses_its_ticks_while_the_robot_moves_on() -> None:
+    bench = make_bench()
+    bench.run_for(0.1)
+    made, missed = bench.loop_ticks, bench.loop.missed_ticks
+    bench.stalled_steps = 5
+    for _ in range(6):
+        bench.step()
+    assert (bench.loop_ticks, bench.loop.missed_ticks) == (made + 1, missed + 5)
+    assert bench.robot.now_s == pytest.approx(bench.now_s, abs=0.001)
+
+
+def test_a_lease_lost_right_after_an_arm_request_names_its_holder_and_prevents_arming() -> None:
+    bench = make_bench()
+    bench.run_for(1.0)
+    bench.loop.lease.renew("alice", bench.now_s, 1.0)
+    assert bench.loop.request(Request.ARM, bench.now_s) is None
+    bench.loop.lease.hang_up("alice")
+    bench.step()
+    assert bench.loop.mode is Mode.IDLE
+    assert FaultKind.LEASE_LOST.fault(holder="alice") in bench.loop.faults.present

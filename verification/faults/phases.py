@@ -1,0 +1,136 @@
+"""The phases of operation in which failures are injected: at rest, arming, every phase of a stride, stopping.
+
+Each phase has a function that operates a robot from power-on into the phase, plus a random number of ticks.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+
+from control.controller import WalkOrder
+from control.modes import Mode, Request
+from control.parameters.fault_bounds import FaultBounds
+from control.parameters.recovery_parameters import RecoveryParameters
+from control.records import Phase
+from drivers.drive import DriveParameters
+from drivers.drive_types import DEFAULT
+from experiments.trials.trial import WALKING, configuration_of
+from firmware_host.configuration.configuration import Configuration
+from simulation.mud.clay import MUDS, Clay
+from simulation.mud.track import Track
+from verification.faults.bench import FaultBench
+
+LENGTH_M = 5.0
+HOLDING_CLAY = Clay("9 kPa", 9000.0)  # in which an insertion of 5 cm leaves the flippers stuck
+DEEP = WalkOrder(0.05, adaptive=False)
+FIRST_DEPTH_M = 0.03
+LONGEST_PATH_S = 8.0
+STRIDE_TICKS = {  # of the random delay into a phase of the gait: at most about two thirds of it
+    Phase.INSERTION: 100,
+    Phase.STANCE: 60,
+    Phase.EXTRACTION: 20,
+    Phase.SWING: 200,
+}
+SHORT_RECOVERY = RecoveryParameters(attempts=1, grace_s=0.05, pause_s=0.05, attempt_s=0.2)
+
+GAIT = ("insertion", "stance", "extraction", "swing")
+AWAKE = ("arming", "hold", *GAIT, "stopping")
+EVERYWHERE = ("idle", *AWAKE)
+PHASES = (*EVERYWHERE, "recovery")
+
+
+def bench_for(phase: str, random: Random, hopeless: bool = False, drive: str = DEFAULT) -> FaultBench:
+    """Make a robot at power-on. In recovery its flippers are stuck; if `hopeless`, the robot soon gives up."""
+    clay = HOLDING_CLAY if phase == "recovery" else random.choice(list(MUDS.values()))
+    configuration = _configuration(hopeless, drive)
+    return FaultBench(configuration, Track([(LENGTH_M, clay)]), random.getrandbits(31))
+
+
+def _configuration(hopeless: bool, drive_type: str) -> Configuration:
+    """Use the bounds of a real robot; simulations in real time have wider ones, for the pauses of a busy computer."""
+    usual = configuration_of(WALKING, drive_type)
+    drives = {joint: _as_real(drive) for joint, drive in usual.drive.items()}
+    configuration = replace(usual, faults=FaultBounds(), drive=drives)
+    return replace(configuration, recovery=SHORT_RECOVERY) if hopeless else configuration
+
+
+def _as_real(drive: DriveParameters) -> DriveParameters:
+    has_number = drive.reports_settings and drive.serial_digits
+    serial_number = f"{drive.node_id:0{drive.serial_digits}x}" if has_number else ""
+    return replace(drive, serial_number=serial_number, command_delay_s=DriveParameters.command_delay_s)
+
+
+def enter_phase(bench: FaultBench, phase: str, random: Random) -> None:
+    """Operate the robot into the phase. Raises RuntimeError where it does not get there."""
+    _PHASE_ENTRIES[phase](bench, random)
+
+
+def _to_idle(bench: FaultBench, random: Random) -> None:
+    loop = bench.loop
+    _reach(bench, "idle", lambda: loop.mode is Mode.IDLE and not loop.faults.blocking(bench.forced))
+    _wait(bench, random, 100)
+
+
+def _to_arming(bench: FaultBench, random: Random) -> None:
+    """Stop in a tick before closed loop is requested, or while drives enter it, which takes 1 to 38 ticks."""
+    _to_idle(bench, random)
+    _reach(bench, "arming", lambda: bench.loop.request(Request.ARM, bench.now_s, forced=bench.forced) is None)
+    for _ in range(random.randint(0, 8)):
+        if bench.loop.mode is not Mode.HOLD:
+            bench.step()
+
+
+def _to_hold(bench: FaultBench, random: Random) -> None:
+    bench.arm()
+    _wait(bench, random, 250)
+
+
+def _to_walk(bench: FaultBench, random: Random) -> None:
+    bench.arm()
+    bench.walk(WalkOrder(FIRST_DEPTH_M))
+
+
+def _to_phase_of_gait(phase: Phase) -> Callable[[FaultBench, Random], None]:
+    def go(bench: FaultBench, random: Random) -> None:
+        _to_walk(bench, random)
+        _reach(bench, phase.name.lower(), lambda: bench.loop.controller.target.phase is phase)
+        delay = random.randint(0, STRIDE_TICKS[phase])
+        for _ in range(delay):
+            bench.step()
+
+    return go
+
+
+def _to_stopping(bench: FaultBench, random: Random) -> None:
+    _to_phase_of_gait(random.choice((Phase.INSERTION, Phase.STANCE)))(bench, random)
+    bench.loop.request(Request.STOP, bench.now_s)
+    bench.step()
+    _wait(bench, random, 60)
+
+
+def _to_recovery(bench: FaultBench, random: Random) -> None:
+    bench.arm()
+    bench.walk(DEEP)
+    _reach(bench, "recovery", lambda: bench.loop.controller.target.phase is Phase.RECOVERY)
+    if bench.loop.configuration.recovery != SHORT_RECOVERY:
+        _wait(bench, random, 400)
+
+
+def _reach(bench: FaultBench, phase: str, there: Callable[[], bool]) -> None:
+    if not bench.run_until(there, LONGEST_PATH_S):
+        raise RuntimeError(f"the robot did not reach {phase}: {bench.loop.mode.name}, {bench.loop.fault}")
+
+
+def _wait(bench: FaultBench, random: Random, most_ticks: int) -> None:
+    for _ in range(random.randint(0, most_ticks)):
+        bench.step()
+
+
+_PHASE_ENTRIES: dict[str, Callable[[FaultBench, Random], None]] = {
+    "idle": _to_idle,
+    "arming": _to_arming,
+    "hold": _to_hold,
+    **{phase.name.lower(): _to_phase_of_gait(phase) for phase in STRIDE_TICKS},
+    "stopping": _to_stopping,
+    "recovery": _to_recovery,
+}

@@ -1,0 +1,291 @@
+"""An hour of operation without growth: the loop, its status socket and a real recorder, in accelerated lockstep.
+
+The robot walks over a long sequence of muds. A random operator arms, walks, stops, disarms and clears through the
+socket; other clients ask and leave, some at once and some without reading; parts of the robot fail at random times. As
+in the daemon no garbage is collected. The simulated robot and the clients are in the same process, so their memory
+counts too. Rows reach the recorder as fast as its pipe takes them, many times faster than on a robot.
+
+After the warm-up (the loop keeps its last 200 strides, Python its free lists, each up to a bound) resident memory must
+not grow by more than the bar, every descriptor and thread must be released, the logs must stay within quota plus the
+file that is being written, and the files that the quota has preserved must contain every tick. Nothing traces
+allocations; a collection at the end counts the cyclic garbage.
+"""
+
+import gc
+import select
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from typing import Any, NamedTuple
+
+import msgpack
+import numpy as np
+
+from control.modes import Mode
+from control.rate import RATE_HZ
+from drivers.fault_injection.failures import Failures
+from firmware_host.computer.realtime import freeze_garbage
+from firmware_host.configuration.log_parameters import LogParameters
+from firmware_host.fault_injection.failure_calls import with_failures
+from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files, new_run_id
+from firmware_host.log.recorder import LogReport, Recorder
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.sockets.status_socket import StatusSocket
+from firmware_host.sockets.user_groups import load_rights
+from logs.files.log_reader import read_log
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water
+from simulation.mud.track import Track
+from simulation.mud.unevenness import RandomStrength
+from verification.example_robot import load_example
+from verification.report import evaluated, run_benchmark, show_progress
+from verification.stress.resources import descriptors, resident_kib, threads
+from verification.stress.stream_client import StreamClient
+
+BAR_KIB = 1024.0
+WARM_UP_FRACTION = 0.2  # of the readings
+LOG = LogParameters(segment_bytes=8_000_000, quota_bytes=40_000_000, min_free_fraction=0.0, rest_hz=0.0)
+CALL_TICKS = 190  # between two calls of the operator
+BY_HAND_TICKS = 1900  # between two checks for joints out of their range
+FAILURE_S = 15.0  # between two failures, on average
+SEGMENTS, SEGMENT_M = 100, 3.0
+PATIENCE_TICKS = 200  # of a client that waits for an answer
+SILENT_FRACTION, HURRIED_FRACTION = 0.1, 0.05  # of the clients: never read, leave before the answer
+READINGS = 30
+ROOM_MS = 20_000  # that the writer may take to empty its pipe
+QUESTIONS = ("status", "strides", "map", "check", "hello", "failures")
+DEPTHS_M = (0.02, 0.03, 0.04, 0.05)
+UNHARMED = "log"  # its failures lose rows on purpose
+
+
+class Call(NamedTuple):
+    method: str
+    params: dict[str, Any]
+
+
+class RandomOperator:
+    """Owns the random numbers; the same seed gives the same calls."""
+
+    def __init__(self, buses: Sequence[str], seed: int) -> None:
+        self.chance = Random(seed)
+        table = Failures(buses).table()
+        self._failures = [(component, str(kind)) for component, kind, _ in table if component != UNHARMED]
+
+    def question(self) -> Call:
+        method = self.chance.choice(QUESTIONS)
+        return Call(method, {"since": self.chance.randrange(1000)} if method == "strides" else {})
+
+    def failure(self) -> Call:
+        component, kind = self.chance.choice(self._failures)
+        for_s = round(self.chance.choice((0.02, 0.1, 0.5, 1.0)) * self.chance.uniform(0.5, 1.5), 3)
+        return Call("fail", {"component": component, "kind": kind, "for_s": for_s})
+
+    def next_call(self, mode: str, blocked: bool) -> Call:
+        """Returns the next call that makes sense in this mode, or a question."""
+        draw = self.chance.random()
+        if mode in ("fault", "damping") or (mode == "idle" and blocked):
+            return Call("clear", {})
+        if mode == "idle":
+            return Call("arm", {})
+        if mode == "hold":
+            return Call("disarm", {}) if draw < 0.05 else self._walk()
+        if mode == "walking" and draw < 0.05:
+            return Call("stop" if draw < 0.03 else "disarm", {})
+        return self.question()
+
+    def _walk(self) -> Call:
+        walk: dict[str, Any] = {"strides": self.chance.choice((0, 0, 0, 1, 5))}
+        if self.chance.random() < 0.3:
+            walk["depth_m"] = self.chance.choice(DEPTHS_M)
+        return Call("walk", walk)
+
+
+class PatientRecorder(Recorder):
+    """Waits for room, since a loop without a clock is faster than any writer."""
+
+    def put(self, kind_index: int, payload: bytes) -> bool:
+        if not self._room.poll(ROOM_MS):
+            raise RuntimeError("the log's writer takes no row any more")
+        return super().put(kind_index, payload)
+
+    def watch(self) -> None:
+        self._room = select.poll()
+        self._room.register(self._pipe, select.POLLOUT)
+
+    def report(self) -> LogReport:
+        """Omits the age of the writer's reports, which has another clock."""
+        return super().report()._replace(slowest_write_s=0.0)
+
+
+class SoakedLoop:
+    """Owns robot, socket and recorder, and the counts."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        configuration = replace(load_example(), log=LOG)
+        self.operator = RandomOperator(list(configuration.bus), seed)
+        self.chance = self.operator.chance
+        self.logs = folder / "logs"
+        run = new_run_id("soak")
+        metadata = {"robot": "soak", "run_id": run}
+        self.recorder = PatientRecorder(first_path(self.logs, run), configuration.text, metadata, LOG)
+        self.recorder.watch()
+        failures = Failures(configuration.bus, seed)
+        self.robot = Lockstep(configuration, self._track(), seed, self.recorder, failures=failures)
+        calls = OperatorCalls(self.robot.loop, [], self._now_s)
+        self.socket = StatusSocket(folder / "s", {}, load_rights(configuration.status))
+        self.socket.methods = with_failures(calls.methods, failures, self.robot.loop.events.report, self._now_s)
+        self.bugs: list[str] = []
+        self.socket.report_bug = self.bugs.append
+        self.visitors: list[tuple[StreamClient, int, int]] = []  # with the number of its calls and its last tick
+        self.asked: Counter[str] = Counter()
+        self.faults: Counter[str] = Counter()
+        self.mode_ticks: Counter[str] = Counter()
+        self.ticks = self.visits = self.refused = self.moved_by_hand = 0
+
+    def _now_s(self) -> float:
+        return self.robot.now_s
+
+    def _track(self) -> Track:
+        waters = [self.chance.uniform(DRIEST_PERCENT + 1.0, WETTEST_PERCENT - 1.0) for _ in range(SEGMENTS)]
+        track = Track([(SEGMENT_M, clay_of_water(water)) for water in waters], random_strength=RandomStrength(0.2))
+        track.clay_at(SEGMENTS * SEGMENT_M)  # drawn as far as this, so that it does not grow on the way
+        return track
+
+    def run_for(self, seconds: float) -> None:
+        """Runs with operator, visitors and failures, and then until no client is connected."""
+        for _ in range(round(seconds * RATE_HZ)):
+            self._step()
+            self._invite()
+        while self.visitors or self.socket.counters["clients"]:
+            self._step()
+
+    def _step(self) -> None:
+        loop = self.robot.loop
+        self.robot.step()
+        self.socket.serve(self.robot.now_s)
+        self.ticks += 1
+        self.mode_ticks[loop.mode.name.lower()] += 1
+        self.faults.update(fault.name for fault in loop.faults.begun)
+        self.visitors = [visitor for visitor in self.visitors if not self._is_gone(*visitor)]
+
+    def _is_gone(self, client: StreamClient, calls: int, last_tick: int) -> bool:
+        client.step()
+        gone = client.closed or len(client.answers) >= calls or self.ticks >= last_tick
+        if gone:
+            self.refused += sum(problem is not None for problem in client.answers.values())
+            client.close()
+        return gone
+
+    def _invite(self) -> None:
+        """Lets the operator and failures come at their times, and resets joints that a fault moved out of range."""
+        loop = self.robot.loop
+        if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.present):
+            for arm in self.robot.robot.plant.arms:
+                arm.reset()
+            self.moved_by_hand += 1
+        if self.ticks % CALL_TICKS == 0:
+            self._visit(self.operator.next_call(loop.mode.name.lower(), bool(loop.faults.blocking())))
+        if self.chance.random() < 1.0 / (FAILURE_S * RATE_HZ):
+            self._visit(self.operator.failure())
+
+    def _visit(self, call: Call) -> None:
+        calls = [call, *(self.operator.question() for _ in range(self.chance.randrange(3)))]
+        data = b"".join(msgpack.packb([0, number, *each]) for number, each in enumerate(calls))
+        hurried, silent = self.chance.random() < HURRIED_FRACTION, self.chance.random() < SILENT_FRACTION
+        client = StreamClient(self.socket.path, [data], hurried, reads=not silent)
+        self.visitors.append((client, len(calls), self.ticks + PATIENCE_TICKS))
+        self.visits += 1
+        self.asked.update(each.method for each in calls)
+
+    def reading(self) -> dict[str, float]:
+        writer = self.recorder.writer_pid
+        return {
+            "at_s": round(self.robot.now_s, 1),
+            "resident_kib": resident_kib(),
+            "descriptors": descriptors(),
+            "threads": threads(),
+            "writer_kib": resident_kib(writer),
+            "writer_descriptors": descriptors(writer),
+            "log_bytes": sum(path.stat().st_size for path in log_files(self.logs, ACTIVE, DONE)),
+        }
+
+    def report(self) -> dict[str, Any]:
+        loop = self.robot.loop
+        return {
+            "simulated_s": round(self.robot.now_s, 1),
+            "strides": loop.learning.strides_closed,
+            "walked_m": round(self.robot.robot.plant.body_m, 2),
+            "moved_by_hand": self.moved_by_hand,
+            "visits": self.visits,
+            "asked": dict(self.asked),
+            "refused": self.refused,
+            "faults": dict(self.faults),
+            "modes_s": {mode: round(ticks / RATE_HZ, 1) for mode, ticks in self.mode_ticks.items()},
+            "bugs": self.bugs[:10],
+            "dropped": self.recorder.dropped,
+        }
+
+    def close(self) -> None:
+        self.socket.close()
+        self.recorder.close(60.0)
+
+
+def soak(folder: Path, seed: int, seconds: float) -> dict[str, Any]:
+    soaked, readings = SoakedLoop(folder, seed), []
+    try:
+        freeze_garbage()
+        for number in range(READINGS):
+            show_progress(number, READINGS, "in lockstep")
+            soaked.run_for(seconds / READINGS)
+            readings.append(soaked.reading())
+        report = soaked.report() | {"garbage": count_garbage(), "readings": readings}
+        if soaked.robot.loop.mode is Mode.BOOT:
+            raise RuntimeError("the drives were never heard")
+    finally:
+        soaked.close()
+    return report | rows_of(soaked.logs)
+
+
+def count_garbage() -> dict[str, Any]:
+    """Counts the reference cycles since collections ended, which only a collection frees."""
+    gc.set_debug(gc.DEBUG_SAVEALL)
+    gc.collect()
+    kinds = Counter(type(each).__name__ for each in gc.garbage)
+    gc.set_debug(0)
+    gc.garbage.clear()
+    return {"objects": sum(kinds.values()), "kinds": dict(kinds.most_common(6))}
+
+
+def rows_of(logs: Path) -> dict[str, Any]:
+    """Counts the rows in the files that the quota preserved: ticks are numbered, and count the missed ones."""
+    read = [read_log(path) for path in log_files(logs, ACTIVE, DONE)]
+    ticks = np.concatenate([log.ticks[["tick", "missed_ticks"]] for log in read])
+    numbers = ticks["tick"].astype(np.int64) - ticks["missed_ticks"].astype(np.int64)
+    return {
+        "files": len(read),
+        "files_not_whole": sum(not log.complete for log in read),
+        "ticks_in_files": len(ticks),
+        "ticks_missing": int(np.abs(np.diff(numbers) - 1).sum()),
+    }
+
+
+def measure(folder: Path, *, hours: float = 1.0, seed: int = 1) -> dict[str, Any]:
+    report = soak(folder, seed, 3600.0 * hours)
+    after = report["readings"][int(WARM_UP_FRACTION * READINGS) :]
+    growth_kib = after[-1]["resident_kib"] - after[0]["resident_kib"]
+    left = {name: after[-1][name] - after[0][name] for name in ("descriptors", "threads", "writer_descriptors")}
+    quota_bytes = LOG.quota_bytes + LOG.segment_bytes
+    largest_log_bytes = max(reading["log_bytes"] for reading in report["readings"])
+    sound = not (report["bugs"] or report["dropped"] or report["ticks_missing"] or report["files_not_whole"])
+    sound = sound and growth_kib < BAR_KIB and max(left.values()) <= 0 and largest_log_bytes <= quota_bytes
+    report |= {"seed": seed, "growth_kib": growth_kib, "left": left}
+    report |= {"largest_log_bytes": largest_log_bytes, "quota_bytes": quota_bytes}
+    bar = f"growth below {BAR_KIB:.0f} KiB, nothing left over, no row lost, logs within their quota"
+    return evaluated(report, bar, sound)
+
+
+if __name__ == "__main__":
+    sys.exit(run_benchmark(measure))
