@@ -34,6 +34,7 @@ def walks(tmp_path: Path, configuration: Configuration) -> list[LoggedTime]:
     logged = [LoggedTime("run", *span_s) for span_s in walk_and_hold(robot, 1, 2, rest_s=15.0)]
     assert recorder.close(20.0)
     stamps_s = {log: read_log(log).ticks["stamp_s"] for log in log_files(tmp_path / "logs", DONE)}
+    stamps_s = {log: at_s for log, at_s in stamps_s.items() if at_s.size}  # a busy writer may leave a segment empty
     copied = [log for log, at_s in stamps_s.items() if at_s[0] < logged[0].to_s or at_s[-1] > logged[1].from_s]
     assert len(copied) < len(stamps_s)
     for log in copied:
