@@ -18,7 +18,7 @@ from typing import Any
 from experiments.campaign.campaign import run_campaign
 from experiments.campaign.campaign_file import Campaign, load_campaign
 from experiments.robot.prompt import AutomaticOperator
-from experiments.trials.parallel_trials import LocalWorkers
+from experiments.study.workers import LocalWorkers
 from experiments.trials.session import Session
 from verification.report import evaluated, run_benchmark, show_progress
 
