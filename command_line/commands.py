@@ -3,10 +3,11 @@
 A function is named as `module.function` below this package, and imported when its command is used.
 """
 
-from collections.abc import Mapping
-from typing import TypeAlias
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
-Target: TypeAlias = "str | Mapping[str, Command]"  # a function, or the commands of a group
+# A function, the commands of a group, or what adds the options itself
+Target: TypeAlias = "str | Mapping[str, Command] | Callable[[Any], None]"
 Command: TypeAlias = tuple[Target, str]  # with its help
 
 DRIVES: Mapping[str, Command] = {

@@ -9,10 +9,10 @@ from typing import Any
 
 from command_line import exit_codes
 from command_line.errors import report
+from command_line.function_options import given_options
 from command_line.json_output import JSON, answers, print_error
 from command_line.parser import build_parser
 from command_line.screen import complaints
-from experiments.options.function_options import call_with_options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,7 +41,7 @@ def _run(given: Sequence[str]) -> int:
     try:
         options = build_parser(given).parse_args(given)
         if callable(options.function):
-            return int(call_with_options(options.function, options))
+            return int(options.function(**given_options(options, options.function)))
         module, function = options.function.rsplit(".", 1)
         run: Callable[[Any], int] = getattr(import_module(f"command_line.{module}"), function)
         return run(options)

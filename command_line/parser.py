@@ -10,8 +10,8 @@ from typing import Any, NoReturn
 
 from command_line import exit_codes
 from command_line.commands import COMMANDS, Command, Target
+from command_line.function_options import add_function_options
 from command_line.screen import complaints
-from experiments.options.function_options import add_options
 
 MISSING = "the following arguments are required"  # as argparse says it
 
@@ -36,7 +36,10 @@ class Parser(argparse.ArgumentParser):
     """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
 
     def __init__(self, *arguments: Any, target: Target = "", **keywords: Any) -> None:
-        """Make the parser of a function, named as `module.function` below command_line, or of a group of commands."""
+        """Make the parser of a function, named as `module.function` below command_line, or of a group of commands.
+
+        A target that can be called adds the options itself.
+        """
         super().__init__(*arguments, **keywords | {"allow_abbrev": False, "formatter_class": Formatter})
         self._target = target
 
@@ -45,13 +48,15 @@ class Parser(argparse.ArgumentParser):
         target, self._target = self._target, ""
         if isinstance(target, Mapping):
             self.add_commands(target)
+        elif callable(target):
+            target(self)
         elif target:
             module, name = target.rsplit(".", 1)
             function = getattr(import_module(f"command_line.{module}"), name)
             if target.startswith("options."):  # of the logs and the experiments, which are not declared yet
                 function(self)
             else:
-                add_options(self, function)
+                add_function_options(self, function)
                 self.set_defaults(function=function)
 
     def add_commands(self, commands: Mapping[str, Command], title: str = "action") -> None:
@@ -72,7 +77,8 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is no choice with the choices, the most similar first."""
         if action.choices is not None and value not in action.choices:
-            raise argparse.ArgumentError(action, f"there is no {value!r}{suggestion(value, list(action.choices))}")
+            existing = suggestion(str(value), [*map(str, action.choices)])
+            raise argparse.ArgumentError(action, f"there is no {value!r}{existing}")
 
     def error(self, message: str) -> NoReturn:
         if message.startswith(MISSING):

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 from drivers.can.run_folder import find_run_folder
-from experiments.options.option import Option
+from experiments.study.option import Option
 
 DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
 DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
@@ -34,7 +34,7 @@ Socket: TypeAlias = Annotated[
     Path,
     Option(
         "Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else that of the service or the simulated robot)",
-        "PATH",
+        metavar="PATH",
         default=default_socket,
     ),
 ]

@@ -9,7 +9,7 @@ from typing import Annotated
 from command_line.errors import usage_error
 from command_line.screen import complain
 from command_line.shared_options import SIMULATED, Seed
-from experiments.options.option import Option
+from experiments.study.option import Option
 from firmware_host.configuration.loading import load_configuration, parse_configuration
 from simulation.harness import peer
 from simulation.harness.local_setup import configuration_text, make_buses, named_folder, write_local_setup
@@ -22,9 +22,9 @@ def simulate(
     bus: Annotated[str, Option("of the local bus")] = SIMULATED,
     config: Annotated[Path | None, Option("use the buses of this configuration")] = None,
     mud: Annotated[
-        list[str] | None,
-        Option("water content, repeatable: 48.5, 53.1, 45.3", "W", choices=tuple(MUDS), alternative="ground"),
-    ] = None,
+        tuple[str, ...],
+        Option("water content: 48.5, 53.1, 45.3", metavar="W", choices=tuple(MUDS), alternative="ground"),
+    ] = (),
     world: Annotated[Path | None, Option("describes the ground and more", alternative="ground")] = None,
     on_blocks: Annotated[bool, Option("no mud: the flippers move in air, for the bench", alternative="ground")] = False,
     seed: Seed = 1,

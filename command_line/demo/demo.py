@@ -19,10 +19,10 @@ from command_line.json_output import print_json
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, stride_line
 from command_line.shared_options import Json, Seed
 from control.modes import Mode
-from experiments.options.option import Option
-from experiments.options.values import folder
 from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_text
+from experiments.study.option import Option
+from experiments.study.values import folder
 from firmware_host.log.log_folder import DONE, log_files, present_path
 from logs.files.log_reader import Log, read_log
 from operator_client.status_client import CallRefusedError, NoDaemonError
@@ -36,7 +36,7 @@ LEAD_M = 0.06  # distance of the flippers ahead of the body's middle when a stri
 def demo(
     *,
     json: Json = False,
-    out: Annotated[Path, Option("for log and plot", "DIR", parse=folder)] = Path("mudskipper-demo"),
+    out: Annotated[Path, Option("for log and plot", metavar="DIR", parse=folder)] = Path("mudskipper-demo"),
     seed: Seed = 1,
     depth: Annotated[
         float | None, Option("fixed insertion depth (default: adaptive)", unit="cm", above=0.0, high=20.0)

@@ -43,7 +43,7 @@ from command_line.screen import GREEN, RED, YELLOW, coloured
 from command_line.shared_options import DEFAULT_CONFIG, Json
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PoseSourceError
-from experiments.options.option import Option
+from experiments.study.option import Option
 from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -80,7 +80,7 @@ def doctor(
         Path | None,
         Option(
             "Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else the configured one)",
-            "PATH",
+            metavar="PATH",
             default=_given_socket,
         ),
     ],

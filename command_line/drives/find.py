@@ -12,8 +12,8 @@ from command_line.shared_options import Json, RobotConfiguration
 from drivers.bench.search import SearchResult, expectation_problems, id_problems, search
 from drivers.drive import DriveParameters
 from drivers.drive_types import DRIVE_BENCHES
-from experiments.options.option import Option
 from experiments.reports.text_tables import table
+from experiments.study.option import Option
 from firmware_host.configuration.configuration import BusParameters
 from firmware_host.configuration.loading import load_configuration
 
@@ -25,13 +25,11 @@ def find(
     *,
     config: RobotConfiguration,
     json: Json = False,
-    bus: Annotated[list[str] | None, Option("configured bus, repeatable (default: all)")] = None,
+    bus: Annotated[tuple[str, ...], Option("configured bus (default: all)")] = (),
     interface: Annotated[str | None, Option("of python-can, such as socketcan, without a configuration")] = None,
     channel: Annotated[str | None, Option("of that interface, such as can0")] = None,
     fd: Annotated[bool, Option("that interface carries CAN FD")] = False,
-    type: Annotated[
-        list[str] | None, Option("ask drives of this type alone, repeatable", choices=tuple(DRIVE_BENCHES))
-    ] = None,
+    type: Annotated[tuple[str, ...], Option("ask drives of this type alone", choices=tuple(DRIVE_BENCHES))] = (),
 ) -> int:
     drives: Mapping[str, DriveParameters] = {}
     if interface and channel:

@@ -16,7 +16,7 @@ from command_line.shared_options import RobotConfiguration
 from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.settings_change import Names, Outcome, change_settings
 from drivers.drive_types import DRIVE_BENCHES
-from experiments.options.option import Option
+from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
@@ -26,16 +26,16 @@ Changes = Mapping[str, Mapping[str, float]]  # by joint and key
 
 
 def setup(
-    joint: Annotated[list[str] | None, Option("such as left_sweep (default: all)", "JOINT")] = None,
+    joint: Annotated[tuple[str, ...], Option("such as left_sweep (default: all)", metavar="JOINT")] = (),
     *,
     config: RobotConfiguration,
     write: Annotated[bool, Option("write and store what differs, one drive at a time", alternative="write")] = False,
     restore: Annotated[Path | None, Option("write the old settings of this file again", alternative="write")] = None,
     backup: Annotated[Path | None, Option("with --write: new file for the old settings; else: compare with it")] = None,
     endpoints: Annotated[
-        list[Path] | None,
-        Option("flat_endpoints.json of an ODrive's build, repeatable (default: those next to the configuration)"),
-    ] = None,
+        tuple[Path, ...],
+        Option("flat_endpoints.json of an ODrive's build (default: those next to the configuration)"),
+    ] = (),
 ) -> int:
     if write and backup and backup.exists():
         raise usage_error(f"--backup {backup}: exists, and may have the only old settings; name another file")

@@ -21,7 +21,7 @@ from drivers.bench.bench_port import BenchPort
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
 from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
-from experiments.options.option import Option
+from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
@@ -43,7 +43,7 @@ class Reading(NamedTuple):
 
 
 def zero(
-    joint: Annotated[list[str], Option("such as left_sweep", "JOINT")],
+    joint: Annotated[tuple[str, ...], Option("such as left_sweep", metavar="JOINT")],
     *,
     config: RobotConfiguration,
     yes: Annotated[bool, Option("write it without asking")] = False,

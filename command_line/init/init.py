@@ -20,7 +20,7 @@ from control.plate_outline import Corner
 from control.records import FLIPPERS, JOINTS, Rig
 from drivers.drive_types import DRIVE_TYPES
 from experiments.campaign.plate_file import read_corners
-from experiments.options.option import Option
+from experiments.study.option import Option
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 
@@ -50,7 +50,7 @@ def geometry_value(text: str) -> tuple[str, float]:
 
 
 def init(
-    file: Annotated[Path, Option("new file (default: %(default)s); -: print", "file")] = Path("mudskipper.toml"),
+    file: Annotated[Path, Option("new file; -: print", metavar="file")] = Path("mudskipper.toml"),
     *,
     defaults: Annotated[bool, Option("ask nothing")] = False,
     name: Annotated[str | None, Option("of the robot, in its logs")] = None,
@@ -60,16 +60,14 @@ def init(
     interface: Annotated[str | None, Option("of python-can, such as socketcan")] = None,
     from_bus: Annotated[bool, Option("search its channels for drives, and write what is found")] = False,
     fd: Annotated[bool, Option("with --from-bus: it carries CAN FD")] = False,
-    channel: Annotated[list[str] | None, Option("such as can0; twice: the left and the right flipper's own")] = None,
-    node: Annotated[
-        list[tuple[str, int]] | None, Option("right_sweep=3, repeatable", "JOINT=ID", parse=node_id)
-    ] = None,
+    channel: Annotated[tuple[str, ...], Option("such as can0; twice: the left and the right flipper's own")] = (),
+    node: Annotated[tuple[tuple[str, int], ...], Option("right_sweep=3", metavar="JOINT=ID", parse=node_id)] = (),
     plate: Annotated[
-        str | None, Option("corners of a plate that is no rectangle: lines of outward, upward in m", "FILE")
+        str | None, Option("corners of a plate that is no rectangle: lines of outward, upward in m", metavar="FILE")
     ] = None,
     set: Annotated[
-        list[tuple[str, float]] | None, Option("geometry: drop_m=0.05, repeatable", "KEY=M", parse=geometry_value)
-    ] = None,
+        tuple[tuple[str, float], ...], Option("geometry: drop_m=0.05", metavar="KEY=M", parse=geometry_value)
+    ] = (),
 ) -> int:
     """Ask for what no option gives; without a terminal, or with `defaults`, the default is the answer."""
     if file != PRINTED and file.exists():

@@ -24,7 +24,7 @@ from command_line.install.service_plan import (
     plan_removal,
 )
 from command_line.screen import complain
-from experiments.options.option import Option
+from experiments.study.option import Option
 
 HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # ProtectHome= and PrivateTmp= of the unit hide them
 COMMAND_TIMEOUT_S = 120.0  # stopping the service may take 20 s
@@ -82,7 +82,7 @@ def run_command(words: Sequence[str]) -> Outcome:
 
 
 DryRun: TypeAlias = Annotated[bool, Option("only show what would be done")]
-Root: TypeAlias = Annotated[Path, Option("root folder of another system", "DIR")]
+Root: TypeAlias = Annotated[Path, Option("root folder of another system", metavar="DIR")]
 
 
 def install(

@@ -15,7 +15,7 @@ from command_line import exit_codes
 from command_line.errors import CommandError
 from command_line.screen import complain
 from command_line.shared_options import Socket
-from experiments.options.option import Option
+from experiments.study.option import Option
 from firmware_host.log.row_stream import stream_path
 from operator_client.live_rows import LiveRow, LiveRows
 from operator_client.row_subscription import RowSubscription
@@ -37,7 +37,7 @@ def live(
     *,
     socket: Socket,
     page: Annotated[bool, Option("serve a page for a browser in place of a viewer's WebSocket")] = False,
-    host: Annotated[str, Option("to listen on", "ADDRESS")] = "127.0.0.1",
+    host: Annotated[str, Option("to listen on", metavar="ADDRESS")] = "127.0.0.1",
     port: Annotated[int, Option("0: a free one (default: 8765)", low=0, high=65535)] = 8765,
 ) -> int:
     try:

@@ -7,19 +7,19 @@ from command_line.errors import usage_error
 from command_line.json_output import print_json, print_value
 from command_line.operation.operation import connect
 from command_line.shared_options import Json, Socket
-from experiments.options.option import Option
 from experiments.reports.text_tables import table
+from experiments.study.option import Option
 
 
 def fail(
-    component: Annotated[str | None, Option("left_sweep, bus.left, pose ..., or all", "component")] = None,
+    component: Annotated[str | None, Option("left_sweep, bus.left, pose ..., or all", metavar="component")] = None,
     kind: Annotated[
-        str | None, Option("off, stuck, garbage, slow, intermittent ..., or ok to end the failure", "kind")
+        str | None, Option("off, stuck, garbage, slow, intermittent ..., or ok to end the failure", metavar="kind")
     ] = None,
     *,
     socket: Socket,
     json: Json = False,
-    seconds: Annotated[float, Option("seconds until it ends", unit="s", names=("--for",))] = 2.0,
+    seconds: Annotated[float, Option("seconds until it ends", unit="s", name="--for")] = 2.0,
     list: Annotated[bool, Option("list what can fail, how, and what fails now")] = False,
 ) -> int:
     if list and component is not None:

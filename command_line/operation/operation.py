@@ -19,9 +19,9 @@ from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
 from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured
 from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
-from experiments.options.option import Option
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
+from experiments.study.option import Option
 from operator_client.status_client import DroppedError, NoDaemonError, StatusClient
 
 ARMING_S = 5.0
@@ -96,7 +96,9 @@ def joint_angle(text: str) -> tuple[str, float]:
 
 
 def move(
-    angles: Annotated[list[tuple[str, float]], Option("left_sweep=10 ...", "JOINT=DEG", parse=joint_angle)],
+    angles: Annotated[
+        tuple[tuple[str, float], ...], Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle)
+    ],
     *,
     socket: Socket,
     json: Json = False,

@@ -4,8 +4,9 @@ import argparse
 from pathlib import Path
 
 from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket, add_vertical
+from command_line.options.studies import add_studies
 from control.records import JOINTS
-from experiments.options.values import (
+from experiments.study.values import (
     between,
     depth_cm,
     folder,
@@ -37,6 +38,7 @@ LABLOGS = (
 
 def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
+    add_studies(names)
     estimation = add(
         names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
     )

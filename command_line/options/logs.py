@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from command_line.options.shared import Commands, add, add_config, add_json, add_vertical
-from experiments.options.values import folder, mud_length, picture, whole
+from experiments.study.values import folder, mud_length, picture, whole
 
 Parser = argparse.ArgumentParser
 METHODS = ("default", "paper")  # of estimation
@@ -93,5 +93,4 @@ def _add_export(actions: Commands) -> None:
     form = export.add_mutually_exclusive_group(required=True)
     form.add_argument("--csv", action="store_true", help="the columns of the authors' plotter, to standard output")
     form.add_argument("--parquet", action="store_true", help="tables of ticks, strides and events, into this folder")
-    form.add_argument("--ros", action="store_true", help="the log with standard ROS 2 messages, to LOG-ros.mcap here")
     export.add_argument("--out", type=Path, metavar="PATH", help="write this file, for --parquet into this folder")

@@ -13,7 +13,7 @@ from command_line.shared_options import Socket
 from command_line.watch.feed import Feed
 from command_line.watch.orders import send_order
 from command_line.watch.plain_lines import print_lines
-from experiments.options.option import Option
+from experiments.study.option import Option
 
 SCREEN_PERIOD_S, LINES_PERIOD_S = 0.1, 1.0
 

@@ -41,11 +41,12 @@ class StoppingClient:
         return
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def stopping_client(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(operation, "StatusClient", StoppingClient)
 
 
+@pytest.mark.usefixtures("stopping_client")
 @pytest.mark.parametrize("command", ["stop", "disarm"])
 def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(command: str) -> None:
     ended = run(command)
@@ -53,6 +54,7 @@ def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(
     assert "accepted" in ended.stderr and TORQUE_UNKNOWN in ended.stderr
 
 
+@pytest.mark.usefixtures("stopping_client")
 @pytest.mark.parametrize("command", ["status", "arm", "walk", "walk --attended", "clear", "check"])
 def test_anything_else_is_not_permitted(command: str) -> None:
     ended = run(*command.split())
