@@ -8,6 +8,7 @@ from typing import Any
 from experiments.pictures.mud_layout import MudLayout
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import choose_strides, with_strides
+from experiments.pictures.style import save_picture
 from experiments.reports.counted_nouns import counted
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.report_page import Figure, Section
@@ -111,7 +112,7 @@ def _draw_strip(walk: RecordedWalk, path: Path) -> Any:
     from experiments.pictures.stride_strip import draw_strip
 
     strides = choose_strides(walk)
-    return draw_strip(with_strides(walk, strides), strides, path)
+    save_picture(partial(draw_strip, with_strides(walk, strides), strides), path)
 
 
 def _fits_section(run: Run) -> Section:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from experiments.pictures.colours import FLIPPER_COLOURS, FORWARD, MUD_SHADES, OUTCOME_COLOURS, UP
+from experiments.pictures.style import FLIPPER_COLOURS, FORWARD, MUD_SHADES, OUTCOME_COLOURS, UP
 from experiments.reports.mud_styles import looks_of
 
 VISIONS = {  # Machado, Oliveira and Fernandes (2009), severity 1.0, on linear RGB
