@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.trials.parallel_trials import LocalWorkers, WorkersError, run_parallel
+from experiments.study.workers import LocalWorkers, WorkersError, run_parallel
 from tests.waiting import wait_until
 
 

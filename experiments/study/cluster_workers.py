@@ -17,8 +17,8 @@ from typing import Any
 from distributed import CancelledError, Client, KilledWorker, as_completed
 from distributed.comm import CommClosedError
 
-from experiments.trials.parallel_trials import Result, WorkersError
-from experiments.trials.provenance import Record, identity, program_text
+from experiments.study.provenance import Record, identity, program_text
+from experiments.study.workers import Result, WorkersError
 
 CONNECT_S = 10.0
 MOST_SUBMITTED = 1000  # trials at the scheduler at once; more than a cluster has processors

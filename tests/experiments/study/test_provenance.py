@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from experiments.trials.provenance import PACKAGES, identity, provenance
+from experiments.study.provenance import PACKAGES, identity, provenance
 from tests.folders import ROOT
 
 STUDY = "experiments.trackway.simulation"
-PRINT = "import sys; from experiments.trials.provenance import source_digest; print(source_digest(sys.argv[1]))"
+PRINT = "import sys; from experiments.study.provenance import source_digest; print(source_digest(sys.argv[1]))"
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_another_location_has_the_same_digest_and_a_changed_constant_another_one
 
 def test_an_import_within_a_function_counts(copy: Path) -> None:
     before = digest_of(copy, "command_line.experiments.workers")
-    with (copy / "experiments/trials/cluster_workers.py").open("a") as module:
+    with (copy / "experiments/study/cluster_workers.py").open("a") as module:
         module.write("ANOTHER = 1\n")
     assert digest_of(copy, "command_line.experiments.workers") != before
 

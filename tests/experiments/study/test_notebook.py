@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.trials.notebook import NAME, Notebook, NotebookError
+from experiments.study.notebook import NAME, Notebook, NotebookError
 
 PLAN = {"weights_g": (10, 20), "joint": "right_sweep"}
 

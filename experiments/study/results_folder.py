@@ -10,9 +10,10 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from experiments.reports.report_page import PAGE, SUMMARY
-from experiments.trials.notebook import NAME, NotebookError, count_entries
-from experiments.trials.provenance import program_text
+from experiments.study.notebook import NAME, NotebookError, count_entries
+from experiments.study.provenance import program_text
+
+PAGE, SUMMARY, RESULTS = "report.html", "summary.json", "results.parquet"
 
 
 def make_folder(name: str) -> Path:

@@ -9,19 +9,19 @@ from pathlib import Path
 
 import pytest
 
+from experiments.study.provenance import PACKAGES
+from experiments.study.workers import LocalWorkers, WorkersError, run_parallel
 from experiments.trackway.depth_rule import constant_depth
 from experiments.trackway.one_mud import MudWalk, run_mud_walk
 from experiments.trackway.walk import Walk
-from experiments.trials.parallel_trials import LocalWorkers, WorkersError, run_parallel
-from experiments.trials.provenance import PACKAGES
 from simulation.mud.clay import MUDS
 from tests.folders import ROOT
 
 pytest.importorskip("distributed", reason="needs the extra cluster")
 
-from experiments.trials import cluster_workers  # noqa: E402 - it imports distributed
-from experiments.trials.cluster_workers import ClusterWorkers  # noqa: E402
-from tests.experiments.trials.running_cluster import running_cluster  # noqa: E402
+from experiments.study import cluster_workers  # noqa: E402 - it imports distributed
+from experiments.study.cluster_workers import ClusterWorkers  # noqa: E402
+from tests.experiments.study.running_cluster import running_cluster  # noqa: E402
 
 WALKS = [partial(run_mud_walk, MudWalk(MUDS["48.5"], constant_depth(0.02), seed, strides=1)) for seed in range(1, 4)]
 

@@ -13,7 +13,7 @@ from contextlib import closing, contextmanager
 from multiprocessing import active_children
 from typing import Protocol, TypeVar
 
-from experiments.trials.session import Show
+from experiments.study.session import Show
 
 POLL_S = 0.5
 MOST_LOSSES = 3  # of workers in a row, without a trial that ends
