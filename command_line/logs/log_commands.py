@@ -15,8 +15,8 @@ from command_line.logs.unfinished import complain_of_end
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
-from experiments.pictures.style import save_picture
 from experiments.reports.shown_values import value_shown
+from experiments.reports.style import save_picture
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration

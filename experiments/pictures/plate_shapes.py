@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from control.geometry import FlipperGeometry
 from experiments.campaign.plate_file import read_corners
-from experiments.pictures.style import BODY, FAINT, FLIPPER_COLOURS, INK, MUD, SURFACE, save_picture
+from experiments.reports.style import BODY, FAINT, FLIPPER_COLOURS, INK, MUD, SURFACE, save_picture
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "plates"
 DEPTH_CM = 3.0
@@ -20,7 +20,7 @@ def draw_plates() -> Figure:
     """Draw plates with their arms level and their lowest corners 3 cm deep, seen along their normal."""
     plates = {"rectangle": FlipperGeometry()}
     plates |= {n: FlipperGeometry(plate_corners_m=read_corners(EXAMPLES / f"{n}.csv")) for n in ("trapezoid", "paddle")}
-    figure = Figure(figsize=(2.6 * len(plates), 3.4), layout="constrained")
+    figure = Figure(figsize=(2.6 * len(plates), 3.4))
     panels = figure.subplots(1, len(plates), sharex=True, sharey=True)
     for panel, (name, geometry) in zip(panels, plates.items(), strict=True):
         arm_cm = 100.0 * geometry.drop_m - DEPTH_CM

@@ -15,7 +15,7 @@ from control.records import Phase
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of
 from experiments.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of
-from experiments.pictures.style import FORCE, INK, OUTCOME_COLOURS, SURFACE
+from experiments.reports.style import FORCE, INK, OUTCOME_COLOURS, SURFACE
 from logs.files.whole_files import whole_file
 
 FRAMES_PER_S = 20  # GIF counts in hundredths of a second

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare
 from experiments.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of
-from experiments.pictures.style import INK, OUTCOME_COLOURS
+from experiments.reports.style import INK, OUTCOME_COLOURS
 
 DEEPEST_M, HIGHEST_M = 0.106, 0.146  # range of a row below and above the surface
 SPACING_M = 0.235  # from one moment to the next
@@ -29,7 +29,7 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride]) -> Figure:
     farthest_m = max(_farthest_m(walk, stride) for stride in strides)
     width_m = 2.0 * MARGIN_M + SPACING_M * (len(captions) - 1) + farthest_m
     height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / width_m * len(strides) + HEAD_IN + FOOT_IN
-    figure = Figure(figsize=(WIDTH_IN, height_in))
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="none")
     panels = figure.subplots(len(strides), 1, squeeze=False)
     figure.subplots_adjust(0.0, FOOT_IN / height_in, 1.0, 1.0 - HEAD_IN / height_in, hspace=0.0)
     for panel, stride in zip(panels[:, 0], strides, strict=True):

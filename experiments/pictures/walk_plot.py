@@ -19,7 +19,9 @@ from numpy.typing import ArrayLike
 from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import Floats, RecordedWalk
 from experiments.pictures.stride_choice import Outcome, Stride, outcome_of
-from experiments.pictures.style import (
+from experiments.pictures.walk_trace import rows_of_curve
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.style import (
     FAINT,
     FLIPPER_COLOURS,
     FORWARD,
@@ -30,8 +32,6 @@ from experiments.pictures.style import (
     UP,
     save_picture,
 )
-from experiments.pictures.walk_trace import rows_of_curve
-from experiments.reports.error_table import COEFFICIENTS
 
 WIDTH_IN, PANEL_IN = 10.0, 1.55
 TITLE_HEIGHT = 1.3  # above the names of the muds, in heights of a panel
@@ -66,7 +66,7 @@ def draw_walk(walk: RecordedWalk, layout: MudLayout | None = None) -> Figure:
         "depth (cm)": _draw_depth,
     }
     rows = len(of_flipper) + -(-len(of_body) // len(sides))
-    figure = Figure(figsize=(WIDTH_IN, PANEL_IN * rows + 0.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, PANEL_IN * rows + 0.6))
     axes = figure.subplots(rows, len(sides), sharex=True, squeeze=False)
     for row, (label, draw) in zip(axes, of_flipper.items(), strict=False):
         row[0].set_ylabel(label)

@@ -8,11 +8,11 @@ from typing import Any
 from experiments.pictures.mud_layout import MudLayout
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.stride_choice import choose_strides, with_strides
-from experiments.pictures.style import save_picture
 from experiments.reports.counted_nouns import counted
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.shown_values import value_shown
+from experiments.reports.style import save_picture
 from experiments.run_report.comparison import SHOWN, ComparedRun, differences
 from experiments.run_report.event_groups import group_events
 from experiments.run_report.fit_quality import R_SQUARED, quality_rows

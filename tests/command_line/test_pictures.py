@@ -23,8 +23,8 @@ from experiments.pictures.mud_layout import describe_mud, layout_of_track, mud_r
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
-from experiments.pictures.style import OUTCOME_COLOURS
 from experiments.pictures.walk_plot import MOST_DASHES, draw_walk, plot_walk
+from experiments.reports.style import OUTCOME_COLOURS
 from logs.files.log_reader import read_log
 from logs.lab.export import write_lab_csv
 from simulation.mud.clay import MUDS, Clay

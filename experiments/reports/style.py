@@ -7,8 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from experiments.pictures.stride_choice import Outcome
-
 INK = "#33302c"
 FAINT = "#8c867d"  # helper lines and small text
 MUD_SHADES = ("#f4eee2", "#e6dac4", "#d6c6a8")  # one after the other along the track
@@ -17,12 +15,7 @@ BODY = "#ece8e1"
 FLIPPER_COLOURS = {"left": "#5aa5c4", "right": "#1f6f8b"}
 TRAIL = "#b5462f"
 FORWARD, UP, FORCE = "#d55e00", "#0072b2", "#8e24aa"
-OUTCOME_COLOURS = {
-    Outcome.GOOD: "#0072b2",
-    Outcome.SLIPPING: "#e69f00",
-    Outcome.STUCK: "#6b0f1a",
-    Outcome.UNKNOWN: FAINT,
-}
+OUTCOME_COLOURS = {"good": "#0072b2", "slipping": "#e69f00", "stuck": "#6b0f1a", "unknown": FAINT}
 STYLE: dict[Any, Any] = {
     "agg.path.chunksize": 1000,  # points: a curve of an hour takes 16 MB where it is drawn at once
     "axes.edgecolor": FAINT,
@@ -30,6 +23,8 @@ STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlesize": "medium",
+    "figure.constrained_layout.use": True,
+    "legend.fontsize": "small",
     "pdf.fonttype": 42,  # TrueType: journals refuse matplotlib's own Type 3
     "savefig.dpi": 120,
     "svg.hashsalt": "mudskipper",  # the same picture has the same bytes
