@@ -171,7 +171,7 @@ class Salvage:
         self._number_of_channel.pop(channel.id, None)
         number = KIND_OF_TOPIC.get(channel.topic)
         if number is not None:
-            self.kinds[number] = described_kind(number, self._schemas.get(channel.schema_id))
+            self.kinds[number] = described_kind(number, self._schemas.get(channel.schema_id), channel.metadata)
             self._number_of_channel[channel.id] = number
 
     def _new_row(self, row: Row) -> Iterator[tuple[int, bytes]]:
