@@ -21,7 +21,7 @@ from experiments.loadcell.comparison import Compared, compare_muds
 from experiments.loadcell.recording import load_counted
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.report_page import to_json
-from experiments.trials.notebook import Entry, Notebook
+from experiments.study.notebook import Entry, Notebook
 from experiments.trials.session import Show
 
 

@@ -20,7 +20,7 @@ from experiments.loadcell.analysis.contact import CONTACT_NOISES, LEAST_FORCE_N,
 from experiments.loadcell.analysis.curve_fit import Array
 from experiments.loadcell.analysis.stage_track import StagePositions
 from experiments.robot.bench_errors import BenchError
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from simulation.test_rig.load_cell_bench import EmulatedBench
 
 POLL_S = 0.005
