@@ -17,7 +17,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from experiments.trials.provenance import PACKAGES, provenance, source_digest
+from experiments.study.provenance import PACKAGES, provenance, source_digest
 from verification.claims.pages import pages_of, rewrite_pages
 from verification.claims.results import (
     ROOT,
