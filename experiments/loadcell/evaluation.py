@@ -20,7 +20,7 @@ from experiments.loadcell.recording import load_counted
 from experiments.loadcell.strokes import AnalysedTrial, StageSettings
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.report_page import to_json
-from experiments.trials.notebook import Entry, Notebook
+from experiments.study.notebook import Entry, Notebook
 from experiments.trials.session import Show
 
 ALIGNMENT_KEYS = ("lag_s", "rate_share", "lag_doubt_s", "rate_doubt")  # as in earlier summaries

@@ -18,7 +18,7 @@ from drivers.load_cell.stage_encoder import StageEncoder, StagePosition
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.strokes import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, Recorded, StagePositions, noise_of
 from experiments.robot.bench_errors import BenchError
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from simulation.test_rig.load_cell_bench import EmulatedBench
 
 POLL_S = 0.005

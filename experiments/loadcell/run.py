@@ -28,7 +28,7 @@ from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
 from experiments.reports.report_page import Section, to_json
 from experiments.reports.text_tables import text_of_tables
 from experiments.robot.bench_errors import BenchError
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from experiments.trials.session import Finding, Session
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell import LoadCell

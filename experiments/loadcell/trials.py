@@ -28,7 +28,7 @@ from experiments.loadcell.recording import (
 from experiments.loadcell.stage import Stage, Trial
 from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Shear, StageSettings
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from experiments.trials.session import Show
 
 KEEP, WITHOUT = "k", "w"

@@ -18,7 +18,7 @@ from experiments.loadcell.run import notebook_plan
 from experiments.loadcell.stage import SimulatedStage
 from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell_bench import EmulatedBench
 from simulation.test_rig.plate_stage import CarriedPlate, StageParameters
