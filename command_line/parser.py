@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from typing import Any, NoReturn
@@ -34,16 +34,18 @@ def _columns() -> int:
 class Parser(argparse.ArgumentParser):
     """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
 
-    def __init__(self, *arguments: Any, options: str = "", **keywords: Any) -> None:
-        """`options` names the function that adds the options, as `module.function` below command_line.options."""
+    def __init__(self, *arguments: Any, options: str | Callable[[Any], None] = "", **keywords: Any) -> None:
+        """`options` is the function that adds the options, or its name as `module.function` in command_line.options."""
         super().__init__(*arguments, **keywords | {"allow_abbrev": False, "formatter_class": Formatter})
         self._options = options
 
     def add_options(self) -> None:
-        if self._options:
-            module, function = self._options.rsplit(".", 1)
-            self._options = ""
-            getattr(import_module(f"command_line.options.{module}"), function)(self)
+        add, self._options = self._options, ""
+        if isinstance(add, str) and add:
+            module, function = add.rsplit(".", 1)
+            add = getattr(import_module(f"command_line.options.{module}"), function)
+        if callable(add):
+            add(self)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Refuses unknown arguments, so that a command names its own usage, not that of `mudskipper`."""

@@ -16,6 +16,7 @@ from command_line.option_types import (
     whole,
 )
 from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket, add_vertical
+from command_line.options.studies import add_studies
 from control.records import JOINTS
 
 SEEDS, TRIALS, WORKERS = whole(1, 1000), whole(1, 100), whole(1, 1000)
@@ -37,6 +38,7 @@ LABLOGS = (
 
 def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
+    add_studies(names)
     estimation = add(
         names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
     )
