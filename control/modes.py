@@ -146,12 +146,33 @@ ACCEPTED_IN: dict[Request, frozenset[Mode]] = {
 }
 
 
+IN_MODE: dict[Mode, str] = {  # why a request is refused, and what to do
+    Mode.BOOT: "not every drive was heard yet; see 'mudskipper check'",
+    Mode.IDLE: "the drives are idle; 'mudskipper arm' first",
+    Mode.ARMING: "the drives are being armed; try again in a moment",
+    Mode.HOLD: "the robot already holds its pose",
+    Mode.WALKING: "the robot walks; 'mudskipper stop' first",
+    Mode.STOPPING: "the robot is stopping; try again in a moment",
+    Mode.FAULT: "a fault is present; read 'mudskipper status', then 'mudskipper clear'",
+    Mode.DAMPING: "a fault lets the joints sink; wait until they rest",
+}
+
+
 class Refusal(NamedTuple):
     """Why a request would change nothing in this mode."""
 
     mode: Mode
     request: Request
     faults: tuple[Fault, ...] = ()  # the faults that prevent it; without any, the mode does
+
+    @property
+    def text(self) -> str:
+        """Return why the robot refuses the request, and what to do."""
+        if self.faults:
+            return " ".join(fault.message for fault in self.faults)
+        if self.request is Request.CLEAR and self.mode is Mode.HOLD:
+            return "nothing to clear: the robot holds its pose"
+        return IN_MODE[self.mode]
 
 
 def refusal(mode: Mode, request: Request, health: Health) -> Refusal | None:

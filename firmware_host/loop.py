@@ -23,7 +23,6 @@ from drivers.drives import Drives
 from drivers.pose.pose_port import PoseSource
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
-from firmware_host.fault_texts import fault_message, refusal_text
 from firmware_host.lease import Lease
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import TICK_KIND, tick_packing
@@ -90,7 +89,7 @@ class Loop:
         self._enter(next_mode(self.mode, self._pop_request(), self.health), now_s)
         self.forced = self.forced and self.mode in ENERGISED
         if self.fault and self.controller.moving:
-            self._end_move(now_s, fault_message(self.fault))
+            self._end_move(now_s, self.fault.message)
         self.sent = self._limit(self._control(tick.missed))
         self._command(now_s)
         sent_after_s = self._clock() - now_s
@@ -272,7 +271,7 @@ class Loop:
             return f"depth {100.0 * order.depth_m:g} cm: out of the flippers' reach over the sweep"
         health = self.health._replace(blocking=tuple(self.faults.blocking(forced)))
         refused = refusal(self.mode, request, health)
-        return refusal_text(refused) if refused else None
+        return refused.text if refused else None
 
 
 def _make_controller(configuration: Configuration) -> Controller:

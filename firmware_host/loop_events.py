@@ -9,7 +9,6 @@ from math import inf
 
 from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
-from firmware_host.fault_texts import fault_advice, fault_message
 from firmware_host.log.recorder import Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, stride_row
 from firmware_host.mud_learning import LearningReport
@@ -70,7 +69,7 @@ class LoopEvents:
 
     def report_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
         for fault in begun:
-            self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault_message(fault)}")
+            self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")
         for fault in over:
             self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
 
@@ -83,7 +82,7 @@ class LoopEvents:
 
     def report_overruled(self, now_s: float, faults: Iterable[Fault]) -> None:
         for fault in faults:
-            self.report(now_s, f"armed by force despite {fault.name}: {fault_message(fault)}")
+            self.report(now_s, f"armed by force despite {fault.name}: {fault.message}")
 
     def report_end_of_move(self, now_s: float, reason: str) -> None:
         self._notify(now_s, f"the joints stopped on their way: {reason}")
@@ -95,12 +94,12 @@ class LoopEvents:
 
         `fault` is the worst that is more than a warning; `rested`: the pose was held for the longest permitted time.
         """
-        because = f": {fault_message(fault)}" if fault else ""
+        because = f": {fault.message}" if fault else ""
         self.report(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
         if after in (Mode.ARMING, Mode.WALKING):
             self.notice = ""
         if fault and before in ENERGISED:
-            self.notice = f"stopped by {fault.name}: {fault_advice(fault)}"
+            self.notice = f"stopped by {fault.name}: {fault.advice}"
         if before is Mode.HOLD and after is Mode.IDLE and rested:
             held_s = self._longest_hold_s
             self._notify(now_s, f"the pose was held for {held_s:g} s without a request: torque went off by itself")

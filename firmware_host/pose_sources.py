@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from drivers.pose.natnet_bridge import NatNetBridge
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import AXES, parse_axis
 from drivers.pose.pose_port import NoPose, OpenedPose, PosePort
@@ -15,7 +16,7 @@ def open_pose(pose: PoseParameters) -> OpenedPose:
         case "socket":
             return PosePort(Path(pose.socket))
         case "natnet":
-            return NatNetPort(pose.natnet, parse_axis(pose.axis) or AXES["x"], pose.origin_m)
+            return NatNetPort(NatNetBridge(pose.natnet, parse_axis(pose.axis) or AXES["x"]), pose.origin_m)
         case "rail_encoder":
             return RailEncoder(pose.rail_encoder, pose.origin_m)
     return NoPose()

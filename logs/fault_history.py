@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from control.fault_causes import AgedFault, Cause, group_by_cause
 from control.faults import FAULT_KINDS, Fault, FaultKind
 from control.records import FLIPPERS, JOINTS
-from firmware_host.fault_texts import what_to_do
 
 BEGUN = re.compile(r"fault (\w+) \(\w+\): (.*)", re.DOTALL)
 OVER = re.compile(r"over: (\w+) ?(.*)")
@@ -96,7 +95,7 @@ def _logged(cause: Cause, episode: list[Begun]) -> LoggedCause:
         name=cause.root.name,
         subjects=tuple(sorted(each.fault.subject for each in cause.faults)),
         message=roots[0].message,
-        what_to_do=what_to_do(cause.root),
+        what_to_do=cause.root.kind.what_to_do,
         consequences=tuple(dict.fromkeys(each.fault.name for each in cause.consequences)),
     )
 

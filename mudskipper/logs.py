@@ -8,8 +8,8 @@ from control.records import Rig
 from estimation.estimation_parameters import Method
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import EVENT, STRIDE, tick_kind
-from logs.export.flat_columns import stack_rows
 from logs.files.log_reader import read_logs
+from logs.flat_columns import stack_rows
 from logs.replay import Replay, configuration_of, replay_files
 from mudskipper.rows import Rows
 

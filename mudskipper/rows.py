@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.log.schema import RowKind
-from logs.export.flat_columns import flat_columns
+from logs.flat_columns import flat_columns
 
 
 class Rows(np.ndarray[Any, np.dtype[np.void]]):

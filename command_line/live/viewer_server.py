@@ -12,13 +12,13 @@ from typing import Any
 import foxglove
 from foxglove import Channel, Schema
 
+from command_line.live.ros_definitions import full_definition, schema_name
+from command_line.live.ros_messages import TOPICS
+from command_line.live.standard_messages import StandardMessages
 from control.geometry import FlipperGeometry
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import EVENT, STRIDE, TICK_KIND, rig_of
-from logs.export.ros_definitions import full_definition, schema_name
-from logs.export.ros_messages import TOPICS
-from logs.export.standard_messages import StandardMessages
 from operator_client.live_rows import LiveRow, LiveRows
 
 

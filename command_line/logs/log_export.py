@@ -22,7 +22,7 @@ def export(options: Options) -> int:
     _require_other_file(options)
     with watched() as watch:
         log = scan_logs(options.files, watch)
-    write = _write_parquet if options.parquet else _write_ros if options.ros else _write_csv
+    write = _write_parquet if options.parquet else _write_csv
     for path in write(log, options):
         print(f"written  {path}", file=sys.stderr)
     complain_of_end(options.files, log.complete)
@@ -60,23 +60,9 @@ def _not_written(path: Path, problem: OSError) -> LogError:
     return LogError(f"{path}: nothing was written: {reason}")
 
 
-def _write_ros(log: ScannedLog, options: Options) -> list[Path]:
-    from logs.export.ros_log import write_ros_log
-    from logs.replay import configuration_of
-
-    path: Path = options.out or Path(f"{_stem(options)}-ros.mcap")
-    geometry = configuration_of(options.files[0], log.configuration_text).geometry
-    try:
-        with watched() as watch:
-            write_ros_log(log, geometry, path, watch)
-    except OSError as problem:
-        raise _not_written(path, problem) from None
-    return [path]
-
-
 def _write_parquet(log: ScannedLog, options: Options) -> list[Path]:
     """The present folder is the default: the user may not be permitted to write into the log folder."""
-    from logs.export.parquet import write_parquet  # pyarrow is slow to import, and an extra
+    from logs.parquet import write_parquet  # pyarrow is slow to import, and an extra
 
     folder: Path = options.out or Path()
     if folder.exists() and not folder.is_dir():

@@ -90,5 +90,4 @@ def _add_export(actions: Commands) -> None:
     form = export.add_mutually_exclusive_group(required=True)
     form.add_argument("--csv", action="store_true", help="the columns of the authors' plotter, to standard output")
     form.add_argument("--parquet", action="store_true", help="tables of ticks, strides and events, into this folder")
-    form.add_argument("--ros", action="store_true", help="the log with standard ROS 2 messages, to LOG-ros.mcap here")
     export.add_argument("--out", type=Path, metavar="PATH", help="write this file, for --parquet into this folder")

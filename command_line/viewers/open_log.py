@@ -1,10 +1,12 @@
-"""`mudskipper log open`: opens a log in a viewer with the project's layout, or says what is missing."""
+"""`mudskipper log open`: opens a log in a viewer with the project's layout, or says what is missing.
+
+The viewers read a log as it is: Rerun shows every field of every row by itself, the others have a layout here.
+"""
 
 import argparse
 import shlex
 import subprocess
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from shutil import which
 
@@ -20,19 +22,25 @@ from logs.files.log_error import DAMAGE, LogError
 
 LAYOUTS = Path(__file__).parent / "layouts"
 FOXGLOVE_PROGRAMS = ("lichtblick", "foxglove-studio", "foxglove")  # the first one that is installed
-STANDARD_TOPIC = "/joint_states"
 
 
 @explain_errors
 def open_log(options: argparse.Namespace) -> int:
-    has_standard = STANDARD_TOPIC in _topics(options.file)
-    if not has_standard and options.viewer != "plotjuggler":
-        complain(f"the 3D view and Rerun's plots need an export: mudskipper log export --ros {options.file}")
-    start = {"foxglove": _foxglove, "plotjuggler": _plotjuggler, "rerun": _rerun}[options.viewer]
-    return start(options.file)
+    log: Path = options.file
+    _require_finished(log)
+    if options.viewer == "foxglove":
+        program = next(filter(None, map(which, FOXGLOVE_PROGRAMS)), None)
+        print(f"the layout: menu View, 'Import layout from file', {LAYOUTS / 'foxglove.json'}")
+        return _start(program, [str(log)], f"neither Lichtblick (free) nor Foxglove is installed: open {log} in one")
+    if options.viewer == "plotjuggler":
+        arguments = ["-d", str(log), "-l", str(LAYOUTS / "plotjuggler.xml")]
+        return _start(
+            which("plotjuggler"), arguments, f"install PlotJuggler, then: plotjuggler {shlex.join(arguments)}"
+        )
+    return _start(which("rerun"), [str(log)], f"install Rerun (pip install rerun-sdk), then: rerun {log}")
 
 
-def _topics(path: Path) -> set[str]:
+def _require_finished(path: Path) -> None:
     """Raises LogError for a file that viewers cannot open."""
     try:
         with path.open("rb") as file:
@@ -45,43 +53,19 @@ def _topics(path: Path) -> set[str]:
         raise LogError(f"{path}: still being written, which viewers refuse: 'mudskipper live' shows it meanwhile")
     if summary is None:
         raise LogError(f"{path}: not a finished log, which viewers refuse: 'mudskipper log recover' repairs it")
-    return {channel.topic for channel in summary.channels.values()}
 
 
-def _foxglove(log: Path) -> int:
-    layout = LAYOUTS / "foxglove.json"
-    program = next(filter(None, map(which, FOXGLOVE_PROGRAMS)), None)
-    print(f"the layout: menu View, 'Import layout from file', {layout}")
-    if program:
-        return _start([program, str(log)])
-    complain(f"neither Lichtblick (free) nor Foxglove is installed here: install one and open {log} in it")
-    return exit_codes.UNHEALTHY
-
-
-def _plotjuggler(log: Path) -> int:
-    command = ["plotjuggler", "-d", str(log), "-l", str(LAYOUTS / "plotjuggler.xml")]
-    if program := which("plotjuggler"):
-        return _start([program, *command[1:]])
-    complain(f"PlotJuggler is not installed here: install it, then: {shlex.join(command)}")
-    return exit_codes.UNHEALTHY
-
-
-def _rerun(log: Path) -> int:
-    if find_spec("rerun") is None or not (program := which("rerun")):
-        complain("Rerun is not installed here: pip install rerun-sdk, in the environment of mudskipper")
+def _start(program: str | None, arguments: Sequence[str], advice: str) -> int:
+    """Start a viewer that outlives this command."""
+    if program is None:
+        complain(f"no viewer of this kind is found here: {advice}")
         return exit_codes.UNHEALTHY
-    from command_line.viewers.rerun_blueprint import write_recording
-
-    recording = Path(f"{log.name.removesuffix('.mcap')}.rrd")
-    write_recording(log, recording)
-    print(f"written  {recording}")
-    return _start([program, str(recording)])
-
-
-def _start(command: Sequence[str]) -> int:
-    """Starts a viewer that outlives this command."""
     subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        [program, *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
-    print(f"started  {shlex.join(command)}")
+    print(f"started  {shlex.join([program, *arguments])}")
     return exit_codes.OK

@@ -8,7 +8,6 @@ from control.rate import PERIOD_S
 from docs.generate.markdown import code, table
 from drivers.fault_injection.failures import EFFECTS
 from experiments.robot.lockstep_robot import simulated_configuration
-from firmware_host.fault_texts import FAULT_TEXTS
 from verification.faults.energy_bounds import STOP_TO_STOP_RAD, STOPPING, energy_bounds
 
 REACTIONS = {
@@ -37,13 +36,13 @@ def faults() -> Iterator[str]:
     rows = [
         (
             code(kind),
-            FAULT_TEXTS[kind].meaning,
+            kind.meaning,
             _name(kind.reaction),
             str(kind.bound_ticks),
             f"{bounds.fault_j(kind):.1f}" if kind.reaction in STOPPING else "",
             BLOCKS[kind.blocks],
             ENDS[kind.clears],
-            FAULT_TEXTS[kind].what_to_do,
+            kind.what_to_do,
         )
         for kind in FaultKind
     ]

@@ -1,202 +1,65 @@
-"""The body's pose from OptiTrack's motion capture: NatNet frames over UDP, multicast or unicast.
+"""The body's pose from motion capture: extrapolates the positions that a stream of them brings to the present tick.
 
-A multicast server sends its frames to a group that this port joins on one interface. A unicast server sends them to
-each client that has asked to connect and keeps sending requests. The server reports which version of the protocol it
-speaks; the configuration states it where requests do not reach the server. Nothing here waits: `read` itself sends
-requests once a second, until they are answered.
-
-A position is stamped with the time of its exposure as far as it is known. From version 3.0 on, frames contain the time
-from the exposure to the sending, and the least recent delay gives the difference of the clocks (pose_timing.py). The
-remaining constant delay, between sending and arriving or in a program that reports no times, is `latency_s`. A frame
-brings no new pose if its body is not tracked, or equals the previous one in every digit. After a long gap or a jump the
-first pose is accepted only when a second one follows, because lost capture shows old positions.
+The stream is the bridge's process (natnet_bridge.py); tests pass a client in this process. After a long gap or a jump
+the first position is accepted only when a second one follows, because lost capture shows old positions.
 """
 
-from errno import EAFNOSUPPORT
+from collections.abc import Iterable
+from typing import Protocol
 
 from control.records import NEVER_S, BodyPose
-from drivers.pose.natnet_codec import (
-    CONNECT,
-    FRAME,
-    KEEP_ALIVE,
-    MODEL,
-    NEWEST,
-    OLDEST,
-    REQUEST_MODEL,
-    SERVER_INFO,
-    FrameLayout,
-    MalformedPacketError,
-    RigidBody,
-    decode_bodies,
-    decode_server_info,
-    message_of,
-)
-from drivers.pose.natnet_sockets import Direction, NatNetParameters, NatNetSockets, parse_version
-from drivers.pose.pose_port import STALE_S, PoseReport, PoseSourceError
-from drivers.pose.pose_timing import LeastDelay, PoseForecast
+from drivers.pose.pose_port import STALE_S, PoseReport
+from drivers.pose.pose_timing import PoseForecast
 
-LONGEST_GAP_S = 0.5  # after a longer one a pose is accepted when a second one follows
-REQUEST_S = 1.0  # between requests; Motive forgets a client that is silent for several seconds
-NO_NETWORK = "the service may use no network: add AF_INET to RestrictAddressFamilies= in its unit"
+LONGEST_GAP_S = 0.5  # after a longer one a position is accepted when a second one follows
+
+
+class PositionStream(Protocol):
+    """Brings positions along the track with their stamps, both as of this computer's monotonic clock."""
+
+    def receive(self, now_s: float) -> Iterable[tuple[float, float]]: ...
+
+    def report(self) -> PoseReport: ...
+
+    def close(self) -> None: ...
 
 
 class NatNetPort:
-    """Implements PoseSource. Owns the server's reports, and the recent positions."""
+    """Implements PoseSource. Owns the recent positions."""
 
-    def __init__(self, parameters: NatNetParameters, direction: Direction, origin_m: float = 0.0) -> None:
-        """Opens the sockets; raises PoseSourceError. `direction` is that of x, a unit vector in the cameras' frame."""
-        self.parameters = parameters
-        self._direction, self._origin_m = direction, origin_m
-        self.poses = self.malformed = self.lost = 0
-        self._unreadable = self._unseen = ""  # why frames cannot be decoded; why the last one brought no pose
-        self.reset()
-        try:
-            self._sockets = NatNetSockets(parameters)
-        except OSError as problem:
-            why = NO_NETWORK if problem.errno == EAFNOSUPPORT else problem.strerror
-            raise PoseSourceError(f"NatNet cannot be received {_source_text(parameters)}: {why}") from None
-
-    def reset(self) -> None:
-        configured = parse_version(self.parameters.version)
-        self._layout = FrameLayout(configured) if configured else None
-        self._version = configured
-        self._ticks_per_s = 0
-        self._identity = self.parameters.body_id
-        self._id_known = not self.parameters.body
-        self._models_changed = False
-        self._now_s = self._asked_s = self._heard_s = self._seen_s = self._accepted_s = NEVER_S
-        self._other_s, self._other_sender = NEVER_S, ""  # the last packet of another sender than the server
-        self._body: RigidBody | None = None
-        self._delay, self._forecast = LeastDelay(), PoseForecast()
-        self._stamp_s = NEVER_S
+    def __init__(self, stream: PositionStream, origin_m: float = 0.0) -> None:
+        """`origin_m` is the position where x is zero."""
+        self._stream, self._origin_m = stream, origin_m
+        self.poses = self._refused = 0
+        self._forecast = PoseForecast()
+        self._now_s = self._stamp_s = self._seen_s = self._accepted_s = NEVER_S
 
     def read(self, now_s: float) -> BodyPose:
         self._now_s = now_s
-        if self.parameters.server and now_s - self._asked_s >= REQUEST_S:
-            self._asked_s = now_s
-            self._send_requests(now_s)
-        for packet, sender in self._sockets.packets():
-            self._on_packet(packet, sender, now_s)
+        for stamp_s, position_m in self._stream.receive(now_s):
+            follows = self._forecast.add(stamp_s, position_m) and now_s - self._seen_s <= LONGEST_GAP_S
+            self._stamp_s, self._seen_s = stamp_s, now_s
+            self._accepted_s = now_s if follows else NEVER_S
+            self.poses += follows
+            self._refused += not follows
         if now_s - self._accepted_s > STALE_S:
             return BodyPose()
         return BodyPose(self._stamp_s, self._forecast.at(now_s) - self._origin_m)
 
-    def _send_requests(self, now_s: float) -> None:
-        silent = now_s - self._heard_s > REQUEST_S
-        self._sockets.request(CONNECT if self._version is None or silent else KEEP_ALIVE)
-        if self.parameters.body and (self._models_changed or not self._id_known):
-            self._models_changed = False
-            self._sockets.request(REQUEST_MODEL)
-
-    def _on_packet(self, packet: bytes, sender: str, now_s: float) -> None:
-        if self.parameters.server and sender != self.parameters.server:
-            self.malformed += 1
-            self._other_s, self._other_sender = now_s, sender
-            return
-        try:
-            self._on_message(packet, now_s)
-        except MalformedPacketError:
-            self.malformed += 1
-
-    def _on_message(self, packet: bytes, now_s: float) -> None:
-        """Handles a packet of the server; raises MalformedPacketError."""
-        message = message_of(packet)
-        if message == FRAME:
-            self._heard_s = now_s
-            if self._layout is not None and self._id_known:
-                self._on_frame(packet, now_s, self._layout)
-        elif message == SERVER_INFO:
-            self._on_server_info(packet)
-        elif message == MODEL and self._version is not None:
-            bodies = decode_bodies(packet, self._version)
-            self._id_known = not self.parameters.body or self.parameters.body in bodies
-            self._identity = bodies.get(self.parameters.body, self.parameters.body_id)
-
-    def _on_server_info(self, packet: bytes) -> None:
-        reported = decode_server_info(packet)
-        self._ticks_per_s = reported.ticks_per_s
-        if self.parameters.version:
-            return
-        readable = OLDEST <= reported.version <= NEWEST
-        self._unreadable = "" if readable else f"{reported.name or 'the server'} speaks NatNet {reported.version}"
-        if reported.version != self._version:
-            self._version = reported.version
-            self._layout = FrameLayout(reported.version) if readable else None
-            self._delay.reset()
-
-    def _on_frame(self, packet: bytes, now_s: float, layout: FrameLayout) -> None:
-        frame = layout.decode_frame(packet, self._identity)
-        self._models_changed = self._models_changed or frame.models_changed
-        body = frame.body
-        if body is None or not body.tracked:
-            self.lost += 1
-            self._unseen = "motion capture does not see the body."
-        elif self._body is not None and body[1:3] == self._body[1:3]:
-            self.lost += 1
-            self._unseen = "motion capture sends the same pose again and again: it is frozen."
-        else:
-            self._body = body
-            exposed_s = sent_s = frame.software_s
-            if frame.sent_ticks and self._ticks_per_s:
-                exposed_s, sent_s = frame.exposed_ticks / self._ticks_per_s, frame.sent_ticks / self._ticks_per_s
-            self._on_pose(body, exposed_s, sent_s, now_s)
-
-    def _on_pose(self, body: RigidBody, exposed_s: float, sent_s: float, now_s: float) -> None:
-        (x_m, y_m, z_m), (a, b, c) = body.position_m, self._direction
-        position_m = a * x_m + b * y_m + c * z_m
-        self._stamp_s = min(exposed_s + self._delay.update(now_s, sent_s) - self.parameters.latency_s, now_s)
-        follows = self._forecast.add(self._stamp_s, position_m) and now_s - self._seen_s <= LONGEST_GAP_S
-        self._seen_s = now_s
-        self._accepted_s = now_s if follows else NEVER_S
-        self.poses += follows
-        if not follows:
-            self.lost += 1
-            self._unseen = "motion capture's poses jump, or arrive seconds apart."
-
     def report(self) -> PoseReport:
-        version = f" {self._version}" if self._version else ""
-        report = PoseReport(f"NatNet{version} {_source_text(self.parameters)}", self.poses, self.malformed, self.lost)
+        report = self._stream.report()
+        report = report._replace(poses=self.poses, lost=report.lost + self._refused)
         if self._now_s - self._accepted_s <= STALE_S:
-            return report
-        trouble, what_to_do = self._trouble()
-        return report._replace(trouble=trouble, what_to_do=what_to_do)
-
-    def _trouble(self) -> tuple[str, str]:
-        """Returns why no pose arrives, and what to do about it."""
-        parameters = self.parameters
-        if self._unreadable:
-            return (
-                f"{self._unreadable}; 2.6 to 4 are supported.",
-                "choose an older version in its streaming settings, and set pose.natnet.version to that",
+            return report._replace(trouble="", what_to_do="")
+        if self._now_s - self._seen_s <= STALE_S:
+            return report._replace(
+                trouble="motion capture's poses jump, or arrive seconds apart.",
+                what_to_do="check its markers, the cameras' view, and pose.natnet.body or body_id",
             )
-        if self._now_s - self._heard_s > STALE_S:
-            if self._now_s - self._other_s <= STALE_S:
-                return (
-                    f"packets arrive from {self._other_sender}, and none from {parameters.server}.",
-                    "set pose.natnet.server to the address that motion capture sends from (its local interface)",
-                )
-            return (
-                f"no NatNet frame arrives {_source_text(parameters)}.",
-                "check that motion capture streams to this computer, and that no firewall or IPAddressDeny= blocks it",
-            )
-        if self._layout is None:
-            return (
-                f"frames arrive, but {parameters.server} does not report their version.",
-                "check pose.natnet.server and command_port, or set pose.natnet.version",
-            )
-        if not self._id_known:
-            return f"there is no rigid body named {parameters.body!r}.", "check pose.natnet.body against its name there"
-        if self._unseen:
-            return self._unseen, "check its markers, the cameras' view, and pose.natnet.body or body_id"
-        return "all NatNet frames are malformed.", "check pose.natnet.version against the version that is streamed"
+        return report
 
     def reopen(self, now_s: float) -> bool:
-        return False  # a socket stays open without its network
+        return False  # the bridge's sockets stay open without their network
 
     def close(self) -> None:
-        self._sockets.close()
-
-
-def _source_text(parameters: NatNetParameters) -> str:
-    by = f"in group {parameters.group}, port {parameters.port}" if parameters.group else f"from {parameters.server}"
-    return f"{by} on {parameters.interface}" if parameters.interface else by
+        self._stream.close()

@@ -69,7 +69,7 @@ class NatNetSockets:
     def __init__(self, parameters: NatNetParameters) -> None:
         """Opens the sockets; raises OSError."""
         self._server = (parameters.server, parameters.command_port)
-        self._sockets: list[socket.socket] = []
+        self.opened: list[socket.socket] = []
         try:
             self._open(parameters)
         except OSError:
@@ -78,15 +78,15 @@ class NatNetSockets:
 
     def _open(self, parameters: NatNetParameters) -> None:
         if parameters.group:
-            self._sockets.append(_join(parameters))
+            self.opened.append(_join(parameters))
         if parameters.server:
             asking = _udp_socket(parameters.interface)
-            self._sockets.append(asking)
+            self.opened.append(asking)
             asking.bind((_address_of(parameters.interface), 0))
 
     def packets(self) -> Iterator[tuple[bytes, str]]:
         """Yields the packets that have arrived, and the address of each sender."""
-        for arriving in self._sockets:
+        for arriving in self.opened:
             for _ in range(MOST_PACKETS_PER_READ):
                 try:
                     packet, sender = arriving.recvfrom(LONGEST_PACKET)
@@ -97,10 +97,10 @@ class NatNetSockets:
     def request(self, message: int) -> None:
         """Sends a request to the server. Without a network it is lost, and the caller repeats it later."""
         with suppress(OSError):
-            self._sockets[-1].sendto(encode_request(message), self._server)
+            self.opened[-1].sendto(encode_request(message), self._server)
 
     def close(self) -> None:
-        for each in self._sockets:
+        for each in self.opened:
             each.close()
 
 

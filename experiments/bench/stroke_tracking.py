@@ -21,7 +21,6 @@ from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.test_rig import Sample, TestRig
 from experiments.robot.bench_errors import BenchError
-from firmware_host.fault_texts import fault_message
 
 Vector = NDArray[np.float64]
 
@@ -115,7 +114,7 @@ def check_strides(test_rig: TestRig) -> Readings:
         samples = walk(test_rig)
         fraction = 100.0 * (test_rig.loop.missed_ticks - missed) / len(samples)
         overruled = {FaultKind.WATCHDOG_UNKNOWN} if test_rig.forced else set()
-        reported = [fault_message(fault) for fault in test_rig.loop.faults.present if fault.kind not in overruled]
+        reported = [fault.message for fault in test_rig.loop.faults.present if fault.kind not in overruled]
     yield from _walk_readings(test_rig, [sample for sample in samples if sample.mode is Mode.WALKING])
     yield Reading("walk: ticks missed", fraction, "%", 0.0, 100.0 * MOST_MISSED_FRACTION, BUSY)
     yield Reading("walk: faults at its end", len(reported), "", 0, 0, " ".join(reported))

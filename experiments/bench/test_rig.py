@@ -20,7 +20,6 @@ from experiments.bench.lateness import Lateness
 from experiments.bench.operator import BenchOperator
 from experiments.bench.rig import Rig
 from experiments.robot.bench_errors import BenchError
-from firmware_host.fault_texts import fault_advice
 from firmware_host.ticker import Tick
 
 ARMING_S = 5.0  # longest time for earlier faults to end, and for the drives to enter closed loop
@@ -254,4 +253,4 @@ def idle(held: Torques, states: DriveStates) -> Torques:
 
 
 def _advice(faults: Sequence[Fault]) -> str:
-    return " ".join(fault_advice(fault) for fault in faults)
+    return " ".join(fault.advice for fault in faults)

@@ -18,7 +18,6 @@ from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import UNKNOWN, Phase
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.fault_texts import fault_message
 from logs.files.log_reader import Log
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import Track
@@ -140,7 +139,7 @@ def walk_in(lockstep: Lockstep, track: Track, order: WalkOrder, done: Callable[[
         lockstep.step()
         record.update(tick_of(lockstep))
     fault = lockstep.loop.fault
-    return Walk(record.strides, fault_message(fault) if fault else "")
+    return Walk(record.strides, fault.message if fault else "")
 
 
 def tick_of(lockstep: Lockstep) -> WalkTick:

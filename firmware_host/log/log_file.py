@@ -29,7 +29,7 @@ FLUSH_INTERVAL_S = 0.4  # the death of the writer may cost as much
 SYNC_INTERVAL_S = 1.0  # a power cut may cost as much
 LATEST_NS = (1 << 63) - 1
 METADATA = "mudskipper"
-EXPORTED = "exported"  # key of the metadata in a copy that `mudskipper log export --ros` made
+EXPORTED = "exported"  # key of the metadata in a copy that `log export --ros` of version 0.2 made
 ATTACHMENT = "configuration.toml"
 
 Rows = Sequence[tuple[int, bytes]]  # number of the row's kind, encoded row

@@ -10,11 +10,10 @@ from math import degrees, isfinite
 from typing import Any
 
 from control.fault_causes import AgedFault, group_by_cause
-from control.faults import Blocks, Fault, FaultKind
+from control.faults import SET_UP, Blocks, Fault, FaultKind
 from control.records import DriveState
 from drivers.drive import DriveHealth
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.fault_texts import SET_UP, fault_message, what_to_do
 from firmware_host.loop import Loop
 from firmware_host.loop_snapshot import take_snapshot
 from firmware_host.operator.reports import check_item
@@ -76,12 +75,12 @@ def _cause(identity: str, faults: Sequence[Fault], cause_lines: Mapping[Fault, s
 
 def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> dict[str, Any]:
     if unheard:
-        reported_as_well = (fault_message(fault) for fault in faults[:MESSAGES_PER_LINE])
+        reported_as_well = (fault.message for fault in faults[:MESSAGES_PER_LINE])
         return check_item(identity, False, "; ".join([text, *reported_as_well]), HEARING) | {"mandatory": True}
     blocking = [fault for fault in faults if fault.kind.blocks is not Blocks.NO]
     reported = (blocking or list(faults))[:MESSAGES_PER_LINE]
-    messages = " ".join(fault_message(fault) for fault in reported)
-    fixes = "; ".join(dict.fromkeys(what_to_do(fault) for fault in reported))
+    messages = " ".join(fault.message for fault in reported)
+    fixes = "; ".join(dict.fromkeys(fault.kind.what_to_do for fault in reported))
     text = messages if blocking else f"warning: {messages}" if reported else text
     item = check_item(identity, not blocking, text, fixes)
     return item | {"mandatory": any(fault.kind.blocks is Blocks.ALWAYS for fault in blocking)}

@@ -14,7 +14,6 @@ from control.fault_causes import AgedFault, group_by_cause
 from control.faults import Blocks, Fault
 from control.modes import Mode, Request
 from control.records import JOINTS
-from firmware_host.fault_texts import fault_message, what_to_do
 from firmware_host.loop import Loop
 from firmware_host.loop_snapshot import LoopSnapshot, take_snapshot
 from firmware_host.operator.arming_checks import arming_checks
@@ -164,7 +163,7 @@ class OperatorCalls:
         if loop.controller.cut_short:
             raise RefusedError("the flippers may be in the mud: 'mudskipper stop' raises them first")
         if loop.fault:
-            raise RefusedError(fault_message(loop.fault))
+            raise RefusedError(loop.fault.message)
         loop.move(angles_rad, self._clock(), str(caller))
         return "accepted"
 
@@ -227,8 +226,8 @@ def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:
     return {
         "name": fault.name,
         "subject": fault.subject,
-        "message": fault_message(fault),
-        "what_to_do": what_to_do(fault),
+        "message": fault.message,
+        "what_to_do": fault.kind.what_to_do,
         "age_s": age_s,
         "reaction": fault.kind.reaction.name.lower(),
         "blocks_arming": fault.kind.blocks is not Blocks.NO,

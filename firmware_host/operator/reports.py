@@ -13,7 +13,6 @@ from control.faults import FaultKind
 from control.mud_estimate import Coefficient, MudEstimate
 from control.records import Estimate, FlipperLoad, Rig, StrideEstimate
 from estimation.mud_map import Mapped, MapRow
-from firmware_host.fault_texts import fault_message, what_to_do
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 JSON_NAMES = {"position_m": "place_m"}  # scripts read the older name
@@ -77,7 +76,7 @@ def cause_report(cause: Cause) -> dict[str, Any]:
         "name": cause.root.name,
         "subjects": [each.fault.subject for each in cause.faults],
         "message": _cause_message(cause),
-        "what_to_do": what_to_do(cause.root),
+        "what_to_do": cause.root.kind.what_to_do,
         "age_s": cause.age_s,
         "reaction": cause.reaction.name.lower(),
         "blocks_arming": cause.blocks_arming,
@@ -86,7 +85,7 @@ def cause_report(cause: Cause) -> dict[str, Any]:
 
 
 def _cause_message(cause: Cause) -> str:
-    text = fault_message(cause.root).rstrip(".") + _silence_of_bus(cause)
+    text = cause.root.message.rstrip(".") + _silence_of_bus(cause)
     *first, last = [each.fault.subject for each in cause.faults]
     if not first:
         return f"{text}."

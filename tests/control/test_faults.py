@@ -1,4 +1,4 @@
-"""The table of all faults: its columns do not contradict each other or the modes."""
+"""The table of all faults: its columns do not contradict each other or the modes, and no text can stop the loop."""
 
 import pytest
 
@@ -57,3 +57,23 @@ def test_a_fault_carries_its_kind_its_subject_and_its_values() -> None:
     )
     assert fault.with_values(reason="why").values == (("angle_deg", 91.0), ("reason", "why"))
     assert FaultKind.LOOP_OVERRUN.fault(missed=1).check_line == "loop"
+
+
+def test_every_fault_has_a_meaning_and_an_advice_and_a_message_even_without_its_values() -> None:
+    for kind in FaultKind:
+        message = kind.fault("left_sweep").message
+        assert message and "{" not in message, kind
+        assert kind.meaning and kind.what_to_do, kind
+        assert kind.clears is Clears.BY_HAND or "clear" not in kind.what_to_do, kind
+
+
+def test_a_message_shows_values_and_ends_with_the_reason() -> None:
+    fault = FaultKind.BUS_REFUSES.fault("left", ticks=3, reason="No buffer space available.")
+    assert fault.message == "The left bus lost commands in 3 ticks in a row: No buffer space available."
+    assert fault.advice.startswith(f"{fault.message} Check wiring")
+
+
+def test_a_signal_that_never_came_has_no_age() -> None:
+    heartbeat = FaultKind.HEARTBEAT_SILENT
+    assert "510 ms" in heartbeat.fault("x", age_s=0.51).exact_message()
+    assert "inf" not in heartbeat.fault("x", age_s=float("inf")).exact_message()

@@ -26,7 +26,6 @@ from firmware_host.buses import BusError, lock_buses, open_bus, open_ports, reop
 from firmware_host.configuration.configuration import BusParameters, Configuration
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.daemon import reopen_buses
-from firmware_host.fault_texts import fault_message
 from operator_client.status_client import NoDaemonError, StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
@@ -167,7 +166,7 @@ def test_an_unplugged_bus_is_a_fault_and_the_robot_stays_disarmed_after_it_retur
     plug.pull()
     plug.run(robot, 6.0)
     assert mode_of(robot) is Mode.FAULT
-    names = {fault.name: fault_message(fault) for fault in robot.loop.faults.present}
+    names = {fault.name: fault.message for fault in robot.loop.faults.present}
     assert "there is no such interface" in names["bus_off"]
     plug.plug_in()
     plug.run(robot, 2.0 * RETRY_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from math import isfinite
@@ -12,6 +13,7 @@ import pytest
 
 from control.modes import Mode
 from control.records import BodyPose
+from drivers.pose.natnet_bridge import NatNetBridge
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import parse_axis
 from drivers.pose.pose_port import NoPose, PosePort, PoseReport, PoseSender, PoseSourceError
@@ -28,6 +30,7 @@ from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from tests.waiting import LONGEST_S
 
 NATNET = 'source = "natnet"\n'
 ENCODER = 'source = "rail_encoder"\n[pose.rail_encoder]\n'
@@ -128,17 +131,29 @@ def test_the_chosen_source_is_opened(example_text: str, short_folder: Path) -> N
         assert isinstance(pose, NatNetPort)
 
 
-def test_motion_capture_is_read_along_the_configured_axis(example_text: str) -> None:
-    poses = [RecordedPose(0.01 * frame, (0.0, -3.0 - 1e-6 * frame, 0.0)) for frame in range(20)]
-    with NatNetServer(poses) as server:
+def test_motion_capture_is_received_by_a_process_of_its_own(example_text: str) -> None:
+    """A body moves along -y; the process ends with its owner, and its end is reported."""
+    with NatNetServer() as server:
         section = NATNET + 'axis = "-y"\norigin_m = 1.0\n[pose.natnet]\nserver = "127.0.0.1"\ngroup = ""\n'
         section += f"command_port = {server.address[1]}"
-        with closing(open_pose(pose_of(example_text, section))) as pose:
-            seen = []
-            for tick in range(-1, 19):
-                seen.append(pose.read(0.01 * tick).x_m)
-                server.step(0.01 * tick)
-    assert seen[-1] == pytest.approx(2.0, abs=1e-4)
+        stream = NatNetBridge(pose_of(example_text, section).natnet, (0.0, -1.0, 0.0))
+        with closing(NatNetPort(stream, 1.0)) as pose:
+            begun_s = time.monotonic()
+            while not isfinite(x_m := pose.read(now_s := time.monotonic()).x_m) and now_s < begun_s + LONGEST_S:
+                server.add(RecordedPose(now_s, (0.0, -3.0 - 1e-6 * (now_s - begun_s), 0.0)))
+                server.step(now_s)
+                time.sleep(0.005)
+            assert x_m == pytest.approx(2.0, abs=1e-3)
+            stream._program.kill()
+            stream._program.wait()
+            pose.read(time.monotonic() + 1.0)
+            assert "has ended" in pose.report().trouble
+
+
+def test_a_refusal_of_that_process_is_the_daemon_s(example_text: str) -> None:
+    section = NATNET + '[pose.natnet]\nserver = "127.0.0.1"\ngroup = ""\ninterface = "nothing0"'
+    with pytest.raises(PoseSourceError, match="from 127.0.0.1 on nothing0: No such device"):
+        open_pose(pose_of(example_text, section))
 
 
 def test_a_rail_encoder_is_opened(example_text: str, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.records import Phase
+from drivers.pose.natnet_client import NatNetClient
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import NatNetParameters
 from estimation.estimation_parameters import EstimationParameters
@@ -92,7 +93,7 @@ def walked(path: Path, latency_s: float) -> Walked:
     estimator = MudEstimator(FlipperGeometry(), (LAB_DRIVE, LAB_DRIVE), EstimationParameters())
     positions_m, ends, steps_m = [], [], []
     rows = zip(*(each.tolist() for each in (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a)), strict=True)
-    with closing(server), closing(NatNetPort(parameters, (x, y, z))) as port:
+    with closing(server), closing(NatNetPort(NatNetClient(parameters, (x, y, z)))) as port:
         for now_s in (-2.0, -1.0):  # connects before the log begins
             port.read(now_s)
             server.step(now_s)
@@ -104,7 +105,7 @@ def walked(path: Path, latency_s: float) -> Walked:
             positions_m.append(body.x_m)
             ends += [row for stride in strides if stride.flipper == "left"]
             steps_m += [stride.step_m for stride in strides if stride.flipper == "left"]
-        assert port.malformed == 0
+        assert port.report().malformed == 0
     return Walked(np.array(positions_m), np.array(ends), np.array(steps_m))
 
 

@@ -22,10 +22,9 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import TICK, rig_of, tick_kind
-from logs.export.flat_columns import flat_columns
-from logs.export.ros_log import write_ros_log
 from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log
+from logs.flat_columns import flat_columns
 from logs.lab.export import write_lab_csv
 from logs.lab.lab_csv import read_lab_csv
 from logs.recovery import recover_log
@@ -115,8 +114,6 @@ def test_viewers_show_the_flippers_that_there_are(walked: Walked, tmp_path: Path
     assert robot_facts(log.configuration_text)["flippers"] == RIGHT.flippers
     numbered = numbered_walk(Path("log"), log)
     assert [side.flipper for side in numbered.sides] == ["right"] and np.isfinite(numbered.depth_m[-1])
-    write_ros_log(log, configured().geometry, tmp_path / "ros.mcap")
-    assert read_log(tmp_path / "ros.mcap").rig == RIGHT
     with (tmp_path / "walk.csv").open("w", encoding="utf-8") as file:
         write_lab_csv(log, file)
     assert read_lab_csv(tmp_path / "walk.csv").flippers == RIGHT.flippers

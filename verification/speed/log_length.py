@@ -30,7 +30,6 @@ COMMANDS = {  # the words before and after the log
     "plot": (("plot",), ("--out", "plot.png")),
     "csv": (("log", "export", "--csv"), ("--out", "log.csv")),
     "parquet": (("log", "export", "--parquet"), ("--out", "tables")),
-    "ros": (("log", "export", "--ros"), ("--out", "ros.mcap")),
     "report": (("log", "report"), ("--out", "report")),
 }
 Record = tuple[int, bytes]

@@ -12,11 +12,11 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from websockets.sync.client import ClientConnection, connect
 
+from command_line.live.ros_definitions import schema_name
+from command_line.live.ros_messages import TOPICS
 from command_line.live.viewer_server import ViewerServer
 from control.records import JOINTS
 from firmware_host.log.rows import ROW_KINDS, TICK
-from logs.export.ros_definitions import schema_name
-from logs.export.ros_messages import TOPICS
 from operator_client.live_rows import LiveRow, LiveRows
 from tests.command_line.command_lines import failure
 

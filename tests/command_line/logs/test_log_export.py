@@ -1,8 +1,7 @@
-"""`mudskipper log export` to CSV, Parquet and ROS, from the command line."""
+"""`mudskipper log export` to CSV and Parquet, from the command line."""
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -19,11 +18,11 @@ from logs.files.log_reader import read_log
 from logs.files.scanned_log import ScannedLog, scan_logs
 from tests.command_line.command_lines import failure, refusal
 from tests.folders import ROOT
-from tests.logs.export.test_parquet import files_of_at_most
+from tests.logs.test_parquet import files_of_at_most
 from tests.waiting import LONGEST_S
 
 LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
-FORMS = {"--csv": "walk.csv", "--parquet": "tables", "--ros": "ros.mcap"}
+FORMS = {"--csv": "walk.csv", "--parquet": "tables"}
 
 
 def test_parquet_goes_into_the_named_folder(tmp_path: Path) -> None:
@@ -37,22 +36,6 @@ def test_a_full_disk_is_one_message_and_leaves_no_half_file(tmp_path: Path, caps
     with files_of_at_most(100_000):
         assert "nothing was written" in failure(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_ros_export_is_no_second_log_in_the_catalogue(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["log", "export", "--ros", LOG]) == exit_codes.OK
-    assert main(["log", "query", "select file, state, strides from logs", str(tmp_path), "--json"]) == exit_codes.OK
-    rows = json.loads(capsys.readouterr().out)["rows"]
-    assert rows == [{"file": "walk_0_1-ros.mcap", "state": "export", "strides": None}]
-
-
-def test_a_ros_export_on_a_full_disk_leaves_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with files_of_at_most(100_000):
-        message = failure(capsys, "log", "export", "--ros", LOG, "--out", str(tmp_path / "walk.mcap"))
-    assert "nothing was written" in message and list(tmp_path.iterdir()) == []
 
 
 def test_a_csv_on_a_full_disk_leaves_the_file_before(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -91,7 +74,7 @@ def test_without_the_extra_a_message_says_what_to_install(tmp_path: Path) -> Non
 def rows_of(form: str, out: Path) -> int:
     if form == "--csv":
         return len(out.read_text(encoding="utf-8").splitlines()) - 3
-    return pq.read_metadata(out / "walk-ticks.parquet").num_rows if form == "--parquet" else read_log(out).rows
+    return int(pq.read_metadata(out / "walk-ticks.parquet").num_rows)
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -1,4 +1,4 @@
-"""Every path in a layout names a field of this project's logs, or of an export's messages, that a viewer can show."""
+"""Every path in a layout names a field of our logs, or of a message of `mudskipper live`, that a viewer can show."""
 
 from __future__ import annotations
 
@@ -12,12 +12,10 @@ from xml.etree import ElementTree
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from command_line.viewers import rerun_blueprint
+from command_line.live.ros_messages import TOPICS
 from command_line.viewers.open_log import LAYOUTS
 from firmware_host.log.rows import ROW_KINDS
 from firmware_host.log.schema import TEXT
-from logs.export.ros_definitions import DEFINITIONS
-from logs.export.ros_messages import TOPICS
 from tests.folders import ROOT
 
 FIELDS = {kind.topic: {field.name: field for field in kind.fields} for kind in ROW_KINDS}
@@ -92,23 +90,9 @@ def test_every_panel_of_foxglove_is_placed_and_described() -> None:
     assert placed | {layout["layout"]} == layout["configById"].keys()
 
 
-def test_the_standard_topics_of_foxglove_are_exported() -> None:
+def test_the_standard_topics_of_foxglove_are_served_live() -> None:
     panels = layout_of_foxglove()["configById"]
     assert {*panels["3D!robot"]["topics"], panels["DiagnosticSummary!state"]["topicToRender"]} <= TOPICS.keys()
-
-
-def test_rerun_shows_what_an_export_contains() -> None:
-    for topic, name in rerun_blueprint.SCALARS.values():
-        assert f" {name}\n" in DEFINITIONS[TOPICS[topic]]
-    for number in rerun_blueprint.FORCES:
-        kind = TOPICS[number.topic]
-        assert kind == number.message
-        for name in number.path.split("."):
-            lines = [line.partition(" ") for line in DEFINITIONS[kind].splitlines()]
-            kind = {field: of for of, _, field in lines}[name]
-        assert kind == "float64"
-    own = {kind.topic for kind in ROW_KINDS}
-    assert {*rerun_blueprint.SPATIAL, *rerun_blueprint.TABLES.values()} <= TOPICS.keys() | own
 
 
 def test_plotjuggler_and_foxglove_can_decode_our_definitions() -> None:

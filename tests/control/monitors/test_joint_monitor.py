@@ -21,7 +21,6 @@ from control.monitors.joint_monitor import (
 from control.parameters.fault_bounds import FaultBounds
 from control.rate import PERIOD_S
 from control.records import NEVER_S, DriveState
-from firmware_host.fault_texts import exact_message
 from tests.control.monitors.monitored_joint import (
     BOUNDS,
     CURRENT_LIMIT_A,
@@ -52,7 +51,7 @@ def seen(monitor: JointMonitor, state: DriveState, now_s: float = NOW_S, **chang
     """Return the messages of the faults by name."""
     found = faults_of(monitor, state, now_s, **changes)
     assert all(fault.subject == JOINT for fault in found)
-    return {fault.name: exact_message(fault) for fault in found}
+    return {fault.name: fault.exact_message() for fault in found}
 
 
 def names(state: DriveState, **changes: Any) -> set[str]:

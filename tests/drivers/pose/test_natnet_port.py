@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from control.records import BodyPose
+from drivers.pose.natnet_client import NatNetClient
 from drivers.pose.natnet_codec import NatNetVersion
 from drivers.pose.natnet_port import NatNetPort
 from drivers.pose.natnet_sockets import MOST_PACKETS_PER_READ, Direction, NatNetParameters
@@ -46,8 +47,8 @@ def moving(duration_s: float, start_s: float = 0.0) -> list[RecordedPose]:
 class Laboratory:
     """A server and a port that are stepped once in a tick of the loop."""
 
-    def __init__(self, server: NatNetServer, port: NatNetPort) -> None:
-        self.server, self.port = server, port
+    def __init__(self, server: NatNetServer, client: NatNetClient, origin_m: float) -> None:
+        self.server, self.client, self.port = server, client, NatNetPort(client, origin_m)
         self.now_s = -0.5
 
     def run(self, until_s: float) -> list[tuple[float, BodyPose]]:
@@ -84,9 +85,9 @@ def open_laboratory() -> Iterator[Open]:
             server = NatNetServer(poses, **serving)
             stack.callback(server.close)
             parameters = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
-            port = NatNetPort(replace(parameters, **listening), direction, origin_m)
-            stack.callback(port.close)
-            return Laboratory(server, port)
+            client = NatNetClient(replace(parameters, **listening), direction)
+            stack.callback(client.close)
+            return Laboratory(server, client, origin_m)
 
         yield opened
 
@@ -169,7 +170,7 @@ def test_a_body_that_is_not_tracked_is_none_and_is_counted(open_laboratory: Open
     assert known(lab.run(0.5 + STALE_S))
     assert not known(lab.run(0.99)[5:])
     assert lab.port.report().trouble == NOT_SEEN
-    assert lab.port.lost == pytest.approx(59, abs=2)
+    assert lab.port.report().lost == pytest.approx(59, abs=2)
 
 
 def test_the_same_digits_again_and_again_are_no_pose(open_laboratory: Open) -> None:
@@ -201,10 +202,10 @@ def test_malformed_and_foreign_packets_are_counted_and_cost_nothing_else(open_la
     assert known(lab.run(0.4))
     frame = encode_frame(lab.server.version, 1, [], FrameTimes(0.0, 0, 0, 0))
     assert isfinite(lab.send(b"", b"\x07", frame[:-30], b"\x07\x00\xff\xff" + bytes(20)).x_m)
-    assert lab.port.malformed == 4
-    lab.port.parameters = replace(lab.port.parameters, server="127.0.0.9")
+    assert lab.client.malformed == 4
+    lab.client.parameters = replace(lab.client.parameters, server="127.0.0.9")
     lab.send(frame)
-    assert lab.port.malformed == 5
+    assert lab.client.malformed == 5
 
 
 def test_malformed_packets_are_reported(open_laboratory: Open) -> None:
@@ -221,9 +222,9 @@ def test_a_sender_gone_wild_is_heard_in_bounded_pieces(open_laboratory: Open) ->
         body = encode_rigid_body(lab.server.version, 1, RecordedPose(0.0, (0.02 + 1e-4 * number, 0.0, 0.0)))
         ticks = 10**10 + number
         lab.server.send_packet(encode_frame(lab.server.version, number, [body], FrameTimes(0.0, ticks, ticks, ticks)))
-    before = lab.port.poses + lab.port.lost
+    before = lab.port.poses + lab.port.report().lost
     lab.send()
-    assert lab.port.poses + lab.port.lost - before == MOST_PACKETS_PER_READ
+    assert lab.port.poses + lab.port.report().lost - before == MOST_PACKETS_PER_READ
 
 
 def test_a_server_that_comes_back_with_another_version_is_understood(open_laboratory: Open) -> None:
@@ -245,7 +246,7 @@ def test_a_server_that_comes_back_with_another_version_is_understood(open_labora
 )
 def test_a_missing_interface_is_reported(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(PoseSourceError, match=message):
-        NatNetPort(replace(NatNetParameters(server=LOOPBACK, group=""), **changes), ALONG_X)
+        NatNetClient(replace(NatNetParameters(server=LOOPBACK, group=""), **changes), ALONG_X)
 
 
 def test_without_a_network_it_is_silent_and_asks_again(open_laboratory: Open) -> None:
@@ -253,7 +254,7 @@ def test_without_a_network_it_is_silent_and_asks_again(open_laboratory: Open) ->
     lab.server.close()
     for now_s in (0.0, 0.5, 1.0, 1.1, 2.2, 2.3):
         assert not isfinite(lab.port.read(now_s).x_m)
-    assert lab.port.malformed == 0
+    assert lab.client.malformed == 0
 
 
 def test_a_service_without_network_access_is_reported_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -262,13 +263,13 @@ def test_a_service_without_network_access_is_reported_with_the_remedy(monkeypatc
 
     monkeypatch.setattr(socket, "socket", refused)
     with pytest.raises(PoseSourceError, match="add AF_INET to RestrictAddressFamilies="):
-        NatNetPort(NatNetParameters(server=LOOPBACK), ALONG_X)
+        NatNetClient(NatNetParameters(server=LOOPBACK), ALONG_X)
 
 
 def test_frames_of_another_computer_than_the_server_are_reported(open_laboratory: Open) -> None:
     laboratory = open_laboratory(moving(1.0))
     laboratory.run(0.3)
-    laboratory.port.parameters = replace(laboratory.port.parameters, server="127.0.0.9")
+    laboratory.client.parameters = replace(laboratory.client.parameters, server="127.0.0.9")
     laboratory.run(0.3 + 2.0 * STALE_S)
     report = laboratory.port.report()
     assert report.trouble == f"packets arrive from {LOOPBACK}, and none from 127.0.0.9."

@@ -22,7 +22,7 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from logs.catalogue.catalogue import Catalogue, CatalogueError
 from logs.catalogue.entry import COLUMNS, TRIALS
 from tests.folders import ROOT
-from tests.logs.export.test_parquet import files_of_at_most
+from tests.logs.test_parquet import files_of_at_most
 
 SHORT = """
 seeds = 2

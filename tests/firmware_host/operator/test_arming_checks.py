@@ -10,7 +10,6 @@ from control.faults import FAULT_KINDS, Blocks, FaultKind, Reaction
 from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.configuration.configuration import Configuration
-from firmware_host.fault_texts import fault_message, what_to_do
 from firmware_host.operator.arming_checks import arming_checks
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -58,8 +57,8 @@ def test_a_line_fails_exactly_if_its_fault_blocks_arming(ready: Lockstep) -> Non
         line = lines[fault.check_line]
         assert line["ok"] == (kind.blocks is Blocks.NO), kind
         assert line["mandatory"] == (kind.blocks is Blocks.ALWAYS), kind
-        assert line["text"] == ("warning: " if line["ok"] else "") + fault_message(fault)
-        assert line["fix"] == ("" if line["ok"] else what_to_do(fault))
+        assert line["text"] == ("warning: " if line["ok"] else "") + fault.message
+        assert line["fix"] == ("" if line["ok"] else fault.kind.what_to_do)
         assert all(each["ok"] for identity, each in lines.items() if identity != line["id"]), kind
 
 
@@ -76,7 +75,7 @@ def test_the_check_and_a_refused_arm_agree(ready: Lockstep, forced: bool) -> Non
         loop.pending_request, loop.forced = Request.NONE, False
         loop.faults.reset()
         loop.health = loop.health._replace(worst=None)
-        assert refused == (fault_message(fault) if against else None)
+        assert refused == (fault.message if against else None)
 
 
 def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) -> None:
@@ -85,8 +84,8 @@ def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) 
         kind.fault("left_sweep")
         for kind in (FaultKind.DRIVE_SILENT, FaultKind.DRIVE_VERSION, FaultKind.HEARTBEAT_SILENT)
     ]
-    assert line["text"] == " ".join(map(fault_message, blocking))
-    assert line["fix"] == "; ".join(map(what_to_do, blocking[:2]))
+    assert line["text"] == " ".join(fault.message for fault in blocking)
+    assert line["fix"] == "; ".join(fault.kind.what_to_do for fault in blocking[:2])
 
 
 def test_one_mandatory_fault_makes_its_line_mandatory(ready: Lockstep) -> None:

@@ -17,7 +17,7 @@ from logs.catalogue.entry import COLUMNS, LogEntry
 from logs.files.log_error import unwatched
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.folders import ROOT
-from tests.logs.export.test_parquet import files_of_at_most
+from tests.logs.test_parquet import files_of_at_most
 
 WALK = ROOT / "tests/fixtures/walk_0_1.mcap"
 

@@ -17,9 +17,10 @@ import pytest
 from control.controller import WalkOrder
 from control.modes import Mode
 from control.records import BodyPose, StrideEstimate
+from drivers.pose.natnet_client import NatNetClient
 from drivers.pose.natnet_port import NatNetPort
-from drivers.pose.natnet_sockets import NatNetParameters
-from drivers.pose.pose_port import PoseReport
+from drivers.pose.natnet_sockets import AXES, NatNetParameters, parse_axis
+from drivers.pose.pose_port import OpenedPose, PoseReport
 from drivers.pose.rail_encoder import RailEncoderParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters
 from firmware_host.pose_sources import open_pose
@@ -55,12 +56,19 @@ def poses_of(folder: Path) -> Iterator[PoseParameters]:
     yield PoseParameters("natnet", axis=[0.6, 0.0, 0.8], natnet=natnet)
 
 
+def open_in_this_process(pose: PoseParameters) -> OpenedPose:
+    """Open the source so that it follows the time of the test; motion capture has a process of its own otherwise."""
+    if pose.chosen != "natnet":
+        return open_pose(pose)
+    return NatNetPort(NatNetClient(pose.natnet, parse_axis(pose.axis) or AXES["x"]), pose.origin_m)
+
+
 @pytest.mark.parametrize("which", range(3), ids=["socket", "unicast", "multicast"])
 def test_poses_arrive_at_the_configured_source(short_folder: Path, which: int) -> None:
     pose = list(poses_of(short_folder))[which]
     broadcast = PoseBroadcast(pose, 1)
     received: list[BodyPose] = []
-    with closing(broadcast), closing(open_pose(pose)) as port:
+    with closing(broadcast), closing(open_in_this_process(pose)) as port:
         for step in range(600):
             now_s = step * STEP_S
             broadcast.step(now_s, made_plant(now_s))
@@ -101,7 +109,7 @@ class StreamedPose:
         self._plant, self._capture = plant, MotionCapture(MotionCaptureParameters(rate_hz=120.0), 1)
         self.server = NatNetServer(latency_s=latency_s)
         address = NatNetParameters(server=LOOPBACK, group="", command_port=self.server.address[1])
-        self.port = NatNetPort(address, (1.0, 0.0, 0.0))
+        self.port = NatNetPort(NatNetClient(address, AXES["x"]))
 
     def read(self, now_s: float) -> BodyPose:
         for frame in self._capture.step(now_s, self._plant):

@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from math import cos, isfinite, sin
 from typing import Any, NamedTuple
 
+from command_line.live.cdr import CdrMessage
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import TWO_FLIPPERS, Rig
 from firmware_host.log.rows import COEFFICIENTS, TICK
-from logs.export.cdr import CdrMessage
 
 TRACK, BASE = "track", "base_link"
 DIAGNOSTICS = "/diagnostics"

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from math import inf
 from typing import Any
 
+from command_line.live.ros_messages import DIAGNOSTICS, Row, diagnostics, tick_messages
 from control.geometry import FlipperGeometry
 from control.rate import RATE_HZ
 from control.records import FLIPPERS, TWO_FLIPPERS, Rig
-from logs.export.ros_messages import DIAGNOSTICS, Row, diagnostics, tick_messages
 
 MESSAGE_HZ = 95.0
 TICKS_A_MESSAGE = max(1, round(RATE_HZ / MESSAGE_HZ))

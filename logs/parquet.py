@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from firmware_host.log.log_file import ATTACHMENT
 from firmware_host.log.rows import EVENT, STRIDE, tick_kind
-from logs.export.flat_columns import Column, flat_columns, stack_rows
 from logs.files.log_error import Watch, unwatched
 from logs.files.log_reader import AnyLog, TickPass
 from logs.files.tick_array import in_groups
 from logs.files.whole_files import whole_files
+from logs.flat_columns import Column, flat_columns, stack_rows
 
 NO_NUMBERS: Mapping[str, NDArray[Any]] = {}
 ROWS_PER_GROUP = 1 << 14  # of a table: six megabytes of ticks, of which the writer needs several copies

@@ -15,11 +15,11 @@ from control.modes import Mode
 from control.records import FLIPPERS, JOINTS, Phase
 from firmware_host.log.rows import EVENT, STRIDE, TICK
 from firmware_host.log.schema import Field, RowKind
-from logs.export import parquet
-from logs.export.flat_columns import flat_columns, stack_rows
-from logs.export.parquet import write_parquet
+from logs import parquet
 from logs.files import log_reader
 from logs.files.log_reader import Log, read_log
+from logs.flat_columns import flat_columns, stack_rows
+from logs.parquet import write_parquet
 from tests.folders import ROOT
 
 
