@@ -2,7 +2,7 @@
 
 Nothing else in the project states a rate or a period: the ticker, the limits, the transmit gate, the monitors, the
 log and the simulator derive theirs from here. `Loop` and `Lockstep` accept another period for tests, and
-verification/walks/daemon_at_rate.py replaces the rate before the import.
+verification/speed/daemon_at_rate.py replaces the rate before the import.
 """
 
 RATE_HZ = 380.0  # the rate at which the paper's robot logged and controlled

@@ -61,7 +61,7 @@ class LocalRobot:
     def start_daemon(self, rate_hz: float = RATE_HZ) -> subprocess.Popen[bytes]:
         if rate_hz == RATE_HZ:
             return self._start("firmware_host.daemon")
-        return self._start("verification.walks.daemon_at_rate", "--rate", str(rate_hz))
+        return self._start("verification.speed.daemon_at_rate", "--rate", str(rate_hz))
 
     def _start(self, module: str, *options: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", module, *options, "--config", str(self.configuration)]

@@ -10,19 +10,18 @@ import sys
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
-from typing import Any
 
 from control.controller import WalkOrder
 from firmware_host.software_version import is_compiled
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
+from verification.benchmark import Report, evaluated, measure_in_turns, run_benchmark
 from verification.example_robot import load_example
-from verification.report import evaluated, run_benchmark, show_progress
 
 BARS_TIMES = {False: 8.0, True: 20.0}  # interpreted, and compiled
 
 
-def walk_once(longest_s: float) -> dict[str, Any]:
+def walk_once(longest_s: float) -> Report:
     configuration, track = load_example(), paper_track()
     walk = Lockstep(configuration, track)
     walk.arm()
@@ -39,15 +38,11 @@ def walk_once(longest_s: float) -> dict[str, Any]:
     }
 
 
-def measure(folder: Path, *, rounds: int = 5, longest: float = 300.0) -> dict[str, Any]:
-    walks = []
-    for number in range(rounds):
-        show_progress(number, rounds, "walking")
-        walks.append(walk_once(longest))
-    times = median(walk["times"] for walk in walks)
-    compiled = is_compiled()
+def measure(folder: Path, *, rounds: int = 5, longest: float = 300.0) -> Report:
+    walks = measure_in_turns({"walking": lambda: walk_once(longest)}, rounds)["walking"]
+    times, compiled = median(walk["times"] for walk in walks), is_compiled()
     bar_times = BARS_TIMES[compiled]
-    report: dict[str, Any] = {"rounds": walks, "median_times": times, "bar_times": bar_times, "compiled": compiled}
+    report = {"rounds": walks, "median_times": times, "bar_times": bar_times, "compiled": compiled}
     return evaluated(report, f"at least {bar_times:g} times faster than real time", times >= bar_times)
 
 

@@ -15,12 +15,12 @@ from typing import Any
 
 from control.controller import WalkOrder
 from firmware_host.log.log_file import LogFile
-from firmware_host.log.recorder import NullRecorder
 from firmware_host.log.rows import ROW_KINDS, TICK_KIND
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
+from verification.behaviour import RowList
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example
-from verification.report import evaluated, run_benchmark, show_progress
 
 BAR_MEMORY, BAR_TIME = 1.5, 1.3
 KIB_PER_MIB = 1024
@@ -35,20 +35,9 @@ COMMANDS = {  # the words before and after the log
 Record = tuple[int, bytes]
 
 
-class _Rows(NullRecorder):
-    """Owns the rows of a walk."""
-
-    def __init__(self) -> None:
-        self.rows: list[Record] = []
-
-    def put(self, number: int, row: bytes) -> bool:
-        self.rows.append((number, row))
-        return True
-
-
 def record_walk(duration_s: float) -> list[Record]:
-    """Returns the rows from the start of the walk."""
-    configuration, recorder = load_example(), _Rows()
+    """Return the rows from the start of the walk."""
+    configuration, recorder = load_example(), RowList()
     robot = Lockstep(configuration, paper_track(), recorder=recorder)
     robot.arm()
     recorder.rows.clear()
@@ -58,7 +47,7 @@ def record_walk(duration_s: float) -> list[Record]:
 
 
 def repeated(rows: list[Record], times: int) -> Iterator[list[Record]]:
-    """Yields the rows again and again, with continued tick numbers and times."""
+    """Yield the rows again and again, with continued tick numbers and times."""
     decoded = [(ROW_KINDS[number], number, ROW_KINDS[number].decode(row)) for number, row in rows]
     first, *_, last = (values for _, number, values in decoded if number == TICK_KIND)
     ticks = last["tick"] - first["tick"] + 1
@@ -73,7 +62,7 @@ def _shifted(values: dict[str, Any], shifts: dict[str, float]) -> dict[str, Any]
 
 
 def write_log(path: Path, rows: list[Record], times: int) -> int:
-    """Returns the number of rows."""
+    """Return the number of rows."""
     opening = {
         "wall_minus_monotonic_ns": 0,
         "configuration_text": load_example().text,
@@ -87,7 +76,7 @@ def write_log(path: Path, rows: list[Record], times: int) -> int:
 
 
 def run_command(name: str, log: Path) -> tuple[float, float]:
-    """Returns the peak memory in MiB and the processor time in s of a command."""
+    """Return the peak memory in MiB and the processor time in s of a command."""
     before, after = COMMANDS[name]
     process = subprocess.Popen(
         [sys.executable, "-m", "command_line.main", *before, str(log), *after],

@@ -1,112 +1,131 @@
-"""How long one whole tick takes while the robot walks, and where that time goes.
+"""How long one whole tick takes while the robot walks, as a multiple of bare sockets, and where that time goes.
 
 The simulated robot walks the paper's track adaptively, in step with the daemon's own loop, with four drives on two
-buses. The robot computes between the ticks and outside of every figure. Hot ticks wait for no deadline, so processor
-and caches are warmer than on a robot; before each cold tick the processor sleeps for a period. Five kinds of
-buses carry the frames: python-can's in-process `virtual` interface, our `mock` bus without python-can, the `local`
-bus's sockets, and SocketCAN on pairs of sockets, by the socket's own frames (`socketcan`) and by python-can's send and
-recv (`python-can`). `--bus` measures only one of them; `--drive` chooses the type of its drives. A rig of one flipper
-with two motors on one bus walks in turn with the robot, and `two_motors` compares its ticks.
-
-The work at the end of an insertion and of a stride is spread over ticks: `longest_us` summarises the longest tick of
-each of these ends. `serving_us` is the cost of serving the status socket after a tick: without a request, with a
-viewer's request for the status, and with one for the largest answer (served_walk.py).
+buses (timed_walk.py): over our `mock` bus, and over SocketCAN on pairs of sockets. `--bus` measures one of them;
+`--drive` chooses the type of the drives. Blocks of 1 s alternate between whole ticks, bare sockets, cold ticks, and
+ticks marked at the beginning of every stage.
 
 `ratios` hardly depend on the computer. `hot_to_bare_sockets` divides a whole tick by the time in which bare sockets
-read and send its frames (bare_sockets.py), in turn with the ticks. The others are divided by a whole tick: cold ticks,
-the longest ticks of the ends, the longest tick of all, and serving. All but the longest of all are medians.
-
-Blocks of 1 s alternate between whole ticks and ticks marked at the beginning of every stage. A stage contains the cost
-of one mark, some 0.2 us; whole ticks carry one reading of the clock. `--picture FILE` draws the medians of the stages;
-it needs matplotlib.
+read and send its frames; cold ticks and the longest ticks at the ends of insertions and strides are divided by a whole
+tick. All are medians, but for the longest tick of all. `--against FOLDER` compares with another working tree: both
+measure their whole tick over the mock bus in turns, as processes of their own. `--picture FILE` draws the medians of
+the stages; it needs matplotlib.
 """
 
+import json
+import subprocess
 import sys
-from contextlib import ExitStack
+from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from statistics import median
 
 from drivers.drive_types import DEFAULT
-from firmware_host.configuration.configuration import Configuration
-from firmware_host.sockets.status_socket import Methods
-from verification.example_robot import load_example, load_one_flipper, require_drive
-from verification.report import evaluated, run_benchmark, show_progress, summary_us
-from verification.speed.bare_sockets import BareSockets, count_frames
-from verification.speed.served_walk import ServedWalk
-from verification.speed.serving_time import fullest_methods
-from verification.speed.tick_pictures import plot_parts, require_matplotlib
-from verification.walks.timed_walk import TimedWalk
-from verification.walks.wired_walk import open_wiring
-from verification.walks.wirings import VARIANTS
+from verification.benchmark import (
+    Report,
+    evaluated,
+    measure_in_turns,
+    paired_ratio,
+    run_benchmark,
+    show_progress,
+)
+from verification.example_robot import load_example, require_drive
+from verification.speed.timed_walk import open_timed_walk
+from verification.wiring import BUSES
 
-BAR_US = 200.0
+BAR_TO_BARE_SOCKETS = 3.6
+PAIR_S = 4  # of walking in each turn of `--against`
+PARTS = {  # of a tick, with their stages and colours
+    "reading": (("read", "pose"), "#0072b2"),
+    "estimate": (("estimate", "adapt"), "#e69f00"),
+    "monitors": (("mode",), "#c44e52"),
+    "command": (("controller", "limits", "command"), "#009e73"),
+    "log": (("learn", "record"), "#999999"),
+}
 
 
-def measure_variant(variant: str, seconds: int, folder: Path, drive: str, fullest: Methods) -> dict[str, Any]:
-    with ExitStack() as stack:
-        walks = [
-            _walk(stack, configuration, variant, folder / str(len(configuration.drive)))
-            for configuration in (load_example(drive), load_one_flipper(drive))
-        ]
-        bare = BareSockets(count_frames(load_example(drive), folder))
-        stack.callback(bare.close)
-        served = ServedWalk(walks[0], fullest, folder)
-        stack.callback(served.close)
+def measure_bus(bus: str, seconds: int, folder: Path, drive: str) -> Report:
+    with open_timed_walk(load_example(drive), bus, folder) as walk:
         for second in range(seconds):
-            show_progress(second, seconds, f"{variant} bus")
-            for walk in walks:
-                walk.run_blocks()
-            bare.run_block()
-            served.run_block()
-        report, two_motors = (walk.report() for walk in walks)
-        ratio = two_motors["whole_us"]["median"] / report["whole_us"]["median"]
-        report |= {"bare_sockets_us": summary_us(bare.durations_s)}
-        report |= {"serving_us": served.report()}
-        report |= {"ratios": _ratios(report) | served.ratios(report["whole_us"]["median"])}
-        return report | {"two_motors": {"whole_us": two_motors["whole_us"], "ratio": round(ratio, 3)}}
-
-
-def _ratios(report: dict[str, Any]) -> dict[str, float | None]:
-    whole_us, ends = report["whole_us"]["median"], report["longest_us"]["ends"]
-    return {
-        "hot_to_bare_sockets": round(whole_us / report["bare_sockets_us"]["median"], 2),
-        "cold_to_hot": round(report["cold_us"]["median"] / whole_us, 2),
-        "ends_to_hot": round(report["longest_us"]["median"] / whole_us, 2) if ends else None,
-        "longest_to_hot": round(report["whole_us"]["max"] / whole_us, 2),
+            show_progress(second, seconds, f"{bus} bus")
+            walk.run_blocks()
+        report = walk.report()
+    whole_us, ends = report["whole_us"]["median"], report["longest_us"]["count"]
+    return report | {
+        "ratios": {
+            "hot_to_bare_sockets": round(whole_us / report["bare_sockets_us"]["median"], 2),
+            "cold_to_hot": round(report["cold_us"]["median"] / whole_us, 2),
+            "ends_to_hot": round(report["longest_us"]["median"] / whole_us, 2) if ends else None,
+            "longest_to_hot": round(report["whole_us"]["max"] / whole_us, 2),
+        }
     }
 
 
-def _medians_us(report: dict[str, Any]) -> dict[str, float]:
-    return {stage: summary["median"] for stage, summary in report["stages_us"].items()}
+def compare_trees(other: Path, pairs: int) -> Report:
+    """Return the whole tick of this tree over that of another one, measured in turns."""
+
+    def whole_us(tree: Path) -> float:
+        options = ["--json", "--seconds", str(PAIR_S), "--bus", "mock"]
+        command = [sys.executable, "-m", "verification.speed.tick_time", *options]
+        done = subprocess.run(command, cwd=tree, capture_output=True, text=True)
+        if done.returncode:
+            raise SystemExit(f"--against {tree}: {done.stderr.strip().splitlines()[-1]}")
+        found: float = json.loads(done.stdout)["variants"]["mock"]["whole_us"]["median"]
+        return found
+
+    own = Path(__file__).parents[2]
+    found = measure_in_turns({"this tree": lambda: whole_us(own), "other tree": lambda: whole_us(other)}, pairs)
+    medians_us = {name: median(each) for name, each in found.items()}
+    return {"pairs": pairs, "medians_us": medians_us} | paired_ratio(found["this tree"], found["other tree"])
 
 
-def _walk(stack: ExitStack, configuration: Configuration, variant: str, folder: Path) -> TimedWalk:
-    folder.mkdir()
-    wiring, recorder = stack.enter_context(open_wiring(variant, configuration, folder))
-    walk = TimedWalk(configuration, wiring, recorder)
-    walk.warm_up()
-    return walk
+def plot_parts(stages_us: Mapping[str, Mapping[str, float]], path: Path) -> None:
+    """Draw a bar for each kind of bus; `stages_us` are medians by bus and stage."""
+    from matplotlib.figure import Figure  # slow to import
+
+    figure = Figure(figsize=(8.0, 0.9 + 0.5 * len(stages_us)), layout="constrained")
+    panel = figure.add_subplot()
+    for bus, own_us in reversed(list(stages_us.items())):
+        left, whole_us = 0.0, sum(own_us.values())
+        for part, (stages, colour) in PARTS.items():
+            fraction = sum(own_us[stage] for stage in stages) / whole_us
+            bar = panel.barh(bus, fraction, left=left, color=colour)
+            panel.bar_label(bar, [f"{part}\n{fraction:.0%}"], label_type="center", size=7, color="white")
+            left += fraction
+    panel.set(xlim=(0.0, 1.0), xlabel="fraction of a tick")
+    panel.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=120)
 
 
 def measure(
-    folder: Path, *, seconds: int = 20, bus: str = "", drive: str = DEFAULT, picture: str = ""
-) -> dict[str, Any]:
-    """The verdict is that of the virtual bus, or of the only one that was measured."""
+    folder: Path,
+    *,
+    seconds: int = 20,
+    bus: str = "",
+    drive: str = DEFAULT,
+    picture: str = "",
+    against: str = "",
+    pairs: int = 8,
+) -> Report:
     require_drive(drive)
-    if bus and bus not in VARIANTS:
-        raise SystemExit(f"--bus {bus}: must be one of {', '.join(VARIANTS)}")
+    if bus and bus not in BUSES:
+        raise SystemExit(f"--bus {bus}: must be one of {', '.join(BUSES)}")
+    if picture and not find_spec("matplotlib"):
+        raise SystemExit("--picture needs matplotlib: pip install 'mudskipper[plots]'")
+    if against:
+        report = compare_trees(Path(against), pairs)
+        return evaluated(report, "no slower than the other tree", report["ratio"] <= 1.0 + (report["std_error"] or 0.0))
+    measured = {each: measure_bus(each, seconds, folder, drive) for each in ([bus] if bus else BUSES)}
     if picture:
-        require_matplotlib()
-    measured, fullest = {}, fullest_methods()
-    for variant in [bus] if bus else VARIANTS:
-        (folder / variant).mkdir()
-        measured[variant] = measure_variant(variant, seconds, folder / variant, drive, fullest)
-    if picture:
-        plot_parts({name: _medians_us(each) for name, each in measured.items()}, Path(picture))
-    bus = bus or "virtual"
-    report = {"seconds": seconds, "drive": drive, "variants": measured, "bar_us": BAR_US}
-    reached = measured[bus]["whole_us"]["median"] <= BAR_US
-    return evaluated(report, f"median whole tick over the {bus} bus at most {BAR_US:.0f} us", reached)
+        stages_us = {
+            name: {stage: summary["median"] for stage, summary in each["stages_us"].items()}
+            for name, each in measured.items()
+        }
+        plot_parts(stages_us, Path(picture))
+    worst = max(each["ratios"]["hot_to_bare_sockets"] for each in measured.values())
+    report = {"seconds": seconds, "drive": drive, "variants": measured, "bar_to_bare_sockets": BAR_TO_BARE_SOCKETS}
+    bar = f"a hot tick at most {BAR_TO_BARE_SOCKETS:g} times bare sockets"
+    return evaluated(report, bar, worst <= BAR_TO_BARE_SOCKETS)
 
 
 if __name__ == "__main__":

@@ -2,39 +2,37 @@
 
 The viewers are `mudskipper watch` on a terminal, `mudskipper live`, and three clients of it that subscribe to every
 channel. The daemon and the simulated robot are processes of their own, as are all viewers, and all share this machine.
-A turn with viewers begins once they have settled; each has a turn without them next to it, and a ratio is the median
-over these pairs. A tick contains the serving of clients.
+A turn with viewers begins once they have settled, and a ratio is that of pairs of turns. A tick contains the serving of
+clients.
 """
 
 import sys
 import time
 from pathlib import Path
 from statistics import median
-from typing import Any
 
+from verification.benchmark import Report, evaluated, measure_in_turns, paired_ratio, run_benchmark
 from verification.local_robot import LocalRobot
-from verification.report import evaluated, run_benchmark, show_progress
 from verification.speed.stream_viewers import Viewers, cpu_s
 
 BAR_RATIO = 1.03
 BAR_SCREEN = 0.05  # of a processor
 SETTLING_S = 5.0  # the screen's libraries take a second or two
 FIGURES = [(name, part) for name in ("tick_us", "wake_late_us") for part in ("p50", "p99")]
-Turn = dict[str, Any]
 
 
-def time_turn(robot: LocalRobot, seconds: float) -> Turn:
-    """Returns the loop's timing over that time of walking. Raises RuntimeError where the robot does not walk."""
+def time_turn(robot: LocalRobot, seconds: float) -> Report:
+    """Return the loop's timing over that time of walking. Raises RuntimeError where the robot does not walk."""
     robot.call("reset_timing")
     time.sleep(seconds)
-    report: Turn = robot.call("status")
+    report: Report = robot.call("status")
     if report["mode"] != "walking":
         raise RuntimeError(f"the simulated robot does not walk: {report['notice'] or report['fault']}")
-    timing: Turn = report["loop"]
+    timing: Report = report["loop"]
     return timing
 
 
-def time_turn_with_viewers(robot: LocalRobot, seconds: float) -> Turn:
+def time_turn_with_viewers(robot: LocalRobot, seconds: float) -> Report:
     viewers = Viewers(robot.socket)
     try:
         time.sleep(SETTLING_S)
@@ -46,39 +44,33 @@ def time_turn_with_viewers(robot: LocalRobot, seconds: float) -> Turn:
         viewers.end()
 
 
-def summary_of(without: list[Turn], with_viewers: list[Turn]) -> dict[str, Any]:
-    summary: dict[str, Any] = {}
-    for name, part in FIGURES:
-        alone, viewed = ([turn[name][part] for turn in turns] for turns in (without, with_viewers))
-        ratio = median(b / max(a, 1.0) for a, b in zip(alone, viewed, strict=True))
-        summary[f"{name}_{part}"] = {"without": median(alone), "with": median(viewed), "ratio": round(ratio, 3)}
-    return summary
-
-
-def measure(folder: Path, *, seconds: float = 10.0, pairs: int = 8) -> dict[str, Any]:
+def measure(folder: Path, *, seconds: float = 10.0, pairs: int = 8) -> Report:
     robot = LocalRobot(folder)
-    without, with_viewers = [], []
     try:
         robot.start_daemon()
         robot.require_walk()
-        for number in range(pairs):
-            show_progress(number, pairs, "without viewers")
-            without.append(time_turn(robot, seconds))
-            show_progress(number + 0.4, pairs, "with viewers")
-            with_viewers.append(time_turn_with_viewers(robot, seconds))
+        turns = {
+            "without": lambda: time_turn(robot, seconds),
+            "with": lambda: time_turn_with_viewers(robot, seconds),
+        }
+        measured = measure_in_turns(turns, pairs)
     finally:
         robot.end()
-    report = summary_of(without, with_viewers)
-    screen = median(turn["screen_cpu"] for turn in with_viewers)
-    turns_of = {"without": without, "with": with_viewers}
-    missed = {name: sum(turn["missed_ticks"] for turn in turns) for name, turns in turns_of.items()}
+    report: Report = {}
+    for name, part in FIGURES:
+        figures = {turn: [max(1.0, each[name][part]) for each in own] for turn, own in measured.items()}
+        medians = {turn: median(each) for turn, each in figures.items()}
+        report[f"{name}_{part}"] = medians | paired_ratio(figures["with"], figures["without"])
+    report |= {
+        "screen_cpu": median(turn["screen_cpu"] for turn in measured["with"]),
+        "missed_ticks": {name: sum(turn["missed_ticks"] for turn in each) for name, each in measured.items()},
+        "pairs": pairs,
+        "all_run": all(turn["all_run"] for turn in measured["with"]),
+    }
     worst = max(report[f"{name}_p50"]["ratio"] for name in ("tick_us", "wake_late_us"))
-    all_run = all(turn["all_run"] for turn in with_viewers)
-    reached = worst <= BAR_RATIO and screen <= BAR_SCREEN and all_run
+    reached = worst <= BAR_RATIO and report["screen_cpu"] <= BAR_SCREEN and report["all_run"]
     bar = f"medians of tick and lateness at most {BAR_RATIO:g} times those without, the screen at most {BAR_SCREEN:.0%}"
-    return evaluated(
-        report | {"screen_cpu": screen, "missed_ticks": missed, "pairs": pairs, "all_run": all_run}, bar, reached
-    )
+    return evaluated(report, bar, reached)
 
 
 if __name__ == "__main__":

@@ -26,8 +26,8 @@ from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example, require_drive
-from verification.report import evaluated, run_benchmark, show_progress
 from verification.stress.harmless_frames import is_harmless
 from verification.stress.resources import resident_kib
 

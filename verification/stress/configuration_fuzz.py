@@ -27,8 +27,8 @@ from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import World, load_world
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example
-from verification.report import evaluated, run_benchmark, show_progress
 from verification.stress.can_fuzz import ObservedRobot
 from verification.stress.harmless_frames import is_harmless
 from verification.stress.malformed_configurations import CandidateFile, next_file

@@ -22,7 +22,7 @@ from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log
 from logs.files.log_summary import log_summary
 from logs.recovery import recover_log
-from verification.report import evaluated, run_benchmark, show_progress
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.stress.resources import peak_kib
 
 BAR_S = 2.0  # for one log

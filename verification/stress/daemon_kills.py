@@ -19,9 +19,9 @@ import numpy.typing as npt
 from drivers.drive_types import DEFAULT
 from simulation.body.plant import STEP_S
 from simulation.harness.peer import WATCHDOG_S
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import require_drive
 from verification.local_robot import LONGEST_WAIT_S, LocalRobot
-from verification.report import evaluated, run_benchmark, show_progress
 from verification.stress.recorded_robot import read_record
 
 TOLERANCE_S = 0.01  # between the kill and the robot's reading of what was sent before it

@@ -22,8 +22,8 @@ from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE, drive_changes
 from simulation.mud.track import Track
 from simulation.mud.unevenness import RandomStrength
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example
-from verification.report import evaluated, run_benchmark, show_progress
 
 WALK_S = 60.0
 STRENGTHS_PA = (400.0, 4000.0)  # softer mud supports no robot, firmer mud holds a flipper that is deep in it

@@ -22,9 +22,9 @@ from drivers.drive_types import DEFAULT
 from firmware_host.log.log_folder import ACTIVE, DONE, log_files, unfinished_files
 from logs.files.log_reader import Log, read_log
 from logs.recovery import recover_all
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import require_drive
 from verification.local_robot import LONGEST_WAIT_S, LocalRobot, kill_session, wait_for
-from verification.report import evaluated, run_benchmark, show_progress
 from verification.stress.resources import children_of
 
 BAR_S = 1.0  # of rows at a log's end

@@ -40,8 +40,8 @@ from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import DRIEST_PERCENT, WETTEST_PERCENT, clay_of_water
 from simulation.mud.track import Track
 from simulation.mud.unevenness import RandomStrength
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example
-from verification.report import evaluated, run_benchmark, show_progress
 from verification.stress.resources import descriptors, resident_kib, threads
 from verification.stress.stream_client import StreamClient
 

@@ -27,8 +27,8 @@ from firmware_host.sockets.status_socket import MOST_CLIENTS, Methods, StatusSoc
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
+from verification.benchmark import evaluated, run_benchmark, show_progress
 from verification.example_robot import load_example
-from verification.report import evaluated, run_benchmark, show_progress
 from verification.stress.malformed_streams import Stream, next_stream
 from verification.stress.resources import resident_kib
 from verification.stress.stream_client import StreamClient

@@ -28,7 +28,7 @@ from drivers.odrive import codec05
 from drivers.odrive.codec import arbitration_id
 from firmware_host.configuration.configuration import Configuration
 from tests.drivers.can.test_can_port import stamps_are_right
-from verification.walks.wirings import CanSocket, open_bus, open_pair
+from verification.wiring import CanSocket, open_bus, open_pair
 
 ENCODER = Frame(0x009, bytes(range(8)))
 OFF = Frame(0x040, bytes(8), is_error=True)

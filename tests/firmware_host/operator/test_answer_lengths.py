@@ -2,19 +2,60 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import msgpack
 import pytest
 
+from control.controller import WalkOrder
+from control.faults import Fault, FaultKind
+from control.modes import Mode
+from control.records import FLIPPERS, JOINTS
+from drivers.fault_injection.failures import Failures
 from estimation.mud_map import MOST_PIECES, PIECE_M
-from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
+from firmware_host.configuration.configuration import Configuration
+from firmware_host.fault_injection.failure_calls import with_failures
+from firmware_host.operator.operator_calls import OperatorCalls
+from firmware_host.sockets.connection import Caller
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, PIECES_PER_ANSWER, STRIDES_PER_ANSWER, Level
 from firmware_host.sockets.status_socket import Methods
-from verification.speed.serving_time import CALLER, READING, answer, every_fault, fullest_methods
+from simulation.harness.lockstep import Lockstep
+from simulation.mud.clay import MUDS
+from simulation.mud.track import Track
 
-LONGEST_BYTES = 24 * 1024  # the time of an answer grows with its length: verification.speed.serving_time
+LONGEST_BYTES = 24 * 1024  # the time of an answer grows with its length
+SLOW_S = 0.019  # a tick that missed several periods
+STRIDES = 12
+CALLER = Caller(1, Peer(1, 0, frozenset({0})), Level.DRIVE)
+READING = ("hello", "status", "strides", "map", "check", "failures")
+SUBJECTS = {"drive": JOINTS, "watchdog": JOINTS, "joint": JOINTS, "bus": ("left", "right"), "flipper": FLIPPERS}
+
+
+def every_fault() -> list[Fault]:
+    return [kind.fault(subject) for kind in FaultKind for subject in SUBJECTS.get(kind.part, ("",))]
 
 
 @pytest.fixture(scope="module")
-def methods() -> Methods:
-    return fullest_methods()
+def methods(configuration: Configuration) -> Methods:
+    """Return the methods of a loop whose answers are as long as they can be."""
+    robot = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]))
+    robot.arm()
+    robot.walk(WalkOrder(0.03, adaptive=True, strides=STRIDES))
+    robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 60.0)
+    for number in range(1000):
+        robot.loop.timing.update(number * SLOW_S, SLOW_S, 0, SLOW_S)
+    walked = [closed.estimate for closed in robot.loop.learning.strides]
+    for piece in range(MOST_PIECES):
+        robot.loop.learning.estimator.map.update((piece + 0.5) * PIECE_M, walked)
+    robot.loop.faults.update(every_fault(), energised=False)
+    calls = OperatorCalls(robot.loop, ["a warning about the operating system"] * 4, lambda: robot.now_s)
+    failures = Failures(configuration.bus)
+    return with_failures(calls.methods, failures, lambda now_s, text: None, lambda: robot.now_s)
+
+
+def answer(methods: Methods, name: str) -> Any:
+    return msgpack.packb([1, 1, None, methods[name]({}, CALLER)])
 
 
 @pytest.mark.parametrize("name", READING)

@@ -1,8 +1,7 @@
-"""Runs every benchmark: reads the options, measures, and prints one JSON object that ends in a verdict.
+"""Runs every benchmark: reads the options, measures, compares in turns, and prints one JSON object with a verdict.
 
-A benchmark of speed does not judge its figures: it ends with status 0, and its verdict says whether its bar was
-reached. One of stress looks for defects and ends with status 1 where its bar is missed. One line on a terminal shows
-the progress.
+A benchmark of speed ends with status 0, and its verdict says whether its bar was reached. One of stress looks for
+defects and ends with status 1 where its bar is missed. One line on a terminal shows the progress.
 """
 
 import argparse
@@ -10,17 +9,20 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter, getfile, getmodule, signature
-from math import inf
+from math import inf, pi, sqrt
 from pathlib import Path
+from statistics import median, stdev
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
+Report = dict[str, Any]
+Measured = TypeVar("Measured")
 FAST_FOLDER = Path("/dev/shm")  # spares the disk
 MAY_BE_ZERO = ("seed", "first", "rate_hz")  # the other numbers are durations, counts and factors
 
 
-def run_benchmark(measure: Callable[..., dict[str, Any]], arguments: Sequence[str] | None = None) -> int:
-    """Calls `measure` with an empty folder and the options, prints its report, and returns the exit status.
+def run_benchmark(measure: Callable[..., Report], arguments: Sequence[str] | None = None) -> int:
+    """Call `measure` with an empty folder and the options, print its report, and return the exit status.
 
     The keyword-only arguments of `measure` are the options; each has a default, which fixes its type.
     """
@@ -46,18 +48,39 @@ def run_benchmark(measure: Callable[..., dict[str, Any]], arguments: Sequence[st
 
 
 def _require_positive(options: Mapping[str, Any]) -> None:
-    """Ends the benchmark before it measures where it would measure nothing."""
+    """End the benchmark before it measures where it would measure nothing."""
     for name, value in options.items():
         if not isinstance(value, str) and name not in MAY_BE_ZERO and not 0 < value < inf:
             raise SystemExit(f"--{name.replace('_', '-')} {value:g}: must be more than 0 and finite")
 
 
-def evaluated(report: dict[str, Any], bar: str, reached: bool) -> dict[str, Any]:
+def measure_in_turns(turns: Mapping[str, Callable[[], Measured]], rounds: int) -> dict[str, list[Measured]]:
+    """Measure each of several things once in every round, so that all of them see the same machine.
+
+    The order changes from round to round, so none profits from its place. Return the measurements by name.
+    """
+    measured: dict[str, list[Measured]] = {name: [] for name in turns}
+    for number in range(rounds):
+        order = list(turns)[:: -1 if number % 2 else 1]
+        for part, name in enumerate(order):
+            show_progress(number + part / len(order), rounds, name)
+            measured[name].append(turns[name]())
+    return measured
+
+
+def paired_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Report:
+    """Return the median ratio of measurements that were made in turns, with its standard error."""
+    ratios = [a / b for a, b in zip(numerators, denominators, strict=True)]
+    error = stdev(ratios) * sqrt(pi / 2.0 / len(ratios)) if len(ratios) > 1 else None  # of a median
+    return {"ratio": round(median(ratios), 3), "std_error": error and round(error, 3)}
+
+
+def evaluated(report: Report, bar: str, reached: bool) -> Report:
     return report | {"reached": reached, "verdict": f"{bar}: {'reached' if reached else 'not reached'}"}
 
 
 def summary_us(durations_s: Sequence[float]) -> dict[str, float]:
-    """Returns median, p99 and maximum in microseconds; zeros where nothing was measured."""
+    """Return median, p99 and maximum in microseconds; zeros where nothing was measured."""
     ordered = sorted(durations_s) or [0.0]
     last = len(ordered) - 1
     fractions = {"median": 0.50, "p99": 0.99, "max": 1.0}
@@ -65,6 +88,6 @@ def summary_us(durations_s: Sequence[float]) -> dict[str, float]:
 
 
 def show_progress(done: float, total: float, what: str) -> None:
-    """Writes one line on a terminal's stderr, and nothing anywhere else."""
+    """Write one line on a terminal's stderr, and nothing anywhere else."""
     if sys.stderr.isatty():
         print(f"\r\033[K{min(1.0, done / total):4.0%}  {what}", end="", file=sys.stderr, flush=True)

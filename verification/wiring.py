@@ -1,23 +1,21 @@
-"""Makes the five kinds of buses between the simulated robot and the loop, each with its two ends.
+"""Makes the buses between a simulated robot and the loop: our mock bus, or SocketCAN on pairs of sockets.
 
 SocketCAN is python-can's SocketcanBus on one end of a datagram pair, so no CAN is needed; a frame's path through the
 kernel's CAN code and the driver is in no figure. The options of a CAN_RAW socket, such as filters, have no effect.
 """
 
 import socket
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from unittest.mock import patch
 
 import can
 from can.interfaces.socketcan import SocketcanBus, constants, socketcan
 
-from drivers.can.can_port import CanPort, PythonCanPort, open_port
+from drivers.can.can_port import CanPort
 from drivers.can.mock_bus import MockBus
 from drivers.can.socketcan_port import SocketcanPort
-from firmware_host.configuration.configuration import BusParameters
 
 
 class CanSocket(socket.socket):
@@ -42,7 +40,7 @@ def open_pair(kind: type[CanSocket] = CanSocket) -> tuple[CanSocket, CanSocket]:
 
 @contextmanager
 def in_place_of_can(near: socket.socket) -> Iterator[None]:
-    """Gives this socket to the next bus that python-can opens."""
+    """Give this socket to the next bus that python-can opens."""
     with patch.object(socketcan, "create_socket", lambda: near), patch.object(socketcan, "bind_socket"):
         yield
 
@@ -54,41 +52,27 @@ def open_bus(near: socket.socket, fd: bool = False) -> SocketcanBus:
     return bus
 
 
-class Wiring(NamedTuple):
-    """The two ends of every bus, by its name."""
-
-    robot: dict[str, CanPort]
-    loop: dict[str, CanPort]
-
-
 PortPair = tuple[CanPort, CanPort]  # the robot's end and the loop's
 
 
-def python_can_pair(interface: str, channel: Path, fd: bool) -> PortPair:
-    return open_port(interface, str(channel), {}, fd), open_port(interface, str(channel), {}, fd)
-
-
-def mock_pair(channel: Path, fd: bool) -> PortPair:
+def _mock_pair(fd: bool) -> PortPair:
     bus = MockBus()
     return bus.open(), bus.open()
 
 
-def socketcan_pair(kind: type[PythonCanPort] | type[SocketcanPort], fd: bool) -> PortPair:
+def _socketcan_pair(fd: bool) -> PortPair:
     far, near = open_pair()
-    return SocketcanPort(open_bus(far, fd)), kind(open_bus(near, fd))
+    return SocketcanPort(open_bus(far, fd)), SocketcanPort(open_bus(near, fd))
 
 
-VARIANTS: dict[str, Callable[[Path, bool], PortPair]] = {
-    "virtual": lambda channel, fd: python_can_pair("virtual", channel, fd),
-    "mock": mock_pair,
-    "local": lambda channel, fd: python_can_pair("mudskipper_local", channel, fd),
-    "socketcan": lambda channel, fd: socketcan_pair(SocketcanPort, fd),
-    "python-can": lambda channel, fd: socketcan_pair(PythonCanPort, fd),
-}
+BUSES: dict[str, Callable[[bool], PortPair]] = {"mock": _mock_pair, "socketcan": _socketcan_pair}
 
 
-def make_wiring(variant: str, buses: Mapping[str, BusParameters], folder: Path) -> Wiring:
-    pairs = {name: VARIANTS[variant](folder / name, bus.data_bit_rate_kbit_s > 0) for name, bus in buses.items()}
-    return Wiring(
-        {name: robot for name, (robot, _) in pairs.items()}, {name: loop for name, (_, loop) in pairs.items()}
-    )
+@contextmanager
+def open_wiring(kind: str, buses: Iterable[str], fd: bool) -> Iterator[dict[str, PortPair]]:
+    """Open the two ends of every bus, by its name, and close them at the end."""
+    wiring = {name: BUSES[kind](fd) for name in buses}
+    yield wiring
+    for pair in wiring.values():
+        for port in pair:
+            port.close()

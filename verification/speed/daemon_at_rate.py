@@ -12,7 +12,7 @@ from control import rate
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="verification.walks.daemon_at_rate", description=__doc__, allow_abbrev=False)
+    parser = argparse.ArgumentParser(prog="verification.speed.daemon_at_rate", description=__doc__, allow_abbrev=False)
     parser.add_argument("--rate", type=float, required=True)
     options, others = parser.parse_known_args(arguments)
     rate.RATE_HZ = options.rate
