@@ -11,7 +11,7 @@ from functools import partial
 from typing import NamedTuple
 
 from drivers.drive_types import DEFAULT
-from experiments.trials.parallel_trials import Workers, run_parallel
+from experiments.study.workers import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.harness.drive_presets import DRIVES
 from verification.faults.cell import run_cell
