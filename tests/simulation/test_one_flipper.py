@@ -20,7 +20,7 @@ from experiments.robot.lockstep_robot import LockstepRobot, simulated_configurat
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.rows import tick_kind
+from firmware_host.log.rows import TICK, rig_of, tick_kind
 from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log
 from logs.flat_columns import flat_columns
