@@ -13,19 +13,6 @@ from command_line import exit_codes
 JSON = "--json"
 answers: list[None] = []  # one for each JSON that this command has printed
 
-EXPERIMENTS = (
-    "actuator",
-    "campaign",
-    "estimation",
-    "faults",
-    "flipper",
-    "lablogs",
-    "loadcell",
-    "mud-fit",
-    "sweep",
-    "trackway",
-    "walk",
-)
 SCHEMAS = {  # what prints it -> version
     "status": 2,
     "error": 1,
@@ -41,12 +28,11 @@ SCHEMAS = {  # what prints it -> version
     "log-query": 1,
     "log-recover": 1,
     "log-report": 1,
-    **{f"experiment-{name}": 1 for name in EXPERIMENTS},
 }
 
 
 def with_schema(name: str, report: dict[str, Any]) -> dict[str, Any]:
-    """Raises KeyError for a shape that SCHEMAS does not list."""
+    """Put name and version of the shape before the report. Raises KeyError for one that is not in SCHEMAS."""
     return {"schema": f"{name}/{SCHEMAS[name]}"} | report
 
 

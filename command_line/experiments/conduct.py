@@ -14,16 +14,17 @@ from typing import Any, TypeVar
 
 from command_line import exit_codes
 from command_line.experiments.terminal_prompt import TerminalPrompt
-from command_line.json_output import print_value, with_schema
+from command_line.json_output import print_value
 from command_line.screen import Progress, complain
 from experiments.reports.report_page import PAGE, to_json, write_report
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
 from experiments.robot.prompt import AutomaticOperator
-from experiments.trials.notebook import NotebookError, count_entries, plan_in
-from experiments.trials.parallel_trials import WorkersError
-from experiments.trials.provenance import identity, provenance
-from experiments.trials.results_folder import make_folder, remove_unused, require_unfinished, set_aside
-from experiments.trials.session import Ending, Finding, Session, Show
+from experiments.study.notebook import NotebookError, count_entries, plan_in
+from experiments.study.provenance import identity, provenance
+from experiments.study.results_folder import make_folder, remove_unused, require_unfinished, set_aside
+from experiments.study.session import Ending, Session, Show
+from experiments.study.workers import WorkersError
+from experiments.trials.session import Finding
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from operator_client.status_client import CallRefusedError
 
@@ -47,19 +48,19 @@ def conduct(options: argparse.Namespace, unit: str, run: Callable[[Show], Findin
     """
     identity(*modules)  # reads the sources before minutes of work, in which they may change
     try:
-        folder = _open_folder(options, continues=False) if options.out else None
+        folder = open_folder(options, None) if options.out else None
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
     try:
-        finding = _run(unit, lambda progress: run(progress.show))
+        finding = run_with_progress(unit, lambda progress: run(progress.show))
     except WorkersError as problem:
         complain(str(problem))
         return exit_codes.UNHEALTHY
     record = provenance(*modules) | {"options": _typed(options)}
-    report = with_schema(f"experiment-{options.name}", to_json(finding.report) | {"provenance": record})
+    report = _schema(options) | to_json(finding.report) | {"provenance": record}
     if folder is not None:
-        _print_written(write_report(folder, report, finding.title, finding.sections))
+        print_written(write_report(folder, report, finding.title, finding.sections))
     _print_finding(report, finding, options.json)
     return EXIT_STATUS[finding.ending]
 
@@ -79,7 +80,7 @@ def conduct_bench(
     if find_spec(needs) is None:  # it is reported before the hours of measuring
         raise ModuleNotFoundError(name=needs)
     try:
-        folder = _open_folder(options, folder_name)
+        folder = open_folder(options, _typed(options), folder_name)
         status = _conduct_in(folder, options, unit, run, modules)
     except NotebookError as problem:
         complain(str(problem))
@@ -94,22 +95,26 @@ def _conduct_in(
 ) -> int:
     program, before = identity(*modules), count_entries(folder) if (folder / PAGE).exists() else None
     try:
-        finding = _run(unit, lambda progress: run(_session(options, folder, progress, program)))
+        finding = run_with_progress(unit, lambda progress: run(session_in(options, folder, progress, program)))
         title = f"{finding.title} (simulated)" if options.simulated else finding.title
         record = provenance(*modules) | {"options": _typed(options), "plan": plan_in(folder)}
         also = {"simulated": bool(options.simulated), "provenance": record}
-        report = with_schema(f"experiment-{options.name}", to_json(finding.report) | also)
+        report = _schema(options) | to_json(finding.report) | also
         written = write_report(folder, report, title, finding.sections, finding.logs)
     except ConfigurationError as problem:
         complain(*problem.problems)
         return exit_codes.CONFIGURATION
     except (BenchError, EndedError, CallRefusedError, WorkersError, KeyboardInterrupt, OSError) as problem:
-        return _end_early(folder, problem)
+        return end_early(folder, problem)
     if before == count_entries(folder):
         print(f"{folder} had every measurement already; they are only evaluated again", file=sys.stderr)
     _print_finding(report, finding, options.json)
-    _print_written(written)
+    print_written(written)
     return EXIT_STATUS[finding.ending]
+
+
+def _schema(options: argparse.Namespace) -> dict[str, str]:
+    return {"schema": f"experiment-{options.name}/1"}
 
 
 def _typed(options: argparse.Namespace) -> dict[str, Any]:
@@ -118,22 +123,22 @@ def _typed(options: argparse.Namespace) -> dict[str, Any]:
     return dict(json.loads(json.dumps(typed, default=str)))
 
 
-def _open_folder(options: argparse.Namespace, name: str = "", continues: bool = True) -> Path:
+def open_folder(options: argparse.Namespace, typed: Mapping[str, Any] | None, name: str = "") -> Path:
     """Return the folder of the results: without --out a new one. Raises NotebookError, OSError.
 
-    A finished study `continues` with other options, such as more trials.
+    A finished study continues with options other than `typed`, such as more trials.
     """
     if options.out is None:
         return make_folder(f"mudskipper-{name or options.name}")
     folder: Path = options.out.resolve() if options.restart else options.out  # the working directory moves too
     if options.restart and (old := set_aside(folder)):
         print(f"the earlier results are in {old} now", file=sys.stderr)
-    require_unfinished(folder, options.name, _typed(options) if continues else None)
+    require_unfinished(folder, options.name, typed)
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
-def _run(unit: str, run: Callable[[Progress], Result]) -> Result:
+def run_with_progress(unit: str, run: Callable[[Progress], Result]) -> Result:
     progress = Progress(unit)
     try:
         return run(progress)
@@ -141,7 +146,7 @@ def _run(unit: str, run: Callable[[Progress], Result]) -> Result:
         progress.clear()
 
 
-def _session(options: argparse.Namespace, folder: Path, progress: Progress, program: Mapping[str, str]) -> Session:
+def session_in(options: argparse.Namespace, folder: Path, progress: Progress, program: Mapping[str, str]) -> Session:
     prompt = TerminalPrompt(progress.clear)
     if options.simulated:
         return Session(folder, AutomaticOperator(prompt.report), progress.show, program=program)
@@ -155,11 +160,11 @@ def _print_finding(report: dict[str, Any], finding: Finding, as_json: bool) -> N
         print(finding.text)
 
 
-def _print_written(paths: list[Path]) -> None:
+def print_written(paths: list[Path]) -> None:
     print(f"written  {', '.join(map(str, paths))}", file=sys.stderr)
 
 
-def _end_early(folder: Path, problem: BaseException) -> int:
+def end_early(folder: Path, problem: BaseException) -> int:
     message, status = str(problem), exit_codes.REFUSED
     match problem:
         case DaemonLostError():

@@ -2,12 +2,12 @@
 
 import argparse
 
-from experiments.trials.parallel_trials import LocalWorkers, Workers
+from experiments.study.workers import LocalWorkers, Workers
 
 
 def workers_of(options: argparse.Namespace) -> Workers:
     if options.cluster:
-        from experiments.trials.cluster_workers import ClusterWorkers  # distributed is slow to import, and an extra
+        from experiments.study.cluster_workers import ClusterWorkers  # distributed is slow to import, and an extra
 
         return ClusterWorkers(options.cluster)
     return LocalWorkers(options.workers)

@@ -21,7 +21,7 @@ from experiments.actuator.weight_handling import WeightHandler
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, arm, ask_to_clear_faults, require_hold
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from experiments.trials.session import Show
 from operator_client.status_client import CallRefusedError
 

@@ -25,8 +25,8 @@ from experiments.reports.text_tables import text_of_tables
 from experiments.robot.bench_robot import BenchRobot, disarm, leave
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.prompt import GO_ON, AutomaticOperator, Operator
-from experiments.trials.notebook import Notebook, count_entries
-from experiments.trials.parallel_trials import LocalWorkers, run_parallel
+from experiments.study.notebook import Notebook, count_entries
+from experiments.study.workers import LocalWorkers, run_parallel
 from experiments.trials.session import Ending, Finding, Session, Show
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import load_configuration, parse_configuration

@@ -18,9 +18,9 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.report_page import Section
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import Rows, number, table
-from experiments.trials.notebook import Entry, Notebook
-from experiments.trials.parallel_trials import Workers, run_parallel
-from experiments.trials.provenance import program_text, provenance
+from experiments.study.notebook import Entry, Notebook
+from experiments.study.provenance import program_text, provenance
+from experiments.study.workers import Workers, run_parallel
 from experiments.trials.session import Finding, Session, Show
 from firmware_host.software_version import build_metadata
 from logs.catalogue.entry import TRIALS

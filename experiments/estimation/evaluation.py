@@ -18,10 +18,10 @@ from typing import NamedTuple
 from estimation.estimation_parameters import EstimationParameters
 from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, PlateRow, error_rows, plate_rows
+from experiments.study.workers import Workers, run_parallel
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, with_method
 from experiments.trials.latency import LATENCY_S
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
-from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from experiments.trials.trial import MEASURING_WALK, SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
 from simulation.mud.clay import Clay, clay_of_water

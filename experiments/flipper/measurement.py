@@ -17,9 +17,9 @@ from control.records import TWO_FLIPPERS, Phase, Rig
 from experiments.flipper.base_check import INVALID_M, load_remarks, moved_text, pose_remarks, surface_remarks
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm, rest, walk
+from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
 from experiments.trials.stride_profile import Floats, StrideProfile, profile_of, profile_row, thinned
 from firmware_host.configuration.configuration import Configuration

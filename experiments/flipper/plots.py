@@ -26,7 +26,7 @@ from experiments.reports.mud_styles import (
     mark_of,
     waters_of,
 )
-from experiments.trials.notebook import Entry
+from experiments.study.notebook import Entry
 from experiments.trials.stride_profile import Floats, StrideProfile, profile_from_row
 
 THIN: dict[str, Any] = {"linewidth": 1.1}

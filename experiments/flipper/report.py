@@ -14,8 +14,8 @@ from experiments.flipper.measurement import Plan
 from experiments.flipper.modelled_force import drawn_coefficients, misfit_n, modelled_forces
 from experiments.reports.coefficient_table import ComparedStride, MudSummary, error_table, gather_coefficients
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow
+from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import configured_method
-from experiments.trials.notebook import Entry
 from experiments.trials.stride_profile import profile_from_row
 from experiments.trials.truth_file import TruthOfMud, missing_text, truth_in
 from firmware_host.configuration.configuration import Configuration

@@ -18,9 +18,9 @@ from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import TitledRows, text_of_tables
+from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import DEFAULT
 from experiments.trials.mud_trials import SEED, left_out_texts, open_bench, run_trials
-from experiments.trials.notebook import Entry
 from experiments.trials.session import Finding, Session
 from experiments.trials.truth_file import load_truth
 from firmware_host.configuration.configuration import Configuration

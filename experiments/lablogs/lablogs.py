@@ -11,7 +11,7 @@ from functools import partial
 from experiments.lablogs.lab_trial import LabTrial, Refusal, read_trial
 from experiments.lablogs.log_choice import GroupRule, Paths, group_key, group_of, matches
 from experiments.lablogs.report import LablogsReport, report_of
-from experiments.trials.parallel_trials import run_parallel
+from experiments.study.workers import run_parallel
 from experiments.trials.session import Show
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.lab.body_track import VERTICAL_AXIS

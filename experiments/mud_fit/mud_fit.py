@@ -27,10 +27,10 @@ from typing import NamedTuple
 
 from experiments.reports.mud_names import mud_label
 from experiments.reports.text_tables import table
+from experiments.study.workers import run_parallel
 from experiments.trackway.depth_rule import constant_depth, walk_by
 from experiments.trackway.one_mud import CONSTANT_STRIDES, ENDLESS_M, has_strides, speed_cm_s
 from experiments.trackway.report import FIXED_DEPTHS_M, PAPER_TABLE, Speed
-from experiments.trials.parallel_trials import run_parallel
 from experiments.trials.session import Finding, Show, screen_finding
 from simulation.body.plant_parameters import PlantParameters
 from simulation.mud.clay import MUDS, Clay

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from statistics import fmean, median
 
+from experiments.study.workers import Workers, run_parallel
 from experiments.trackway.depth_rule import METHODS, chosen_by, configuration_for
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
@@ -26,7 +27,6 @@ from experiments.trackway.one_mud import (
 )
 from experiments.trackway.report import count_failures
 from experiments.trackway.walk import Walk
-from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import TRACKWAY

@@ -27,12 +27,12 @@ from experiments.robot.bench_robot import (
     mode_reason,
     wait_until,
 )
+from experiments.study.notebook import Entry
 from experiments.trackway.depth_rule import DepthRule, constant_depth
 from experiments.trackway.report import ADAPTIVE, FIXED_DEPTHS_M, Settings, TrackwayReport, table_report
 from experiments.trackway.simulation import STUCK_S
 from experiments.trackway.walk import Walk, WalkedStride, logged_strides, speed_m_s, walk_of
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.notebook import Entry
 from experiments.trials.session import Show
 from firmware_host.configuration.configuration import Configuration
 

@@ -43,6 +43,11 @@ def chosen_by(method: str, name: str = "") -> DepthRule:
     return DepthRule(name or method, configuration_of(WALKING).adaptation.initial_depth_m, method)
 
 
+def arm_m() -> float:
+    """Return the length of the walking robot's flippers."""
+    return configuration_of(WALKING).geometry.flipper_length_m
+
+
 def configuration_for(rule: DepthRule) -> Configuration:
     configuration = configuration_of(WALKING)
     if not rule.method:

@@ -12,6 +12,8 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from math import fsum
 
+from experiments.study.notebook import Notebook
+from experiments.study.workers import Workers, run_parallel
 from experiments.trackway.depth_rule import DepthRule, chosen_by, configuration_for, constant_depth, walk_by
 from experiments.trackway.one_mud import (
     CONSTANT_STRIDES,
@@ -25,8 +27,6 @@ from experiments.trackway.one_mud import (
 )
 from experiments.trackway.report import ADAPTIVE, FIXED_DEPTHS_M, Settings, TrackwayReport, table_report
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
-from experiments.trials.notebook import Notebook
-from experiments.trials.parallel_trials import Workers, run_parallel
 from experiments.trials.session import Show
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.toml_records import parse_document

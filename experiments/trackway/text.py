@@ -16,13 +16,13 @@ from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import number, table
 from experiments.robot.log_copies import cut_log
 from experiments.robot.prompt import Operator
+from experiments.study.notebook import Notebook
+from experiments.study.workers import Workers
 from experiments.trackway import bench, simulation
 from experiments.trackway.bench import BenchReport, LoggedTime
 from experiments.trackway.report import PAPER_TABLE, SpeedCell, TrackwayReport
 from experiments.trackway.simulation import SimulatedReport
 from experiments.trials.mud_trials import open_bench, run_trials
-from experiments.trials.notebook import Notebook
-from experiments.trials.parallel_trials import Workers
 from experiments.trials.session import Finding, Session
 from firmware_host.log.log_folder import first_path, run_files
 from logs.files.log_error import LogError

@@ -16,7 +16,7 @@ from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, ask_to_clear_faults, disarm, leave, rest
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.trials.notebook import Entry, Notebook
+from experiments.study.notebook import Entry, Notebook
 from experiments.trials.session import Session
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document

@@ -4,33 +4,14 @@ An experiment runs in a `Session`: a folder for its results, the operator at the
 ends with a `Finding`: the report for programs, sections for the page, and a text for the screen.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from enum import Enum, auto
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from experiments.reports.report_page import Figure, Section
-from experiments.robot.prompt import Operator
-
-Show = Callable[[int, int], None]  # how many steps are done, of how many
-
-
-class Session(NamedTuple):
-    """The surroundings of one run of an experiment."""
-
-    folder: Path  # exists
-    operator: Operator
-    show: Show
-    socket: Path | None = None  # of the daemon that controls the robot; None where the robot is simulated
-    program: Mapping[str, str] = {}  # version and sources, a part of every notebook's plan
-
-
-class Ending(Enum):
-    """How a finished experiment ends, for the exit status of its command."""
-
-    DONE = auto()
-    UNHEALTHY = auto()  # a check failed
-    REFUSED = auto()  # something that was asked for was not done
+from experiments.study.session import Ending as Ending
+from experiments.study.session import Session as Session
+from experiments.study.session import Show as Show
 
 
 class Finding(NamedTuple):

@@ -14,8 +14,8 @@ from experiments.reports.coefficient_table import PER_CM3, ComparedStride, Gathe
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
+from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.notebook import Entry
 from experiments.trials.stride_profile import StrideProfile, profile_from_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import Plan

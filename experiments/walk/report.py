@@ -25,9 +25,9 @@ from experiments.reports.coefficient_table import (
 )
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow
 from experiments.reports.mud_names import mud_text
+from experiments.study.notebook import Entry
 from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
-from experiments.trials.notebook import Entry
 from experiments.trials.stride_profile import profile_from_row
 from experiments.trials.truth_file import TruthOfMud, missing_text, truth_in
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED

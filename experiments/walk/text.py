@@ -18,10 +18,10 @@ from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.text_tables import TitledRows, text_of_tables
+from experiments.study.notebook import Entry
 from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
 from experiments.trials.mud_trials import SEED, PlannedTrial, open_bench, run_trials
-from experiments.trials.notebook import Entry
 from experiments.trials.session import Finding, Session
 from experiments.trials.truth_file import TruthOfMud, load_truth
 from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, run

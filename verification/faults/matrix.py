@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from drivers.drive_types import DEFAULT
 from drivers.fault_injection.failure_table import BY_NAME, PHASES, FailureMode
-from experiments.trials.parallel_trials import Workers, run_parallel
+from experiments.study.workers import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.harness.drive_presets import DRIVES
 from verification.faults.cell import run_cell

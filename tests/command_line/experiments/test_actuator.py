@@ -19,7 +19,7 @@ from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.robot.prompt import AutomaticOperator
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from experiments.trials.session import Ending, Session
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.file_recorder import FileRecorder

@@ -18,8 +18,8 @@ from command_line.experiments.conduct import conduct, conduct_bench
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from experiments.reports.report_page import Section
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
-from experiments.trials import provenance
-from experiments.trials.notebook import NAME, Notebook
+from experiments.study import provenance
+from experiments.study.notebook import NAME, Notebook
 from experiments.trials.session import Finding, Session, Show
 
 STUDY = "experiments.reports.value_text"  # any module of the product

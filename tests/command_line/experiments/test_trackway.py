@@ -12,12 +12,12 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 from experiments.mud_fit import mud_fit
+from experiments.study.notebook import Notebook
 from experiments.sweep import sweep
 from experiments.trackway import simulation
 from experiments.trackway.one_mud import constant_walks
 from experiments.trackway.report import ADAPTIVE
 from experiments.trackway.walk import Walk, WalkedStride
-from experiments.trials.notebook import Notebook
 from experiments.trials.session import Show
 from simulation.mud.clay import MUDS
 from tests.command_line.command_lines import failure, refusal

@@ -15,7 +15,7 @@ from experiments.actuator.reading import MovedError, Reading, Side
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON
-from experiments.trials.notebook import Notebook
+from experiments.study.notebook import Notebook
 from firmware_host.configuration.configuration import Configuration
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator

@@ -17,7 +17,7 @@ from experiments.campaign import campaign as campaign_module
 from experiments.campaign.campaign_file import Campaign, load_campaign
 from experiments.campaign.walk_trial import run_walk
 from experiments.reports.report_page import PAGE
-from experiments.trials.notebook import NAME, Notebook
+from experiments.study.notebook import NAME, Notebook
 from firmware_host.configuration.file_problems import ConfigurationError
 from logs.catalogue.catalogue import Catalogue, CatalogueError
 from logs.catalogue.entry import COLUMNS, TRIALS
@@ -271,7 +271,7 @@ def test_a_cluster_that_cannot_be_reached_is_one_sentence_and_costs_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip("distributed", reason="needs the extra cluster")
-    monkeypatch.setattr("experiments.trials.cluster_workers.CONNECT_S", 0.5)
+    monkeypatch.setattr("experiments.study.cluster_workers.CONNECT_S", 0.5)
     assert command("--cluster", "tcp://127.0.0.1:1") == exit_codes.UNHEALTHY
     said = capsys.readouterr().err
     assert said.startswith("mudskipper: no cluster answers at tcp://127.0.0.1:1") and said.count("\n") == 1
@@ -307,7 +307,7 @@ def test_a_changed_file_and_a_changed_program_are_refused_in_the_same_folder(
         said = capsys.readouterr().err
         assert then in said and now in said and "--out" in said and "--restart" in said
     with monkeypatch.context() as patch:
-        patch.setattr("experiments.trials.provenance.software_version", lambda: "9")
+        patch.setattr("experiments.study.provenance.software_version", lambda: "9")
         assert command() == exit_codes.REFUSED
         assert "version = 9" in capsys.readouterr().err
     assert command() == exit_codes.OK and len(rows(tmp_path)) == 4

@@ -26,8 +26,8 @@ from experiments.estimation.evaluation import (
 )
 from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, error_rows
 from experiments.reports.report_page import to_json
+from experiments.study.workers import LocalWorkers
 from experiments.trials.latency import LATENCY_S
-from experiments.trials.parallel_trials import LocalWorkers
 from experiments.trials.trial import MEASURING_WALK, SINGLE, TORQUE_ERROR, WALKING, Setup
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances

@@ -20,9 +20,9 @@ from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, se
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.study.notebook import Entry, Notebook
 from experiments.trials.estimation_methods import DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
-from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.simulated_bed import CarriedBed
 from experiments.trials.stride_profile import profile_from_row
 from experiments.trials.trial import SINGLE, configuration_of

@@ -13,6 +13,7 @@ from experiments.reports.report_page import to_json
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.robot.prompt import SKIP
+from experiments.study.notebook import Notebook
 from experiments.trackway.bench import (
     UNSEEN_S,
     BenchReport,
@@ -29,7 +30,6 @@ from experiments.trackway.plots import plot_trackway
 from experiments.trackway.text import trackway_text
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.mud_trials import Bench, InvalidTrialError, counted_entries
-from experiments.trials.notebook import Notebook
 from experiments.trials.simulated_bed import simulated_bench
 from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.mud.clay import MUDS

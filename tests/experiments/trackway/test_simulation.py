@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
+from experiments.study.notebook import Notebook
+from experiments.study.workers import LocalWorkers
 from experiments.trackway.one_mud import STARTING, BestDepth, MudWalk
 from experiments.trackway.report import ADAPTIVE, PAPER_TABLE, Speed
 from experiments.trackway.simulation import FIXED, Plan, SimulatedReport, end_of, is_over, report_of, rules_of, run
 from experiments.trackway.walk import Walk, WalkedStride
-from experiments.trials.notebook import Notebook
-from experiments.trials.parallel_trials import LocalWorkers
 from simulation.mud.clay import MUDS
 from simulation.mud.track import paper_track
 

@@ -11,6 +11,7 @@ from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import CLEAR, LEAVE, leave
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.study.notebook import Entry, Notebook, NotebookError
 from experiments.trials import mud_trials
 from experiments.trials import session as session_module
 from experiments.trials.mud_trials import (
@@ -24,7 +25,6 @@ from experiments.trials.mud_trials import (
     counted_entries,
     open_bench,
 )
-from experiments.trials.notebook import Entry, Notebook, NotebookError
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
 

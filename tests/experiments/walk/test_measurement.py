@@ -14,10 +14,10 @@ import pytest
 from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.reports.report_page import to_json
 from experiments.robot.lockstep_robot import LockstepRobot
+from experiments.study.notebook import Entry, Notebook
 from experiments.trackway.bench import Mud
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError
-from experiments.trials.notebook import Entry, Notebook
 from experiments.trials.simulated_bed import CarriedBed
 from experiments.walk import measurement as walk_mapping
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED

@@ -18,7 +18,7 @@ from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from drivers.can import stamp_clock
 from drivers.fault_injection.failure_table import BY_NAME, FAILURE_MODES, PHASES, FailureMode
-from experiments.trials.parallel_trials import run_parallel
+from experiments.study.workers import run_parallel
 from simulation.harness.drive_presets import DRIVES
 from verification.faults.cell import FORBIDDEN_TICKS, run_cell
 from verification.faults.evaluation import Cell, problems

@@ -1,0 +1,64 @@
+"""The folder of a study's results: a new one for each run, or a given one, where the study continues or begins again.
+
+A study is finished where its page is written, the last of its files. Its summary says what computed it.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from experiments.study.notebook import NAME, NotebookError, count_entries
+from experiments.study.provenance import program_text
+
+PAGE, SUMMARY, RESULTS = "report.html", "summary.json", "results.parquet"
+
+
+def make_folder(name: str) -> Path:
+    """Make a folder, with a number after its name where that exists, and return it. Raises OSError."""
+    for folder in _numbered(Path(name)):
+        with suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+    raise AssertionError("numbers do not end")
+
+
+def set_aside(folder: Path) -> Path | None:
+    """Rename a folder with results; return its new path, or None where it has none. Raises OSError."""
+    if not (count_entries(folder) or (folder / SUMMARY).exists()):
+        return None
+    return folder.rename(next(each for each in _numbered(folder.with_name(f"{folder.name}-old")) if not each.exists()))
+
+
+def _numbered(path: Path) -> Iterator[Path]:
+    return (path.with_name(path.name + (f"-{number}" if number > 1 else "")) for number in count(1))
+
+
+def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any] | None = None) -> None:
+    """Raises NotebookError for results of another experiment, and for a finished one.
+
+    With `options`, one that was finished with others, such as fewer trials, may continue: its notebook decides.
+    """
+    summary: dict[str, Any] = {}
+    with suppress(OSError, ValueError):
+        summary = dict(json.loads((folder / SUMMARY).read_bytes()))
+    earlier = summary.get("experiment", experiment)
+    if earlier != experiment:
+        raise NotebookError(f"{folder} has the results of experiment {earlier}: choose another folder with --out")
+    record = summary.get("provenance", {})
+    if (folder / PAGE).exists() and options in (None, record.get("options", options)):
+        raise NotebookError(
+            f"{folder} has a finished experiment {experiment}, of {record.get('date', 'an unknown date')} by "
+            f"{program_text(record)}: choose another folder with --out, or begin again with --restart, which renames "
+            "this folder"
+        )
+
+
+def remove_unused(folder: Path) -> None:
+    """Remove a new folder in which nothing was measured. Logs stay, and so does their folder."""
+    if not (count_entries(folder) or (folder / SUMMARY).exists()):
+        with suppress(OSError):
+            (folder / NAME).unlink(missing_ok=True)
+            folder.rmdir()

@@ -1,0 +1,104 @@
+"""Trials on a Dask cluster of real processes: the same digits, lost workers, and clusters that cannot be used."""
+
+from __future__ import annotations
+
+import gc
+import shutil
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from experiments.study.provenance import PACKAGES
+from experiments.study.workers import LocalWorkers, WorkersError, run_parallel
+from experiments.trackway.depth_rule import constant_depth
+from experiments.trackway.one_mud import MudWalk, run_mud_walk
+from experiments.trackway.walk import Walk
+from simulation.mud.clay import MUDS
+from tests.folders import ROOT
+
+pytest.importorskip("distributed", reason="needs the extra cluster")
+
+from experiments.study import cluster_workers  # noqa: E402 - it imports distributed
+from experiments.study.cluster_workers import ClusterWorkers  # noqa: E402
+from tests.experiments.study.running_cluster import running_cluster  # noqa: E402
+
+WALKS = [partial(run_mud_walk, MudWalk(MUDS["48.5"], constant_depth(0.02), seed, strides=1)) for seed in range(1, 4)]
+
+
+@pytest.fixture(autouse=True)
+def closed_clients() -> None:
+    """Closes the clients of earlier tests that found no cluster.
+
+    Otherwise the garbage collector may close one in the thread of the next client's event loop, which then waits for
+    itself.
+    """
+    gc.collect()
+
+
+@pytest.fixture(scope="module")
+def digits() -> list[Walk]:
+    return run_parallel(WALKS, ignore, LocalWorkers(1))
+
+
+def ignore(done: int, total: int) -> None:
+    pass
+
+
+def test_two_local_workers_find_the_digits_of_one(digits: list[Walk]) -> None:
+    assert run_parallel(WALKS, ignore, LocalWorkers(2)) == digits
+
+
+def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed(
+    tmp_path: Path, digits: list[Walk]
+) -> None:
+    shown: list[tuple[int, int]] = []
+    with running_cluster(tmp_path, workers=2) as cluster:
+
+        def kill_one_after_the_first(index: int, walk: Walk) -> None:
+            if shown[-1][0] == 0:
+                cluster.workers[0].kill()
+
+        workers = ClusterWorkers(cluster.address)
+        assert run_parallel(WALKS, lambda *count: shown.append(count), workers, kill_one_after_the_first) == digits
+    assert shown == [(done, len(WALKS)) for done in range(len(WALKS) + 1)]
+
+
+def test_a_lost_cluster_is_one_message_after_the_results_that_it_gave(tmp_path: Path, digits: list[Walk]) -> None:
+    kept: list[Walk] = []
+    with running_cluster(tmp_path, workers=1) as cluster:
+
+        def lose(index: int, walk: Walk) -> None:
+            kept.append(walk)
+            cluster.end()
+
+        with pytest.raises(WorkersError, match=f"the cluster at {cluster.address} was lost"):
+            run_parallel(WALKS, ignore, ClusterWorkers(cluster.address), lose)
+    assert kept == digits[: len(kept)]
+
+
+def test_a_cluster_that_cannot_be_reached_is_one_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_workers, "CONNECT_S", 0.5)
+    for address in ("tcp://127.0.0.1:1", "127.0.0.1:1", "fog://127.0.0.1:1", "nowhere"):
+        with pytest.raises(WorkersError, match=f"no cluster answers at {address}"):
+            run_parallel(WALKS, ignore, ClusterWorkers(address))
+
+
+def test_a_cluster_without_workers_of_these_sources_is_refused_before_the_first_trial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = tmp_path / "other"
+    for folder in PACKAGES:
+        shutil.copytree(ROOT / folder, other / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    with (other / "simulation" / "mud" / "clay.py").open("a", encoding="utf-8") as module:
+        module.write("MUDS = {}\n")
+    with running_cluster(tmp_path) as cluster:
+        monkeypatch.setattr(cluster_workers, "CONNECT_S", 1.0)
+        with pytest.raises(WorkersError, match="has no workers: start some with 'dask worker tcp://"):
+            run_parallel(WALKS, ignore, ClusterWorkers(cluster.address))
+        monkeypatch.undo()
+        cluster.add_worker({"PYTHONPATH": str(other)}, other)
+        cluster.wait_for_workers()
+        with pytest.raises(WorkersError, match="install the same version of mudskipper on all workers") as refused:
+            run_parallel(WALKS, ignore, ClusterWorkers(cluster.address))
+    assert str(refused.value).count("sources") == 2
