@@ -43,7 +43,8 @@ def _coefficient(history: History, flipper: str, name: str) -> Row:
         style = BOUND if estimate["at_least"] else ""
         bound = "≥ " if estimate["at_least"] else ""
         text = bound + value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-    return [right(text, style), Text(trend(readings), "bold", justify="center"), Sparkline(values, width=len(values))]
+    last = Sparkline(values, width=len(values)) if values else Text()
+    return [right(text, style), Text(trend(readings), "bold", justify="center"), last]
 
 
 def trend(readings: Sequence[Report]) -> str:

@@ -13,6 +13,7 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
+from textual.css.query import NoMatches
 from textual.events import Key
 from textual.widgets import DataTable, Footer, Label, RichLog, Sparkline, Static
 
@@ -116,7 +117,7 @@ class WatchApp(App[int]):
     Rows { height: auto; scrollbar-size: 0 0; overflow: hidden; }
     Rows > .datatable--header { text-style: dim; background: ansi_default; }
     #strides { height: 1fr; min-height: 3; }
-    #messages, #question { height: 1; scrollbar-size: 0 0; overflow: hidden; }
+    #messages, #question { height: 1; scrollbar-size: 0 0; }
     .roomy #messages { height: 4; }
     .roomy #body > * { margin-bottom: 1; }
     """
@@ -137,7 +138,6 @@ class WatchApp(App[int]):
         super().__init__(ansi_color=True)
         self.feed, self._flippers, self._period_s, self._send = feed, flippers, period_s, send
         self._asked = ""  # the order that waits for an answer
-        self._mode = ""
 
     def compose(self) -> ComposeResult:
         yield Static(id="alarm")
@@ -170,7 +170,7 @@ class WatchApp(App[int]):
     def redraw(self) -> None:
         """Show the newest history."""
         history, now_s = self.feed.history, time.monotonic()
-        with self.feed.lock:
+        with self.feed.lock, suppress(NoMatches):  # while the screen closes, its widgets are gone one after another
             if history.status:
                 self._show(history, now_s)
 
@@ -189,14 +189,11 @@ class WatchApp(App[int]):
         self.query_one("#strides", Rows).show(stride_rows(history))
         self.query_one("#drives", Rows).show(drive_rows(history, heard))
         self.query_one("#machine", Static).update(machine_text(history, roomy))
-        mode = history.status["mode"]
-        if mode != self._mode:
-            self._mode = mode
-            self.say(f"mode {mode}")
 
     def on_key(self, event: Key) -> None:
-        """Take any key without a binding as a no to a question."""
-        self._ask("")
+        """Take any key but y as a no to a question; the actions of keys follow this."""
+        if event.key != "y":
+            self._ask("")
 
     def action_ask(self, method: str) -> None:
         self._ask(method)
@@ -228,7 +225,7 @@ class WatchApp(App[int]):
 
     def _deliver(self, method: str) -> None:
         answer = self._send(method)
-        with suppress(RuntimeError):  # the operator has left meanwhile
+        with suppress(RuntimeError, NoMatches):  # the operator has left meanwhile
             self.call_from_thread(self.say, answer)
 
     def say(self, message: str) -> None:
