@@ -14,7 +14,7 @@ from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS, TORQUE_CODES
 
 damiao = pytest.importorskip("damiao_motor.core.motor", reason="the package damiao-motor, an oracle, is not installed")
-RANDOM_FRAMES = 100_000
+RANDOM_FRAMES = 5_000
 DAMIAO = {f"DM{name}": name for name in damiao.MOTOR_TYPE_PRESETS}
 
 
