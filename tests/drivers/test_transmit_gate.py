@@ -198,7 +198,7 @@ def test_closing_at_full_torque_lets_zero_leave_at_once(armed: Bench) -> None:
     assert armed.gate.refused == 0
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([MOTOR, OTHER]), st.floats(width=32)), max_size=30), st.booleans())
 def test_every_torque_that_leaves_is_within_limit_and_slew(torques: list[tuple[int, float]], is_open: bool) -> None:
     bench = Bench()
@@ -224,7 +224,7 @@ ANY_FRAME = st.builds(
 )
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(ANY_FRAME)
 def test_no_frame_raises_and_none_passes_a_closed_gate_but_harmless_ones(frame: Frame) -> None:
     bench = Bench()
