@@ -154,7 +154,7 @@ def walk_of_trace(
 
 def _columns_of(rows: Rows, start_s: float, rig: Rig, flipper: str) -> dict[str, Any]:
     """Return the arrays of a walk in which `flipper` is shown."""
-    series = {
+    series: dict[str, dict[str, Any]] = {
         name: {
             "sweep_angle_rad": rows["angle_rad"][:, 2 * number],
             "adduction_angle_rad": rows["angle_rad"][:, 2 * number + 1],
@@ -222,7 +222,7 @@ def walk_of_lab(path: Path, lab: LabLog, number: int = 0) -> RecordedWalk:
         rows += [STRIDE.decode(stride_row(stride.t_end_s, stride, nan)) for stride in own]
         if reading.strides and estimator.mud_estimate.boundary:
             noticed_s.append(now_s - start_s)
-    series = {
+    series: dict[str, dict[str, Any]] = {
         flipper: {
             "sweep_angle_rad": lab.angle_rad[:, 2 * place],
             "adduction_angle_rad": lab.angle_rad[:, 2 * place + 1],
