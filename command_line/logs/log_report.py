@@ -18,8 +18,9 @@ from experiments.reports.error_table import COEFFICIENTS
 from experiments.run_report.page import comparison_result, comparison_sentences, run_result
 from experiments.run_report.results import Entry, differences, headline_of, headline_sentences
 from experiments.run_report.run import Run, read_runs
-from experiments.study.page import PAGE, write_result
+from experiments.study.page import write_result
 from experiments.study.result import to_json
+from experiments.study.results_folder import PAGE
 from firmware_host.operator.reports import known, map_report, stride_report
 from logs.files.log_error import LogError
 from logs.files.log_summary import log_summary

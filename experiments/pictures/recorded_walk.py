@@ -73,7 +73,7 @@ class RecordedWalk(NamedTuple):
     complete: bool = True  # False if the writer of the log was interrupted, or still writes
     cut: str = ""  # how the walk may extend beyond this log
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
-    series: Mapping[str, Mapping[str, Floats]] = {}  # of every flipper that moved, the left one first
+    series: Mapping[str, Mapping[str, Any]] = {}  # of every flipper that moved, the left one first
     source: TraceSource | None = None  # of a walk that has not every row of the log
 
     @property

@@ -70,11 +70,10 @@ def travel_of(walks: Sequence[RecordedWalk]) -> Entry:
 
 def _speed(distance_m: float | None, duration_s: float | None = None, std_error_m_s: float | None = None) -> Entry:
     """`duration_s` is None where there is no pose; `std_error_m_s` of a single stride."""
-    known = distance_m is not None and duration_s is not None
     return {
         "distance_m": distance_m,
         "duration_s": duration_s,
-        "speed_m_s": distance_m / duration_s if known else None,
+        "speed_m_s": None if distance_m is None or duration_s is None else distance_m / duration_s,
         "speed_std_error_m_s": std_error_m_s,
     }
 
@@ -184,12 +183,14 @@ def _between(first: Run, before: Entry, other: Run, after: Entry) -> Iterator[En
 
 
 def _quantities(before: Entry, after: Entry, same_robot: bool) -> Iterator[tuple[str, Value, Value]]:
-    yield SPEED, *((each["speed_m_s"], each["speed_std_error_m_s"]) for each in (before, after))
+    a, b = [(each["speed_m_s"], each["speed_std_error_m_s"]) for each in (before, after)]
+    yield SPEED, a, b
     for name in COEFFICIENTS:
-        a, b = before["both"][name], after["both"][name]
-        if not (a.at_least or b.at_least):
-            by_trials = same_robot and a.trials_error is not None and b.trials_error is not None
-            yield name, *((each.value, each.trials_error if by_trials else each.std_error) for each in (a, b))
+        both: list[GatheredCoefficient] = [each["both"][name] for each in (before, after)]
+        if not any(each.at_least for each in both):
+            by_trials = same_robot and all(each.trials_error is not None for each in both)
+            a, b = [(each.value, each.trials_error if by_trials else each.std_error) for each in both]
+            yield name, a, b
 
 
 def is_shown(difference: Mapping[str, Any]) -> bool | None:

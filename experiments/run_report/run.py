@@ -136,9 +136,9 @@ def _describe_strides(
     """Return the rows of STRIDES and of ESTIMATES."""
     starts_s = [walk.begun_s for walk in walks]
     fits: dict[tuple[int, int, str], StrideFits] = {}
-    for replayed, found in zip(replay.strides, replay.fits, strict=True):
+    for replayed, of_stride in zip(replay.strides, replay.fits, strict=True):
         number = int(np.searchsorted(starts_s, replayed.t_end_s - replay.begin_s))
-        fits[number, replayed.index, replayed.flipper] = found
+        fits[number, replayed.index, replayed.flipper] = of_stride
     strides, estimates = [], []
     for number, walk in enumerate(walks, 1):
         regions = mud_regions(walk, None) if layout is None else []

@@ -52,7 +52,12 @@ def test_the_page_shows_every_walk_stride_and_event(
 def shown(monkeypatch: pytest.MonkeyPatch, *words: str) -> tuple[dict[str, str], dict[str, list[list[str]]]]:
     """Return the texts and the tables of the page by their sections or titles, without its pictures."""
     results: list[Result] = []
-    monkeypatch.setattr(log_report, "write_result", lambda folder, result, *_, **__: results.append(result) or [])
+
+    def take(folder: Path, result: Result, *_: object, **__: object) -> list[Path]:
+        results.append(result)
+        return []
+
+    monkeypatch.setattr(log_report, "write_result", take)
     assert main(["log", "report", *words]) == exit_codes.OK
     (result,) = results
     return dict(result.texts), {table.title or table.section: table.cells() for table in result.tables}
