@@ -159,7 +159,7 @@ def _run(claim: Claim, logs: Path | None, folder: Path, root: Path) -> Any:
     try:
         return json.loads(done.stdout)
     except ValueError as error:
-        raise ValueError(f"exit status {done.returncode} and no JSON from: {claim.command}") from error
+        raise ValueError(f"exit status {done.returncode} and no JSON from {claim.command} in {folder}") from error
 
 
 def drifted(claim: Claim, old: Mapping[str, Figure], new: Mapping[str, Figure]) -> list[str]:
