@@ -2,12 +2,13 @@
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from inspect import Parameter
 from pathlib import Path
 from typing import Any
 
-from command_line.option_types import between, whole
-from experiments.study.option import DeclaredOption, declared_options
+from command_line.option_types import above, between, whole
+from experiments.study.option import DeclaredOption, OptionError, declared_options
 
 METAVARS = {int: "N", float: "X", Path: "FILE", str: "NAME"}
 SHOWN_DEFAULTS = 4  # of a repeatable option
@@ -56,12 +57,21 @@ def _add(parser: argparse.ArgumentParser, declared: DeclaredOption) -> None:
 def _parser(declared: DeclaredOption) -> Callable[[str], Any]:
     option = declared.option
     if option.parse is not None:
-        return option.parse
+        return partial(_parse, option.parse)
+    if option.above is not None:
+        return above(option.above, option.high, option.unit)
     if option.low is None or option.high is None:
         return declared.type
     if declared.type is int:
         return whole(int(option.low), int(option.high))
     return between(option.low, option.high, option.unit)
+
+
+def _parse(parse: Callable[[str], Any], text: str) -> Any:
+    try:
+        return parse(text)
+    except OptionError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
 
 
 def _help(declared: DeclaredOption) -> str:

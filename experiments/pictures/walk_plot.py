@@ -58,7 +58,15 @@ Panels = list[tuple[str, Draw]]
 
 
 def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -> Figure:
-    """Draw a walk into a PNG, SVG or PDF file, each flipper in a column. `layout` names the muds where it is known."""
+    """Draw a walk into a PNG, SVG or PDF file."""
+    figure = draw_walk(walk, layout)
+    with rc_context(STYLE):
+        figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
+
+
+def draw_walk(walk: RecordedWalk, layout: MudLayout | None = None) -> Figure:
+    """Draw a walk, each flipper in a column. `layout` names the muds where it is known."""
     sides, own, of_body = walk.sides, _flipper_panels(), _body_panels(walk)
     rows = len(own) + -(-len(of_body) // len(sides))
     with rc_context(STYLE):
@@ -75,7 +83,6 @@ def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -
             draw(panel, walk)
             panel.set_ylabel(label)
         _finish(figure, axes, walk, mud_regions(walk, layout))
-        figure.savefig(path, dpi=DOTS_PER_INCH)
     return figure
 
 

@@ -22,10 +22,12 @@ class Option(NamedTuple):
     help: str
     low: float | None = None
     high: float | None = None
+    above: float | None = None  # instead of `low`, where that value itself is not allowed
     unit: str = ""
     metavar: str = ""
     also: str = ""  # a second name, such as "--seeds"
-    parse: Callable[[str], Any] | None = None  # the text of a value; raises argparse.ArgumentTypeError
+    joined: bool = False  # one text has all values of a tuple, such as A,B
+    parse: Callable[[str], Any] | None = None  # the text of a value; raises OptionError
 
 
 class DeclaredOption(NamedTuple):
@@ -53,7 +55,7 @@ def declared_options(function: Callable[..., Any]) -> list[DeclaredOption]:
 def _declared(parameter: Parameter, kind: Any, option: Option) -> DeclaredOption:
     if get_origin(kind) in (Union, UnionType):
         kind = next(each for each in get_args(kind) if each is not type(None))
-    repeatable = get_origin(kind) is tuple and get_args(kind)[-1] is Ellipsis
+    repeatable = get_origin(kind) is tuple and get_args(kind)[-1] is Ellipsis and not option.joined
     kind = get_args(kind)[0] if repeatable else kind
     choices = get_args(kind) if get_origin(kind) is Literal else ()
     return DeclaredOption(
