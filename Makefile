@@ -14,7 +14,7 @@ PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --duration
 # Exact versions with hashes, for installations as root; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
 
-.PHONY: help lock setup demo test test-compiled test-vm mutants dst lint docs docs-links man clean
+.PHONY: help lock setup demo test test-compiled test-vm mutants dst claims lint docs docs-links man clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -42,6 +42,9 @@ mutants: .venv/test  ## change what keeps the robot safe in 1200 places; its tes
 
 dst: .venv/test  ## simulate SEEDS=200 random schedules of failures and operators; every promise must hold
 	@$(BIN)/python -m tests.dst.campaign $(or $(SEEDS),200) $(ARGS)
+
+claims: .venv/test  ## measure the figures of the documentation again; ARGS='NAME --rewrite' writes them
+	@$(BIN)/python -m verification.claims $(ARGS)
 
 lint: .venv/test .venv/docs  ## run ruff and mypy --strict
 	$(BIN)/ruff check .

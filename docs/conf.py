@@ -4,12 +4,15 @@ import os
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
+from typing import Any
 
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS.parent))
 os.environ.pop("MUDSKIPPER_SOCKET", None)  # a default of the command line, which the pages show
 
 from docs.generate.pages import write_tables  # noqa: E402 - it needs the path above
+from verification.claims.pages import fill  # noqa: E402
+from verification.claims.results import load_results  # noqa: E402
 
 write_tables(DOCS / "reference" / "generated")
 
@@ -25,3 +28,12 @@ html_title = f"mudskipper {release}"
 copybutton_prompt_text = "$ "
 man_pages = [("reference/command_line", "mudskipper", "operates a robot that crawls over mud", "", 1)]
 linkcheck_anchors = False  # GitHub renders its anchors with scripts
+
+
+def fill_figures(app: Any, page: str, source: list[str]) -> None:
+    """Show the figures of the results in a page, without their templates."""
+    source[0] = fill(source[0], load_results(), markers=False)
+
+
+def setup(app: Any) -> None:
+    app.connect("source-read", fill_figures)

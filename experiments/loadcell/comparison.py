@@ -6,7 +6,7 @@ from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from experiments.loadcell.analysis.coefficients import COEFFICIENTS, MudCoefficient
+from experiments.loadcell.analysis import COEFFICIENTS, MudCoefficient
 from experiments.reports.mud_names import mud_key, mud_text
 from experiments.reports.text_tables import Rows
 from experiments.reports.value_text import N_CM3, miss_text, value_text

@@ -7,22 +7,23 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drivers.load_cell.calibration import LoadCellCalibration
-from experiments.loadcell.analysis.analyse import analyse
-from experiments.loadcell.analysis.coefficients import (
+from experiments.loadcell.analysis import (
     COEFFICIENTS,
-    AnalysedTrial,
     MudCoefficient,
+    analyse,
     bench_uncertainty,
     gather_trials,
     speed_remark,
 )
-from experiments.loadcell.analysis.force_motion import StageSettings
 from experiments.loadcell.comparison import Compared, compare_muds
 from experiments.loadcell.recording import load_counted
+from experiments.loadcell.strokes import AnalysedTrial, StageSettings
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.report_page import to_json
 from experiments.study.notebook import Entry, Notebook
 from experiments.trials.session import Show
+
+ALIGNMENT_KEYS = ("lag_s", "rate_share", "lag_doubt_s", "rate_doubt")  # as in earlier summaries
 
 
 class Results(NamedTuple):
@@ -116,7 +117,7 @@ def _trial_entries(trial: AnalysedTrial, entry: Entry) -> dict[str, Any]:
         "speed_m_s": trial.speed_m_s,
         "is_measured": trial.is_measured,
         "place_error_m": trial.position_error_m if trial.is_measured else None,
-        "alignment": trial.alignment,
+        "alignment": trial.alignment and dict(zip(ALIGNMENT_KEYS, trial.alignment, strict=True)),
         "problem": trial.problem,
         "remark": trial.remark,
     }

@@ -8,15 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from control.plate_integrals import submerged_part
-from experiments.loadcell.analysis.coefficients import (
-    COEFFICIENTS,
-    AnalysedTrial,
-    MudCoefficient,
-    depths_of,
-    volume_m3,
-)
-from experiments.loadcell.analysis.force_motion import REVERSAL_FRACTION, Insertion, Shear, StageSettings
+from experiments.loadcell.analysis import COEFFICIENTS, MudCoefficient
+from experiments.loadcell.force_trials import depths_of
+from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, Insertion, Shear, StageSettings
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import DOTS_PER_INCH, INK, LABELS, looks_of, mark_of
 from experiments.reports.value_text import N_CM3
@@ -83,23 +77,22 @@ def _plot_vertical_model(
         per_m3, within = sign * coefficients[name].value, (trial_m >= 0.0) & (trial_m <= fraction * np.nanmax(trial_m))
         shown = within & (profile.times_s >= from_s) & (profile.times_s <= to_s)
         label = "model" if name == "k_p" else None
-        vertical.plot(since_s[shown], per_m3 * volume_m3(settings, trial_m[shown]), label=label, **MODEL)
-        curve.plot(100.0 * fraction * even_m, per_m3 * volume_m3(settings, fraction * even_m), **MODEL)
+        vertical.plot(since_s[shown], per_m3 * settings.volumes_m3(trial_m[shown]), label=label, **MODEL)
+        curve.plot(100.0 * fraction * even_m, per_m3 * settings.volumes_m3(fraction * even_m), **MODEL)
 
 
 def _plot_shear(panel: Axes, trial: AnalysedTrial, colour: str, label: str) -> None:
     motion, profile = trial.motion, trial.profile
     assert isinstance(motion, Shear) and profile is not None
-    zero_n = -trial.recorded.zero_n if profile.turned else trial.recorded.zero_n
-    shown = profile.times_s > motion.begin_s - BEFORE_S
-    since_s, forces_n = profile.times_s[shown] - motion.begin_s, profile.forces_n[shown] - zero_n
-    panel.plot(since_s, forces_n, color=colour, linewidth=1.0, label=label)
+    since_s, forces_n = profile.times_s - motion.begin_s, profile.forces_n - profile.zero_n(trial.recorded)
+    shown = since_s > -BEFORE_S
+    panel.plot(since_s[shown], forces_n[shown], color=colour, linewidth=1.0, label=label)
 
 
 def _plot_shear_model(panel: Axes, trial: AnalysedTrial, k_s: MudCoefficient, settings: StageSettings) -> None:
     motion = trial.motion
     assert isinstance(motion, Shear)
-    force_n = k_s.value * submerged_part(settings.plate, settings.depth_m, 0.0, 1.0).depth_moment_m3
+    force_n = k_s.value * settings.moment_m3
     steady_s = [motion.steady_from_s - motion.begin_s, motion.steady_to_s - motion.begin_s]
     panel.plot(steady_s, [force_n, force_n], label="model", **MODEL)
 

@@ -18,8 +18,8 @@ from drivers.load_cell.calibration import (
 from drivers.load_cell.line_formats import AUTO, COUNTS, LineFormat, find_format
 from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.serial.serial_line import SerialLine, text_fraction
-from experiments.loadcell.analysis.force_motion import StageSettings
 from experiments.loadcell.recording import CellRecorder
+from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import TrialBench
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON, Operator

@@ -15,10 +15,8 @@ import numpy as np
 
 from drivers.load_cell.load_cell_port import LoadCellPort, Sample
 from drivers.load_cell.stage_encoder import StageEncoder, StagePosition
-from experiments.loadcell.analysis.coefficients import Recorded
-from experiments.loadcell.analysis.contact import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, noise_of
-from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.stage_track import StagePositions
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.strokes import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, Recorded, StagePositions, noise_of
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Notebook
 from simulation.test_rig.load_cell_bench import EmulatedBench

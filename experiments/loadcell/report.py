@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.loadcell.analysis.coefficients import CALLIPERS_M, COEFFICIENTS, AnalysedTrial, MudCoefficient
-from experiments.loadcell.analysis.force_motion import RATE_EXPONENT, Insertion, StageSettings
-from experiments.loadcell.analysis.stage_track import common_alignment
+from experiments.loadcell.analysis import CALLIPERS_M, COEFFICIENTS, MudCoefficient
 from experiments.loadcell.comparison import OTHER_PLATE, Compared
 from experiments.loadcell.evaluation import Results
 from experiments.loadcell.plots import plot_coefficients, plot_mud
+from experiments.loadcell.stage_track import common_alignment
+from experiments.loadcell.strokes import RATE_EXPONENT, AnalysedTrial, Insertion, StageSettings
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.mud_names import mud_text
 from experiments.reports.report_page import Figure, Section

@@ -17,13 +17,13 @@ from drivers.load_cell.line_formats import AUTO, COUNTS, NUMBER, LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
 from drivers.serial.serial_line import SerialLineError
-from experiments.loadcell.analysis.force_motion import StageSettings
 from experiments.loadcell.comparison import truth_rows
 from experiments.loadcell.evaluation import evaluate_muds, make_report
 from experiments.loadcell.preparation import OR_WITHOUT, CellSettings, prepare_cell
 from experiments.loadcell.recording import RAW, CellRecorder, WallClock
 from experiments.loadcell.report import TITLE, make_sections, make_tables
 from experiments.loadcell.stage import ManualStage, SimulatedStage, clay_truth, water_of
+from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
 from experiments.reports.report_page import Section, to_json
 from experiments.reports.text_tables import text_of_tables

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.loadcell.analysis.analyse import analyse_trial
-from experiments.loadcell.analysis.coefficients import INSERTION, KINDS, SINGLE_SPEED_BOUND, AnalysedTrial, speed_remark
-from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.force_motion import Insertion, Shear, StageSettings, wide_pace
+from experiments.loadcell.analysis import analyse_trial, speed_remark
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.force_trials import wide_pace
 from experiments.loadcell.recording import (
     AVERAGED,
     CellRecorder,
@@ -27,6 +26,7 @@ from experiments.loadcell.recording import (
     write_samples,
 )
 from experiments.loadcell.stage import Stage, Trial
+from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Shear, StageSettings
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.study.notebook import Notebook
 from experiments.trials.session import Show
@@ -41,6 +41,7 @@ LISTENING_S, SILENT_S = 1.0, 1.0
 FORCE_ALONE = "the trial is evaluated by its force alone, which assumes a stage of one speed"
 LEAST_DRIFT_N, DRIFT_FRACTION = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
 GARBLED_FRACTION = 0.05
+SINGLE_SPEED_BOUND = 0.12  # difference from the set speed that is remarked; the speed of one trial is less certain
 MISSING_FRACTION = 0.15  # of the samples of a stroke
 FLAT_SAMPLES = 8  # equal samples at the largest force: a cell that saturates without a message
 

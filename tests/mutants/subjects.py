@@ -29,13 +29,13 @@ SUBJECTS = (
         },
     ),
     Subject(
-        "drivers.odrive.gate_tables",
-        ("drivers/test_transmit_gate.py", "drivers/odrive/test_gate_table05.py"),
+        "drivers.odrive.gate_table",
+        ("drivers/test_transmit_gate.py", "drivers/odrive05/test_gate_table.py"),
         EVERY_MUTANT,
     ),
-    Subject("drivers.moteus.gate_tables", ("drivers/moteus/test_gate_table.py",)),
+    Subject("drivers.moteus.gate_table", ("drivers/moteus/test_gate_table.py",)),
     Subject("drivers.moteus.codec", ("drivers/moteus/test_gate_table.py",), functions=("decode_torque",)),
-    Subject("drivers.mit.gate_tables", ("drivers/mit/test_gate_table.py",)),
+    Subject("drivers.mit.gate_table", ("drivers/mit/test_gate_table.py",)),
     Subject("drivers.mit.codec", ("drivers/mit/test_gate_table.py",), functions=("decode_torque", "_decode")),
     Subject(
         "drivers.can.reopening_port",

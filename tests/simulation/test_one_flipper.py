@@ -85,10 +85,10 @@ def test_its_log_names_its_joints_and_replays_to_the_last_digit_with_its_own_rig
         replay_log(Path("log"), log, simulated_configuration(FIXED))
 
 
-def test_the_definition_of_the_rows_names_the_flippers() -> None:
+def test_the_metadata_of_the_rows_names_the_flippers() -> None:
     for rig in (Rig(), RIGHT, Rig(("left",))):
-        assert rig_of(tick_kind(rig).definition) == rig
-    assert tick_kind(Rig()) is TICK
+        assert rig_of(tick_kind(rig).metadata) == rig
+    assert rig_of({}) == Rig() and tick_kind(Rig()) is TICK
 
 
 def test_one_flipper_moves_a_body_on_a_rail() -> None:

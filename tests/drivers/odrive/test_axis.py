@@ -18,8 +18,8 @@ from drivers.drive import WatchdogEndpoints
 from drivers.drive_types import make_drives
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message, arbitration_id
-from drivers.odrive.drive_settings import REFRESH_S, REPEAT_UNKNOWN_S
 from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.settings import REFRESH_S, REPEAT_UNKNOWN_S
 
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
 PRO = (2, 4, 4, 58, 0, 6, 11, 0)

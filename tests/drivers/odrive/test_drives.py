@@ -31,8 +31,8 @@ from drivers.odrive.codec import (
     Message,
     arbitration_id,
 )
-from drivers.odrive.drive_settings import REPEAT_UNKNOWN_S
 from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.settings import REPEAT_UNKNOWN_S
 
 PARAMETERS = {
     "left_sweep": OdriveParameters("left", 0),

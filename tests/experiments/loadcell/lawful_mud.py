@@ -6,9 +6,8 @@ from random import Random
 
 import numpy as np
 
-from experiments.loadcell.analysis.coefficients import SHEAR, Recorded
-from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.stage_track import StagePositions
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.strokes import SHEAR, Recorded, StagePositions
 from simulation.test_rig.plate_stage import CarriedPlate, PlateStage, StageParameters
 from simulation.test_rig.stage_motion import ManualMotionParameters
 

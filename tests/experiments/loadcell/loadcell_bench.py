@@ -11,12 +11,12 @@ from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
-from experiments.loadcell.analysis.force_motion import StageSettings
 from experiments.loadcell.evaluation import Results, evaluate_muds
 from experiments.loadcell.preparation import CellSettings, prepare_cell
 from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.run import notebook_plan
 from experiments.loadcell.stage import SimulatedStage
+from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
 from experiments.study.notebook import Notebook
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters

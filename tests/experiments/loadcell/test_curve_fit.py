@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.loadcell.analysis.curve_fit import Array, Prior, fit_curve
+from experiments.loadcell.curve_fit import Array, Prior, fit_curve
 
 T = np.linspace(0.0, 4.0, 80)
 NOTHING_KNOWN = Prior(np.zeros(1), np.array([np.inf]))

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from experiments.loadcell.analysis.coefficients import INSERTION, bench_uncertainty
+from experiments.loadcell.analysis import bench_uncertainty
 from experiments.loadcell.preparation import CellSettings, examine_encoder
 from experiments.loadcell.recording import RAW, load_counted
 from experiments.loadcell.stage import Trial
+from experiments.loadcell.strokes import INSERTION
 from experiments.loadcell.trials import KEEP, WITHOUT, measure
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON

@@ -10,25 +10,32 @@ import pytest
 import statsmodels.api as sm
 
 from estimation.strokes.origin_fit import student_factor
-from experiments.loadcell.analysis.analyse import analyse, analyse_trial, common_pace
-from experiments.loadcell.analysis.coefficients import (
+from experiments.loadcell.analysis import (
     COEFFICIENTS,
+    analyse,
+    analyse_trial,
+    bench_uncertainty,
+    common_pace,
+    gather_trials,
+    speed_remark,
+)
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.force_trials import depths_of, wide_pace
+from experiments.loadcell.strokes import (
     INSERTION,
     SHEAR,
     AnalysedTrial,
     Coefficient,
+    Insertion,
+    Pace,
     Recorded,
-    bench_uncertainty,
-    depths_of,
-    gather_trials,
+    Shear,
+    StageSettings,
+    find_contact,
+    fit_slope,
     noises_n,
-    slope,
-    speed_remark,
-    volume_m3,
+    without_spikes,
 )
-from experiments.loadcell.analysis.contact import find_contact, without_spikes
-from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.force_motion import Insertion, Pace, Shear, StageSettings, wide_pace
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.load_cell import LoadCurve, measure_insertion, measure_shear
 from simulation.test_rig.load_cell_bench import PAPER_PLATE, RELAXATION, clay_plate
@@ -115,9 +122,9 @@ def test_the_error_of_a_trial_is_about_its_standard_error_though_clay_does_not_f
 def test_the_error_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_least_squares() -> None:
     """The force deviates smoothly from the law, which plain least squares takes for scatter."""
     random, depths_m = np.random.default_rng(1), np.linspace(0.0, 0.03, 25)
-    volumes_m3 = volume_m3(SETTINGS, depths_m)
+    volumes_m3 = SETTINGS.volumes_m3(depths_m)
     reported = [
-        slope(SETTINGS, depths_m, profile_n(depths_m) + 0.01 * random.standard_normal(25), 0.03, 0.0)
+        fit_slope(SETTINGS, depths_m, profile_n(depths_m) + 0.01 * random.standard_normal(25), 0.03, 0.0)
         for _ in range(300)
     ]
     scatter = float(np.std([each.value for each in reported]))

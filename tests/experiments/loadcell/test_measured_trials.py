@@ -7,20 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.loadcell.analysis.analyse import analyse, analyse_trial
-from experiments.loadcell.analysis.coefficients import (
-    COEFFICIENTS,
+from experiments.loadcell.analysis import COEFFICIENTS, analyse, analyse_trial, gather_trials
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.force_trials import depths_of, wide_pace
+from experiments.loadcell.measured_trials import moving
+from experiments.loadcell.stage_track import WIDE, common_alignment, fit_rate
+from experiments.loadcell.strokes import (
     INSERTION,
     SHEAR,
+    Alignment,
     AnalysedTrial,
     Recorded,
-    depths_of,
-    gather_trials,
+    StagePositions,
+    StageSettings,
 )
-from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.force_motion import StageSettings, wide_pace
-from experiments.loadcell.analysis.measured_motion import moving
-from experiments.loadcell.analysis.stage_track import WIDE, Alignment, StagePositions, common_alignment, fit_rate
 from simulation.mud.clay import RATE_COEFFICIENT
 from simulation.test_rig.load_cell_bench import clay_plate
 from simulation.test_rig.stage_motion import ManualMotionParameters

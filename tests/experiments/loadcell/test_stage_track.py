@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.stage_track import StagePositions, StageTrack
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.stage_track import StageTrack
+from experiments.loadcell.strokes import StagePositions
 
 TIMES_S = np.arange(0.0, 2.0, 0.01)
 
@@ -18,7 +19,6 @@ def even(times_s: Array = TIMES_S) -> StageTrack:
 def test_the_mean_of_an_even_motion_is_its_middle() -> None:
     until_s = np.array([0.5, 0.5037, 1.2])
     assert even().mean_positions_m(until_s, 0.0125) == pytest.approx(0.1 * (until_s - 0.00625))
-    assert even().speeds_m_s(until_s, 0.0125) == pytest.approx(0.1)
 
 
 def test_straight_lines_are_off_by_no_more_than_the_stated_error() -> None:
@@ -55,10 +55,9 @@ def test_a_single_wrong_position_is_removed() -> None:
     assert track.positions_m(TIMES_S[70:71]) == pytest.approx([0.07])
 
 
-def test_positions_are_relative_to_the_first_and_can_be_turned() -> None:
-    track = even().turned()
-    assert track.farthest_m == pytest.approx(-0.199)
-    assert track.turned().farthest_m == pytest.approx(0.199)
+def test_positions_are_relative_to_the_first_and_go_forward_whatever_the_sign_of_the_encoder() -> None:
+    backward = StageTrack(StagePositions(TIMES_S, 5.0 - 0.1 * TIMES_S))
+    assert backward.positions_m(TIMES_S) == pytest.approx(0.1 * TIMES_S)
 
 
 def test_an_abrupt_stop_is_no_leap() -> None:

@@ -10,12 +10,11 @@ from statistics import fmean
 
 import pytest
 
-from experiments.loadcell.analysis.coefficients import INSERTION, SHEAR, AnalysedTrial
-from experiments.loadcell.analysis.force_motion import Insertion, Pace
 from experiments.loadcell.evaluation import list_remarks
 from experiments.loadcell.preparation import CellSettings, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, correlation, load_counted
 from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
+from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial, Insertion, Pace
 from experiments.loadcell.trials import KEEP, list_problems, measure, record
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON, REDO, SKIP

@@ -10,8 +10,9 @@ import odrive_can
 import pytest
 
 from drivers.can.frames import MalformedMessageError
-from drivers.odrive import codec, codec05
+from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
+from drivers.odrive05 import codec as codec05
 
 DBC: Any = cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / "odrive-cansimple-0.5.6.dbc")
 OWN = {name: value for name, value in vars(codec05).items() if isinstance(value, Message)}

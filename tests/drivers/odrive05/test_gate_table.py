@@ -5,8 +5,8 @@ from math import inf, nan
 import pytest
 
 from drivers.can.frames import Frame
-from drivers.odrive.gate_tables import gate_table_05
-from drivers.odrive.parameters import Odrive05Parameters
+from drivers.odrive05.gate_table import gate_table
+from drivers.odrive05.parameters import Odrive05Parameters
 from drivers.transmit_gate import FrameKind
 from tests.drivers.gate_bench import OdriveGateBench
 
@@ -51,7 +51,7 @@ REFUSED = [
 class Bench(OdriveGateBench):
     def __init__(self) -> None:
         drives = [Odrive05Parameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
-        super().__init__(map(gate_table_05, drives))
+        super().__init__(map(gate_table, drives))
 
     def torque(self, torque_nm: float, identifier: int = TORQUE) -> float:
         return super().torque(torque_nm, identifier)
@@ -70,7 +70,7 @@ def armed() -> Bench:
 
 
 def test_the_table_is_of_its_node_and_checks_no_payload() -> None:
-    table = gate_table_05(Odrive05Parameters("left", 2))
+    table = gate_table(Odrive05Parameters("left", 2))
     assert (table.node_id, table.torque_id, table.kind) == (2, TORQUE, FrameKind())
     assert table.decode_torque(table.zero_torque) == 0.0
     assert table.checks == {} and table.idle == b"" and table.torque_step_nm == 0.0

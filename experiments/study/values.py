@@ -3,12 +3,8 @@
 import argparse
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import fields
 from math import inf, isfinite, nan
 from pathlib import Path
-
-from control.geometry import FlipperGeometry
-from control.records import JOINTS
 
 
 def _number(text: str) -> float:
@@ -59,33 +55,6 @@ _lever_cm = between(1.0, 100.0, "cm")
 def lever_m(text: str) -> float:
     """Parses a length in cm."""
     return _lever_cm(text) / 100.0
-
-
-def joint_angle(text: str) -> tuple[str, float]:
-    joint, _, angle_deg = text.partition("=")
-    if joint and joint not in JOINTS:
-        raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; there are {', '.join(JOINTS)}")
-    with suppress(ValueError):
-        if joint and isfinite(float(angle_deg)):
-            return joint, float(angle_deg)
-    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, such as left_sweep=10")
-
-
-def node_id(text: str) -> tuple[str, int]:
-    joint, _, number = text.partition("=")
-    if joint not in JOINTS or not number.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text}: must be a joint and its id, such as {JOINTS[0]}=0")
-    return joint, int(number)
-
-
-def geometry_value(text: str) -> tuple[str, float]:
-    """Parses a key of [geometry] with its value in m or degrees; the reader checks its bounds."""
-    key, _, value = text.partition("=")
-    names = [field.name for field in fields(FlipperGeometry) if field.name != "plate_corners_m"]
-    with suppress(ValueError):
-        if key in names and isfinite(float(value)):
-            return key, float(value)
-    raise argparse.ArgumentTypeError(f"{text}: must be one of {', '.join(names)} with its value, as in drop_m=0.05")
 
 
 def mud_length(text: str) -> tuple[str, float]:

@@ -1,8 +1,8 @@
 """ODrive CANSimple, firmware 0.5.6: the bytes of the messages that differ from those of 0.6.
 
-Ids, axis states, commands of torque, and the reports of motion, current and supply are those of codec.py. The heartbeat
-contains an error word of the axis and one flag each for errors of motor, encoder and controller, whose words are
-messages of their own. There is no version, no temperature, no serial number and no reading of parameters. Sources:
+Ids, axis states, commands of torque, and the reports of motion, current and supply are those of drivers/odrive. The
+heartbeat contains an error word of the axis and one flag each for errors of motor, encoder and controller, whose words
+are messages of their own. There is no version, no temperature, no serial number and no reading of parameters. Sources:
 can_simple.cpp and odrive-interface.yaml of odriverobotics/ODrive, tag fw-v0.5.6, and the DBC that is published with it.
 Where those two differ, the firmware counts: the DBC has 32 of the motor's 64 error flags, and unsigned counts.
 """

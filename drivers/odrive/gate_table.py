@@ -1,15 +1,15 @@
-"""Lists what may pass the transmit gate for one ODrive: the messages that this program uses, with their payloads only.
+"""Lists what may pass the transmit gate for one ODrive with firmware 0.6: the messages that this program uses.
 
 Idle, torque mode, the configured limits and the clearing of errors may always leave, and so may requests to read.
-Closed loop may be asked for only while the gate is open. The firmwares differ in how errors are cleared and settings
-are read: the ids by which 0.6 reads parameters and its serial number do nothing in 0.5, or set a new node id.
+Closed loop may be asked for only while the gate is open. Firmware 0.5 differs in how errors are cleared and settings
+are read (drivers/odrive05/gate_table.py).
 """
 
 from collections.abc import Callable, Mapping
 from math import nan
 
 from drivers.can.frames import Frame, MalformedMessageError
-from drivers.odrive import codec, codec05
+from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import GateTable
@@ -18,22 +18,17 @@ READ_BYTES = 4  # of a request to read a parameter
 
 
 def gate_table(drive: OdriveParameters) -> GateTable:
-    """Lists what may leave for a drive with firmware 0.6."""
     clearing = {codec.CLEAR_ERRORS: codec.CLEAR_ERRORS.encode(0)}  # without blinking
-    return _table(drive, clearing, (codec.GET_VERSION, codec.ADDRESS), {codec.RX_SDO: _reads_parameter})
+    return cansimple_table(drive, clearing, (codec.GET_VERSION, codec.ADDRESS), {codec.RX_SDO: _reads_parameter})
 
 
-def gate_table_05(drive: OdriveParameters) -> GateTable:
-    clearing = {codec05.CLEAR_ERRORS: codec05.CLEAR_ERRORS.encode()}
-    return _table(drive, clearing, (codec.GET_VERSION, codec05.GET_ENCODER_COUNT), {})
-
-
-def _table(
+def cansimple_table(
     drive: OdriveParameters,
     clearing: Mapping[Message, bytes],
     requests: tuple[Message, ...],
     checks: Mapping[Message, Callable[[bytes], bool]],
 ) -> GateTable:
+    """Lists what the firmwares have in common, and what one of them adds."""
     always: dict[Message, bytes] = {
         codec.SET_LIMITS: codec.SET_LIMITS.encode(drive.velocity_limit_turn_s, drive.current_limit_a),
         codec.SET_VEL_GAINS: codec.SET_VEL_GAINS.encode(drive.velocity_gain_nm_s_turn, 0.0),

@@ -5,7 +5,7 @@ from math import isnan
 import pytest
 
 from control.rate import PERIOD_S
-from drivers.odrive.watchdog_proof import WatchdogProof
+from drivers.odrive05.watchdog_proof import WatchdogProof
 
 HEARTBEAT_S = 0.1
 LONGEST_S = 2.0

@@ -14,10 +14,11 @@ from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.drive import DriveHealth
 from drivers.drive_types import make_drives
-from drivers.odrive import codec, codec05
-from drivers.odrive.axis05 import Odrive05Axis
+from drivers.odrive import codec
 from drivers.odrive.codec import Message, arbitration_id
-from drivers.odrive.parameters import Odrive05Parameters
+from drivers.odrive05 import codec as codec05
+from drivers.odrive05.axis import Odrive05Axis
+from drivers.odrive05.parameters import Odrive05Parameters
 
 JOINT, NODE = "left_sweep", 3
 COUNTS = Frame(arbitration_id(NODE, codec05.GET_ENCODER_COUNT), is_remote=True)

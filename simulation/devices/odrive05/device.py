@@ -11,16 +11,21 @@ from collections.abc import Callable
 from random import Random
 
 from drivers.can.frames import Frame
-from drivers.odrive import codec, codec05
-from drivers.odrive.codec import Message
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, Message
+from drivers.odrive05 import codec as codec05
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
 from simulation.devices.motor import encoder_turns
 from simulation.devices.odrive.device import Firmware, SimulatedOdrive
-from simulation.devices.odrive.forgeries import FORGERIES_05, forged_current, forged_frame
+from simulation.devices.odrive.forgeries import COMMON, Forgeries, forged_current, forged_frame
 
 BUS_CURRENT_OUT_OF_RANGE = 0x400000  # of the motor
 OVERSPEED = 0x1  # of the controller
-
+FORGERIES: Forgeries = {  # firmware 0.5 reports no settings and no serial number
+    **COMMON,
+    Forgery.OLD_FIRMWARE: (codec.GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0), b""),
+    Forgery.STARTING: (codec05.HEARTBEAT, (0, AxisState.UNDEFINED, 0, 0, 0), b""),
+}
 
 FIRMWARE_05 = Firmware(
     error_flags={
@@ -75,7 +80,7 @@ class SimulatedOdrive05(SimulatedOdrive):
         super()._trip_if_due(now_s)
 
     def forge(self, forgery: Forgery) -> Frame:
-        return forged_frame(self.parameters.node_id, forgery, FORGERIES_05)
+        return forged_frame(self.parameters.node_id, forgery, FORGERIES)
 
     def forge_current(self, current_a: float) -> Frame:
         direction = self.parameters.encoder_direction

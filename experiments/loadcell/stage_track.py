@@ -11,57 +11,38 @@ again near the median of all trials, which have the same devices and about the s
 shears.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from math import inf, isfinite, nan, sqrt
 from statistics import median, stdev
-from typing import NamedTuple
 
 import numpy as np
 
-from experiments.loadcell.analysis.contact import Profile
-from experiments.loadcell.analysis.curve_fit import Array
-from experiments.loadcell.analysis.force_motion import RATE_EXPONENT, StageSettings
+from experiments.loadcell.curve_fit import Array
+from experiments.loadcell.strokes import RATE_EXPONENT, Alignment, Profile, StagePositions, StageSettings
 
 LONGEST_GAP_S, LONGEST_GAP = 0.06, 2.5  # between lines that are joined; the second in periods of the encoder
 STANDING_M = 2e-4  # between the ends of a gap in which the stage stood still
-LEAST_POSITIONS = 8
 LEAP_M, LEAP_FRACTION = 2e-4, 0.25
 RESTING_FRACTION = 0.12  # of the set speed, below which the stage rests
 LEAST_LAG_UNCERTAINTY_S = 2e-3  # between trials: lines wait until they are read
 LEAST_RATE_UNCERTAINTY = 0.03  # mud follows the speed a millimetre late
 MEDIAN_ERROR = 1.25  # standard error of a median over that of a mean
 CORRELATION = 2.0  # standard error of correlated samples over that of independent ones
-
-
-class StagePositions(NamedTuple):
-    """The encoder's lines."""
-
-    times_s: Array
-    positions_m: Array
+WIDE = Alignment(0.0, 0.08, 0.03, 0.08)  # adapters and filters; 5 to 20 % a decade, as clay practice has it
 
 
 class StageTrack:
-    """Position against time, relative to the first position."""
+    """Position against time, relative to the first position, and positive in the direction of the stroke."""
 
     def __init__(self, lines: StagePositions) -> None:
-        self._times_s, self._positions_m = lines.times_s, without_leaps(lines.positions_m - lines.positions_m[0])
+        positions_m = without_leaps(lines.positions_m - lines.positions_m[0])
+        farthest_m = positions_m[int(np.argmax(np.abs(positions_m)))]
+        self._times_s, self._positions_m = lines.times_s, positions_m if farthest_m > 0.0 else -positions_m
         steps_s, means_m = np.diff(self._times_s), (self._positions_m[1:] + self._positions_m[:-1]) / 2.0
         self._sums = np.concatenate([[0.0], np.cumsum(steps_s * means_m)])  # integral of the position
         longest_s = max(LONGEST_GAP_S, LONGEST_GAP * float(np.median(steps_s)))
         unknown = (steps_s > longest_s) & (np.abs(np.diff(self._positions_m)) > STANDING_M)
         self._unknown_s = np.concatenate([[0.0], np.cumsum(steps_s * unknown)])
-
-    def turned(self) -> StageTrack:
-        """Return the track with the opposite sign."""
-        return StageTrack(StagePositions(self._times_s, -self._positions_m))
-
-    @property
-    def farthest_m(self) -> float:
-        """The position farthest from the first one, with its sign."""
-        return float(self._positions_m[int(np.argmax(np.abs(self._positions_m)))])
 
     @property
     def interpolation_error_m(self) -> float:
@@ -79,9 +60,6 @@ class StageTrack:
         gaps_s -= np.interp(until_s - over_s, self._times_s, self._unknown_s)
         known = (until_s - over_s >= self._times_s[0]) & (until_s <= self._times_s[-1]) & (gaps_s <= 0.0)
         return np.where(known, mean_m, np.nan)
-
-    def speeds_m_s(self, until_s: Array, over_s: float) -> Array:
-        return (self.positions_m(until_s) - self.positions_m(until_s - over_s)) / over_s
 
     def _integral(self, times_s: Array) -> Array:
         line = np.clip(np.searchsorted(self._times_s, times_s) - 1, 0, len(self._times_s) - 2)
@@ -101,25 +79,11 @@ def without_leaps(positions_m: Array) -> Array:
     return fixed
 
 
-@dataclass(frozen=True)
-class Alignment:
-    """Lag and rate fraction r with one standard error each; a lag is NaN where a trial does not show it."""
-
-    lag_s: float
-    rate_fraction: float = field(metadata={"key": "rate_share"})
-    lag_uncertainty_s: float = field(metadata={"key": "lag_doubt_s"})
-    rate_uncertainty: float = field(metadata={"key": "rate_doubt"})
-
-
-WIDE = Alignment(0.0, 0.08, 0.03, 0.08)  # adapters and filters; 5 to 20 % a decade, as clay practice has it
-
-
 class PositionedProfile:
-    """Forces with their positions. The track is turned so that the stroke goes forward."""
+    """Forces with their positions."""
 
     def __init__(self, profile: Profile, track: StageTrack, settings: StageSettings) -> None:
-        self.profile, self.settings = profile, settings
-        self.track = track if track.farthest_m > 0.0 else track.turned()
+        self.profile, self.track, self.settings = profile, track, settings
         self.period_s = float(np.median(np.diff(profile.times_s)))
 
     def mean_positions_m(self, lag_s: float) -> Array:
@@ -127,16 +91,17 @@ class PositionedProfile:
         return self.track.mean_positions_m(self.profile.times_s - lag_s, self.period_s)
 
     def speeds_m_s(self, lag_s: float) -> Array:
-        return self.track.speeds_m_s(self.profile.times_s - lag_s, self.period_s)
-
-    def speed_factors(self, lag_s: float, rate_fraction: float) -> Array:
-        """Return g of each force."""
-        return 1.0 + rate_fraction * self.speed_terms(lag_s)
+        until_s = self.profile.times_s - lag_s
+        return (self.track.positions_m(until_s) - self.track.positions_m(until_s - self.period_s)) / self.period_s
 
     def speed_terms(self, lag_s: float) -> Array:
         """Return (v/v_0)^0.4 - 1 of each force."""
         fractions = np.maximum(np.abs(self.speeds_m_s(lag_s)) / self.settings.speed_m_s, RESTING_FRACTION)
         return np.asarray(fractions**RATE_EXPONENT - 1.0, dtype=np.float64)
+
+    def speed_factors(self, lag_s: float, rate_fraction: float) -> Array:
+        """Return g of each force."""
+        return 1.0 + rate_fraction * self.speed_terms(lag_s)
 
 
 def fit_rate(forces_n: Array, speed_terms: Array) -> Alignment:
@@ -157,15 +122,13 @@ def common_alignment(trials: Sequence[Alignment]) -> Alignment:
     """Return the medians of all trials, with their standard errors."""
     insertions = [each for each in trials if isfinite(each.lag_s)]
     rated = [each for each in trials if not isfinite(each.lag_s)] or insertions
-    lag_s, lag_uncertainty_s = WIDE.lag_s, WIDE.lag_uncertainty_s
+    lag_s, lag_error_s = WIDE.lag_s, WIDE.lag_uncertainty_s
+    rate, rate_error = WIDE.rate_fraction, WIDE.rate_uncertainty
     if insertions:
-        lag_s, lag_uncertainty_s = _median([(each.lag_s, each.lag_uncertainty_s) for each in insertions])
-    rate, rate_uncertainty = WIDE.rate_fraction, WIDE.rate_uncertainty
+        lag_s, lag_error_s = _median([(each.lag_s, each.lag_uncertainty_s) for each in insertions])
     if rated:
-        rate, rate_uncertainty = _median([(each.rate_fraction, each.rate_uncertainty) for each in rated])
-    return Alignment(
-        lag_s, rate, max(lag_uncertainty_s, LEAST_LAG_UNCERTAINTY_S), max(rate_uncertainty, LEAST_RATE_UNCERTAINTY)
-    )
+        rate, rate_error = _median([(each.rate_fraction, each.rate_uncertainty) for each in rated])
+    return Alignment(lag_s, rate, max(lag_error_s, LEAST_LAG_UNCERTAINTY_S), max(rate_error, LEAST_RATE_UNCERTAINTY))
 
 
 def _median(values_with_errors: Sequence[tuple[float, float]]) -> tuple[float, float]:

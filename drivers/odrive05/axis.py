@@ -2,9 +2,9 @@
 
 Until the drive has been in closed loop once since its supply came, it reports a position and a velocity of exactly
 zero. In an idle drive such zeros count as absent, and the program asks for the counts of the encoder in every tick. An
-idle drive repeats the last current that was measured; one that repeats to the last bit counts as none, and with it no
-set-point, also before a heartbeat says that the drive is idle. Its currents have the sign of the motor's phases, which
-`encoder_direction` turns into that of position and torque.
+idle drive repeats the last current that was measured. So a current with the same bits as the one before counts as zero,
+and the set-point in its message as absent, also before a heartbeat says that the drive is idle. Its currents have the
+sign of the motor's phases, which `encoder_direction` turns into that of position and torque.
 
 The watchdog cannot be read over CAN: watchdog_proof.py proves it, and the position waits for that. It also expires in
 an idle drive while no program runs. That is no error of the drive: it is reported as one only if torque was on, and is
@@ -17,12 +17,12 @@ from collections.abc import Callable, Mapping
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.drive import DriveHealth, Outlet
-from drivers.odrive import codec, codec05
 from drivers.odrive.cansimple_axis import RESTART_SILENCE_S, CanSimpleAxis
-from drivers.odrive.codec import AxisState, Message, arbitration_id
-from drivers.odrive.drive_settings import DriveSettings
-from drivers.odrive.parameters import Odrive05Parameters
-from drivers.odrive.watchdog_proof import WatchdogProof
+from drivers.odrive.codec import GET_ENCODER_ESTIMATES, AxisState, Message, arbitration_id
+from drivers.odrive.settings import DriveSettings
+from drivers.odrive05 import codec
+from drivers.odrive05.parameters import Odrive05Parameters
+from drivers.odrive05.watchdog_proof import WatchdogProof
 
 FIRMWARE = "0.5"
 ABSENT = bytes(8)  # position and velocity of a drive that has not been in closed loop
@@ -33,13 +33,13 @@ LONGEST_GAP_S = 0.03  # between two counts, whose difference is the velocity: on
 
 
 class Odrive05Axis(CanSimpleAxis):
-    COMMANDS = codec05.COMMANDS
-    CLEAR_ERRORS = codec05.CLEAR_ERRORS.encode()
+    COMMANDS = codec.COMMANDS
+    CLEAR_ERRORS = codec.CLEAR_ERRORS.encode()
     parameters: Odrive05Parameters
 
     def __init__(self, joint: str, parameters: Odrive05Parameters, outlet: Outlet) -> None:
         self._proof = WatchdogProof(parameters.watchdog_s, parameters.heartbeat_period_s)
-        self._counts_request = Frame(arbitration_id(parameters.node_id, codec05.GET_ENCODER_COUNT), is_remote=True)
+        self._counts_request = Frame(arbitration_id(parameters.node_id, codec.GET_ENCODER_COUNT), is_remote=True)
         super().__init__(joint, parameters, outlet, DriveSettings())
 
     def reset(self) -> None:
@@ -62,21 +62,21 @@ class Odrive05Axis(CanSimpleAxis):
     def _reports(self) -> Mapping[Message, Callable[[bytes, float], None]]:
         return {
             **super()._reports,
-            codec05.HEARTBEAT: self._receive_heartbeat,
-            codec05.GET_ENCODER_COUNT: self._receive_counts,
-            codec05.GET_MOTOR_ERROR: lambda data, now_s: self._receive_part(0, codec05.GET_MOTOR_ERROR, data),
-            codec05.GET_ENCODER_ERROR: lambda data, now_s: self._receive_part(1, codec05.GET_ENCODER_ERROR, data),
-            codec05.GET_CONTROLLER_ERROR: lambda data, now_s: self._receive_part(2, codec05.GET_CONTROLLER_ERROR, data),
+            codec.HEARTBEAT: self._receive_heartbeat,
+            codec.GET_ENCODER_COUNT: self._receive_counts,
+            codec.GET_MOTOR_ERROR: lambda data, now_s: self._receive_part(0, codec.GET_MOTOR_ERROR, data),
+            codec.GET_ENCODER_ERROR: lambda data, now_s: self._receive_part(1, codec.GET_ENCODER_ERROR, data),
+            codec.GET_CONTROLLER_ERROR: lambda data, now_s: self._receive_part(2, codec.GET_CONTROLLER_ERROR, data),
         }
 
     def _receive_heartbeat(self, data: bytes, now_s: float) -> None:
-        error, state, motor, encoder, controller = codec05.HEARTBEAT.decode(data)
-        flags = codec05.axis_flags(error, motor, encoder, controller)
-        expired = bool(flags & codec05.ERROR_WATCHDOG)
+        error, state, motor, encoder, controller = codec.HEARTBEAT.decode(data)
+        flags = codec.axis_flags(error, motor, encoder, controller)
+        expired = bool(flags & codec.ERROR_WATCHDOG)
         if expired and not self._expired:
             self._expired_idle = not self.closed_loop and not self._following
         self._expired = expired
-        self._error_flags = flags & ~codec05.ERROR_WATCHDOG if self._expired_idle else flags
+        self._error_flags = flags & ~codec.ERROR_WATCHDOG if self._expired_idle else flags
         if self.closed_loop and state != AxisState.CLOSED_LOOP:
             self._following, self._current_a, self._idle_data = False, 0.0, b""
         self._receive_state(state, False, now_s)
@@ -99,7 +99,7 @@ class Odrive05Axis(CanSimpleAxis):
             self._absent = True
 
     def _receive_counts(self, data: bytes, now_s: float) -> None:
-        count, _ = codec05.GET_ENCODER_COUNT.decode(data)
+        count, _ = codec.GET_ENCODER_COUNT.decode(data)
         turns = count / self.parameters.encoder_counts
         if not self._counts_known:
             self._counts_known, self._health = True, None
@@ -107,7 +107,7 @@ class Odrive05Axis(CanSimpleAxis):
             self._compare_counts(count, turns)
         elif self._proof.concluded:
             turns_s = self._turns_s(turns - self._turns, now_s - self._angle_stamp_s)
-            super()._receive_encoder(codec.GET_ENCODER_ESTIMATES.encode(turns, turns_s), now_s)
+            super()._receive_encoder(GET_ENCODER_ESTIMATES.encode(turns, turns_s), now_s)
         self._turns = turns
 
     def _turns_s(self, moved_turns: float, elapsed_s: float) -> float:
@@ -126,7 +126,7 @@ class Odrive05Axis(CanSimpleAxis):
             self._counts_problem, self._health = problem, None
 
     def _receive_current(self, data: bytes, now_s: float) -> None:
-        """With a current that repeats to the last bit no set-point counts: its heartbeat will say that it is idle."""
+        """Ignores the set-point next to a current with the same bits as the one before: only an idle drive sends it."""
         repeated, self._measured_data = data[4:] == self._measured_data, data[4:]
         super()._receive_current(NO_SETPOINT + data[4:] if repeated and self.closed_loop else data, now_s)
 
@@ -144,7 +144,7 @@ class Odrive05Axis(CanSimpleAxis):
 
     def _build_health(self) -> DriveHealth:
         version = self.settings.version  # which only firmware 0.6 has
-        errors = codec05.errors_text(self._error_flags, *self._part_errors)
+        errors = codec.errors_text(self._error_flags, *self._part_errors)
         common = super()._build_health()
         return common._replace(
             firmware=".".join(map(str, version)) if version else FIRMWARE if self._counts_known else "",
@@ -152,7 +152,7 @@ class Odrive05Axis(CanSimpleAxis):
             firmware_supported=self._counts_known and version is None,
             watchdog_s=self._proof.watchdog_s,
             watchdog_advice="clear the drive's errors, let no other program send to it, and wait for a second",
-            watchdog_expired=bool(self._error_flags & codec05.ERROR_WATCHDOG),
+            watchdog_expired=bool(self._error_flags & codec.ERROR_WATCHDOG),
             setting_problem=self._counts_problem,
             active_errors=errors,
             errors=errors,

@@ -1,0 +1,1 @@
+"""The figures of the documentation, each with the command that measures it."""
