@@ -4,7 +4,8 @@ from collections import deque
 from math import isfinite
 
 from control.records import BodyPose
-from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
+from drivers.fault_injection.failure_table import FailureKind
+from drivers.fault_injection.failures import NO_NUMBERS, Failure, Failures
 from drivers.pose.pose_port import PoseReport, PoseSource
 
 LATE_S = 0.2
@@ -45,7 +46,7 @@ class FailingPose:
         return BodyPose()
 
     def _delayed(self, body: BodyPose, now_s: float) -> BodyPose:
-        """Stamps the pose when it is read, because a late camera does not report its delay."""
+        """Stamp the pose when it is read, because a late camera does not report its delay."""
         self._late.append((now_s + LATE_S, body))
         while len(self._late) > 1 and self._late[1][0] <= now_s:
             self._late.popleft()
