@@ -157,10 +157,13 @@ class GatedPort:
             NOT_ARMED if idle else self._gate.torque_problem(torque_nm, self._sent_nm[identifier], table.torque_step_nm)
         )
         if problem:
-            what = f"{_text_of(frame)}, {torque_nm:.4g} N·m to node {table.node_id},"
-            unlisted = "" if torque_nm == torque_nm else "it is neither a listed frame nor a torque command, and "
-            replaced = "the frame that keeps it idle" if idle else "zero torque"
-            self._gate.refuse(f"{what} was replaced by {replaced}: {unlisted}{problem}.")
+            is_torque = torque_nm == torque_nm
+            torque = f" ({torque_nm:.4g} N·m)" if is_torque else ""
+            rule = problem if is_torque else "it is neither a listed frame nor a torque command"
+            replacement = "the frame that keeps it idle" if idle else "zero torque"
+            self._gate.refuse(
+                f"{_text_of(frame)}{torque} to node {table.node_id} was replaced by {replacement}: {rule}."
+            )
             torque_nm, frame = 0.0, frame._replace(data=idle or table.zero_torque)
         self._sent_nm[identifier] = torque_nm
         self._port.send(frame)
