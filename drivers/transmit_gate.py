@@ -170,9 +170,9 @@ class GatedPort:
 
     def _broken_rule(self, frame: Frame) -> str:
         """Say why a frame that commands no torque may not leave."""
-        if frame.is_remote or frame.is_error:
+        if frame.is_remote:
             return "it is none of the requests that the tables of this bus list"
-        if (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:
+        if frame.is_error or (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:
             return "the drives of this bus take frames of another kind"
         if frame.arbitration_id not in self._listed:
             return "the tables of this bus do not list its id"
