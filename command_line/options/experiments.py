@@ -59,7 +59,6 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
     _add_actuator(names)
     _add_trackway(names)
     _add_sweep(names)
-    _add_faults(names)
     _add_flipper(names)
     _add_walk(names)
     _add_loadcell(names)
@@ -296,16 +295,3 @@ def _add_sweep(names: Commands) -> None:
     option("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="repeatable (default: 12)")
     option("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
     option("--seeds", type=SEEDS, default=2, metavar="N", help="walks of each point (default: 2)")
-
-
-def _add_faults(names: Commands) -> None:
-    faults = add(
-        names, "faults", "experiments.faults.run_faults", "Every fault in every phase, with the bounds of its reaction."
-    )
-    _add_report(faults, "the faults happen to a simulated robot", "write JSON and picture there")
-    _add_workers(faults)
-    option = faults.add_argument
-    option("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
-    option("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
-    option("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
-    option("--drive", default="odrive", metavar="TYPE", help="type of the robot's drives, such as mit:AK80-9")
