@@ -2,12 +2,13 @@
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from inspect import Parameter
 from pathlib import Path
 from typing import Any
 
-from command_line.option_types import between, whole
-from experiments.study.option import DeclaredOption, declared_options
+from command_line.option_types import above, between, whole
+from experiments.study.option import DeclaredOption, OptionError, declared_options
 
 METAVARS = {int: "N", float: "X", Path: "FILE", str: "NAME"}
 SHOWN_DEFAULTS = 4  # of a repeatable option
@@ -43,6 +44,8 @@ def _add(parser: argparse.ArgumentParser, declared: DeclaredOption) -> None:
         keywords["choices"] = declared.choices
     else:
         keywords["metavar"] = option.metavar or option.unit.upper() or METAVARS.get(declared.type, "VALUE")
+    if option.bare is not None:
+        keywords |= {"nargs": "?", "const": option.bare}
     if declared.named:
         names = [flag_of(declared.parameter), *([option.also] if option.also else [])]
         action = "append" if declared.repeatable else "store"
@@ -56,12 +59,21 @@ def _add(parser: argparse.ArgumentParser, declared: DeclaredOption) -> None:
 def _parser(declared: DeclaredOption) -> Callable[[str], Any]:
     option = declared.option
     if option.parse is not None:
-        return option.parse
+        return partial(_parse, option.parse)
+    if option.above is not None:
+        return above(option.above, option.high, option.unit)
     if option.low is None or option.high is None:
         return declared.type
     if declared.type is int:
         return whole(int(option.low), int(option.high))
     return between(option.low, option.high, option.unit)
+
+
+def _parse(parse: Callable[[str], Any], text: str) -> Any:
+    try:
+        return parse(text)
+    except OptionError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
 
 
 def _help(declared: DeclaredOption) -> str:

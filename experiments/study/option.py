@@ -22,10 +22,12 @@ class Option(NamedTuple):
     help: str
     low: float | None = None
     high: float | None = None
+    above: float | None = None  # instead of `low`, where that value itself is not allowed
     unit: str = ""
     metavar: str = ""
+    bare: str | None = None  # the value of an option that is given without one
     also: str = ""  # a second name, such as "--seeds"
-    parse: Callable[[str], Any] | None = None  # the text of a value; raises argparse.ArgumentTypeError
+    parse: Callable[[str], Any] | None = None  # the text of a value; raises OptionError
 
 
 class DeclaredOption(NamedTuple):
