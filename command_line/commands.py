@@ -1,44 +1,45 @@
-"""The commands of `mudskipper`: function and help of each, and the module that adds its options.
+"""The commands of `mudskipper`: the function and the help of each.
 
-A function is named as `module.function` below this package, and imported when the command is used.
+A function is named as `module.function` below this package, and imported when its command is used.
 """
 
-COMMANDS = {  # module of options/ -> command -> function, help
-    "operation": {
-        "status": ("operation.operation.status", "Print the state of the robot."),
-        "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
-        "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
-        "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
-        "stop": ("operation.confirmed_stop.end_motion", "End the walk, raise the flippers and hold the pose."),
-        "disarm": ("operation.confirmed_stop.end_motion", "Switch torque off at once, in any state."),
-        "clear": ("operation.operation.clear", "Clear a fault and the errors of the drives."),
-        "check": (
-            "operation.operation.check",
-            "List what prevents the robot from being armed, and what to do about it.",
-        ),
-        "watch": ("watch.watch.watch", "Show the robot live, with keys that operate it."),
-        "fail": ("operation.failing.fail", "Make a part of the robot fail on purpose, where allowed."),
-    },
-    "computer": {
-        "live": ("live.live.live", "Pass the robot's rows on to Foxglove, Lichtblick or a browser."),
-        "doctor": ("doctor.doctor.doctor", "Check this computer and its buses, line by line."),
-        "init": ("init.init.init", "Write a configuration for a new robot, from questions or options."),
-        "install": ("install.installation.install", "Set up the service, network and users of this computer."),
-        "uninstall": (
-            "install.installation.uninstall",
-            "Undo the installation; configuration and logs stay.",
-        ),
-    },
-    "drives": {"drives": ("", "Find and set up motor drives, while the daemon does not run.")},
-    "simulation": {
-        "demo": ("demo.demo.demo", "Walk a simulated robot over three muds, in real time."),
-        "simulate": ("simulate.simulate", "Simulate the robot on a bus until Ctrl-C."),
-    },
-    "logs": {
-        "replay": ("logs.log_commands.replay", "Run the estimator over a recorded log."),
-        "plot": ("logs.log_commands.plot", "Draw a walk against time: forces, coefficients, depth."),
-        "film": ("logs.log_commands.film", "Draw strides from the side, as a strip or a film."),
-        "log": ("", "Read and manage logs."),
-    },
-    "experiments": {"experiment": ("", "The paper's experiments.")},
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+# A function, the commands of a group, or what adds the options itself
+Target: TypeAlias = "str | Mapping[str, Command] | Callable[[Any], None]"
+Command: TypeAlias = tuple[Target, str]  # with its help
+
+DRIVES: Mapping[str, Command] = {
+    "find": ("drives.find.find", "List the drives that answer on the buses."),
+    "setup": (
+        "drives.setup.setup",
+        "Compare the drives' settings with the configuration, and write those that differ.",
+    ),
+    "zero": ("drives.zero.zero", "Make a joint's present position its angle zero, in the configuration file."),
+}
+COMMANDS: Mapping[str, Command] = {
+    "status": ("operation.operation.status", "Print the state of the robot."),
+    "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
+    "walk": ("operation.operation.walk", "Walk, with a fixed depth or one that adapts to the mud."),
+    "move": ("operation.operation.move", "Move joints slowly to other angles while the robot holds its pose."),
+    "stop": ("operation.confirmed_stop.stop", "End the walk, raise the flippers and hold the pose."),
+    "disarm": ("operation.confirmed_stop.disarm", "Switch torque off at once, in any state."),
+    "clear": ("operation.operation.clear", "Clear a fault and the errors of the drives."),
+    "check": ("operation.operation.check", "List what prevents the robot from being armed, and what to do about it."),
+    "watch": ("watch.watch.watch", "Show the robot live, with keys that operate it."),
+    "fail": ("operation.failing.fail", "Make a part of the robot fail on purpose, where allowed."),
+    "live": ("live.live.live", "Pass the robot's rows on to Foxglove, Lichtblick or a browser."),
+    "doctor": ("doctor.doctor.doctor", "Check this computer and its buses, line by line."),
+    "init": ("init.init.init", "Write a configuration for a new robot, from questions or options."),
+    "install": ("install.installation.install", "Set up the service, network and users of this computer."),
+    "uninstall": ("install.installation.uninstall", "Undo the installation; configuration and logs stay."),
+    "drives": (DRIVES, "Find and set up motor drives, while the daemon does not run."),
+    "demo": ("demo.demo.demo", "Walk a simulated robot over three muds, in real time."),
+    "simulate": ("simulate.simulate", "Simulate the robot on a bus until Ctrl-C."),
+    "replay": ("options.logs.add_replay", "Run the estimator over a recorded log."),
+    "plot": ("options.logs.add_plot", "Draw a walk against time: forces, coefficients, depth."),
+    "film": ("options.logs.add_film", "Draw strides from the side, as a strip or a film."),
+    "log": ("options.logs.add_log", "Read and manage logs."),
+    "experiment": ("options.experiments.add_experiment", "The paper's experiments."),
 }

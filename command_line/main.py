@@ -1,4 +1,4 @@
-"""Parses the command line of `mudskipper` and runs the command, whose module is imported only then."""
+"""Parses the command line of `mudskipper` and runs the command, whose module is imported when it is used."""
 
 import os
 import sys
@@ -8,14 +8,11 @@ from io import TextIOWrapper
 from typing import Any
 
 from command_line import exit_codes
+from command_line.errors import report
+from command_line.function_options import given_options
 from command_line.json_output import JSON, answers, print_error
 from command_line.parser import build_parser
-from command_line.screen import complain, complaints
-
-EXTRA_OF = {  # by module
-    "matplotlib": "plots", "PIL": "plots", "pyarrow": "data", "duckdb": "data", "pandas": "data",
-    "distributed": "cluster",
-}  # fmt: skip
+from command_line.screen import complaints
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,25 +40,18 @@ def _answer(given: Sequence[str], status: int) -> None:
 def _run(given: Sequence[str]) -> int:
     try:
         options = build_parser(given).parse_args(given)
+        if callable(options.function):
+            return int(options.function(**given_options(options, options.function)))
         module, function = options.function.rsplit(".", 1)
         run: Callable[[Any], int] = getattr(import_module(f"command_line.{module}"), function)
         return run(options)
     except KeyboardInterrupt:
         return exit_codes.INTERRUPTED
-    except ModuleNotFoundError as problem:
-        module = (problem.name or "").partition(".")[0]
-        if module not in EXTRA_OF:
-            raise
-        complain(f"{module} is not installed, which this needs: install mudskipper with its extra '{EXTRA_OF[module]}'")
-        return exit_codes.UNHEALTHY
     except BrokenPipeError:  # the reader of the output, such as `head`, has closed it
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return exit_codes.OK
-    except OSError as problem:
-        from firmware_host.configuration.file_problems import why_not
-
-        complain(why_not(problem))
-        return exit_codes.UNHEALTHY
+    except Exception as problem:  # noqa: BLE001 - `report` raises again what it does not know
+        return report(problem)
 
 
 if __name__ == "__main__":

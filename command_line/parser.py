@@ -1,15 +1,16 @@
-"""The parser of the command line. The options of a command are added when the command is used: `status` starts fast."""
+"""The parser of the command line. A command is imported when it is used, so that `status` starts fast."""
 
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from typing import Any, NoReturn
 
 from command_line import exit_codes
-from command_line.commands import COMMANDS
+from command_line.commands import COMMANDS, Command, Target
+from command_line.function_options import add_function_options
 from command_line.screen import complaints
 
 MISSING = "the following arguments are required"  # as argparse says it
@@ -34,32 +35,65 @@ def _columns() -> int:
 class Parser(argparse.ArgumentParser):
     """Refuses abbreviated options, also of its commands: `arm --f` would overrule failed checks."""
 
-    def __init__(self, *arguments: Any, options: str | Callable[[Any], None] = "", **keywords: Any) -> None:
-        """`options` is the function that adds the options, or its name as `module.function` in command_line.options."""
-        super().__init__(*arguments, **keywords | {"allow_abbrev": False, "formatter_class": Formatter})
-        self._options = options
+    def __init__(self, *arguments: Any, target: Target = "", **keywords: Any) -> None:
+        """Make the parser of a function, named as `module.function` below command_line, or of a group of commands.
 
-    def add_options(self) -> None:
-        add, self._options = self._options, ""
-        if isinstance(add, str) and add:
-            module, function = add.rsplit(".", 1)
-            add = getattr(import_module(f"command_line.options.{module}"), function)
-        if callable(add):
-            add(self)
+        A target that can be called adds the options itself.
+        """
+        super().__init__(*arguments, **keywords | {"allow_abbrev": False, "formatter_class": Formatter})
+        self._target = target
+
+    def add_target(self) -> None:
+        """Add the options of the function, or the commands of the group, once."""
+        target, self._target = self._target, ""
+        if isinstance(target, Mapping):
+            self.add_commands(target)
+        elif callable(target):
+            target(self)
+        elif target:
+            module, name = target.rsplit(".", 1)
+            function = getattr(import_module(f"command_line.{module}"), name)
+            if target.startswith("options."):  # of the logs and the experiments, which are not declared yet
+                function(self)
+            else:
+                add_function_options(self, function)
+                self.set_defaults(function=function)
+
+    def add_commands(self, commands: Mapping[str, Command], title: str = "action") -> None:
+        """Add a parser for each command."""
+        choices = self.add_subparsers(dest=title, required=True, metavar=title)
+        for name, (target, text) in commands.items():
+            choices.add_parser(name, help=text, description=text, target=target)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Refuses unknown arguments, so that a command names its own usage, not that of `mudskipper`."""
-        self.add_options()
+        """Refuse unknown arguments, so that a command names its own usage, not that of `mudskipper`."""
+        self.add_target()
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            options = [name for action in self._actions for name in action.option_strings]
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(unknown[0], options)}")
         return found, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is no choice with the choices, the most similar first."""
+        if action.choices is not None and value not in action.choices:
+            existing = suggestion(str(value), [*map(str, action.choices)])
+            raise argparse.ArgumentError(action, f"there is no {value!r}{existing}")
 
     def error(self, message: str) -> NoReturn:
         if message.startswith(MISSING):
             message = f"{message} ('{self.prog} --help' explains them)"
         complaints.append(message)
         super().error(message)
+
+
+def suggestion(name: str, existing: Sequence[str]) -> str:
+    """Return the text that follows an unknown name: a similar one, and all that exist."""
+    from difflib import get_close_matches  # slow to import, and seldom needed
+
+    similar = get_close_matches(name, existing, 1)
+    there_are = f"did you mean {similar[0]}? There are" if similar else "there are"
+    return f"; {there_are} {', '.join(existing)}"
 
 
 class PrintVersion(argparse.Action):
@@ -78,7 +112,7 @@ class PrintCompletion(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, _: object, shell: object, __: object = None) -> NoReturn:
         import shtab
 
-        add_all_options(parser)
+        complete(parser)
         print(shtab.complete(parser, str(shell)))
         parser.exit()
 
@@ -98,20 +132,16 @@ def build_parser(given: Sequence[str] = ()) -> Parser:
         choices=("bash", "zsh", "tcsh"),
         help="print a completion script for this shell and exit",
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="command")
-    described = {name: (module, *what) for module, group in COMMANDS.items() for name, what in group.items()}
-    for name in {*given[:1]} & described.keys() or described:
-        module, function, text = described[name]
-        command = commands.add_parser(name, help=text, description=text, options=f"{module}.add_{name}")
-        command.set_defaults(function=function)
+    chosen = {name: COMMANDS[name] for name in given[:1] if name in COMMANDS}
+    parser.add_commands(chosen or COMMANDS, "command")
     return parser
 
 
-def add_all_options(parser: argparse.ArgumentParser) -> None:
-    """Completes a parser for its documentation."""
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Add the options of all commands, for documentation and completion."""
     if isinstance(parser, Parser):
-        parser.add_options()
+        parser.add_target()
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for command in action.choices.values():
-                add_all_options(command)
+                complete(command)

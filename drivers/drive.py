@@ -1,22 +1,18 @@
 """The interface of motor drives, independent of the protocol that they speak.
 
-A `DriveAxis` is one drive as one joint; drivers/drives.py commands all of them together, in any mix of protocols. A
-`DriveHealth` contains what a drive reports about itself, as opposed to its joint. A `DriveType` describes one protocol:
-the parameters that the configuration states, the axis and the gate's table of one drive, and how to read its frames
-without commanding a drive, which the checks of the wiring and the fault injection need. drivers/drive_types.py lists
-the types that exist.
+`DriveParameters` are the configuration of one drive. A `DriveAxis` is one drive as one joint; drivers/drives.py
+commands all of them together, in any mix of protocols. A `DriveHealth` contains what a drive reports about itself, as
+opposed to its joint. drivers/drive_type.py says what a protocol consists of.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 from typing import Annotated, ClassVar, NamedTuple, Protocol
 
 from control.bounds import Bounds, Meaning
 from control.records import UNKNOWN, DriveState
-from drivers.can.bus_load import FrameRate
 from drivers.can.frames import Frame
-from drivers.transmit_gate import FrameKind, GateTable
 
 FD = 1 << 29  # above every arbitration id
 
@@ -157,72 +153,3 @@ class DriveAxis(Protocol):
 
     def request_settings(self, now_s: float) -> None:
         """Asks for settings that are unknown or were read long ago. It is called in every tick while idle."""
-
-
-class Span(NamedTuple):
-    """Where a signal stands in a payload that contains several, and its bytes where the drive does not know it."""
-
-    begin: int
-    end: int
-    absent: bytes
-
-
-class FrameContent(NamedTuple):
-    """The meaning of a frame in a drive's protocol."""
-
-    node_id: int  # of the drive that sends it or is addressed
-    is_command: bool = False  # a drive obeys it and never sends it
-    signals: tuple[str, ...] = ()  # what it reports, the main one first: position, current, heartbeat, error, ...
-    spans: Mapping[str, Span] = {}  # of these signals; one without a span is the whole payload
-
-
-class DriveType(Protocol):
-    """One protocol, and the drives that speak it."""
-
-    @property
-    def parameters(self) -> type[DriveParameters]:
-        """The record of the configuration's `[drive.JOINT]`."""
-
-    @property
-    def example_error(self) -> int:
-        """The flags of an error on which the drive switches its torque off, for fault injection."""
-
-    @property
-    def command(self) -> FrameRate:
-        """The command that this program sends to each drive in every tick."""
-
-    @property
-    def reports(self) -> tuple[FrameRate, ...]:
-        """The messages that each drive sends cyclically, at the rates that the set-up instructions give."""
-
-    @property
-    def kind(self) -> FrameKind:
-        """The kind of the frames that this program sends. All drives of a bus need the same."""
-
-    def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
-        """Returns every arbitration id that this drive sends or obeys; with the bit FD for CAN FD frames."""
-
-    def gate_table(self, parameters: DriveParameters) -> GateTable:
-        """Lists everything that may leave for one drive."""
-
-    def make_axis(
-        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
-    ) -> DriveAxis: ...
-
-    def query(self, node_id: int) -> Frame | None:
-        """Returns the frame that asks a drive for all signals; None where drives report by themselves."""
-
-    def announces(self, node_id: int) -> Frame:
-        """Returns a frame that only a drive of this type sends under this id, by itself or when asked."""
-
-    def read_frame(self, frame: Frame) -> FrameContent | None:
-        """Returns the content of a frame by its id; None for frames of another kind than the protocol uses."""
-
-    def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
-        """Returns frames that other programs may send while torque is on, by name: they must not feed a watchdog."""
-
-    def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        """Returns the payload of a frame that reports errors, with these error flags added and the drive set to `idle`.
-
-        A payload that cannot be decoded is returned unchanged.
-        """

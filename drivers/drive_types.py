@@ -12,14 +12,13 @@ from drivers.bench.drive_bench import DriveBench
 from drivers.can.bus_load import FrameRate
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
-from drivers.drive import FD, DriveParameters, DriveType, FrameContent, WatchdogEndpoints
+from drivers.drive import FD, DriveParameters, WatchdogEndpoints
+from drivers.drive_type import DriveType, FrameContent
 from drivers.drives import Drives
-from drivers.mit.bench import MitBench
 from drivers.mit.drive_type import Mit
-from drivers.moteus.bench import MoteusBench
 from drivers.moteus.drive_type import Moteus
-from drivers.odrive.bench import Odrive05Bench, OdriveBench
-from drivers.odrive.drive_type import Odrive, Odrive05
+from drivers.odrive.drive_type import Odrive
+from drivers.odrive05.drive_type import Odrive05
 from drivers.transmit_gate import TransmitGate
 
 DEFAULT = "odrive"
@@ -29,13 +28,13 @@ DRIVE_TYPES: Mapping[str, DriveType] = {
     "mit": Mit(),
     "odrive05": Odrive05(),
 }
-# In the order in which a bus is searched: the questions of the first disturb no other drive.
-DRIVE_BENCHES: Mapping[str, DriveBench] = {
-    "odrive": OdriveBench(),
-    "odrive05": Odrive05Bench(),
-    "mit": MitBench(),
-    "moteus": MoteusBench(),
-}
+# Those that can be found and set up, in the order in which a bus is searched: the first disturb no other drive.
+DRIVE_BENCHES: Mapping[str, DriveBench] = dict(
+    sorted(
+        ((name, each.bench) for name, each in DRIVE_TYPES.items() if each.bench is not None),
+        key=lambda item: (bool(item[1].disturbs), item[1].is_fd),
+    )
+)
 
 
 def type_of(parameters: DriveParameters) -> DriveType:
@@ -66,7 +65,7 @@ def make_drives(
 
 
 def _other_types(parameters: Mapping[str, DriveParameters], bus: str) -> dict[int, tuple[str, str]]:
-    """Returns what drives of other types would send under these node ids: by id, the joint and the type."""
+    """Returns the joint and the other type of drive that a frame with an arbitration id announces under its node id."""
     return {
         announced.arbitration_id | FD * announced.is_fd: (joint, name)
         for joint, drive in parameters.items()

@@ -29,7 +29,11 @@ class Drives:
         gate: TransmitGate,
         others: Mapping[str, Mapping[int, tuple[str, str]]] | None = None,
     ) -> None:
-        """`others`: by bus and id, what drives of other types send: the joint whose node id it is, and their type."""
+        """Joins the axes with the ports.
+
+        `others`: by bus and arbitration id of a frame that only another type of drive sends, the joint that has its
+        node id, and that type.
+        """
         self.ports = dict(ports)  # by the name of the bus
         self.gate = gate
         self.axes = tuple(axes)  # in the order of the rig

@@ -9,9 +9,9 @@ none may leave then. Where a protocol rounds torques to coarse codes, a torque m
 rounding. The gate examines the bytes as they leave, so it covers signs and encodings. control/limits.py enforces the
 same limits earlier and more gently; this check is the last one and relies on nothing before it.
 
-A refused frame is not sent. It is counted, and its reason is recorded as a message, since a refusal always is a bug. In
-place of a refused torque the gate sends zero torque: the drive's watchdog stays fed and its motor without torque, until
-the loop has seen the count grow and reacts. The slew then counts from that zero.
+A refused frame is not sent. It is counted, and a message records the frame and the rule that it broke, since a refusal
+always is a bug. In place of a refused torque the gate sends zero torque: the drive's watchdog stays fed and its motor
+without torque, until the loop has seen the count grow and reacts. The slew then counts from that zero.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from control.records import NEVER_S
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 
-NOT_ARMED = "the drives are not armed"
+NOT_ARMED = "it may only leave while the drives are armed"
 ROUNDING_NM = 1e-6  # binary32 rounds a torque of 5 N·m by less than a quarter of this
 
 
@@ -96,10 +96,10 @@ class TransmitGate:
             return NOT_ARMED
         largest_nm, step_nm = self._largest_nm + 0.5 * code_step_nm, self._step_nm + 1.5 * code_step_nm
         if not -largest_nm <= torque_nm <= largest_nm:
-            return f"the limit is {self._largest_nm:.4g} N·m"
+            return f"it is no torque within the limit of {self._largest_nm:.4g} N·m"
         lowest_nm, highest_nm = before_nm - step_nm, before_nm + step_nm
         if (torque_nm < lowest_nm and torque_nm < 0.0) or (torque_nm > highest_nm and torque_nm > 0.0):
-            return f"too far from the {before_nm:.4g} N·m before"
+            return f"it is more than one step from the {before_nm:.4g} N·m before"
         return ""
 
     def refuse(self, message: str) -> None:
@@ -147,7 +147,7 @@ class GatedPort:
         if passes:
             self._port.send(frame)
         else:
-            self._gate.refuse(f"A frame that is not on the list was not sent: {_text_of(frame)}.")
+            self._gate.refuse(f"{_text_of(frame)} was not sent: {self._broken_rule(frame)}.")
 
     def _send_torque(self, frame: Frame, table: GateTable) -> None:
         identifier = table.torque_id
@@ -157,11 +157,25 @@ class GatedPort:
             NOT_ARMED if idle else self._gate.torque_problem(torque_nm, self._sent_nm[identifier], table.torque_step_nm)
         )
         if problem:
-            what = f"The torque command of {torque_nm:.4g} N·m to node {table.node_id}"
-            self._gate.refuse(f"{what} was replaced by zero torque: {problem}.")
+            what = f"{_text_of(frame)}, {torque_nm:.4g} N·m to node {table.node_id},"
+            unlisted = "" if torque_nm == torque_nm else "it is neither a listed frame nor a torque command, and "
+            replaced = "the frame that keeps it idle" if idle else "zero torque"
+            self._gate.refuse(f"{what} was replaced by {replaced}: {unlisted}{problem}.")
             torque_nm, frame = 0.0, frame._replace(data=idle or table.zero_torque)
         self._sent_nm[identifier] = torque_nm
         self._port.send(frame)
+
+    def _broken_rule(self, frame: Frame) -> str:
+        """Says why a frame that commands no torque may not leave."""
+        if frame.is_remote or frame.is_error:
+            return "it is none of the requests that the tables of this bus list"
+        if (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:
+            return "the drives of this bus take frames of another kind"
+        if frame.arbitration_id not in self._listed:
+            return "the tables of this bus do not list its id"
+        if frame.data in self._while_open.get(frame.arbitration_id, ()):
+            return NOT_ARMED
+        return "the tables of this bus do not list its payload"
 
     def _may_leave(self, identifier: int, data: bytes) -> bool:
         if data in self._always.get(identifier, ()):
@@ -180,4 +194,4 @@ def _text_of(frame: Frame) -> str:
         (frame.bit_rate_switch, "bit-rate-switch"),
     )
     marks = "".join(f" {kind}" for marked, kind in kinds if marked)
-    return f"0x{frame.arbitration_id:03x}{marks} {frame.data.hex(' ')}".rstrip()
+    return f"Frame 0x{frame.arbitration_id:03x}{marks} {frame.data.hex(' ')}".rstrip()

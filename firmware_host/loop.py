@@ -25,7 +25,7 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.fault_monitor import FaultMonitor, MonitorInput
 from firmware_host.lease import Lease
 from firmware_host.log.recorder import Recording
-from firmware_host.log.rows import TICK_KIND, tick_packing
+from firmware_host.log.rows import TICK_KIND, tick_kind, tick_row
 from firmware_host.loop_events import LoopEvents
 from firmware_host.loop_timing import LoopTiming
 from firmware_host.mud_learning import MudLearning
@@ -74,7 +74,7 @@ class Loop:
         self._mode_since_s = 0.0
         self._clock, self._wall_clock = clock, wall_clock
         self._joint_ranges = configuration.joint_ranges
-        self._tick_row = tick_packing(configuration.rig)
+        self._tick_kind = tick_kind(configuration.rig)
 
     def tick(self, tick: Tick) -> None:
         """Read the drives, choose the mode, control the joints, send the torques, learn from the mud, and record."""
@@ -224,7 +224,20 @@ class Loop:
 
     def _record(self, tick: Tick, sent_after_s: float) -> None:
         tick_s = self._clock() - tick.now_s
-        self.recorder.put(TICK_KIND, self._tick_row(tick, sent_after_s, self))
+        row = tick_row(
+            self._tick_kind,
+            tick,
+            sent_after_s,
+            states=self.states,
+            sent=self.sent,
+            loads=self.learning.loads,
+            target=self.target,
+            stride_depth_m=self.stride_depth_m,
+            body=self.body,
+            missed_ticks=self.missed_ticks,
+            mode=self.mode,
+        )
+        self.recorder.put(TICK_KIND, row)
         if self.controller.recovery.events:
             self.events.report(tick.now_s, self.controller.recovery.events)
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)

@@ -55,7 +55,7 @@ def flat_columns(rows: NDArray[np.void], kind: RowKind) -> list[Column]:
 def _columns_of(field: Field, values: NDArray[Any]) -> list[Column]:
     unit = COEFFICIENT_UNIT if field.meaning == COEFFICIENT_UNIT else unit_of(field.name, Meaning(""))
     if values.ndim == 1:
-        return [Column(field.name, unit, field.meaning, values, field.words)]
+        return [Column(field.name, unit, field.meaning, values, dict(enumerate(field.words)))]
     each = field.each or tuple(map(str, range(values.shape[1])))
     names = [f"{name}_{field.name}" if field.each else f"{field.name}_{name}" for name in each]
     return [Column(name, unit, field.meaning, values[:, number], {}) for number, name in enumerate(names)]

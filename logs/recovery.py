@@ -122,7 +122,9 @@ class Salvage:
                 case Channel():
                     self._number_of_channel.pop(record.id, None)
                     if (number := KIND_OF_TOPIC.get(record.topic)) is not None:
-                        self.kinds[number] = described_kind(number, self._schemas.get(record.schema_id))
+                        self.kinds[number] = described_kind(
+                            number, self._schemas.get(record.schema_id), record.metadata
+                        )
                         self._number_of_channel[record.id] = number
                 case Row():
                     yield from self._add_row(record)

@@ -98,15 +98,12 @@ class LiveRows:
 
     def _open(self, opening: dict[str, Any]) -> None:
         self.metadata, self.configuration_text = opening["metadata"], opening["configuration_text"]
-        self.kinds = _kinds([served["definition"] for served in opening["kinds"]])
+        kinds = opening["kinds"]
+        own = row_kinds(rig_of(kinds[TICK_KIND].get("metadata", {})))
+        try:
+            self.kinds = list(map(read_definition, own, (kind["definition"] for kind in kinds)))
+        except LayoutError as problem:
+            raise NoDaemonError(f"the daemon is of another version: {problem}") from problem
 
     def close(self) -> None:
         self._socket.close()
-
-
-def _kinds(definitions: list[str]) -> list[RowKind]:
-    own = row_kinds(rig_of(definitions[TICK_KIND]))
-    try:
-        return list(map(read_definition, own, definitions))
-    except LayoutError as problem:
-        raise NoDaemonError(f"the daemon is of another version: {problem}") from problem

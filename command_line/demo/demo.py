@@ -3,26 +3,27 @@
 It uses the interfaces that operators and their programs use, and ends with a summary, a plot and the log.
 """
 
-import argparse
 import os
 import signal
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from command_line import exit_codes
 from command_line.demo.demonstration import ENDING_SIGNALS, Demo, DemoError, InterruptedDemoError, running_demo
+from command_line.errors import CommandError
 from command_line.json_output import print_json
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, stride_line
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, stride_line
+from command_line.shared_options import Json, Seed
 from control.modes import Mode
 from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_text
-from firmware_host.configuration.file_problems import ConfigurationError
+from experiments.study.option import Option
+from experiments.study.values import folder
 from firmware_host.log.log_folder import DONE, log_files, present_path
-from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log
 from operator_client.status_client import CallRefusedError, NoDaemonError
 from simulation.harness.world import load_world
@@ -32,51 +33,46 @@ WALKED = ("mode", "stamp_s", "body_x_m")  # fields of a tick that the summary ne
 LEAD_M = 0.06  # distance of the flippers ahead of the body's middle when a stride begins
 
 
-def demo(options: argparse.Namespace) -> int:
-    _on_signals()
-    refused = _refuse(options)
-    if refused is not None:
-        return refused
-    before = set(log_files(options.out, DONE))
+def demo(
+    *,
+    json: Json = False,
+    out: Annotated[Path, Option("for log and plot", metavar="DIR", parse=folder)] = Path("mudskipper-demo"),
+    seed: Seed = 1,
+    depth: Annotated[
+        float | None, Option("fixed insertion depth (default: adaptive)", unit="cm", above=0.0, high=20.0)
+    ] = None,
+    world: Annotated[Path | None, Option("describes the ground (default: three muds)")] = None,
+) -> int:
+    _end_on_signals()
+    if world:
+        load_world(world)  # is refused before anything starts
+    out.mkdir(parents=True, exist_ok=True)
+    before = set(log_files(out, DONE))
     try:
-        with redirect_stdout(sys.stderr if options.json else sys.stdout):  # data goes to standard output, all else not
-            report, demonstration = _perform(options)
-            summary = _conclude(options, report, demonstration)
-        if options.json:
-            print_json("demo", summary)
-    except (DemoError, CallRefusedError, NoDaemonError, LogError) as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+        with redirect_stdout(sys.stderr if json else sys.stdout):  # data goes to standard output, all else not
+            report, demonstration = _perform(out, seed, depth, world)
+            summary = _conclude(out, report, demonstration)
     except (InterruptedDemoError, KeyboardInterrupt) as problem:
-        for path in sorted(set(log_files(options.out, DONE)) - before):
+        for path in sorted(set(log_files(out, DONE)) - before):
             print(f"\nlog      {path}")
-        complain(str(problem) or "stopped")
-        return exit_codes.INTERRUPTED
+        raise CommandError(str(problem) or "stopped", status=exit_codes.INTERRUPTED) from None
+    except (DemoError, NoDaemonError, CallRefusedError) as problem:
+        raise CommandError(str(problem)) from None
+    if json:
+        print_json("demo", summary)
     return exit_codes.OK
 
 
-def _on_signals() -> None:
-    """Lets all ending signals end the demo as Ctrl-C does."""
+def _end_on_signals() -> None:
+    """Let all ending signals end the demo as Ctrl-C does."""
     for number in ENDING_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
             signal.signal(number, signal.default_int_handler)
 
 
-def _refuse(options: argparse.Namespace) -> int | None:
-    """Returns the exit status if the options cannot work, before anything starts."""
-    try:
-        if options.world:
-            load_world(options.world)
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return exit_codes.CONFIGURATION
-    options.out.mkdir(parents=True, exist_ok=True)
-    return None
-
-
-def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
+def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -> tuple[dict[str, Any], Demo]:
     print("Starting a simulated robot and the daemon ...", flush=True)
-    with running_demo(options.out, options.seed, options.world) as demonstration:
+    with running_demo(out, seed, world) as demonstration:
         os.nice(5)  # the display gives way to robot and daemon
         demonstration.connect()
         print("Arming ...", flush=True)
@@ -89,17 +85,17 @@ def _perform(options: argparse.Namespace) -> tuple[dict[str, Any], Demo]:
         def show(stride: dict[str, Any]) -> None:
             print(stride_line(stride, demonstration.walk_start_s), flush=True)
 
-        demonstration.walk(options.depth, show)
+        demonstration.walk(depth_cm, show)
         report = demonstration.stop()
         demonstration.fetch_strides(show)
         return report, demonstration
 
 
-def _conclude(options: argparse.Namespace, report: dict[str, Any], demonstration: Demo) -> dict[str, Any]:
+def _conclude(out: Path, report: dict[str, Any], demonstration: Demo) -> dict[str, Any]:
     """Prints the summary, draws the plot, and returns the summary."""
     log_path = present_path(Path(report["log"]["path"]))
     log = read_log(log_path, fields=WALKED)
-    plot_path = options.out / log_path.with_suffix(".png").name
+    plot_path = out / log_path.with_suffix(".png").name
     summary = summarise(report, demonstration, log, log_path, plot_path)
     print(f"\n{summary_text(summary)}\nDrawing ...", flush=True)
     from experiments.pictures.mud_layout import layout_of_track

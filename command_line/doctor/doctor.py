@@ -3,7 +3,6 @@
 Each check is one line with its fix. Nothing is transmitted: `check` listens whether the drives are heard.
 """
 
-import argparse
 import grp
 import os
 import pwd
@@ -13,7 +12,7 @@ from contextlib import closing, suppress
 from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from command_line import exit_codes
 from command_line.doctor.can_links import CanLink, examine_buses, read_links
@@ -41,8 +40,10 @@ from command_line.doctor.host_facts import (
 )
 from command_line.json_output import print_value
 from command_line.screen import GREEN, RED, YELLOW, coloured
+from command_line.shared_options import DEFAULT_CONFIG, Json
 from drivers.drive_types import make_drives
 from drivers.pose.pose_port import PoseSourceError
+from experiments.study.option import Option
 from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -66,16 +67,32 @@ LISTENING_S = 0.6  # six heartbeats
 START = "'systemctl start mudskipper', then 'systemctl status mudskipper'"
 
 
-def doctor(options: argparse.Namespace) -> int:
+def _given_socket() -> Path | None:
+    given = os.environ.get("MUDSKIPPER_SOCKET")
+    return Path(given) if given else None
+
+
+def doctor(
+    *,
+    config: Annotated[Path, Option("of the daemon")] = Path(DEFAULT_CONFIG),
+    json: Json = False,
+    socket: Annotated[
+        Path | None,
+        Option(
+            "Unix socket of the daemon (default: $MUDSKIPPER_SOCKET, else the configured one)",
+            metavar="PATH",
+            default=_given_socket,
+        ),
+    ],
+) -> int:
     try:
-        configuration = load_configuration(options.config)
+        configuration = load_configuration(config)
     except ConfigurationError as problem:
-        fix = f"edit {options.config}" if options.config.exists() else MAKE_CONFIGURATION
+        fix = f"edit {config}" if config.exists() else MAKE_CONFIGURATION
         failed = [fail("configuration", message, fix) for message in problem.problems]
-        return _show([*failed, *examine_this_python(), _examine_clock()], options.json)
-    socket = options.socket or Path(configuration.status.socket)
-    findings = [ok("configuration", str(options.config)), *examine_all(configuration, socket, read_links(ROOT))]
-    return _show(findings, options.json)
+        return _show([*failed, *examine_this_python(), _examine_clock()], json)
+    findings = examine_all(configuration, socket or Path(configuration.status.socket), read_links(ROOT))
+    return _show([ok("configuration", str(config)), *findings], json)
 
 
 def examine_all(configuration: Configuration, socket: Path, links: dict[str, CanLink]) -> Iterator[Finding]:

@@ -1,48 +1,59 @@
 """`mudskipper drives find`: lists what answers on the buses, and what does not fit the configuration."""
 
-import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 from command_line import exit_codes
-from command_line.drives.opened_buses import OpenedBus, chosen_buses, opened_buses
+from command_line.drives.opened_buses import FD_RATE_KBIT_S, OpenedBus, opened_buses
+from command_line.errors import CommandError
 from command_line.json_output import print_json
-from command_line.screen import GREEN, RED, YELLOW, coloured, complain, watched
+from command_line.screen import GREEN, RED, YELLOW, coloured, watched
+from command_line.shared_options import Json, RobotConfiguration
 from drivers.bench.search import SearchResult, expectation_problems, id_problems, search
 from drivers.drive import DriveParameters
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table
-from firmware_host.buses import BusError
-from firmware_host.configuration.file_problems import ConfigurationError
+from experiments.study.option import Option
+from firmware_host.configuration.configuration import BusParameters
+from firmware_host.configuration.loading import load_configuration
 
 HEAD = ("id", "type", "joint", "hardware", "firmware", "serial number")
 UNKNOWN = "-"
 
 
-def find(options: argparse.Namespace) -> int:
-    try:
-        buses, configuration = chosen_buses(options)
-        drives = configuration.drive if configuration else {}
-        with opened_buses(buses) as opened:
-            results = [(bus, _search(bus, options)) for bus in opened]
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return exit_codes.CONFIGURATION
-    except BusError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
-    reports = [_report(bus, result, _on_bus(drives, bus.name)) for bus, result in results]
-    if options.json:
+def find(
+    *,
+    config: RobotConfiguration,
+    json: Json = False,
+    bus: Annotated[tuple[str, ...], Option("configured bus (default: all)")] = (),
+    interface: Annotated[str | None, Option("of python-can, such as socketcan, without a configuration")] = None,
+    channel: Annotated[str | None, Option("of that interface, such as can0")] = None,
+    fd: Annotated[bool, Option("that interface carries CAN FD")] = False,
+    type: Annotated[tuple[str, ...], Option("ask drives of this type alone", choices=tuple(DRIVE_BENCHES))] = (),
+) -> int:
+    drives: Mapping[str, DriveParameters] = {}
+    if interface and channel:
+        rate_kbit_s = FD_RATE_KBIT_S if fd else 0
+        buses = {channel: BusParameters(interface, channel, {}, 1000, rate_kbit_s)}
+    elif interface or channel:
+        belong = "--interface and --channel belong together: --interface socketcan --channel can0"
+        raise CommandError(belong, status=exit_codes.CONFIGURATION)
+    else:
+        configuration = load_configuration(config)
+        drives, configured = configuration.drive, configuration.bus
+        if unknown := next((name for name in bus or () if name not in configured), None):
+            there_are = f"--bus {unknown}: {config} has {', '.join(configured)}"
+            raise CommandError(there_are, status=exit_codes.CONFIGURATION)
+        buses = {name: each for name, each in configured.items() if name in (bus or configured)}
+    with opened_buses(buses) as opened, watched() as show:
+        results = [(each, search(each.port, DRIVE_BENCHES, each.carries_fd, type or (), show)) for each in opened]
+    reports = [_report(each, result, _on_bus(drives, each.name)) for each, result in results]
+    if json:
         print_json("drives-find", {"buses": reports})
     else:
         print("\n\n".join("\n".join(_lines(report)) for report in reports))
     failed = any(report["problems"] or not report["drives"] for report in reports)
     return exit_codes.UNHEALTHY if failed else exit_codes.OK
-
-
-def _search(bus: OpenedBus, options: argparse.Namespace) -> SearchResult:
-    with watched() as show:
-        return search(bus.port, DRIVE_BENCHES, bus.carries_fd, options.type or (), show)
 
 
 def _on_bus(drives: Mapping[str, DriveParameters], bus: str) -> dict[str, DriveParameters]:

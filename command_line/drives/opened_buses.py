@@ -1,6 +1,5 @@
 """Opens the buses for the commands on drives, which never share them with the daemon."""
 
-import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -9,9 +8,7 @@ from drivers.bench.bench_port import BenchPort
 from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import CanPort
 from firmware_host.buses import BusError, lock_buses, open_ports
-from firmware_host.configuration.configuration import BusParameters, Configuration
-from firmware_host.configuration.file_problems import ConfigurationError
-from firmware_host.configuration.loading import load_configuration
+from firmware_host.configuration.configuration import BusParameters
 
 FD_RATE_KBIT_S = 5000
 STOP_DAEMON = "If that is the daemon: 'systemctl stop mudskipper', with the robot disarmed."
@@ -28,24 +25,6 @@ class OpenedBus(NamedTuple):
     @property
     def carries_fd(self) -> bool:
         return self.parameters.data_bit_rate_kbit_s > 0
-
-
-def chosen_buses(options: argparse.Namespace) -> tuple[dict[str, BusParameters], Configuration | None]:
-    """Returns the buses that the options name, and the configuration, where it is used. Raises ConfigurationError."""
-    if options.interface or options.channel:
-        if not (options.interface and options.channel):
-            raise ConfigurationError(
-                ["--interface and --channel belong together: --interface socketcan --channel can0"]
-            )
-        rate_kbit_s = FD_RATE_KBIT_S if options.fd else 0
-        return {options.channel: BusParameters(options.interface, options.channel, {}, 1000, rate_kbit_s)}, None
-    configuration = load_configuration(options.config)
-    for name in options.bus or ():
-        if name not in configuration.bus:
-            raise ConfigurationError([f"--bus {name}: {options.config} has {', '.join(configuration.bus)}"])
-    return {
-        name: bus for name, bus in configuration.bus.items() if name in (options.bus or configuration.bus)
-    }, configuration
 
 
 @contextmanager

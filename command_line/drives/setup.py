@@ -1,19 +1,22 @@
 """`mudskipper drives setup`: compares the drives' settings with the configuration, and writes those that differ."""
 
-import argparse
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
 
 from command_line import exit_codes
 from command_line.drives.backup_file import Backup, default_path, read_backup, write_backup
 from command_line.drives.joint_setup import JointSetup, bus_problems, lines_of, read_documents, read_joint
 from command_line.drives.opened_buses import OpenedBus, opened_buses
-from command_line.screen import GREEN, RED, coloured, complain, watched
+from command_line.errors import CommandError, usage_error
+from command_line.screen import GREEN, RED, coloured, watched
+from command_line.shared_options import RobotConfiguration
 from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.settings_change import Names, Outcome, change_settings
 from drivers.drive_types import DRIVE_BENCHES
-from firmware_host.buses import BusError
+from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
@@ -22,47 +25,57 @@ ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 Changes = Mapping[str, Mapping[str, float]]  # by joint and key
 
 
-class RefusedError(Exception):
-    """Nothing was written; the message says why."""
-
-
-def setup(options: argparse.Namespace) -> int:
-    if options.write and options.backup and options.backup.exists():
-        complain(f"--backup {options.backup}: exists, and may have the only old settings; name another file")
-        return exit_codes.USAGE
+def setup(
+    joint: Annotated[tuple[str, ...], Option("such as left_sweep (default: all)", metavar="JOINT")] = (),
+    *,
+    config: RobotConfiguration,
+    write: Annotated[bool, Option("write and store what differs, one drive at a time", alternative="write")] = False,
+    restore: Annotated[Path | None, Option("write the old settings of this file again", alternative="write")] = None,
+    backup: Annotated[Path | None, Option("with --write: new file for the old settings; else: compare with it")] = None,
+    endpoints: Annotated[
+        tuple[Path, ...],
+        Option("flat_endpoints.json of an ODrive's build (default: those next to the configuration)"),
+    ] = (),
+) -> int:
+    if write and backup and backup.exists():
+        raise usage_error(f"--backup {backup}: exists, and may have the only old settings; name another file")
+    configuration = load_configuration(config)
+    compared = restore or (None if write else backup)
+    backups = read_backup(compared) if compared else {}
+    joints = _joints(joint or [], configuration, backups)
+    documents = read_documents(endpoints, config)
+    buses = {name: configuration.bus[name] for name in {configuration.drive[each].bus: 0 for each in joints}}
     try:
-        configuration = load_configuration(options.config)
-        backups = _backups(options)
-        joints = _joints(options, configuration, backups)
-        documents = read_documents(options.endpoints, options.config)
-        buses = {name: configuration.bus[name] for name in {configuration.drive[each].bus: 0 for each in joints}}
         with opened_buses(buses) as opened:
             setups = _read(opened, configuration, joints, documents)
-            return _act(options, setups, backups)
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return exit_codes.CONFIGURATION
-    except (BusError, NoAnswerError, RefusedError) as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+            for each in setups:
+                print("\n".join(lines_of(each)), end="\n\n")
+            if restore:
+                return _write(setups, _restoring(setups, backups), Names("former", "restored"))
+            for each in setups:
+                if each.joint in backups:
+                    print(f"{each.joint} {backups[each.joint].state(each.values)} of {backup}")
+            changes = {each.joint: each.wanted for each in setups if each.wanted}
+            if write and changes:
+                path = backup or default_path()
+                write_backup(path, [each for each in setups if each.joint in changes], changes)
+                print(f"the old settings are in {path}")
+                return _write(setups, changes, Names())
+            return _summary(setups, write)
+    except NoAnswerError as problem:
+        raise CommandError(str(problem)) from None
 
 
-def _backups(options: argparse.Namespace) -> dict[str, Backup]:
-    """Returns the file to restore, or the one to compare with; none where it is to be written."""
-    if options.restore:
-        return read_backup(options.restore)
-    return read_backup(options.backup) if options.backup and not options.write else {}
-
-
-def _joints(options: argparse.Namespace, configuration: Configuration, backups: Mapping[str, Backup]) -> list[str]:
+def _joints(named: Sequence[str], configuration: Configuration, backups: Mapping[str, Backup]) -> list[str]:
+    """Return the joints to set up. Raises ConfigurationError for one that is unknown or cannot be set up over CAN."""
     known = configuration.rig.joints
-    for joint in [*options.joint, *backups]:
+    for joint in [*named, *backups]:
         if joint not in known:
             raise ConfigurationError([f"{joint}: this robot has {', '.join(known)}"])
-    for joint in options.joint:
+    for joint in named:
         if backups and joint not in backups:
             raise ConfigurationError([f"{joint}: the file has {', '.join(backups)}"])
-    wanted = options.joint or backups or known
+    wanted = named or backups or known
     joints = [joint for joint in known if joint in wanted]
     for joint in joints:
         if configuration.drive[joint].type not in DRIVE_BENCHES:
@@ -74,33 +87,16 @@ def _joints(options: argparse.Namespace, configuration: Configuration, backups: 
 def _read(
     opened: Sequence[OpenedBus], configuration: Configuration, joints: Sequence[str], documents: Sequence[object]
 ) -> list[JointSetup]:
-    """Raises RefusedError where a drive is not the configured one, before anything else is asked."""
+    """Read every drive's settings. Raises CommandError where one is not the configured one, before anything else."""
     buses = {bus.name: bus for bus in opened}
     with watched() as show:
         problems = [each for bus in opened for each in bus_problems(bus, configuration, joints, show)]
         if problems:
-            complain(*problems)
-            raise RefusedError("nothing was read or written: correct this first; 'mudskipper drives find' lists all")
+            nothing = "nothing was read or written: correct this first; 'mudskipper drives find' lists all"
+            raise CommandError(*problems, nothing)
         return [
             read_joint(joint, buses[configuration.drive[joint].bus], configuration, documents, show) for joint in joints
         ]
-
-
-def _act(options: argparse.Namespace, setups: Sequence[JointSetup], backups: Mapping[str, Backup]) -> int:
-    for each in setups:
-        print("\n".join(lines_of(each)), end="\n\n")
-    if options.restore:
-        return _write(setups, _restoring(setups, backups), Names("former", "restored"))
-    for each in setups:
-        if each.joint in backups:
-            print(f"{each.joint} {backups[each.joint].state(each.values)} of {options.backup}")
-    changes = {each.joint: each.wanted for each in setups if each.wanted}
-    if options.write and changes:
-        path = options.backup or default_path()
-        write_backup(path, [each for each in setups if each.joint in changes], changes)
-        print(f"the old settings are in {path}")
-        return _write(setups, changes, Names())
-    return _summary(setups, options.write)
 
 
 def _summary(setups: Sequence[JointSetup], written: bool) -> int:
@@ -117,12 +113,12 @@ def _summary(setups: Sequence[JointSetup], written: bool) -> int:
 
 
 def _restoring(setups: Sequence[JointSetup], backups: Mapping[str, Backup]) -> Changes:
-    """Returns the old values. Raises RefusedError where a file is of another drive."""
+    """Return the old values. Raises CommandError where a file is of another drive."""
     for each in setups:
         backup, found = backups[each.joint], each.found
         if (backup.type, backup.serial_number) != (found.type, found.serial_number):
             text = f"{each.joint}: the file is of a drive of type {backup.type} with serial number"
-            raise RefusedError(f"{text} {backup.serial_number or '-'}, not {found.serial_number or '-'}")
+            raise CommandError(f"{text} {backup.serial_number or '-'}, not {found.serial_number or '-'}")
         print(f"{each.joint} {backup.state(each.values)}")
     return {each.joint: backups[each.joint].old for each in setups}
 

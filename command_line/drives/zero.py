@@ -4,22 +4,24 @@ The drive keeps its own zero; `zero_turn` is the encoder's reading where the joi
 by the daemon's own driver with a closed transmit gate, so sign and protocol are those of the walk.
 """
 
-import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from difflib import unified_diff
 from math import degrees, isfinite, pi
-from typing import NamedTuple
+from pathlib import Path
+from typing import Annotated, NamedTuple
 
 from command_line import exit_codes
 from command_line.drives.opened_buses import opened_buses
+from command_line.errors import CommandError
 from command_line.screen import complain, watched
+from command_line.shared_options import RobotConfiguration
 from drivers.bench.bench_port import BenchPort
 from drivers.drive_types import make_drives
 from drivers.drives import Drives
 from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
-from firmware_host.buses import BusError
+from experiments.study.option import Option
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
@@ -32,10 +34,6 @@ LARGEST_MOTION_DEG = 0.3  # several steps of the coarsest encoder code (MIT mode
 DIGITS = 5  # of a turn: 0.004°
 
 
-class UnusableReadingError(Exception):
-    """The position cannot be used; the message says why."""
-
-
 class Reading(NamedTuple):
     joint: str
     old_turn: float
@@ -44,39 +42,39 @@ class Reading(NamedTuple):
     motion_deg: float  # between the extremes
 
 
-def zero(options: argparse.Namespace) -> int:
+def zero(
+    joint: Annotated[tuple[str, ...], Option("such as left_sweep", metavar="JOINT")],
+    *,
+    config: RobotConfiguration,
+    yes: Annotated[bool, Option("write it without asking")] = False,
+) -> int:
+    text = read_text(config)
+    configuration = parse_configuration(text, config)
+    for name in joint:
+        if name not in configuration.rig.joints:
+            raise ConfigurationError([f"{name}: this robot has {', '.join(configuration.rig.joints)}"])
+    readings = _read(configuration, list(dict.fromkeys(joint)))
+    moved = [each for each in readings if each.new_turn != each.old_turn]
     try:
-        text = read_text(options.config)
-        configuration = parse_configuration(text, options.config)
-        for joint in options.joint:
-            if joint not in configuration.rig.joints:
-                raise ConfigurationError([f"{joint}: this robot has {', '.join(configuration.rig.joints)}"])
-        readings = _read(configuration, list(dict.fromkeys(options.joint)))
-        moved = [each for each in readings if each.new_turn != each.old_turn]
         after = changed_text(text, {("drive", each.joint, "zero_turn"): each.new_turn for each in moved})
         for each in readings:
             print(
                 f"{each.joint}: zero_turn {each.old_turn:g} -> {each.new_turn:g}; the joint stood at"
                 f" {each.angle_deg:.2f}°, and moved by {each.motion_deg:.3f}°"
             )
-        return _replace(options, text, after)
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return exit_codes.CONFIGURATION
-    except (BusError, UnusableReadingError, FileChangeError) as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+        return _replace(config, text, after, yes)
+    except FileChangeError as problem:
+        raise CommandError(str(problem)) from None
 
 
-def _replace(options: argparse.Namespace, before: str, after: str) -> int:
-    path = options.config
+def _replace(path: Path, before: str, after: str, is_agreed: bool) -> int:
     if after == before:
         print(f"{path} needs no change")
         return exit_codes.OK
     print(
         "\n".join(unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", "", "", 0, ""))
     )
-    if not options.yes and not _agreed(f"Write this to {path}? [y/N] "):
+    if not is_agreed and not _agreed(f"Write this to {path}? [y/N] "):
         print(f"{path} was left as it is")
         return exit_codes.REFUSED if sys.stdin.isatty() else exit_codes.USAGE
     backup = replace_file(path, before, after)
@@ -94,7 +92,7 @@ def _agreed(question: str) -> bool:
 
 
 def _read(configuration: Configuration, joints: Sequence[str]) -> list[Reading]:
-    """Reads all joints at once. Raises BusError and UnusableReadingError."""
+    """Reads all joints at once. Raises BusError and CommandError."""
     names = {configuration.drive[joint].bus for joint in joints}
     chosen = {joint: configuration.drive[joint] for joint in configuration.rig.joints if joint in joints}
     with opened_buses({name: configuration.bus[name] for name in configuration.bus if name in names}) as opened:
@@ -108,7 +106,7 @@ def _read(configuration: Configuration, joints: Sequence[str]) -> list[Reading]:
 def read_angles(
     drives: Drives, clock: BenchPort, show: Callable[[str, int, int], None]
 ) -> Mapping[str, Sequence[float]]:
-    """Returns the new readings of every joint's angle for READING_S. Raises UnusableReadingError."""
+    """Returns the new readings of every joint's angle for READING_S. Raises CommandError."""
     begun_s = clock.now_s
     states = drives.read(begun_s)
     while not drives.heard and clock.now_s - begun_s < HEARING_S:
@@ -125,7 +123,7 @@ def read_angles(
         states = drives.read(clock.now_s)
         for axis, state in zip(drives.axes, states, strict=True):
             if state.closed_loop:
-                raise UnusableReadingError(f"{axis.joint}: its drive follows torque; nothing was written")
+                raise CommandError(f"{axis.joint}: its drive follows torque; nothing was written")
             if state.angle_stamp_s != stamps_s[axis.joint] and isfinite(state.angle_rad):
                 stamps_s[axis.joint] = state.angle_stamp_s
                 found[axis.joint].append(state.angle_rad)
@@ -135,11 +133,11 @@ def read_angles(
 def _reading(joint: str, zero_turn: float, sign: int, angles_rad: Sequence[float]) -> Reading:
     if len(angles_rad) < FEWEST_READINGS:
         text = f"{joint}: {len(angles_rad)} readings of its position in {READING_S:g} s, {FEWEST_READINGS} are needed"
-        raise UnusableReadingError(f"{text}; check its power, wiring and id with 'mudskipper drives find'")
+        raise CommandError(f"{text}; check its power, wiring and id with 'mudskipper drives find'")
     motion_deg = degrees(max(angles_rad) - min(angles_rad))
     if motion_deg > LARGEST_MOTION_DEG:
         text = f"{joint} moved by {motion_deg:.2f}° within {READING_S:g} s, more than {LARGEST_MOTION_DEG:g}°"
-        raise UnusableReadingError(f"{text}: hold it still, and run the command again")
+        raise CommandError(f"{text}: hold it still, and run the command again")
     mean_rad = sum(angles_rad) / len(angles_rad)
     new_turn = round(zero_turn + sign * mean_rad / (2.0 * pi), DIGITS)
     return Reading(joint, zero_turn, new_turn, degrees(mean_rad), motion_deg)

@@ -4,8 +4,8 @@ import argparse
 
 from command_line.experiments.conduct import conduct, refuse
 from command_line.experiments.workers import workers_of
+from drivers.fault_injection.failure_table import PHASES
 from verification.faults import matrix
-from verification.faults.phases import PHASES
 from verification.faults.text import faults_finding
 
 

@@ -2,95 +2,149 @@
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import fields
+from math import isfinite
 from pathlib import Path
+from typing import Annotated
 
 from command_line import exit_codes
+from command_line.errors import usage_error
 from command_line.init.bus_scan import scan, with_found, with_identities
 from command_line.init.key_reference import Key, configuration_keys
 from command_line.init.new_file import NewRobot, drive_keys, new_file
 from command_line.init.questions import Ask, ask, number, one_of, whole_number
-from command_line.screen import complain
 from control.geometry import FlipperGeometry
 from control.plate_outline import Corner
-from control.records import FLIPPERS, Rig
+from control.records import FLIPPERS, JOINTS, Rig
 from drivers.drive_types import DRIVE_TYPES
 from experiments.campaign.plate_file import read_corners
-from firmware_host.buses import BusError
+from experiments.study.option import Option
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 
 PRINTED = Path("-")
+FLIPPER_SETS = (*FLIPPERS, "both")
+BASES = ("fixed", "moves")
 RECTANGLE = "rectangle"
 SIDES = ("plate_width_m", "plate_height_m")
 
 
-def init(options: argparse.Namespace) -> int:
-    can_ask = sys.stdin.isatty() and not options.defaults
-    if options.file != PRINTED and options.file.exists():
-        complain(f"{options.file} exists: name another file, or move it away")
-        return exit_codes.USAGE
+def node_id(text: str) -> tuple[str, int]:
+    """Parse a joint and its id."""
+    joint, _, number = text.partition("=")
+    if joint not in JOINTS or not number.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text}: must be a joint and its id, such as {JOINTS[0]}=0")
+    return joint, int(number)
+
+
+def geometry_value(text: str) -> tuple[str, float]:
+    """Parse a key of [geometry] with its value in m or degrees, whose bounds the configuration checks."""
+    key, _, value = text.partition("=")
+    names = [field.name for field in fields(FlipperGeometry) if field.name != "plate_corners_m"]
+    with suppress(ValueError):
+        if key in names and isfinite(float(value)):
+            return key, float(value)
+    raise argparse.ArgumentTypeError(f"{text}: must be one of {', '.join(names)} with its value, as in drop_m=0.05")
+
+
+def init(
+    file: Annotated[Path, Option("new file; -: print", metavar="file")] = Path("mudskipper.toml"),
+    *,
+    defaults: Annotated[bool, Option("ask nothing")] = False,
+    name: Annotated[str | None, Option("of the robot, in its logs")] = None,
+    flippers: Annotated[str | None, Option("one with two motors, or both with four", choices=FLIPPER_SETS)] = None,
+    base: Annotated[str | None, Option("a bench, or a body that the flippers move", choices=BASES)] = None,
+    drive: Annotated[str | None, Option("protocol of the drives", choices=tuple(DRIVE_TYPES))] = None,
+    interface: Annotated[str | None, Option("of python-can, such as socketcan")] = None,
+    from_bus: Annotated[bool, Option("search its channels for drives, and write what is found")] = False,
+    fd: Annotated[bool, Option("with --from-bus: it carries CAN FD")] = False,
+    channel: Annotated[tuple[str, ...], Option("such as can0; twice: the left and the right flipper's own")] = (),
+    node: Annotated[tuple[tuple[str, int], ...], Option("right_sweep=3", metavar="JOINT=ID", parse=node_id)] = (),
+    plate: Annotated[
+        str | None, Option("corners of a plate that is no rectangle: lines of outward, upward in m", metavar="FILE")
+    ] = None,
+    set: Annotated[
+        tuple[tuple[str, float], ...], Option("geometry: drop_m=0.05", metavar="KEY=M", parse=geometry_value)
+    ] = (),
+) -> int:
+    """Ask for what no option gives; without a terminal, or with `defaults`, the default is the answer."""
+    if file != PRINTED and file.exists():
+        raise usage_error(f"{file} exists: name another file, or move it away")
+    read = input if sys.stdin.isatty() and not defaults else None
     try:
-        text = new_file(answers(options, input if can_ask else None))
-        parse_configuration(text)
-    except ConfigurationError as problem:
-        complain(*problem.problems)
-        return exit_codes.CONFIGURATION
-    except BusError as problem:
-        complain(str(problem))
-        return exit_codes.UNHEALTHY
+        robot = _frame(name, flippers, base, read)
+        if from_bus:
+            robot = _from_bus(robot, interface, channel, drive, fd, dict(node or ()), read)
+        else:
+            robot = _described(robot, interface, channel, drive, dict(node or ()), read)
+        text = new_file(robot._replace(geometry=_geometry(plate, dict(set or ()), read)))
     except EOFError:
         return exit_codes.INTERRUPTED
-    if options.file == PRINTED:
+    parse_configuration(text)
+    if file == PRINTED:
         print(text, end="")
         return exit_codes.OK
-    with options.file.open("x", encoding="utf-8") as file:
-        file.write(text)
-    print(f"written  {options.file}\ncheck it with: mudskipper doctor --config {options.file}")
+    with file.open("x", encoding="utf-8") as opened:
+        opened.write(text)
+    print(f"written  {file}\ncheck it with: mudskipper doctor --config {file}")
     return exit_codes.OK
 
 
-def answers(options: argparse.Namespace, read: Ask | None) -> NewRobot:
-    """Returns the robot of the options; `read` asks for what is left open. Raises ConfigurationError and BusError."""
-    default = NewRobot()
-    name = options.name or ask("name of the robot", default.name, str, read)
-    wanted = options.flippers or ask("flippers: left, right or both", "both", one_of((*FLIPPERS, "both")), read)
-    rig = Rig(FLIPPERS if wanted == "both" else (wanted,))
-    base = options.base or ask("base: fixed or moves", "moves", one_of(("fixed", "moves")), read)
-    if options.from_bus:
-        return _from_bus(options, NewRobot(name, rig, base == "fixed"), read)
+def _frame(name: str | None, flippers: str | None, base: str | None, read: Ask | None) -> NewRobot:
+    name = name or ask("name of the robot", NewRobot().name, str, read)
+    wanted = flippers or ask("flippers: left, right or both", "both", one_of(FLIPPER_SETS), read)
+    base = base or ask("base: fixed or moves", "moves", one_of(BASES), read)
+    return NewRobot(name, Rig(FLIPPERS if wanted == "both" else (wanted,)), base == "fixed")
+
+
+def _described(
+    robot: NewRobot,
+    interface: str | None,
+    channels: Sequence[str] | None,
+    drive: str | None,
+    node_ids: Mapping[str, int],
+    read: Ask | None,
+) -> NewRobot:
     types = tuple(DRIVE_TYPES)
-    drive_type = options.drive or ask(f"drives: {' or '.join(types)}", default.drive_type, one_of(types), read)
-    interface = options.interface or ask("interface of python-can", default.interface, str, read)
-    robot = NewRobot(name, rig, base == "fixed", drive_type, interface, _channels(options, rig, read))
-    return robot._replace(node_ids=_node_ids(options, robot, read), geometry=_geometry(options, read))
+    drive = drive or ask(f"drives: {' or '.join(types)}", robot.drive_type, one_of(types), read)
+    interface = interface or ask("interface of python-can", robot.interface, str, read)
+    robot = robot._replace(drive_type=drive, interface=interface, channels=_channels(channels, robot.rig, read))
+    return robot._replace(node_ids=_node_ids(node_ids, robot, read))
 
 
-def _from_bus(options: argparse.Namespace, robot: NewRobot, read: Ask | None) -> NewRobot:
-    """Scans the buses, and asks which drive moves which joint. Raises ConfigurationError and BusError."""
-    interface = options.interface or ask("interface of python-can", robot.interface, str, read)
-    robot = robot._replace(interface=interface, channels=_channels(options, robot.rig, read))
-    found = scan(robot, options.fd, options.drive)
+def _from_bus(
+    robot: NewRobot,
+    interface: str | None,
+    channels: Sequence[str] | None,
+    drive: str | None,
+    carries_fd: bool,
+    node_ids: Mapping[str, int],
+    read: Ask | None,
+) -> NewRobot:
+    """Scan the buses, and ask which drive moves which joint. Raises ConfigurationError and BusError."""
+    interface = interface or ask("interface of python-can", robot.interface, str, read)
+    robot = robot._replace(interface=interface, channels=_channels(channels, robot.rig, read))
+    found = scan(robot, carries_fd, drive)
     for channel, drives in found.items():
         print(f"found on {channel}: {', '.join(f'{each.type} {each.node_id}' for each in drives)}", file=sys.stderr)
-    robot = with_found(robot, found, dict(options.node or ()))
-    robot = robot._replace(node_ids=_node_ids(options, robot, read))
-    return with_identities(robot, found)._replace(geometry=_geometry(options, read))
+    robot = with_found(robot, found, node_ids)
+    return with_identities(robot._replace(node_ids=_node_ids(node_ids, robot, read)), found)
 
 
-def _channels(options: argparse.Namespace, rig: Rig, read: Ask | None) -> tuple[str, ...]:
+def _channels(given: Sequence[str] | None, rig: Rig, read: Ask | None) -> tuple[str, ...]:
     """Raises ConfigurationError."""
     text = "its channels, one for all flippers or one for each" if len(rig.flippers) > 1 else "its channel"
-    channels = tuple(options.channel or ask(text, "can0", str, read).replace(",", " ").split())
+    channels = tuple(given or ask(text, "can0", str, read).replace(",", " ").split())
     if len(channels) not in (1, len(rig.flippers)):
         possible = " or ".join(map(str, sorted({1, len(rig.flippers)})))
         raise ConfigurationError([f"{len(channels)} channels, {', '.join(channels)}: must be {possible} for this rig"])
     return channels
 
 
-def _node_ids(options: argparse.Namespace, robot: NewRobot, read: Ask | None) -> dict[str, int]:
+def _node_ids(given: Mapping[str, int], robot: NewRobot, read: Ask | None) -> dict[str, int]:
     """Raises ConfigurationError."""
-    given = dict(options.node or ())
     for joint in given.keys() - set(robot.rig.joints):
         raise ConfigurationError([f"--node {joint}: this rig has {', '.join(robot.rig.joints)}"])
     bounds = next(key.bounds for key in drive_keys(robot.drive_type) if key.name == "node_id")
@@ -103,23 +157,22 @@ def _node_ids(options: argparse.Namespace, robot: NewRobot, read: Ask | None) ->
     }
 
 
-def _geometry(options: argparse.Namespace, read: Ask | None) -> FlipperGeometry:
+def _geometry(plate: str | None, given: Mapping[str, float], read: Ask | None) -> FlipperGeometry:
     """Raises ConfigurationError."""
-    given = dict(options.set or ())
-    corners = _corners(options, given, read)
+    corners = _corners(plate, given, read)
     left_out = {"plate_corners_m", *(SIDES if corners else ())}
     keys = {key.name: key for key in configuration_keys(FlipperGeometry, "geometry") if key.name not in left_out}
     values = {name: given[name] if name in given else _ask_value(key, read) for name, key in keys.items()}
     return FlipperGeometry(plate_corners_m=corners, **values)
 
 
-def _corners(options: argparse.Namespace, given: Mapping[str, float], read: Ask | None) -> tuple[Corner, ...]:
+def _corners(plate: str | None, given: Mapping[str, float], read: Ask | None) -> tuple[Corner, ...]:
     """Returns the plate's corners; none for a rectangle. Raises ConfigurationError."""
     sides = [name for name in SIDES if name in given]
-    if options.plate and sides:
+    if plate and sides:
         raise ConfigurationError([f"--set {sides[0]}: must be left out where --plate gives the plate's corners"])
     prompt = f"plate: {RECTANGLE}, or a file of its corners"
-    plate = options.plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, _plate_answer, read))
+    plate = plate or (RECTANGLE if sides else ask(prompt, RECTANGLE, _plate_answer, read))
     try:
         return () if plate == RECTANGLE else read_corners(Path(plate))
     except ValueError as problem:

@@ -1,12 +1,12 @@
 """`mudskipper install` and `uninstall`: print the planned steps, do them, and report how many were done."""
 
-import argparse
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated, TypeAlias
 
 from command_line import exit_codes
 from command_line.install.service_plan import (
@@ -24,6 +24,7 @@ from command_line.install.service_plan import (
     plan_removal,
 )
 from command_line.screen import complain
+from experiments.study.option import Option
 
 HIDDEN = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")  # ProtectHome= and PrivateTmp= of the unit hide them
 COMMAND_TIMEOUT_S = 120.0  # stopping the service may take 20 s
@@ -80,27 +81,40 @@ def run_command(words: Sequence[str]) -> Outcome:
     return Outcome(done.returncode, done.stdout + done.stderr)
 
 
-def install(options: argparse.Namespace, run: Run = run_command, find: Find = shutil.which) -> int:
-    system = _system(options, run)
+DryRun: TypeAlias = Annotated[bool, Option("only show what would be done")]
+Root: TypeAlias = Annotated[Path, Option("root folder of another system", metavar="DIR")]
+
+
+def install(
+    *, dry_run: DryRun = False, root: Root = Path("/"), run: Run = run_command, find: Find = shutil.which
+) -> int:
+    system = _system(root, run)
     refusal = location_problem((system.prefix, Path(__file__).resolve().parent)) if system.live else ""
     if refusal:
         complain(refusal)
         return exit_codes.REFUSED
     plan = plan_installation(system)
-    status = _carry_out(options, system, plan, find)
+    status = _carry_out(plan, system, dry_run, find)
     is_new = any(isinstance(step, WriteFile) and step.path == system.root / CONFIGURATION for step in plan.steps)
-    if is_new and status == exit_codes.OK and not options.dry_run:
+    if is_new and status == exit_codes.OK and not dry_run:
         print(NEXT.format(root=str(system.root).rstrip("/") + "/"))
     return status
 
 
-def uninstall(options: argparse.Namespace, run: Run = run_command, find: Find = shutil.which) -> int:
-    system = _system(options, run)
-    return _carry_out(options, system, plan_removal(system, options.purge), find)
+def uninstall(
+    *,
+    purge: Annotated[bool, Option("remove configuration, logs and user too")] = False,
+    dry_run: DryRun = False,
+    root: Root = Path("/"),
+    run: Run = run_command,
+    find: Find = shutil.which,
+) -> int:
+    system = _system(root, run)
+    return _carry_out(plan_removal(system, purge), system, dry_run, find)
 
 
-def _system(options: argparse.Namespace, run: Run) -> System:
-    root, prefix = options.root.resolve(), Path(sys.prefix)
+def _system(root: Path, run: Run) -> System:
+    root, prefix = root.resolve(), Path(sys.prefix)
     if prefix.is_relative_to(root):
         prefix = Path("/") / prefix.relative_to(root)
     return System(root, prefix, run, live=root == Path("/"))
@@ -118,8 +132,8 @@ def location_problem(folders: Sequence[Path]) -> str:
     return ""
 
 
-def _carry_out(options: argparse.Namespace, system: System, plan: Plan, find: Find) -> int:
-    if system.live and os.geteuid() != 0 and not options.dry_run:
+def _carry_out(plan: Plan, system: System, dry_run: bool, find: Find) -> int:
+    if system.live and os.geteuid() != 0 and not dry_run:
         complain("this changes the system: run it with sudo, or print the steps with --dry-run")
         return exit_codes.NOT_PERMITTED
     for note in plan.notes:
@@ -127,7 +141,7 @@ def _carry_out(options: argparse.Namespace, system: System, plan: Plan, find: Fi
     if not plan.steps:
         print("nothing to do")
         return exit_codes.OK
-    if options.dry_run:
+    if dry_run:
         print("\n".join(("would:", *(f"  {step}" for step in plan.steps))))
         return exit_codes.OK
     programs = {step.words[0]: None for step in plan.steps if isinstance(step, Command)}

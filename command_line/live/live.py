@@ -5,18 +5,20 @@ serves them to Foxglove and Lichtblick by WebSocket, or as a page for a browser 
 that is not there yet, and for one that restarts.
 """
 
-import argparse
 import signal
 import time
 from collections.abc import Sequence
-from typing import NoReturn, Protocol
+from pathlib import Path
+from typing import Annotated, NoReturn, Protocol
 
 from command_line import exit_codes
+from command_line.errors import CommandError
 from command_line.screen import complain
+from command_line.shared_options import Socket
+from experiments.study.option import Option
 from firmware_host.log.row_stream import stream_path
 from operator_client.live_rows import LiveRow, LiveRows
 from operator_client.row_subscription import RowSubscription
-from operator_client.status_client import NotPermittedError
 
 READ_S = 0.2
 
@@ -31,38 +33,41 @@ class Audience(Protocol):
         """Rows have come; `lost` counts those that this program did not read in time."""
 
 
-def live(options: argparse.Namespace) -> int:
+def live(
+    *,
+    socket: Socket,
+    page: Annotated[bool, Option("serve a page for a browser in place of a viewer's WebSocket")] = False,
+    host: Annotated[str, Option("to listen on", metavar="ADDRESS")] = "127.0.0.1",
+    port: Annotated[int, Option("0: a free one (default: 8765)", low=0, high=65535)] = 8765,
+) -> int:
     try:
-        audience, address = (_open_page if options.page else _open_viewers)(options)
+        audience, address = _open_page(host, port, socket) if page else _open_viewers(host, port)
     except ModuleNotFoundError:
-        complain("viewers need foxglove-sdk: install mudskipper with its extra 'live', or use --page")
-        return exit_codes.UNHEALTHY
+        raise CommandError(
+            "viewers need foxglove-sdk: install mudskipper with its extra 'live', or use --page"
+        ) from None
     except OSError as problem:
-        complain(f"{options.host}:{options.port}: {problem.strerror or problem}; choose another --port")
-        return exit_codes.UNHEALTHY
+        raise CommandError(f"{host}:{port}: {problem.strerror or problem}; choose another --port") from None
     print(f"Serving on {address}. Ctrl-C ends.", flush=True)
     try:
-        pass_on(RowSubscription(stream_path(options.socket)), audience)
-    except NotPermittedError as problem:
-        complain(str(problem))
-        return exit_codes.NOT_PERMITTED
+        pass_on(RowSubscription(stream_path(socket)), audience)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C would interrupt the end of the server's threads
         return exit_codes.OK
 
 
-def _open_page(options: argparse.Namespace) -> tuple[Audience, str]:
+def _open_page(host: str, port: int, socket: Path) -> tuple[Audience, str]:
     from command_line.live.page_server import PageServer
 
-    page = PageServer(options.host, options.port, options.socket)
-    return page, f"http://{options.host}:{page.port}/"
+    page = PageServer(host, port, socket)
+    return page, f"http://{host}:{page.port}/"
 
 
-def _open_viewers(options: argparse.Namespace) -> tuple[Audience, str]:
+def _open_viewers(host: str, port: int) -> tuple[Audience, str]:
     from command_line.live.viewer_server import ViewerServer
 
-    viewers = ViewerServer(options.host, options.port)
-    return viewers, f"ws://{options.host}:{viewers.port}; open it in Foxglove or Lichtblick as a Foxglove WebSocket"
+    viewers = ViewerServer(host, port)
+    return viewers, f"ws://{host}:{viewers.port}; open it in Foxglove or Lichtblick as a Foxglove WebSocket"
 
 
 def pass_on(rows: RowSubscription, audience: Audience) -> NoReturn:

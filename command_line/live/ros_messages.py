@@ -21,7 +21,7 @@ DIAGNOSTICS = "/diagnostics"
 OK, WARN, ERROR = range(3)
 STRIDE_VALUES = ("index", *(f"{k}{part}" for k in COEFFICIENTS for part in ("", "_std_error")), "depth_m", "step_m")
 JOINT_VALUES = ("current_a", "temperature_c", "angle_age_s", "current_age_s")
-WORDS = {field.name: field.words for field in TICK.fields}
+WORDS = {field.name: dict(enumerate(field.words)) for field in TICK.fields}
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 Row = Any  # one element of the array of ticks, or a mapping with its fields
 

@@ -45,7 +45,7 @@ class ViewerServer:
             if kind.topic not in self._channels:
                 self._add_channel(kind.topic, kind.schema_name, kind.definition)
         self._standard = StandardMessages(
-            geometry_of(source.configuration_text), rig_of(source.kinds[TICK_KIND].definition)
+            geometry_of(source.configuration_text), rig_of(source.kinds[TICK_KIND].metadata)
         )
         self._server.clear_session()
 

@@ -3,6 +3,7 @@
 import argparse
 import os
 from collections.abc import Sequence
+from functools import partial
 from math import fsum, nan
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, o
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
 from experiments.reports.shown_values import value_shown
+from experiments.reports.style import save_picture
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration
@@ -90,11 +92,17 @@ def film(options: Options) -> int:
     strides = _chosen_strides(options, walk, moving)
     walk = with_strides(walk, strides)
     if moving:
-        _draw_film(walk, strides, path)
+        from experiments.pictures.stride_film import draw_film
+
+        progress = Progress("frames")
+        try:
+            draw_film(walk, strides, path, progress.show)
+        finally:
+            progress.clear()
     else:
         from experiments.pictures.stride_strip import draw_strip
 
-        draw_strip(walk, strides, path)
+        save_picture(partial(draw_strip, walk, strides), path)
     names = [f"{outcome_of(stride, walk.geometric_step_m)} {stride['index']}" for stride in strides]
     print(f"strides  {', '.join(names)}\nwritten  {path}")
     return exit_codes.OK
@@ -142,16 +150,6 @@ def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[
     if moving and length_s > LONGEST_FILM_S:
         raise UsageError(f"{length_s:.0f} s of film are more than {LONGEST_FILM_S:.0f} s; choose with --stride")
     return strides
-
-
-def _draw_film(walk: RecordedWalk, strides: list[Stride], path: Path) -> None:
-    from experiments.pictures.stride_film import draw_film
-
-    progress = Progress("frames")
-    try:
-        draw_film(walk, strides, path, progress.show)
-    finally:
-        progress.clear()
 
 
 @explain_errors

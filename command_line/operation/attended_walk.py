@@ -4,7 +4,6 @@ Ctrl-C stops the robot and waits until it holds. If this program dies or hangs f
 stops the robot.
 """
 
-import argparse
 import sys
 import time
 from typing import Any
@@ -21,21 +20,21 @@ MOVING = ("walking", "stopping", "damping")
 MILD = ("none", "warn")  # reactions that do not end a walk
 
 
-def attend(client: StatusClient, options: argparse.Namespace, params: dict[str, Any]) -> int:
+def attend(client: StatusClient, as_json: bool, params: dict[str, Any]) -> int:
     """Walks, and returns when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
     try:
-        report, status = _renew(client, options), exit_codes.OK
+        report, status = _renew(client, as_json), exit_codes.OK
     except KeyboardInterrupt:
         client.call("stop")
-        report, status = _renew(client, options), exit_codes.INTERRUPTED
+        report, status = _renew(client, as_json), exit_codes.INTERRUPTED
     client.call("release")
-    return _conclude(report, options, status)
+    return _conclude(report, as_json, status)
 
 
-def _renew(client: StatusClient, options: argparse.Namespace) -> dict[str, Any]:
+def _renew(client: StatusClient, as_json: bool) -> dict[str, Any]:
     """Renews the lease until the walk ends; returns the last status."""
-    line = LiveLine(silent=options.json)
+    line = LiveLine(silent=as_json)
     while True:
         report: dict[str, Any] = client.call("status")
         if report["mode"] not in MOVING:
@@ -51,11 +50,11 @@ def _renew(client: StatusClient, options: argparse.Namespace) -> dict[str, Any]:
         time.sleep(RENEWAL_S)
 
 
-def _conclude(report: dict[str, Any], options: argparse.Namespace, status: int) -> int:
+def _conclude(report: dict[str, Any], as_json: bool, status: int) -> int:
     """Prints why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
     fault = report["fault"]
     is_sound = report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD)
-    print_mode(options, report["mode"], reached=is_sound)
+    print_mode("walk", as_json, report["mode"], reached=is_sound)
     if is_sound:
         return status
     complain(report["notice"] or (fault["message"] if fault else "the torque was switched off"))

@@ -1,46 +1,50 @@
 """Runs `mudskipper fail`: makes a part of the robot fail on purpose, where its configuration allows that."""
 
-import argparse
-from typing import Any
+from typing import Annotated, Any
 
 from command_line import exit_codes
+from command_line.errors import usage_error
 from command_line.json_output import print_json, print_value
-from command_line.operation.operation import with_daemon
-from command_line.screen import complain
+from command_line.operation.operation import connect
+from command_line.shared_options import Json, Socket
 from experiments.reports.text_tables import table
-from operator_client.status_client import StatusClient
+from experiments.study.option import Option
 
 
-def fail(options: argparse.Namespace) -> int:
-    if options.list and options.component is not None:
-        complain("fail --list takes neither COMPONENT nor KIND")
-        return exit_codes.USAGE
-    if options.list:
-        return with_daemon(options, lambda client: _show(client, options.json))
-    if options.component is None or options.kind is None:
-        complain("fail needs a COMPONENT and a KIND, or --list")
-        return exit_codes.USAGE
-    return with_daemon(options, lambda client: _fail(client, options))
-
-
-def _fail(client: StatusClient, options: argparse.Namespace) -> int:
-    failing = client.call("fail", component=options.component, kind=options.kind, for_s=options.seconds)
-    if options.json:
+def fail(
+    component: Annotated[str | None, Option("left_sweep, bus.left, pose ..., or all", metavar="component")] = None,
+    kind: Annotated[
+        str | None, Option("off, stuck, garbage, slow, intermittent ..., or ok to end the failure", metavar="kind")
+    ] = None,
+    *,
+    socket: Socket,
+    json: Json = False,
+    seconds: Annotated[float, Option("seconds until it ends", unit="s", name="--for")] = 2.0,
+    list: Annotated[bool, Option("list what can fail, how, and what fails now")] = False,
+) -> int:
+    if list and component is not None:
+        raise usage_error("fail --list takes neither COMPONENT nor KIND")
+    if not list and (component is None or kind is None):
+        raise usage_error("fail needs a COMPONENT and a KIND, or --list")
+    with connect(socket) as client:
+        if list:
+            _show(client.call("failures"), json)
+            return exit_codes.OK
+        failing = client.call("fail", component=component, kind=kind, for_s=seconds)
+    if json:
         print_value(failing)
     else:
         print(failing_table(failing))
     return exit_codes.OK
 
 
-def _show(client: StatusClient, as_json: bool) -> int:
-    report = client.call("failures")
+def _show(report: dict[str, Any], as_json: bool) -> None:
     if as_json:
         print_json("failures", report)
     elif report["allowed"]:
         print(f"{families_table(report['table'])}\n\n{failing_table(report['failing'])}")
     else:
         print("deliberate failures are not allowed: failures.allowed is false in the configuration")
-    return exit_codes.OK
 
 
 def families_table(rows: list[dict[str, Any]]) -> str:

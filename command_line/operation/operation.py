@@ -6,121 +6,141 @@ It imports the standard library and msgpack only, so these commands start fast.
 import argparse
 import time
 from collections.abc import Callable
-from math import degrees, radians
-from typing import Any
+from contextlib import closing, suppress
+from math import degrees, isfinite, radians
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
 from command_line.drive_state import torque_state
+from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
-from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured, complain
+from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured
+from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
-from operator_client.status_client import (
-    CallRefusedError,
-    DroppedError,
-    NoDaemonError,
-    NotPermittedError,
-    StatusClient,
-)
+from experiments.study.option import Option
+from operator_client.status_client import DroppedError, NoDaemonError, StatusClient
 
-Options = argparse.Namespace
 ARMING_S = 5.0
 CLEARING_S = 1.5
 POLL_S = 0.05
-SIMULATE = "Without a robot, 'mudskipper simulate' makes one."
 MODE_COLOURS = {"fault": RED, "damping": RED, "walking": GREEN, "hold": GREEN, "stopping": YELLOW, "arming": YELLOW}
 
 
-def with_daemon(options: Options, act: Callable[[StatusClient], int]) -> int:
-    """Calls `act` with a client; prints why that failed and returns the exit status."""
-    try:
-        client = StatusClient(options.socket)
-        try:
-            return act(client)
-        finally:
-            client.close()
-    except DroppedError as problem:
-        complain(str(problem))
-        return exit_codes.NO_DAEMON
-    except NoDaemonError as problem:
-        complain(f"{problem}. Start it with 'systemctl start mudskipper', or name its socket with --socket. {SIMULATE}")
-        return exit_codes.NO_DAEMON
-    except NotPermittedError as problem:
-        complain(str(problem))
-        return exit_codes.NOT_PERMITTED
-    except CallRefusedError as problem:
-        complain(str(problem))
-        return exit_codes.REFUSED
+TakeOver: TypeAlias = Annotated[bool, Option("take the lease from a program that holds it")]
 
 
-def status(options: Options) -> int:
-    def show(client: StatusClient) -> int:
+def connect(socket: Path) -> closing[StatusClient]:
+    """Return a client that is closed at the end of a `with` block. Raises NoDaemonError and NotPermittedError."""
+    return closing(StatusClient(socket))
+
+
+def status(*, socket: Socket, json: Json = False) -> int:
+    with connect(socket) as client:
         report = client.call("status")
-        if options.json:
-            print_value(report)
-        else:
-            print(status_text(report))
-        return exit_codes.UNHEALTHY if report["mode"] in ("fault", "damping") else exit_codes.OK
-
-    return with_daemon(options, show)
+    if json:
+        print_value(report)
+    else:
+        print(status_text(report))
+    return exit_codes.UNHEALTHY if report["mode"] in ("fault", "damping") else exit_codes.OK
 
 
-def arm(options: Options) -> int:
-    params = {"force": options.force, "take_over": options.take_over}
-    return with_daemon(options, lambda client: _request(client, options, "hold", ARMING_S, params))
+def arm(
+    *,
+    socket: Socket,
+    json: Json = False,
+    force: Annotated[bool, Option("overrule failed checks that are not mandatory")] = False,
+    take_over: TakeOver = False,
+) -> int:
+    return _change_mode("arm", "hold", socket, json, {"force": force, "take_over": take_over})
 
 
-def walk(options: Options) -> int:
-    params: dict[str, Any] = {"strides": options.strides, "take_over": options.take_over}
-    if options.depth is not None:
-        params["depth_m"] = options.depth / 100.0
-    if options.attended:
-        return with_daemon(options, lambda client: attend(client, options, params))
-    return with_daemon(options, lambda client: _request(client, options, "walking", ARMING_S, params))
+def walk(
+    *,
+    socket: Socket,
+    json: Json = False,
+    depth: Annotated[  # the daemon knows the robot's limit
+        float | None, Option("insertion depth of every stride", unit="cm", above=0.0, alternative="depth")
+    ] = None,
+    adaptive: Annotated[
+        bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
+    ] = False,
+    strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
+    attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
+    take_over: TakeOver = False,
+) -> int:
+    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed."""
+    params: dict[str, Any] = {"strides": strides, "take_over": take_over}
+    if depth is not None:
+        params["depth_m"] = depth / 100.0
+    if attended:
+        with connect(socket) as client:
+            return attend(client, json, params)
+    return _change_mode("walk", "walking", socket, json, params)
 
 
-def move(options: Options) -> int:
-    """Waits until the joints have arrived; Ctrl-C stops them."""
-    joints = [joint for joint, _ in options.angles]
+def joint_angle(text: str) -> tuple[str, float]:
+    """Parse a joint and its angle in degrees."""
+    from control.records import JOINTS  # imports too much for `status`
+
+    joint, _, angle_deg = text.partition("=")
+    if joint and joint not in JOINTS:
+        raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; there are {', '.join(JOINTS)}")
+    with suppress(ValueError):
+        if joint and isfinite(float(angle_deg)):
+            return joint, float(angle_deg)
+    raise argparse.ArgumentTypeError(f"{text}: must be a joint and its angle in degrees, such as left_sweep=10")
+
+
+def move(
+    angles: Annotated[
+        tuple[tuple[str, float], ...], Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle)
+    ],
+    *,
+    socket: Socket,
+    json: Json = False,
+    take_over: TakeOver = False,
+) -> int:
+    """Wait until the joints have arrived; Ctrl-C stops them."""
+    joints = [joint for joint, _ in angles]
     if twice := next((joint for joint in joints if joints.count(joint) > 1), None):
-        complain(f"{twice} is named twice")
-        return exit_codes.USAGE
-
-    def act(client: StatusClient) -> int:
+        raise usage_error(f"{twice} is named twice")
+    with connect(socket) as client:
         try:
-            angles_rad = {f"{joint}_rad": radians(angle_deg) for joint, angle_deg in options.angles}
-            client.call("move", take_over=options.take_over, **angles_rad)
+            angles_rad = {f"{joint}_rad": radians(angle_deg) for joint, angle_deg in angles}
+            client.call("move", take_over=take_over, **angles_rad)
             while (report := client.call("status"))["moving"]:
                 time.sleep(POLL_S)
         except KeyboardInterrupt:
             client.call("stop")
             raise
-        arrived = report["mode"] == "hold" and not report["notice"]
-        print_mode(options, report["mode"], reached=arrived)
-        if arrived:
-            return exit_codes.OK
-        complain(report["notice"] or f"the robot is in {report['mode']}")
-        return exit_codes.REFUSED
-
-    return with_daemon(options, act)
+    arrived = report["mode"] == "hold" and not report["notice"]
+    print_mode("move", json, report["mode"], reached=arrived)
+    if not arrived:
+        raise _refusal(report["notice"] or f"the robot is in {report['mode']}")
+    return exit_codes.OK
 
 
-def clear(options: Options) -> int:
-    def act(client: StatusClient) -> int:
+def clear(*, socket: Socket, json: Json = False) -> int:
+    with connect(socket) as client:
         client.call("clear")
-        report = _poll(
-            client, lambda status: status["mode"] in ("idle", "boot") and not stopping_faults(status), CLEARING_S
-        )
-        messages = [fault["message"] for fault in stopping_faults(report)]
-        if report["mode"] in ("idle", "boot") and not messages:
-            print_mode(options, report["mode"])
-            return exit_codes.OK
-        complain(f"the cause is still there: {' '.join(messages) or report['mode']}")
-        return exit_codes.REFUSED
+        report = _poll(client, lambda status: _is_at_rest(status) and not stopping_faults(status), CLEARING_S)
+    messages = [fault["message"] for fault in stopping_faults(report)]
+    if messages or not _is_at_rest(report):
+        raise _refusal(f"the cause is still there: {' '.join(messages) or report['mode']}")
+    print_mode("clear", json, report["mode"])
+    return exit_codes.OK
 
-    return with_daemon(options, act)
+
+def _is_at_rest(report: dict[str, Any]) -> bool:
+    return report["mode"] in ("idle", "boot")
+
+
+def _refusal(message: str) -> CommandError:
+    return CommandError(message, status=exit_codes.REFUSED)
 
 
 def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
@@ -128,18 +148,17 @@ def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
-def _request(client: StatusClient, options: Options, mode: str, longest_s: float, params: dict[str, Any]) -> int:
-    """Sends the command and waits until the robot is in the mode that it asks for."""
-    client.call(options.command, **params)
-    report = _poll(client, lambda status: status["mode"] in (mode, "fault"), longest_s)
-    if report["mode"] == mode:
-        print_mode(options, mode, report["notice"])
-        return exit_codes.OK
+def _change_mode(command: str, mode: str, socket: Path, as_json: bool, params: dict[str, Any]) -> int:
+    """Send the command and wait until the robot is in the mode that it asks for."""
+    with connect(socket) as client:
+        client.call(command, **params)
+        report = _poll(client, lambda status: status["mode"] in (mode, "fault"), ARMING_S)
     if report["mode"] == "fault":
-        complain(report["fault"]["message"] if report["fault"] else report["notice"])
-        return exit_codes.REFUSED
-    complain(f"still {report['mode']} after {longest_s:g} s")
-    return exit_codes.TIMED_OUT
+        raise _refusal(report["fault"]["message"] if report["fault"] else report["notice"])
+    if report["mode"] != mode:
+        raise CommandError(f"still {report['mode']} after {ARMING_S:g} s", status=exit_codes.TIMED_OUT)
+    print_mode(command, as_json, mode, report["notice"])
+    return exit_codes.OK
 
 
 def _poll(client: StatusClient, done: Callable[[dict[str, Any]], bool], longest_s: float) -> dict[str, Any]:
@@ -150,21 +169,23 @@ def _poll(client: StatusClient, done: Callable[[dict[str, Any]], bool], longest_
     return dict(report)
 
 
-def check(options: Options) -> int:
-    """Asks the daemon; where none runs, checks what it would need."""
+def check(
+    *,
+    socket: Socket,
+    json: Json = False,
+    config: Annotated[Path, Option("used without a daemon")] = Path(DEFAULT_CONFIG),
+) -> int:
+    """Ask the daemon; where none runs, check what it would need."""
     try:
-        StatusClient(options.socket).close()
+        with connect(socket) as client:
+            items = client.call("check")
+    except DroppedError:
+        raise
     except NoDaemonError as problem:
         from command_line.doctor.doctor import check_without_daemon  # imports too much for `status`
 
-        return _show_items(options, check_without_daemon(options.config, str(problem)))
-    except NotPermittedError:
-        pass  # with_daemon reports it
-    return with_daemon(options, lambda client: _show_items(options, client.call("check")))
-
-
-def _show_items(options: Options, items: list[dict[str, Any]]) -> int:
-    if options.json:
+        items = check_without_daemon(config, str(problem))
+    if json:
         print_value(items)
     else:
         for item in items:

@@ -3,7 +3,10 @@
 import argparse
 from pathlib import Path
 
-from command_line.option_types import (
+from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket, add_vertical
+from command_line.options.studies import add_studies
+from control.records import JOINTS
+from experiments.study.values import (
     between,
     depth_cm,
     folder,
@@ -13,9 +16,6 @@ from command_line.option_types import (
     weights_g,
     whole,
 )
-from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket, add_vertical
-from command_line.options.studies import add_studies
-from control.records import JOINTS
 
 SEEDS, TRIALS, WORKERS = whole(1, 1000), whole(1, 100), whole(1, 1000)
 STRENGTH_PA = between(50.0, 50000.0, "Pa")

@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from command_line.option_types import folder, mud_length, picture, whole
 from command_line.options.shared import Commands, add, add_config, add_json, add_vertical
+from experiments.study.values import folder, mud_length, picture, whole
 
 Parser = argparse.ArgumentParser
 METHODS = ("default", "paper")  # of estimation
@@ -17,6 +17,7 @@ FOLDER = "names the folder (default: %(default)s)"
 
 
 def add_replay(replay: Parser) -> None:
+    replay.set_defaults(function="logs.log_commands.replay")
     replay.add_argument("files", type=Path, nargs="+", metavar="FILE", help=ANY_LOG)
     add_json(replay)
     replay.add_argument(
@@ -27,11 +28,13 @@ def add_replay(replay: Parser) -> None:
 
 
 def add_plot(plot: Parser) -> None:
+    plot.set_defaults(function="logs.log_commands.plot")
     plot.add_argument("--out", type=picture(".png", ".svg", ".pdf"), metavar="PNG", help="or .svg, .pdf")
     _add_walk(plot)
 
 
 def add_film(film: Parser) -> None:
+    film.set_defaults(function="logs.log_commands.film")
     film.add_argument("--out", type=picture(".png", ".gif"), metavar="FILE", help=".png for a strip, .gif for a film")
     film.add_argument("--stride", action="append", type=COUNT, metavar="N", help="number in the replay, repeatable")
     _add_walk(film)

@@ -1,16 +1,13 @@
-"""Options that several commands have: the daemon's socket, the configuration, JSON."""
+"""Options of the commands that are not declared at their functions yet."""
 
 import argparse
-import os
 from pathlib import Path
 from typing import TypeAlias
 
-from drivers.can.run_folder import find_run_folder
+from command_line.shared_options import DEFAULT_CONFIG as DEFAULT_CONFIG
+from command_line.shared_options import default_socket
 
-DEFAULT_SOCKET = "/run/mudskipper/mudskipper.sock"
-SIMULATED = "robot"  # the name that `mudskipper simulate` has without --bus
 AXES = ("x", "y", "z")  # of motion capture
-DEFAULT_CONFIG = "/etc/mudskipper/mudskipper.toml"
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # generic for type checkers alone
 
 
@@ -19,23 +16,6 @@ def add(commands: Commands, name: str, function: str, text: str) -> argparse.Arg
     command = commands.add_parser(name, help=text, description=text)
     command.set_defaults(function=function)
     return command
-
-
-def default_socket() -> Path:
-    """Returns $MUDSKIPPER_SOCKET, else the service's socket; where no service runs, that of `mudskipper simulate`."""
-    given, service = os.environ.get("MUDSKIPPER_SOCKET"), Path(DEFAULT_SOCKET)
-    if given or service.exists():
-        return Path(given) if given else service
-    folder = find_run_folder()
-    simulated = folder / SIMULATED / service.name if folder else service
-    return simulated if simulated.exists() else service
-
-
-def default_configuration() -> Path:
-    """Returns the daemon's configuration; where there is none, that of `mudskipper simulate`."""
-    configured, folder = Path(DEFAULT_CONFIG), find_run_folder()
-    simulated = folder / SIMULATED / configured.name if folder else configured
-    return simulated if simulated.exists() and not configured.exists() else configured
 
 
 def add_socket(parser: argparse.ArgumentParser) -> None:

@@ -15,18 +15,18 @@ from types import ModuleType
 from typing import Any, get_type_hints
 
 from command_line.function_options import add_function_options
-from command_line.option_types import folder, whole
 from command_line.options.shared import Commands, add_json, add_socket
 from experiments.study.catalogue import load_study, study_texts
 from experiments.study.option import declared_options
 from experiments.study.session import Session
+from experiments.study.values import folder, whole
 
 
 def add_studies(names: Commands) -> None:
     """Add the command of every study."""
     for name, text in study_texts().items():
         command = names.add_parser(
-            name, help=text.partition("\n")[0], description=text, options=partial(_add_options, name)
+            name, help=text.partition("\n")[0], description=text, target=partial(_add_options, name)
         )
         command.set_defaults(function="experiments.studies.run_study")
 

@@ -1,38 +1,42 @@
 """Runs `mudskipper watch`: a live screen on a terminal, plain lines elsewhere."""
 
-import argparse
 import os
 import sys
 from functools import partial
 from importlib.util import find_spec
+from typing import Annotated
 
 from command_line import exit_codes
-from command_line.operation.operation import with_daemon
+from command_line.operation.operation import connect
 from command_line.screen import complain
+from command_line.shared_options import Socket
 from command_line.watch.feed import Feed
 from command_line.watch.orders import send_order
 from command_line.watch.plain_lines import print_lines
-from operator_client.status_client import StatusClient
+from experiments.study.option import Option
 
 SCREEN_PERIOD_S, LINES_PERIOD_S = 0.1, 1.0
 
 
-def watch(options: argparse.Namespace) -> int:
-    """Begins only with a daemon that answers; later it survives its restart."""
-    return with_daemon(options, lambda client: _begin(client, options))
-
-
-def _begin(client: StatusClient, options: argparse.Namespace) -> int:
-    client.call("status")
-    client.close()
-    if _can_show_screen(options.lines):
+def watch(
+    *,
+    lines: Annotated[bool, Option("plain lines, as in a pipe, also on a terminal")] = False,
+    period: Annotated[
+        float | None, Option("seconds between two (default: 0.1; lines: 1)", unit="s", low=0.05, high=3600.0)
+    ] = None,
+    socket: Socket,
+) -> int:
+    """Begin only with a daemon that answers; later the screen survives its restart."""
+    with connect(socket) as client:
+        client.call("status")
+    if _can_show_screen(lines):
         from command_line.watch.screen_app import WatchApp  # textual takes half a second to import
 
-        feed = Feed(options.socket, options.period or SCREEN_PERIOD_S)
-        app = WatchApp(feed, options.period or SCREEN_PERIOD_S, partial(send_order, options.socket))
+        period_s = period or SCREEN_PERIOD_S
+        app = WatchApp(Feed(socket, period_s), period_s, partial(send_order, socket))
         return app.run(mouse=False) or exit_codes.OK
-    period_s = options.period or LINES_PERIOD_S
-    print_lines(Feed(options.socket, period_s), period_s)
+    period_s = period or LINES_PERIOD_S
+    print_lines(Feed(socket, period_s), period_s)
     return exit_codes.OK
 
 

@@ -5,14 +5,14 @@ import os
 from collections.abc import Iterator
 
 from command_line import exit_codes
-from command_line.parser import add_all_options, build_parser
+from command_line.parser import build_parser, complete
 from docs.generate.markdown import code, table
 
 
 def commands() -> Iterator[str]:
     os.environ["COLUMNS"] = "100"  # the width of a usage line
     parser = build_parser()
-    add_all_options(parser)
+    complete(parser)
     yield from _options(parser)
     yield from _commands(parser)
 

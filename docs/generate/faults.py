@@ -6,7 +6,7 @@ from control.faults import Blocks, Clears, FaultKind, Reaction
 from control.modes import TRANSITIONS, Mode
 from control.rate import PERIOD_S
 from docs.generate.markdown import code, table
-from drivers.fault_injection.failures import EFFECTS
+from drivers.fault_injection.failure_table import EFFECTS
 from experiments.robot.lockstep_robot import simulated_configuration
 from verification.faults.energy_bounds import STOP_TO_STOP_RAD, STOPPING, energy_bounds
 

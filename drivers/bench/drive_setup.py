@@ -4,9 +4,9 @@ A setting is a number under the drive's own name, in the drive's own unit. Writi
 storing makes it last. A type of drive that can do neither says so in `cannot`.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from math import nan
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from drivers.bench.found_drive import FoundDrive
 
@@ -44,39 +44,40 @@ def same(value: float, expected: float) -> bool:
     return abs(value - expected) <= SAME_FRACTION * abs(expected)
 
 
-class DriveSetup(Protocol):
-    """One drive, under the id of the configuration. Everything raises NoAnswerError where it does not answer."""
+class DriveSetup(ABC):
+    """One drive, under the id of the configuration, whose settings cannot be read unless a protocol says how.
 
-    @property
-    def cannot(self) -> str:
-        """Why its settings can be neither read nor written over CAN; empty where they can."""
+    Everything raises NoAnswerError where the drive does not answer.
+    """
 
-    @property
-    def stored(self) -> str:
-        """What proves that settings last, once `save` has returned; for people."""
+    cannot = ""  # why its settings can be neither read nor written over CAN; empty where they can
+    stored = ""  # what proves that settings last, once `save` has returned; for people
 
+    @abstractmethod
     def identify(self) -> FoundDrive:
         """Asks for what is known of this drive; it comes before everything else."""
 
     def activity(self) -> str:
         """Returns what the drive does, where it is not idle; empty for an idle one."""
+        return ""
 
-    def settings(self) -> Sequence[Setting]: ...
+    def settings(self) -> Sequence[Setting]:
+        return ()
 
     def read(self, key: str) -> float:
-        """Raises CannotReadError."""
+        raise CannotReadError(self.cannot)
 
     def write(self, key: str, value: float) -> None:
         """Writes to the drive's memory. Raises CannotReadError."""
+        raise CannotReadError(self.cannot)
 
     def save(self) -> None:
         """Stores all settings, and returns once the drive answers again."""
+        raise CannotReadError(self.cannot)
 
 
-class NoSetup:
-    """Implements DriveSetup for drives whose settings cannot be read over CAN."""
-
-    stored = ""
+class NoSetup(DriveSetup):
+    """A drive whose settings cannot be read over CAN, for a reason."""
 
     def __init__(self, found: FoundDrive, reason: str) -> None:
         self._found = found
@@ -84,18 +85,3 @@ class NoSetup:
 
     def identify(self) -> FoundDrive:
         return self._found
-
-    def activity(self) -> str:
-        return ""
-
-    def settings(self) -> Sequence[Setting]:
-        return ()
-
-    def read(self, key: str) -> float:
-        return nan
-
-    def write(self, key: str, value: float) -> None:
-        raise CannotReadError(self.cannot)
-
-    def save(self) -> None:
-        raise CannotReadError(self.cannot)

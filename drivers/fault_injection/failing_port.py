@@ -18,9 +18,11 @@ from struct import Struct
 from drivers.can.can_port import CanPort
 from drivers.can.frames import DATA_MAX_BYTES, STANDARD_MASK, Frame
 from drivers.can.port_health import BusState
-from drivers.drive import DriveParameters, FrameContent, Span
+from drivers.drive import DriveParameters
+from drivers.drive_type import FrameContent, Span
 from drivers.drive_types import read_frame, type_of
-from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
+from drivers.fault_injection.failure_table import FailureKind
+from drivers.fault_injection.failures import NO_NUMBERS, Failure, Failures
 
 NO_NODE = -1
 FAR_TURNS = 2.0  # random values that look plausible

@@ -4,7 +4,8 @@ from collections import deque
 from math import isfinite
 
 from control.records import BodyPose
-from drivers.fault_injection.failures import NO_NUMBERS, Failure, FailureKind, Failures
+from drivers.fault_injection.failure_table import FailureKind
+from drivers.fault_injection.failures import NO_NUMBERS, Failure, Failures
 from drivers.pose.pose_port import PoseReport, PoseSource
 
 LATE_S = 0.2

@@ -1,21 +1,21 @@
 """The failures that an operator injects: which component fails, how, and until when.
 
 A stop that has never been exercised cannot be trusted, so an operator can make parts of the robot fail: in simulation,
-and on hardware where the configuration allows it. Components and kinds follow PX4's `failure` command; a component
-that cannot fail in the requested way is refused with a message. Every failure ends by itself. Nothing here touches a
-wire: the `failing_*` classes ask `Failures` what fails and change what passes through them. Time is that of the last
+and on hardware where the configuration allows it. The table of failures (failure_table.py) lists them; a component that
+cannot fail in the requested way is refused with a message. Every failure ends by itself. Nothing here touches a wire:
+the `failing_*` classes ask `Failures` what fails and change what passes through them. Time is that of the last
 `update`, and random draws come from a seed, so a failure in lockstep is reproducible to the last bit.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 from math import inf, nan
 from random import Random
 from typing import Annotated, NamedTuple
 
 from control.bounds import Meaning
 from control.records import JOINTS, NEVER_S
+from drivers.fault_injection.failure_table import EFFECTS, FailureKind
 
 USUAL_S = 2.0
 SHORTEST_S, LONGEST_S = 0.01, 60.0
@@ -27,88 +27,6 @@ NO_NUMBERS = (nan, inf, -inf, 3e38, -3e38)  # the last two still fit into the fo
 @dataclass(frozen=True)
 class FailureParameters:
     allowed: Annotated[bool, Meaning("whether `mudskipper fail` may make parts of this robot fail")] = False
-
-
-class FailureKind(StrEnum):
-    OFF = "off"
-    STUCK = "stuck"
-    GARBAGE = "garbage"
-    SLOW = "slow"
-    INTERMITTENT = "intermittent"
-    WARNING = "warning"
-    PASSIVE = "passive"
-    BUS_OFF = "bus-off"
-
-
-Kind = FailureKind
-Effects = Mapping[FailureKind, str]
-
-
-def _signal(name: str) -> Effects:
-    return {
-        Kind.OFF: f"its {name} does not arrive",
-        Kind.STUCK: f"its {name} is frozen while messages keep arriving",
-        Kind.GARBAGE: f"its {name} is random, not a number, huge, or of a wrong length",
-        Kind.SLOW: f"its {name} arrives 5 to 20 ms late",
-        Kind.INTERMITTENT: f"half of the messages of its {name} are lost, at random",
-    }
-
-
-EFFECTS: Mapping[str, Effects] = {  # JOINT and NAME stand for each joint and each bus
-    "JOINT": {
-        Kind.OFF: "no frame arrives from the drive and none reaches it, as if it were unplugged",
-        Kind.STUCK: "all that it reports is frozen; commands reach it",
-        Kind.GARBAGE: "all that it reports is random, not a number, huge, or of a wrong length; commands reach it",
-        Kind.SLOW: "all messages from and to it are 5 to 20 ms late",
-        Kind.INTERMITTENT: "half of the messages from and to it are lost, at random",
-    },
-    "JOINT.position": _signal("position"),
-    "JOINT.current": _signal("current"),
-    "JOINT.heartbeat": _signal("heartbeat"),
-    "JOINT.temperature": _signal("temperature"),
-    "JOINT.voltage": _signal("bus voltage"),
-    "JOINT.error": {
-        Kind.OFF: "it reports that it left closed loop, without an error",
-        Kind.STUCK: "it reports a gate driver fault and that it left closed loop",
-        Kind.GARBAGE: "it reports random errors",
-        Kind.INTERMITTENT: "half of the time it reports a gate driver fault and that it left closed loop",
-    },
-    "JOINT.command": {
-        Kind.OFF: "no command reaches it",
-        Kind.SLOW: "commands reach it 5 to 20 ms late",
-        Kind.INTERMITTENT: "half of the commands to it are lost, at random",
-    },
-    "bus.NAME": {
-        Kind.OFF: "the interface is gone: no frame arrives, sending fails",
-        Kind.STUCK: "the transmit queue is full: sending fails",
-        Kind.GARBAGE: "half of the frames are malformed, with random frames in between",
-        Kind.SLOW: "all frames are 5 to 20 ms late",
-        Kind.INTERMITTENT: "half of the frames are lost, at random",
-        Kind.WARNING: "error frames arrive, and the controller warns",
-        Kind.PASSIVE: "error frames arrive, and the controller is error-passive",
-        Kind.BUS_OFF: "the controller took itself off the bus: only error frames arrive, sending fails",
-    },
-    "pose": {
-        Kind.OFF: "no pose arrives",
-        Kind.STUCK: "the body seems to stand still",
-        Kind.GARBAGE: "the position is random, not a number or huge",
-        Kind.SLOW: "the position is that of 0.2 s ago",
-        Kind.INTERMITTENT: "half of the time no pose arrives, at random",
-    },
-    "log": {
-        Kind.OFF: "the log's writer looks dead and takes no row",
-        Kind.STUCK: "the log takes no row",
-        Kind.INTERMITTENT: "half of the rows are refused, at random",
-    },
-    "loop": {
-        Kind.STUCK: "the loop stalls for 30 ms, once",
-        Kind.SLOW: "every tick takes 4 ms longer",
-    },
-    "clock": {
-        Kind.STUCK: "the wall clock stops",
-        Kind.GARBAGE: "the wall clock is an hour ahead, and steps back at the end",
-    },
-}
 
 
 class Failure(NamedTuple):

@@ -8,18 +8,16 @@ Sources: see codec.py; ODrive's CANSimple documentation.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import cast
 
 from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_bench import SetupFacts
+from drivers.bench.drive_bench import DriveBench, SetupFacts
 from drivers.bench.drive_setup import DriveSetup, NoSetup
 from drivers.bench.found_drive import FoundDrive
 from drivers.can.frames import Frame
 from drivers.mit import codec
-from drivers.mit.identity import is_answer, is_register, models_of, node_of, number_of
-from drivers.mit.parameters import LARGEST_ID, MitParameters
+from drivers.mit.parameters import LARGEST_ID
 from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, TMAX, VMAX
-from drivers.mit.setup import NOTHING, DamiaoSetup
+from drivers.mit.setup import NOTHING, DamiaoSetup, is_answer, is_register, models_of, node_of, number_of
 
 NAME = "mit"
 IDS = range(1, LARGEST_ID + 1)
@@ -27,19 +25,16 @@ ASKED = (SOFTWARE, SERIAL, PMAX, VMAX, TMAX)
 Values = dict[int, set[float]]  # of one id by register: two values where two drives answer
 
 
-class MitBench:
-    """Implements DriveBench."""
-
-    is_fd = False
+class MitBench(DriveBench):
     disturbs = "ODrives of id 0 take its questions for commands"
 
-    def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
-        """These drives send nothing by themselves."""
-        return set()
-
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
-        answered = _answers(port.ask_all(Frame(node_id, codec.LEAVE) for node_id in IDS))
-        registers = self._read_registers(port, answered)
+        answered: dict[int, list[int]] = {}  # the ids of the answers, by the id of the drive that gave them
+        for frame in port.ask_all(Frame(node_id, codec.LEAVE) for node_id in IDS):
+            node_id = node_of(frame)
+            if is_answer(frame, node_id) and not is_register(frame, node_id):
+                answered.setdefault(node_id, []).append(frame.arbitration_id)
+        registers = _read_registers(port, answered)
         return [
             each
             for node_id, ids in sorted(answered.items())
@@ -47,31 +42,22 @@ class MitBench:
         ]
 
     def open_setup(self, port: BenchPort, facts: SetupFacts) -> DriveSetup:
-        parameters = cast(MitParameters, facts.parameters)
+        parameters = facts.parameters
         if parameters.ranges.has_registers:
             return DamiaoSetup(port, parameters, facts.longest_watchdog_s)
         return NoSetup(FoundDrive(NAME, parameters.node_id, parameters.model), NOTHING)
 
-    def _read_registers(self, port: BenchPort, node_ids: Iterable[int]) -> dict[int, Values]:
-        questions = (
-            Frame(codec.REGISTER_ID, codec.encode_read(node_id, register)) for node_id in node_ids for register in ASKED
-        )
-        found: dict[int, Values] = {}
-        for frame in port.ask_all(questions):
-            node_id = node_of(frame)
-            if is_answer(frame, node_id) and is_register(frame, node_id):
-                _, _, register, value = codec.decode_register(frame.data)
-                found.setdefault(node_id, {}).setdefault(register, set()).add(number_of(register, value))
-        return found
 
-
-def _answers(frames: Iterable[Frame]) -> dict[int, list[int]]:
-    """Returns the ids of the answers by the id of the drive that gave them."""
-    found: dict[int, list[int]] = {}
-    for frame in frames:
+def _read_registers(port: BenchPort, node_ids: Iterable[int]) -> dict[int, Values]:
+    questions = (
+        Frame(codec.REGISTER_ID, codec.encode_read(node_id, register)) for node_id in node_ids for register in ASKED
+    )
+    found: dict[int, Values] = {}
+    for frame in port.ask_all(questions):
         node_id = node_of(frame)
-        if is_answer(frame, node_id) and not is_register(frame, node_id):
-            found.setdefault(node_id, []).append(frame.arbitration_id)
+        if is_answer(frame, node_id) and is_register(frame, node_id):
+            _, _, register, value = codec.decode_register(frame.data)
+            found.setdefault(node_id, {}).setdefault(register, set()).add(number_of(register, value))
     return found
 
 
@@ -88,4 +74,12 @@ def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDr
         problem = f"it answers under id {min(ids)}: set MST_ID (register 7) to {node_id + 16}"
     numbers = [f"{int(each):08x}" for each in sorted(values.get(SERIAL, ()))] or [""]
     for number in numbers if len(numbers) > 1 else numbers * len(ids):
-        yield FoundDrive(NAME, node_id, " or ".join(models), firmware, number, problem, next(iter(models), ""))
+        yield FoundDrive(
+            type=NAME,
+            node_id=node_id,
+            hardware=" or ".join(models),
+            firmware=firmware,
+            serial_number=number,
+            problem=problem,
+            model=next(iter(models), ""),
+        )

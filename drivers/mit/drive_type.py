@@ -1,18 +1,20 @@
 """MIT mode as a drive type: its parameters, its axis, and how to read and forge its frames without commanding one."""
 
-from collections.abc import Mapping, Sequence
-from typing import cast
+from collections.abc import Mapping
+from typing import Any
 
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
 from drivers.can.frames import Frame
-from drivers.drive import DriveParameters, FrameContent, Outlet, Span, WatchdogEndpoints
+from drivers.drive import DriveParameters
+from drivers.drive_type import DriveType, FrameContent, Span
 from drivers.mit import codec
 from drivers.mit.axis import MASTER_ID, MitAxis
-from drivers.mit.gate_tables import gate_table
+from drivers.mit.bench import MitBench
+from drivers.mit.gate_table import gate_table
 from drivers.mit.models import MODELS
 from drivers.mit.parameters import LARGEST_ID, MitParameters
-from drivers.transmit_gate import FrameKind, GateTable
+from drivers.transmit_gate import GateTable
 
 # All other signals of an answer arrive together or not at all: no code says that one is unknown.
 ROTOR_TEMPERATURE: Mapping[str, Span] = {"temperature": Span(7, 8, bytes(1))}  # of a Damiao
@@ -23,11 +25,12 @@ OVERCURRENT = 0xA  # of a Damiao; its low bits are that of a CubeMars
 MODEL = MODELS["DM4310"]
 
 
-class Mit:
-    """Describes MIT mode, as DriveType requires."""
+class Mit(DriveType):
+    """Describes MIT mode."""
 
     parameters = MitParameters
-    kind = FrameKind()
+    axis = MitAxis
+    bench = MitBench()
     example_error = OVERCURRENT
     command = FrameRate(codec.ANSWER_BYTES, RATE_HZ)
     reports = (FrameRate(codec.ANSWER_BYTES, RATE_HZ),)
@@ -37,13 +40,8 @@ class Mit:
         node_id = parameters.node_id
         return frozenset({MASTER_ID, node_id, node_id + DAMIAO_OFFSET, codec.REGISTER_ID})
 
-    def gate_table(self, parameters: DriveParameters) -> GateTable:
-        return gate_table(cast(MitParameters, parameters))
-
-    def make_axis(
-        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
-    ) -> MitAxis:
-        return MitAxis(joint, cast(MitParameters, parameters), outlet)
+    def gate_table(self, parameters: Any) -> GateTable:
+        return gate_table(parameters)
 
     def query(self, node_id: int) -> Frame:
         return Frame(node_id, codec.LEAVE)

@@ -5,15 +5,16 @@ the kind, the register. Storing (0xAA) is acknowledged; that it lasts shows only
 on. Source: damiao-motor 1.0.6 (REGISTER_TABLE and store_parameters of core/motor.py).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from struct import Struct
 
 from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_setup import Setting, exactly
+from drivers.bench.drive_setup import DriveSetup, Setting, exactly
 from drivers.bench.found_drive import FoundDrive
 from drivers.can.frames import Frame
 from drivers.mit import codec
-from drivers.mit.identity import is_answer, is_register, models_of, number_of
-from drivers.mit.parameters import MitParameters
+from drivers.mit.models import MODELS
+from drivers.mit.parameters import LARGEST_ID, MitParameters
 from drivers.mit.settings import (
     CONTROL_MODE,
     FLOAT,
@@ -61,10 +62,39 @@ def wanted_settings(drive: MitParameters, longest_watchdog_s: float) -> Sequence
     )
 
 
-class DamiaoSetup:
-    """Implements DriveSetup."""
+def number_of(register: int, value: bytes) -> float:
+    layout: Struct = FLOAT if register in FLOATS else WORD
+    return float(layout.unpack(value)[0])
 
-    cannot = ""
+
+def node_of(frame: Frame) -> int:
+    return frame.data[0] & LARGEST_ID if frame.data else 0
+
+
+def is_answer(frame: Frame, node_id: int) -> bool:
+    """Drives answer under their own id, under that plus 16 as the set-up page says, or under 0 as delivered."""
+    known = frame.is_plain and len(frame.data) == codec.ANSWER_BYTES and node_of(frame) == node_id
+    return known and frame.arbitration_id in (0, node_id, node_id + 16)
+
+
+def is_register(frame: Frame, node_id: int) -> bool:
+    return codec.is_register_answer(frame.data, node_id)
+
+
+def models_of(values: Mapping[int, float]) -> list[str]:
+    """Returns the models with registers that are delivered with these ranges."""
+    found = [values.get(register, 0.0) for register in (PMAX, VMAX, TMAX)]
+    return [
+        name
+        for name, model in MODELS.items()
+        if model.has_registers
+        and all(
+            abs(each - expected) <= SAME_FRACTION * expected for each, expected in zip(found, model[:3], strict=True)
+        )
+    ]
+
+
+class DamiaoSetup(DriveSetup):
     stored = "it has acknowledged the storing; switch its supply off and on, and compare again"
 
     def __init__(self, port: BenchPort, parameters: MitParameters, longest_watchdog_s: float) -> None:
@@ -76,7 +106,11 @@ class DamiaoSetup:
         values = {register: self._read(register, "its identity") for register in (SOFTWARE, SERIAL, PMAX, VMAX, TMAX)}
         models = " or ".join(models_of(values))
         return FoundDrive(
-            "mit", self._parameters.node_id, models, f"{values[SOFTWARE]:.0f}", f"{int(values[SERIAL]):08x}"
+            type="mit",
+            node_id=self._parameters.node_id,
+            hardware=models,
+            firmware=f"{values[SOFTWARE]:.0f}",
+            serial_number=f"{int(values[SERIAL]):08x}",
         )
 
     def activity(self) -> str:
@@ -112,8 +146,10 @@ class DamiaoSetup:
         node_id = self._parameters.node_id
         head = codec.encode_register(node_id, kind, register, value)[:4]
         question = Frame(codec.REGISTER_ID, head + value)
-        return self._port.ask(question, lambda frame: _begins(frame, head), what, longest_s)
-
-
-def _begins(frame: Frame, head: bytes) -> bool:
-    return frame.is_plain and len(frame.data) == codec.ANSWER_BYTES and frame.data[: len(head)] == head
+        size = codec.ANSWER_BYTES
+        return self._port.ask(
+            question,
+            lambda frame: frame.is_plain and len(frame.data) == size and frame.data.startswith(head),
+            what,
+            longest_s,
+        )

@@ -207,7 +207,7 @@ class MoteusAxis(DriveSignals):
     def request_settings(self, now_s: float) -> None:
         request = self.settings.due_request(now_s)
         if request:
-            self._outlet.send(Frame(self._id, request, is_extended=True, is_fd=True, bit_rate_switch=True))
+            self._outlet.send(codec.command_frame(self.parameters.node_id, request))
 
     def _transmit(self, data: bytes) -> None:
         self._answers.on_question(self._read_s)

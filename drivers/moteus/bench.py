@@ -4,33 +4,25 @@ On a bus with drives of classic CAN, frames of CAN FD are errors. Source: docs/p
 mjbots/moteus.
 """
 
-from collections.abc import Iterable, Sequence
-from typing import cast
+from collections.abc import Sequence
 
 from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_bench import SetupFacts
+from drivers.bench.drive_bench import DriveBench, SetupFacts
 from drivers.bench.found_drive import FoundDrive
-from drivers.can.frames import Frame
-from drivers.moteus.identity import found_drive, is_reply, request
-from drivers.moteus.parameters import LARGEST_ID, SMALLEST_ID, MoteusParameters
+from drivers.moteus.codec import command_frame
+from drivers.moteus.parameters import LARGEST_ID, SMALLEST_ID
 from drivers.moteus.settings import IDENTITY
-from drivers.moteus.setup import MoteusSetup
+from drivers.moteus.setup import MoteusSetup, found_drive
 
 
-class MoteusBench:
-    """Implements DriveBench."""
-
+class MoteusBench(DriveBench):
     is_fd = True
     disturbs = "drives of classic CAN take its CAN FD frames for errors"
 
-    def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
-        """A moteus sends nothing by itself."""
-        return set()
-
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
-        answers = port.ask_all(request(node_id, IDENTITY) for node_id in range(SMALLEST_ID, LARGEST_ID + 1))
-        found = (found_drive(frame) for frame in answers if is_reply(frame))
-        return sorted({each for each in found if each is not None}, key=lambda each: (each.node_id, each.serial_number))
+        answers = port.ask_all(command_frame(node_id, IDENTITY) for node_id in range(SMALLEST_ID, LARGEST_ID + 1))
+        found = {each for each in map(found_drive, answers) if each is not None}
+        return sorted(found, key=lambda each: (each.node_id, each.serial_number))
 
     def open_setup(self, port: BenchPort, facts: SetupFacts) -> MoteusSetup:
-        return MoteusSetup(port, cast(MoteusParameters, facts.parameters), facts.longest_watchdog_s)
+        return MoteusSetup(port, facts.parameters, facts.longest_watchdog_s)

@@ -15,7 +15,7 @@ from math import nan
 from struct import Struct, error
 from typing import NamedTuple
 
-from drivers.can.frames import MalformedMessageError
+from drivers.can.frames import Frame, MalformedMessageError
 from drivers.moteus.registers import padded
 
 REPLY_WANTED = 0x8000
@@ -89,6 +89,10 @@ class Reply(NamedTuple):
 
 def command_id(node_id: int) -> int:
     return REPLY_WANTED | node_id
+
+
+def command_frame(node_id: int, data: bytes) -> Frame:
+    return Frame(command_id(node_id), data, is_extended=True, is_fd=True, bit_rate_switch=True)
 
 
 def reply_id(node_id: int) -> int:

@@ -1,17 +1,19 @@
 """moteus as a drive type: its parameters, its axis, and how to read and forge its frames without commanding one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import cast
+from typing import Any
 
 from control.rate import RATE_HZ
 from drivers.can.bus_load import FrameRate
 from drivers.can.frames import Frame, MalformedMessageError
-from drivers.drive import FD, DriveParameters, FrameContent, Outlet, Span, WatchdogEndpoints
+from drivers.drive import FD, DriveParameters
+from drivers.drive_type import DriveType, FrameContent, Span
 from drivers.moteus import codec
 from drivers.moteus.axis import MoteusAxis
+from drivers.moteus.bench import MoteusBench
 from drivers.moteus.codec import Mode, Reply
-from drivers.moteus.gate_tables import KIND, gate_table
+from drivers.moteus.gate_table import KIND, gate_table
 from drivers.moteus.parameters import LARGEST_ID, SMALLEST_ID, MoteusParameters
 from drivers.transmit_gate import GateTable
 
@@ -28,10 +30,12 @@ MOTOR_DRIVER_FAULT = 33
 UNUSED_NODE = LARGEST_ID
 
 
-class Moteus:
-    """Describes the moteus protocol, as DriveType requires."""
+class Moteus(DriveType):
+    """Describes the moteus protocol."""
 
     parameters = MoteusParameters
+    axis = MoteusAxis
+    bench = MoteusBench()
     kind = KIND
     example_error = MOTOR_DRIVER_FAULT
     command = FrameRate(codec.TORQUE_BYTES, RATE_HZ, KIND.is_extended, KIND.is_fd)
@@ -43,17 +47,11 @@ class Moteus:
             identifier | FD for identifier in (codec.reply_id(node_id), codec.command_id(node_id), node_id)
         )
 
-    def gate_table(self, parameters: DriveParameters) -> GateTable:
-        return gate_table(cast(MoteusParameters, parameters))
-
-    def make_axis(
-        self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
-    ) -> MoteusAxis:
-        return MoteusAxis(joint, cast(MoteusParameters, parameters), outlet)
+    def gate_table(self, parameters: Any) -> GateTable:
+        return gate_table(parameters)
 
     def query(self, node_id: int) -> Frame:
-        identifier = codec.command_id(node_id)
-        return Frame(identifier, codec.QUERY_ALONE, is_extended=True, is_fd=True, bit_rate_switch=True)
+        return codec.command_frame(node_id, codec.QUERY_ALONE)
 
     def announces(self, node_id: int) -> Frame:
         identifier, reply = codec.reply_id(node_id), Reply(Mode.STOPPED, 0.0, 0.0, 0.0, 0.0, 24.0, 0, 0.0)

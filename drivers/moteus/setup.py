@@ -8,13 +8,12 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from drivers.bench.bench_port import BenchPort, NoAnswerError
-from drivers.bench.drive_setup import CannotReadError, Setting, exactly
+from drivers.bench.drive_setup import CannotReadError, DriveSetup, Setting, exactly
 from drivers.bench.found_drive import FoundDrive
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.moteus import codec, registers
 from drivers.moteus.codec import Mode
-from drivers.moteus.identity import found_drive, is_reply, request
-from drivers.moteus.parameters import MoteusParameters
+from drivers.moteus.parameters import LARGEST_ID, SMALLEST_ID, MoteusParameters
 from drivers.moteus.registers import Register, Resolution
 from drivers.moteus.settings import (
     IDENTITY,
@@ -23,11 +22,13 @@ from drivers.moteus.settings import (
     MOST_CONSOLE_BYTES,
     POLL,
     RATIO,
+    REGISTER_MAP,
     SAME_FRACTION,
     SAME_TORQUE_FRACTION,
     TIMEOUT_MODE,
     TORQUE_FACTOR,
     WATCHDOG,
+    MoteusSettings,
 )
 
 ID = "id.id"
@@ -53,10 +54,31 @@ def wanted_settings(drive: MoteusParameters, longest_watchdog_s: float) -> Seque
     )
 
 
-class MoteusSetup:
-    """Implements DriveSetup."""
+def is_reply(frame: Frame) -> bool:
+    source, destination = frame.arbitration_id >> 8, frame.arbitration_id & 0xFF
+    return frame.is_fd and not frame.is_error and destination == codec.HOST and SMALLEST_ID <= source <= LARGEST_ID
 
-    cannot = ""
+
+def found_drive(frame: Frame) -> FoundDrive | None:
+    """Returns the drive that answers with the registers of its identity; None for any other frame."""
+    values = _values(frame)
+    node_id = frame.arbitration_id >> 8
+    settings = MoteusSettings(MoteusParameters("", node_id))
+    settings.on_registers(values)
+    if not (is_reply(frame) and settings.firmware):
+        return None
+    map_problem = f"register map {values[Register.REGISTER_MAP]:.0f}: needs {REGISTER_MAP}"
+    return FoundDrive(
+        type="moteus",
+        node_id=node_id,
+        hardware=f"model {values.get(Register.MODEL, 0.0):.0f}",
+        firmware=settings.firmware,
+        serial_number=settings.serial_number,
+        problem="" if settings.supported else map_problem,
+    )
+
+
+class MoteusSetup(DriveSetup):
     stored = "it has read them back from its store"
 
     def __init__(self, port: BenchPort, parameters: MoteusParameters, longest_watchdog_s: float) -> None:
@@ -122,7 +144,7 @@ class MoteusSetup:
     def _ask(self, data: bytes, what: str, is_answer: Callable[[Frame], bool]) -> Frame:
         node_id = self._parameters.node_id
         return self._port.ask(
-            request(node_id, data),
+            codec.command_frame(node_id, data),
             lambda frame: is_reply(frame) and frame.arbitration_id == codec.reply_id(node_id) and is_answer(frame),
             what,
         )

@@ -9,8 +9,8 @@ from drivers.drive import DriveHealth, Outlet, WatchdogEndpoints
 from drivers.odrive import codec
 from drivers.odrive.cansimple_axis import CanSimpleAxis
 from drivers.odrive.codec import Message
-from drivers.odrive.drive_settings import SUPPORTED, DriveSettings
 from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.settings import SUPPORTED, DriveSettings
 
 
 class OdriveAxis(CanSimpleAxis):

@@ -8,7 +8,7 @@ before, so a stall of this program is not taken for a silence of the drive.
 A command for this drive that arrives here comes from another program, because a port does not receive its own frames.
 Emergency stops are no such commands, and neither are requests to read: any program may send them.
 
-axis.py and axis05.py add what differs between the firmwares 0.6 and 0.5: errors, settings and their messages.
+axis.py and drivers/odrive05/axis.py add what differs between the firmwares: errors, settings and their messages.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,9 +20,9 @@ from drivers.drive import DriveHealth, Outlet
 from drivers.drive_signals import DriveSignals
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
-from drivers.odrive.drive_settings import DriveSettings
 from drivers.odrive.duplicate_node_monitor import DuplicateNodeMonitor
 from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.settings import DriveSettings
 from drivers.setpoint_monitor import SetpointMonitor
 
 RESTART_SILENCE_S = 0.3  # three heartbeats

@@ -1,4 +1,4 @@
-"""ODrive CANSimple, firmware 0.6: the bytes of each message, in both directions. codec05.py has those of 0.5.
+"""ODrive CANSimple, firmware 0.6: the bytes of each message, in both directions. drivers/odrive05 has those of 0.5.
 
 An 11-bit arbitration id is (node id << 5) | command; payloads are little-endian, floats IEEE-754 binary32, positions
 in turns. A remote frame with the id of a value asks for that value. Source: ODrive's CANSimple documentation and its

@@ -11,14 +11,14 @@ from struct import Struct, error
 from typing import Any, NamedTuple
 
 from drivers.bench.bench_port import BenchPort, NoAnswerError
-from drivers.bench.drive_setup import CannotReadError, Setting, exactly
+from drivers.bench.drive_setup import CannotReadError, DriveSetup, Setting, exactly
 from drivers.bench.found_drive import FoundDrive
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import WatchdogEndpoints
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
-from drivers.odrive.drive_settings import SUPPORTED
 from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.settings import SUPPORTED
 
 CAN, MOTOR, CONTROLLER = "axis0.config.can", "axis0.config.motor", "axis0.controller.config"
 ENABLE, TIMEOUT = "axis0.config.enable_watchdog", "axis0.config.watchdog_timeout"
@@ -92,10 +92,23 @@ def wanted_settings(drive: OdriveParameters, longest_watchdog_s: float) -> Seque
     )
 
 
-class OdriveSetup:
-    """Implements DriveSetup. Owns the numbers of the drive's build, once it is identified."""
+def found_drive(node_id: int, version: Sequence[int], serial_number: str = "") -> FoundDrive:
+    """Returns the drive that reports this version: the values of GET_VERSION."""
+    firmware, hardware = (".".join(map(str, version[part])) for part in (slice(4, 7), slice(1, 4)))
+    supported = tuple(version[4:6]) == SUPPORTED
+    return FoundDrive(
+        type="odrive",
+        node_id=node_id,
+        hardware=hardware,
+        firmware=firmware,
+        serial_number=serial_number,
+        problem="" if supported else f"firmware {firmware} is not supported: needs 0.6",
+    )
 
-    cannot = ""
+
+class OdriveSetup(DriveSetup):
+    """Owns the numbers of the drive's build, once it is identified."""
+
     stored = "it has restarted with them"
 
     def __init__(
@@ -110,16 +123,13 @@ class OdriveSetup:
 
     def identify(self) -> FoundDrive:
         version = codec.GET_VERSION.decode(self._request(codec.GET_VERSION, "its version", 8))
-        firmware, hardware = (".".join(map(str, version[part])) for part in (slice(4, 7), slice(1, 4)))
-        self._build = f"firmware {firmware}, hardware {hardware}"
+        found = found_drive(self._parameters.node_id, version)
+        self._build = f"firmware {found.firmware}, hardware {found.hardware}"
         self._numbers = {}
         for build in self._builds:
-            if (build.firmware, build.hardware) == (firmware, hardware):
+            if (build.firmware, build.hardware) == (found.firmware, found.hardware):
                 self._numbers |= build.numbers
-        found = FoundDrive("odrive", self._parameters.node_id, hardware, firmware)
-        if version[4:6] != SUPPORTED:
-            return found._replace(problem=f"firmware {firmware} is not supported: needs 0.6")
-        if version[4:7] < codec.FIRST_WITH_ADDRESS:
+        if found.problem or version[4:7] < codec.FIRST_WITH_ADDRESS:
             return found
         number = codec.decode_serial_number(self._request(codec.ADDRESS, "its serial number", 7))
         return found._replace(serial_number=number)
@@ -155,20 +165,23 @@ class OdriveSetup:
 
     def save(self) -> None:
         self._port.send(Frame(arbitration_id(self._parameters.node_id, codec.REBOOT), codec.REBOOT.encode(SAVE)))
-        if self._answers_within(SILENT_S, answers=False):
+        if not self._comes_to(False, SILENT_S):
             raise NoAnswerError("it did not restart")
-        if not self._answers_within(RESTART_S, answers=True):
+        if not self._comes_to(True, RESTART_S):
             raise NoAnswerError(f"it did not answer within {RESTART_S:g} s of its restart")
 
-    def _answers_within(self, longest_s: float, answers: bool) -> bool:
-        """Asks for the version until it is answered, or until it is not; returns whether it was answered last."""
-        answered, begun_s = not answers, self._port.now_s
-        while answered != answers and self._port.now_s - begun_s < longest_s:
+    def _comes_to(self, answering: bool, longest_s: float) -> bool:
+        """Asks for the version again and again; returns whether the drive came to answer, or to be silent, in time."""
+        begun_s = self._port.now_s
+        while self._port.now_s - begun_s < longest_s:
             try:
-                answered = bool(self._request(codec.GET_VERSION, "its version", 8))
+                self._request(codec.GET_VERSION, "its version", 8)
+                answered = True
             except NoAnswerError:
                 answered = False
-        return answered
+            if answered is answering:
+                return True
+        return False
 
     def _number(self, key: str) -> Number:
         if key not in self._numbers:

@@ -4,9 +4,8 @@ encoder_counts.py decodes the lines and rejects implausible counts; serial_line.
 unplugged port is opened again between two ticks and only while nothing moves, because that may take milliseconds.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from control.bounds import Bounds, Meaning
 from control.records import NEVER_S, BodyPose
@@ -33,17 +32,12 @@ class RailEncoderParameters:
 class RailEncoder:
     """Implements PoseSource. Owns its serial line, its counts, and the newest pose."""
 
-    def __init__(
-        self,
-        parameters: RailEncoderParameters,
-        origin_m: float = 0.0,
-        open_device: Callable[[str, int], Any] | None = None,
-    ) -> None:
+    def __init__(self, parameters: RailEncoderParameters, origin_m: float = 0.0) -> None:
         """Opens the device; raises PoseSourceError. `origin_m` is the counter's position where x is zero."""
         self.parameters = parameters
         device = parameters.device
         try:
-            self.line = SerialLine(device, parameters.bit_rate, LONGEST_LINE_BYTES, RETRY_S, open_device)
+            self.line = SerialLine(device, parameters.bit_rate, LONGEST_LINE_BYTES, RETRY_S)
         except SerialLineError as problem:
             raise PoseSourceError(f"the rail encoder {device} does not open: {problem.why}") from None
         self._counts = EncoderCounts(parameters.metres_per_count, parameters.label, origin_m)

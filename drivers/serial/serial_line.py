@@ -45,21 +45,13 @@ class SerialLineError(Exception):
 class SerialLine:
     """Owns the open device, which is None while it is gone, and the incomplete line."""
 
-    def __init__(
-        self,
-        path: str,
-        baud: int,
-        longest_bytes: int = LONGEST_LINE_BYTES,
-        retry_s: float = RETRY_S,
-        open_device: Callable[[str, int], Any] | None = None,
-    ) -> None:
+    def __init__(self, path: str, baud: int, longest_bytes: int = LONGEST_LINE_BYTES, retry_s: float = RETRY_S) -> None:
         """Opens the device; raises SerialLineError where it does not open."""
         self.path, self.baud = path, baud
         self.unpluggings = 0
         self.problem: SerialLineError | None = None  # the newest one
-        self._open_device = open_device or open_serial
         self._longest_bytes, self._retry_s, self._retry_at_s = longest_bytes, retry_s, NEVER_S
-        self._use(self._open_device(path, baud))
+        self._use(open_serial(path, baud))
 
     def _use(self, device: Any) -> None:
         self._device: Any = device
@@ -130,7 +122,7 @@ class SerialLine:
             return False
         self._retry_at_s = now_s + self._retry_s
         try:
-            self._use(self._open_device(self.path, self.baud))
+            self._use(open_serial(self.path, self.baud))
         except SerialLineError as problem:
             self.problem = problem
             return False

@@ -12,7 +12,8 @@ from control.rate import PERIOD_S, RATE_HZ
 from drivers.can.bus_load import MOST_FRACTION, FrameRate, bus_load
 from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
-from drivers.drive import DriveHealth, DriveParameters, FrameContent
+from drivers.drive import DriveHealth, DriveParameters
+from drivers.drive_type import FrameContent
 from drivers.drive_types import read_frame, traffic_of, type_of
 from experiments.bench.lateness import BUSY
 from experiments.bench.reading import Reading, Readings, left_out

@@ -5,7 +5,7 @@ the body; forces and strides are estimated from them, as in `mudskipper replay`.
 and are listed in `missing`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import nan, radians, sin
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
-from control.records import FLIPPERS, FlipperLoad, Rig, StrideEstimate
+from control.records import FLIPPERS, FlipperLoad, Rig
 from experiments.pictures.walk_trace import Rows, WalkTraces, drawn_rows
 from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import STRIDE, stride_row
@@ -31,22 +31,12 @@ Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
 ANOTHER_MUD = "another mud"  # the loop's event after a stride that did not fit what was known
+LOAD_COLUMNS = ("depth_m", "force_x_n", "force_z_n")  # of each flipper
 DESCRIPTIONS = {
     "body_x_m": "the position of the body, so no steps",
     "depth_command_m": "the commanded depth",
     "force_z_n": "forces",
 }
-
-
-class FlipperSeries(NamedTuple):
-    """The time series of one flipper, a value a row."""
-
-    flipper: str
-    sweep_angle_rad: Floats
-    adduction_angle_rad: Floats
-    depth_m: Floats  # measured, below the nominal surface
-    force_x_n: Floats
-    force_z_n: Floats
 
 
 class TraceSource(NamedTuple):
@@ -83,13 +73,13 @@ class RecordedWalk(NamedTuple):
     complete: bool = True  # False if the writer of the log was interrupted, or still writes
     cut: str = ""  # how the walk may extend beyond this log
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
-    series: tuple[FlipperSeries, ...] = ()  # of every flipper that moved, the left one first
+    series: Mapping[str, Mapping[str, Floats]] = {}  # of every flipper that moved, the left one first
     source: TraceSource | None = None  # of a walk that has not every row of the log
 
     @property
     def sides(self) -> list["RecordedWalk"]:
         """The same walk with each flipper as the one that is shown."""
-        return [self._replace(**series._asdict()) for series in self.series] or [self]
+        return [self._replace(flipper=flipper, **series) for flipper, series in self.series.items()] or [self]
 
     @property
     def geometric_step_m(self) -> float:
@@ -133,7 +123,7 @@ def read_walk(
 
 def numbered_walk(path: Path, log: AnyLog, number: int = 0, watch: Watch = unwatched) -> RecordedWalk:
     """Return a walk of a log; `path` is for messages. Raises LogError."""
-    configuration, traces = configuration_of(path, log.configuration_text), WalkTraces(number)
+    configuration, traces = configuration_of(path, log.configuration_text), WalkTraces(log.rows, number)
     complete = TickPass(log, watch, "ticks read").feed(traces.add)
     _refuse_number(path, number, len(traces.walks))
     return walk_of_trace(log, configuration, traces, number or len(traces.walks), complete)
@@ -158,19 +148,28 @@ def walk_of_trace(
         begun_s=trace.start_s - begin_s(log),
         complete=complete,
         cut=_cut_of(log, trace.first_row == 0, trace.end_row == log.rows),
-        source=TraceSource(log, trace.rows, trace.start_s) if trace.bin_ticks else None,
+        source=TraceSource(log, trace.rows, trace.start_s) if traces.bin_ticks else None,
     )
 
 
 def _columns_of(rows: Rows, start_s: float, rig: Rig, flipper: str) -> dict[str, Any]:
     """Return the arrays of a walk in which `flipper` is shown."""
-    series = {name: _series_of(rows, number, name) for number, name in enumerate(rig.flippers)}
-    return series[flipper]._asdict() | {
+    series = {
+        name: {
+            "sweep_angle_rad": rows["angle_rad"][:, 2 * number],
+            "adduction_angle_rad": rows["angle_rad"][:, 2 * number + 1],
+            **{column: rows[column][:, number] for column in LOAD_COLUMNS},
+        }
+        for number, name in enumerate(rig.flippers)
+    }
+    return {
+        "flipper": flipper,
+        **series[flipper],
         "time_s": rows["stamp_s"] - start_s,
         "phase": rows["phase"].astype(np.int64),
         "depth_command_m": rows["depth_command_m"],
         "body_x_m": rows["body_x_m"],
-        "series": tuple(series.values()),
+        "series": series,
     }
 
 
@@ -206,70 +205,44 @@ def _refuse_number(path: Path, number: int, walks: int) -> None:
         raise LogError(f"{path}: it has no walk {number}, only {walks}")
 
 
-def _series_of(rows: Rows, number: int, flipper: str) -> FlipperSeries:
-    return FlipperSeries(
-        flipper=flipper,
-        sweep_angle_rad=rows["angle_rad"][:, 2 * number],
-        adduction_angle_rad=rows["angle_rad"][:, 2 * number + 1],
-        depth_m=rows["depth_m"][:, number],
-        force_x_n=rows["force_x_n"][:, number],
-        force_z_n=rows["force_z_n"][:, number],
-    )
-
-
 def _since(start_s: float, stride: dict[str, Any]) -> dict[str, Any]:
     return stride | {name: stride[name] - start_s for name in ("stamp_s", "t_start_s")}
-
-
-class _LabReading(NamedTuple):
-    """The estimator's results for one of the authors' runs."""
-
-    loads: list[tuple[FlipperLoad, ...]]  # left and right, a row each
-    strides: list[StrideEstimate]
-    noticed_s: list[float]
-
-
-def _read_lab(lab: LabLog) -> _LabReading:
-    """Estimate one run as `replay_lab` does."""
-    estimator, reading = lab_estimator(lab), _LabReading([], [], [])
-    for now_s, reported in lab_readings(estimator, lab):
-        reading.loads.append(reported.loads)
-        reading.strides.extend(stride for stride in reported.strides if stride.flipper in lab.flippers)
-        if reported.strides and estimator.mud_estimate.boundary:
-            reading.noticed_s.append(now_s)
-    return reading
 
 
 def walk_of_lab(path: Path, lab: LabLog, number: int = 0) -> RecordedWalk:
     """Return the one walk of a CSV that was read already; `path` is for its title and messages. Raises LogError."""
     _refuse_number(path, number, 1 if lab.flippers else 0)
-    start_s, reading = float(lab.stamp_s[0]), _read_lab(lab)
-    rows = [STRIDE.decode(stride_row(stride.t_end_s, stride, nan)) for stride in reading.strides]
-    series = tuple(_lab_series(lab, reading, flipper) for flipper in lab.flippers)
+    start_s, estimator = float(lab.stamp_s[0]), lab_estimator(lab)
+    loads: list[tuple[FlipperLoad, ...]] = []  # left and right, a row each
+    rows: list[dict[str, Any]] = []
+    noticed_s: list[float] = []
+    for now_s, reading in lab_readings(estimator, lab):
+        loads.append(reading.loads)
+        own = [stride for stride in reading.strides if stride.flipper in lab.flippers]
+        rows += [STRIDE.decode(stride_row(stride.t_end_s, stride, nan)) for stride in own]
+        if reading.strides and estimator.mud_estimate.boundary:
+            noticed_s.append(now_s - start_s)
+    series = {
+        flipper: {
+            "sweep_angle_rad": lab.angle_rad[:, 2 * place],
+            "adduction_angle_rad": lab.angle_rad[:, 2 * place + 1],
+            **{name: np.array([getattr(both[place], name) for both in loads]) for name in LOAD_COLUMNS},
+        }
+        for place, flipper in enumerate(FLIPPERS)
+        if flipper in lab.flippers
+    }
     return RecordedWalk(
         title=path.name,
         geometry=FlipperGeometry(),
         sweep_rad=lab.gait.get("lateral_angle_range", radians(lab.gait.get("sweep_angle_deg", nan))),
-        **series[-1]._asdict(),
+        flipper=lab.flippers[-1],
+        **series[lab.flippers[-1]],
         time_s=lab.stamp_s - start_s,
         phase=lab.phase,
         depth_command_m=lab.commanded_depth_m,
         body_x_m=lab.body_x_m,
         strides=[_since(start_s, row) for row in rows],
-        noticed_s=[now_s - start_s for now_s in reading.noticed_s],
+        noticed_s=noticed_s,
         findings=lab.findings,
         series=series,
-    )
-
-
-def _lab_series(lab: LabLog, reading: _LabReading, flipper: str) -> FlipperSeries:
-    number = FLIPPERS.index(flipper)
-    loads = [both[number] for both in reading.loads]
-    return FlipperSeries(
-        flipper=flipper,
-        sweep_angle_rad=lab.angle_rad[:, 2 * number],
-        adduction_angle_rad=lab.angle_rad[:, 2 * number + 1],
-        depth_m=np.array([load.depth_m for load in loads]),
-        force_x_n=np.array([load.force_x_n for load in loads]),
-        force_z_n=np.array([load.force_z_n for load in loads]),
     )

@@ -4,9 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
 
-from experiments.pictures.colours import BODY, FAINT, FLIPPER_COLOURS, INK, MUD, SURFACE, TRAIL
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.side_view import SideView, view_from_side
+from experiments.reports.style import BODY, FAINT, FLIPPER_COLOURS, INK, MUD, SURFACE, TRAIL
 
 BODY_LENGTH_M, BODY_HEIGHT_M, CORNER_M = 0.13, 0.052, 0.018  # not in any log
 EYE_M = 0.0045

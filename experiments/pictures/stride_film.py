@@ -1,7 +1,6 @@
 """A walk as an animated GIF from the side in real time. The camera moves with the body, the scale with the mud."""
 
 from collections.abc import Callable, Iterator, Sequence
-from io import BytesIO
 from math import ceil, floor, hypot
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,11 @@ from matplotlib.figure import Figure
 from PIL import Image  # comes with matplotlib
 
 from control.records import Phase
-from experiments.pictures.colours import FORCE, INK, OUTCOME_COLOURS, SURFACE
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare, view_of
 from experiments.pictures.stride_choice import Outcome, Stride, outcome_of, rows_of
+from experiments.reports.style import FORCE, INK, OUTCOME_COLOURS, SURFACE
+from logs.files.whole_files import whole_file
 
 FRAMES_PER_S = 20  # GIF counts in hundredths of a second
 DEEPEST_M, HIGHEST_M, HALF_WIDTH_M = 0.085, 0.135, 0.25
@@ -28,8 +28,6 @@ COLOURS = 256  # all that a GIF can have
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": FORCE, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 2.4}
 
 Show = Callable[[int, int], None]  # frames done and to do
-
-
 Frame = tuple[Stride, int]  # a row of the walk, with its stride
 
 
@@ -43,36 +41,30 @@ def film_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
     return frames
 
 
-class Camera:
-    """Owns the figure on which all frames are drawn."""
-
-    def __init__(self, walk: RecordedWalk) -> None:
-        self.walk = walk
-        height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / (2.0 * HALF_WIDTH_M)
-        self._canvas: Any = FigureCanvasAgg(Figure(figsize=(WIDTH_IN, height_in), dpi=DOTS_PER_INCH))
-        self._panel = self._canvas.figure.subplots()
-        self._canvas.figure.subplots_adjust(0.0, 0.0, 1.0, 1.0)
-
-    def picture(self, frame: Frame) -> Image.Image:
-        self._panel.clear()
-        _draw_frame(self._panel, self.walk, *frame)
-        self._canvas.draw()
-        return Image.fromarray(np.asarray(self._canvas.buffer_rgba())).convert("RGB")
-
-
 def draw_film(walk: RecordedWalk, strides: Sequence[Stride], path: Path, show: Show) -> None:
-    """Write a looping GIF."""
-    frames, camera, film = film_frames(walk, strides), Camera(walk), BytesIO()
-    palette = _palette([camera.picture(frame) for frame in _fullest_frames(walk, strides)])
+    """Write a looping GIF. All frames are drawn on one figure."""
+    height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / (2.0 * HALF_WIDTH_M)
+    canvas: Any = FigureCanvasAgg(Figure(figsize=(WIDTH_IN, height_in), dpi=DOTS_PER_INCH))
+    panel = canvas.figure.subplots()
+    canvas.figure.subplots_adjust(0.0, 0.0, 1.0, 1.0)
+
+    def picture(stride: Stride, row: int) -> Image.Image:
+        panel.clear()
+        _draw_frame(panel, walk, stride, row)
+        canvas.draw()
+        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+    frames = film_frames(walk, strides)
+    palette = _palette([picture(*frame) for frame in _fullest_frames(walk, strides)])
 
     def pictures() -> Iterator[Image.Image]:
         for number, frame in enumerate(frames, 1):
-            yield camera.picture(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+            yield picture(*frame).quantize(palette=palette, dither=Image.Dither.NONE)
             show(number, len(frames))
 
     rest = pictures()
-    next(rest).save(film, "GIF", save_all=True, append_images=rest, duration=1000 // FRAMES_PER_S, loop=0)
-    path.write_bytes(film.getvalue())
+    with whole_file(path) as hidden, hidden.open("wb") as film:
+        next(rest).save(film, "GIF", save_all=True, append_images=rest, duration=1000 // FRAMES_PER_S, loop=0)
 
 
 def _fullest_frames(walk: RecordedWalk, strides: Sequence[Stride]) -> list[Frame]:
@@ -95,19 +87,14 @@ def _force_n(walk: RecordedWalk, row: int) -> tuple[float, float]:
 def _draw_frame(panel: Axes, walk: RecordedWalk, stride: Stride, row: int) -> None:
     position_m = body_position_m(walk, row)
     prepare(panel, position_m - HALF_WIDTH_M, position_m + HALF_WIDTH_M, DEEPEST_M, HIGHEST_M)
-    _draw_marks(panel, position_m)
+    for number in range(ceil((position_m - HALF_WIDTH_M) / MARK_M), floor((position_m + HALF_WIDTH_M) / MARK_M) + 1):
+        panel.plot([number * MARK_M] * 2, [-DEEPEST_M, 0.012 - DEEPEST_M], color=SURFACE, linewidth=1.2)
+        corner = (number * MARK_M + 0.004, 0.003 - DEEPEST_M)
+        panel.text(*corner, f"{100.0 * number * MARK_M:.0f} cm", size=9, color=SURFACE, clip_on=True)
     draw_robot(panel, walk, row, 0.0)
     draw_trail(panel, walk, range(rows_of(walk, stride).start, row + 1), 0.0)
     _draw_force(panel, walk, row)
     _draw_texts(panel, walk, stride, row)
-
-
-def _draw_marks(panel: Axes, position_m: float) -> None:
-    first, last = ceil((position_m - HALF_WIDTH_M) / MARK_M), floor((position_m + HALF_WIDTH_M) / MARK_M)
-    for number in range(first, last + 1):
-        panel.plot([number * MARK_M] * 2, [-DEEPEST_M, 0.012 - DEEPEST_M], color=SURFACE, linewidth=1.2)
-        corner = (number * MARK_M + 0.004, 0.003 - DEEPEST_M)
-        panel.text(*corner, f"{100.0 * number * MARK_M:.0f} cm", size=9, color=SURFACE, clip_on=True)
 
 
 def _draw_force(panel: Axes, walk: RecordedWalk, row: int) -> None:

@@ -1,52 +1,46 @@
 """Strides as strips of pictures: the flipper in the mud from one insertion to the next, and the advance of the body."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.pictures.colours import INK, OUTCOME_COLOURS
 from experiments.pictures.recorded_walk import RecordedWalk
 from experiments.pictures.robot_sketch import body_position_m, draw_robot, draw_trail, prepare
 from experiments.pictures.stride_choice import MOMENTS, Outcome, Stride, moments_of, outcome_of, rows_of
+from experiments.reports.style import INK, OUTCOME_COLOURS
 
 DEEPEST_M, HIGHEST_M = 0.106, 0.146  # range of a row below and above the surface
 SPACING_M = 0.235  # from one moment to the next
 MARGIN_M = 0.09
 LEAST_ARROW_M = 0.015
-WIDTH_IN, HEAD_IN, FOOT_IN, DOTS_PER_INCH = 12.0, 0.36, 0.34, 150
+WIDTH_IN, HEAD_IN, FOOT_IN = 12.0, 0.36, 0.34
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 1.2}
 WITH_POSE = "Arrow: advance of the body since the start of the insertion.  Red line: path of the plate's lower edge."
 WITHOUT_POSE = "Red line: path of the plate's lower edge.  This log has no position of the body."
 
 
-def draw_strip(walk: RecordedWalk, strides: Sequence[Stride], path: Path) -> Figure:
+def draw_strip(walk: RecordedWalk, strides: Sequence[Stride]) -> Figure:
     """Draw one row for each stride, with its moments from left to right."""
     shown = {moment.caption for stride in strides for moment in moments_of(walk, stride)}
     captions = [caption for caption, *_ in MOMENTS if caption in shown]
     farthest_m = max(_farthest_m(walk, stride) for stride in strides)
     width_m = 2.0 * MARGIN_M + SPACING_M * (len(captions) - 1) + farthest_m
     height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / width_m * len(strides) + HEAD_IN + FOOT_IN
-    figure = Figure(figsize=(WIDTH_IN, height_in))
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="none")
     panels = figure.subplots(len(strides), 1, squeeze=False)
     figure.subplots_adjust(0.0, FOOT_IN / height_in, 1.0, 1.0 - HEAD_IN / height_in, hspace=0.0)
     for panel, stride in zip(panels[:, 0], strides, strict=True):
         prepare(panel, -MARGIN_M, width_m - MARGIN_M, DEEPEST_M, HIGHEST_M)
         _draw_row(panel, walk, stride, captions)
-    _write_captions(figure, captions, width_m, height_in)
-    legend = WITH_POSE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_POSE
-    figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
-    figure.savefig(path, dpi=DOTS_PER_INCH)
-    return figure
-
-
-def _write_captions(figure: Figure, captions: Sequence[str], width_m: float, height_in: float) -> None:
     for column, caption in enumerate(captions):
         centre = (MARGIN_M + column * SPACING_M) / width_m, 1.0 - 0.65 * HEAD_IN / height_in
         figure.text(*centre, caption, size=13, ha="center", va="center", color=INK)
+    legend = WITH_POSE if np.any(np.isfinite(walk.body_x_m)) else WITHOUT_POSE
+    figure.text(0.012, 0.45 * FOOT_IN / height_in, legend, size=12, va="center", color=INK)
+    return figure
 
 
 def _farthest_m(walk: RecordedWalk, stride: Stride) -> float:

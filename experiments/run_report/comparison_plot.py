@@ -8,10 +8,10 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.pictures.walk_plot import STYLE
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_key
 from experiments.reports.mud_styles import LABELS, looks_of, mark_of
+from experiments.reports.style import STYLE
 from experiments.reports.value_text import N_CM3
 from experiments.run_report.comparison import ComparedRun
 from experiments.run_report.mud_results import MudResult

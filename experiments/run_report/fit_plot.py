@@ -16,10 +16,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimation.strokes.fit_samples import FitSamples
-from experiments.pictures.colours import FAINT
-from experiments.pictures.walk_plot import STYLE
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_styles import LABELS, looks_of
+from experiments.reports.style import FAINT, STYLE
 from experiments.reports.value_text import N_CM3
 from experiments.run_report.fit_quality import N_CM
 from experiments.run_report.run import ReportedStride, Run

@@ -150,7 +150,7 @@ def read_run(source: Source, layout: MudLayout | None, watch: Watch, vertical: C
 
 def _read_ticks(path: Path, log: ScannedLog, watch: Watch) -> tuple[Replay, list[RecordedWalk]]:
     """Return the estimates and the walks of a log. Raises LogError."""
-    configuration, traces = configuration_of(path, log.configuration_text), WalkTraces()
+    configuration, traces = configuration_of(path, log.configuration_text), WalkTraces(log.rows)
     running = RunningReplay(path, log, configuration)
     complete = TickPass(log, watch, "ticks replayed").feed(running.add, traces.add)
     numbers = range(1, len(traces.walks) + 1)

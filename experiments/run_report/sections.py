@@ -12,6 +12,7 @@ from experiments.reports.counted_nouns import counted
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.report_page import Figure, Section
 from experiments.reports.shown_values import value_shown
+from experiments.reports.style import save_picture
 from experiments.run_report.comparison import SHOWN, ComparedRun, differences
 from experiments.run_report.event_groups import group_events
 from experiments.run_report.fit_quality import R_SQUARED, quality_rows
@@ -111,7 +112,7 @@ def _draw_strip(walk: RecordedWalk, path: Path) -> Any:
     from experiments.pictures.stride_strip import draw_strip
 
     strides = choose_strides(walk)
-    return draw_strip(with_strides(walk, strides), strides, path)
+    save_picture(partial(draw_strip, with_strides(walk, strides), strides), path)
 
 
 def _fits_section(run: Run) -> Section:

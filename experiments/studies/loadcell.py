@@ -6,6 +6,7 @@ optionally, a position encoder of the stage are serial ports; the operator moves
 """
 
 import os
+from argparse import ArgumentTypeError
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,16 +35,16 @@ Plate = tuple[float, float, float]
 
 
 def parse_plate(text: str) -> Plate:
-    """Parse 3x3.5 or, with its thickness, 3x3.5x0.4. Raises OptionError."""
+    """Parse 3x3.5 or, with its thickness, 3x3.5x0.4. Raises ArgumentTypeError."""
     sides = text.lower().removesuffix("cm").split("x")
     if len(sides) not in (2, 3):
-        raise OptionError(f"{text}: must be width x height, or width x height x thickness, in cm")
+        raise ArgumentTypeError(f"{text}: must be width x height, or width x height x thickness, in cm")
     try:
         width, height, thickness = (float(side) for side in [*sides, "0.4"][:3])
     except ValueError:
         width = height = thickness = 0.0
     if not (0.2 <= width <= 50.0 and 0.2 <= height <= 50.0 and 0.02 <= thickness <= 10.0):
-        raise OptionError(f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10 cm")
+        raise ArgumentTypeError(f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10 cm")
     return width, height, thickness
 
 
@@ -73,7 +74,7 @@ def study(
     speed: Annotated[float, Option("of the stage", low=0.001, high=1.0, unit="m/s")] = 0.1,
     position: Annotated[
         str | None,
-        Option("port of an encoder of the stage, which may be pushed by hand then", metavar="PATH", bare=""),
+        Option("port of an encoder of the stage, which may be pushed by hand then", metavar="PATH", without_value=""),
     ] = None,
     position_step: Annotated[
         float | None, Option("travel per count, of either sign", low=0.01, high=10000.0, unit="um")

@@ -16,20 +16,14 @@ from typing import Any
 import pandas as pd
 from matplotlib import rc_context
 
+from experiments.reports.style import STYLE
 from experiments.study.result import Figure, Result, Rows, Table, to_json
 from experiments.study.results_folder import PAGE, RESULTS, SUMMARY
 from firmware_host.software_version import software_version
 from logs.files.whole_files import whole_file
 
 ENDINGS = (".png", ".svg", ".pdf")
-PICTURES: Any = {  # the style of all figures
-    "figure.constrained_layout.use": True,
-    "savefig.dpi": 110,
-    "axes.titlesize": "medium",
-    "legend.fontsize": "small",
-    "pdf.fonttype": 42,  # TrueType: journals refuse matplotlib's own Type 3
-}
-STYLE = """\
+PAGE_STYLE = """\
 body { font: 15px/1.5 Georgia, serif; max-width: 66em; margin: 2em auto; padding: 0 1.5em; color: #111 }
 h1, h2, table, footer { font-family: Helvetica, Arial, sans-serif }
 h1 { font-size: 1.6em; margin-bottom: 0 } h2 { font-size: 1.15em; margin-top: 2em }
@@ -110,7 +104,7 @@ def _encoded(value: Any, level: int) -> str:
 def _draw(figure: Figure, folder: Path) -> list[Path]:
     """Draw a picture once, and save it in every form."""
     paths = [folder / f"{figure.name}{ending}" for ending in ENDINGS]
-    with rc_context(PICTURES):
+    with rc_context(STYLE):
         drawing = figure.draw()
         for path in paths:
             with whole_file(path) as hidden:
@@ -123,7 +117,7 @@ def _page(folder: Path, result: Result) -> Iterator[str]:
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     title, version = escape(result.title), escape(software_version())
     yield f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-    yield f"<style>\n{STYLE}</style></head><body>\n<h1>{title}</h1>"
+    yield f"<style>\n{PAGE_STYLE}</style></head><body>\n<h1>{title}</h1>"
     yield f'<p class="when">{made}, mudskipper {version}</p>'
     parts: list[Table | Figure] = [*result.tables, *result.figures]
     for section in dict.fromkeys([*result.texts, *(part.section for part in parts)]):

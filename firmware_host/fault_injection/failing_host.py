@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from drivers.fault_injection.failures import Failure, FailureKind, Failures, end_text
+from drivers.fault_injection.failure_table import FailureKind
+from drivers.fault_injection.failures import Failure, Failures, end_text
 from firmware_host.log.recorder import STAMP, LogReport, Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
 from firmware_host.ticker import Tick

@@ -7,7 +7,8 @@ failures. `disarm` ends every failure first, so that it always reaches the drive
 from collections.abc import Callable
 from typing import Any
 
-from drivers.fault_injection.failures import EFFECTS, Failures, begin_text, end_text
+from drivers.fault_injection.failure_table import EFFECTS
+from drivers.fault_injection.failures import Failures, begin_text, end_text
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.operator_calls import validated
 from firmware_host.sockets.connection import Caller

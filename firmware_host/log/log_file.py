@@ -79,7 +79,7 @@ class LogFile:
             self._write_opening(opening["configuration_text"], opening["metadata"])
             for kind in kinds:
                 schema = self._writer.register_schema(kind.schema_name, "ros2msg", kind.definition.encode())
-                self._channels.append(self._writer.register_channel(kind.topic, "cdr", schema))
+                self._channels.append(self._writer.register_channel(kind.topic, "cdr", schema, kind.metadata))
             self._write_out()
             self._synchronise()
         except OSError:

@@ -7,8 +7,8 @@ its own buffer in the kernel and then loses whole packets; the number of lost ro
 A packet is a sequence of records (row_records.py) of these kinds:
 
     0 to 2      rows of the log: tick, stride, event (rows.py)
-    OPENING     JSON, the first record: the kinds with topic, name and ros2msg definition, the run's metadata
-                and its configuration
+    OPENING     JSON, the first record: the kinds with topic, name, ros2msg definition and metadata, the run's
+                metadata and its configuration
     LOST        JSON, the number of rows that this subscriber has lost here
     REFUSAL     text, the only record for a user without the right to read; the connection then ends
 """
@@ -84,7 +84,10 @@ class RowStream:
     ) -> None:
         self.problem = ""
         self._rights, self._peer_of = rights, peer_of
-        served = [{"topic": k.topic, "schema": k.schema_name, "definition": k.definition} for k in kinds]
+        served = [
+            {"topic": kind.topic, "schema": kind.schema_name, "definition": kind.definition, "metadata": kind.metadata}
+            for kind in kinds
+        ]
         opening = {"kinds": served, "metadata": metadata, "configuration_text": configuration_text}
         self._opening = pack_record(OPENING, json.dumps(opening).encode())
         self._subscribers: list[Subscriber] = []

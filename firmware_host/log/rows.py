@@ -1,24 +1,36 @@
-"""The three kinds of row in a log. A new field is one line here: name with unit, type, source and meaning.
+"""The three kinds of row in a log. A new field is a line of a table here, and its value in the packer below the table.
 
-The source of a field is the Python expression that gives its value; it uses the names that `tick_packing` and
-`stride_row` define.
-Wide types come first, so that a row needs no padding between its fields.
+Wide types come first, so that a row needs no padding between its fields. The words of an enumeration and the names of
+the joints and flippers, in whose order an array has its values, are data: the log has them in its channels' metadata.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from functools import cache
 from typing import Any
 
+from control.limits import LimitedTorques
 from control.modes import Mode
-from control.records import FLIPPERS, TWO_FLIPPERS, Phase, Rig, StrideEstimate
-from firmware_host.log.schema import TEXT, Field, RowKind
+from control.records import (
+    FLIPPERS,
+    TWO_FLIPPERS,
+    BodyPose,
+    DriveStates,
+    FlipperLoad,
+    GaitTarget,
+    Phase,
+    Rig,
+    StrideEstimate,
+)
+from firmware_host.log.schema import CDR_HEADER, TEXT, Field, RowKind
+from firmware_host.ticker import Tick
 
 MESSAGES = "mudskipper_msgs/msg"
 
 
-def _numbered(values: type[IntEnum]) -> str:
-    return ", ".join(f"{value} {value.name.lower()}" for value in values)
+def _enumeration(name: str, values: type[IntEnum]) -> Field:
+    words = tuple(value.name.lower() for value in values)
+    return Field(name, "uint8", ", ".join(f"{number} {word}" for number, word in enumerate(words)), words=words)
 
 
 @cache
@@ -30,82 +42,137 @@ def tick_kind(rig: Rig) -> RowKind:
         "/tick",
         f"{MESSAGES}/Tick",
         (
-            Field("stamp_s", "float64", "now_s", "monotonic clock when the tick began"),
-            Field("wake_late_s", "float64", "tick.late_s", "how long after its deadline the tick began"),
-            Field("tick_s", "float64", "tick_s", "from the wake-up until the commands were sent"),
-            Field("angle_rad", "float64", "{}.angle_rad", joint_order, rig.joints),
-            Field("velocity_rad_s", "float64", "{}.velocity_rad_s", joint_order, rig.joints),
-            Field("current_a", "float64", "{}.current_a", "measured q current", rig.joints),
-            Field("angle_age_s", "float64", "now_s - {}.angle_stamp_s", "since the position arrived", rig.joints),
-            Field("current_age_s", "float64", "now_s - {}.current_stamp_s", "since the current arrived", rig.joints),
-            Field("torque_command_nm", "float64", "{}_nm", "after the limits, as sent", rig.joints),
-            Field("sweep_load_nm", "float64", "{}.sweep_torque_nm", flipper_order, rig.flippers),
-            Field("adduction_load_nm", "float64", "{}.adduction_torque_nm", "of the mud on the joint", rig.flippers),
-            Field("force_x_n", "float64", "{}.force_x_n", "forward", rig.flippers),
-            Field("force_z_n", "float64", "{}.force_z_n", "up", rig.flippers),
-            Field("depth_m", "float64", "{}.depth_m", "measured, below the nominal surface", rig.flippers),
-            Field("depth_command_m", "float64", "target.depth_m", "below the nominal surface"),
-            Field("stride_depth_m", "float64", "loop.stride_depth_m", "insertion depth chosen for this stride"),
-            Field("body_x_m", "float64", "body.x_m", "position along the track; NaN without a pose"),
-            Field("temperature_c", "float64", "{}.temperature_c", "of the motor", rig.joints),
-            Field("tick", "uint32", "tick.number", "ticks since the start, missed ones included"),
-            Field("missed_ticks", "uint32", "loop.missed_ticks", "since the start"),
-            Field("stride", "int32", "target.stride", "-1 outside of a walk"),
-            Field("mode", "uint8", "loop.mode", _numbered(Mode)),
-            Field("phase", "uint8", "target.phase", _numbered(Phase)),
-            Field("limited", "bool", "sent.limited", "the limits cut a torque"),
+            Field("stamp_s", "float64", "monotonic clock when the tick began"),
+            Field("wake_late_s", "float64", "how long after its deadline the tick began"),
+            Field("tick_s", "float64", "from the wake-up until the commands were sent"),
+            Field("angle_rad", "float64", joint_order, rig.joints),
+            Field("velocity_rad_s", "float64", joint_order, rig.joints),
+            Field("current_a", "float64", "measured q current", rig.joints),
+            Field("angle_age_s", "float64", "since the position arrived", rig.joints),
+            Field("current_age_s", "float64", "since the current arrived", rig.joints),
+            Field("torque_command_nm", "float64", "after the limits, as sent", rig.joints),
+            Field("sweep_load_nm", "float64", flipper_order, rig.flippers),
+            Field("adduction_load_nm", "float64", "of the mud on the joint", rig.flippers),
+            Field("force_x_n", "float64", "forward", rig.flippers),
+            Field("force_z_n", "float64", "up", rig.flippers),
+            Field("depth_m", "float64", "measured, below the nominal surface", rig.flippers),
+            Field("depth_command_m", "float64", "below the nominal surface"),
+            Field("stride_depth_m", "float64", "insertion depth chosen for this stride"),
+            Field("body_x_m", "float64", "position along the track; NaN without a pose"),
+            Field("temperature_c", "float64", "of the motor", rig.joints),
+            Field("tick", "uint32", "ticks since the start, missed ones included"),
+            Field("missed_ticks", "uint32", "since the start"),
+            Field("stride", "int32", "-1 outside of a walk"),
+            _enumeration("mode", Mode),
+            _enumeration("phase", Phase),
+            Field("limited", "bool", "the limits cut a torque"),
         ),
+        metadata={"flippers": " ".join(rig.flippers), "joints": " ".join(rig.joints)},
     )
 
 
-def rig_of(definition: str) -> Rig:
-    """Return the rig whose joints a definition of ticks names; where none is named, a rig with two flippers."""
-    named = tuple(flipper for flipper in FLIPPERS if f"{flipper} sweep" in definition)
-    return Rig(named or FLIPPERS)
+def tick_row(
+    kind: RowKind,
+    tick: Tick,
+    tick_s: float,
+    states: DriveStates,
+    sent: LimitedTorques,
+    loads: Sequence[FlipperLoad],
+    target: GaitTarget,
+    stride_depth_m: float,
+    body: BodyPose,
+    missed_ticks: int,
+    mode: Mode,
+) -> bytes:
+    """Pack the values of one tick, in the order of the table above."""
+    now_s = tick.now_s
+    return kind.layout.pack(
+        CDR_HEADER,
+        now_s,
+        tick.late_s,
+        tick_s,
+        *[state.angle_rad for state in states],
+        *[state.velocity_rad_s for state in states],
+        *[state.current_a for state in states],
+        *[now_s - state.angle_stamp_s for state in states],
+        *[now_s - state.current_stamp_s for state in states],
+        *sent.torques_nm,
+        *[load.sweep_torque_nm for load in loads],
+        *[load.adduction_torque_nm for load in loads],
+        *[load.force_x_n for load in loads],
+        *[load.force_z_n for load in loads],
+        *[load.depth_m for load in loads],
+        target.depth_m,
+        stride_depth_m,
+        body.x_m,
+        *[state.temperature_c for state in states],
+        tick.number,
+        missed_ticks,
+        target.stride,
+        mode,
+        target.phase,
+        sent.limited,
+    )
+
+
+def rig_of(metadata: Mapping[str, str]) -> Rig:
+    """Return the rig that the metadata of ticks names; a rig with two flippers where it names none."""
+    named = metadata.get("flippers", "").split()
+    return Rig(tuple(flipper for flipper in FLIPPERS if flipper in named) or FLIPPERS)
 
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 COEFFICIENT_UNIT = "N/m^3"
 COEFFICIENT_FIELDS = tuple(
-    Field(f"{name}{part}", "float64", f"{name}.{source}", COEFFICIENT_UNIT)
-    for name in COEFFICIENTS
-    for part, source in (("", "value"), ("_std_error", "std_error"))
+    Field(f"{name}{part}", "float64", COEFFICIENT_UNIT) for name in COEFFICIENTS for part in ("", "_std_error")
 )
 
 STRIDE = RowKind(
     "/stride",
     f"{MESSAGES}/Stride",
     (
-        Field("stamp_s", "float64", "now_s", "monotonic clock when the stride closed"),
-        Field("t_start_s", "float64", "stride.t_start_s", "monotonic clock when the insertion began"),
-        Field("insertion_s", "float64", "stride.insertion_s", "duration"),
-        Field("stance_s", "float64", "stride.stance_s", "duration"),
-        Field("extraction_s", "float64", "stride.extraction_s", "duration"),
+        Field("stamp_s", "float64", "monotonic clock when the stride closed"),
+        Field("t_start_s", "float64", "monotonic clock when the insertion began"),
+        Field("insertion_s", "float64", "duration"),
+        Field("stance_s", "float64", "duration"),
+        Field("extraction_s", "float64", "duration"),
         *COEFFICIENT_FIELDS,
-        Field("surface_m", "float64", "stride.surface_m", "depth of the mud's surface below its nominal height"),
-        Field("surface_std_error_m", "float64", "stride.surface_std_error_m"),
-        Field("other_surface_m", "float64", "stride.other_surface_m", "where a trial's strokes find two; else NaN"),
-        Field("depth_m", "float64", "stride.depth_m", "deepest point below that surface"),
-        Field("insertion_force_n", "float64", "stride.insertion_force_n", "largest upward force"),
-        Field("stance_force_n", "float64", "stride.stance_force_n", "largest forward force"),
-        Field("extraction_force_n", "float64", "stride.extraction_force_n", "most negative upward force"),
-        Field("step_m", "float64", "stride.step_m", "advance of the body; NaN without a pose"),
+        Field("surface_m", "float64", "depth of the mud's surface below its nominal height"),
+        Field("surface_std_error_m", "float64"),
+        Field("other_surface_m", "float64", "where a trial's strokes find two; else NaN"),
+        Field("depth_m", "float64", "deepest point below that surface"),
+        Field("insertion_force_n", "float64", "largest upward force"),
+        Field("stance_force_n", "float64", "largest forward force"),
+        Field("extraction_force_n", "float64", "most negative upward force"),
+        Field("step_m", "float64", "advance of the body; NaN without a pose"),
         Field(
-            "position_m", "float64", "stride.position_m",
+            "position_m", "float64",
             "of the body along the track when the insertion ended; NaN without a pose", formerly=("place_m",),
         ),
-        Field("tare_n", "float64", "stride.tare_n", "weight of the mud that clings to the flipper"),
-        Field("tare_drift_n", "float64", "stride.tare_drift_n", "since the stride before"),
-        Field("extraction_torque_nm", "float64", "stride.extraction_torque_nm", "largest one of the mud on adduction"),
-        Field("chosen_depth_m", "float64", "chosen_depth_m", "insertion depth of the next stride"),
-        Field("index", "uint32", "stride.index", "number of the stride in its walk"),
-        *(Field(f"{name}_samples", "uint32", f"{name}.samples", "distinct ones in the fit") for name in COEFFICIENTS),
-        Field("flipper", "uint8", "stride.flipper != 'left'", "0 left, 1 right"),
-        *(Field(f"{name}_valid", "bool", f"{name}.valid", "the coefficient can be used") for name in COEFFICIENTS),
-        *(Field(f"{name}_at_least", "bool", f"{name}.at_least", "it is a lower bound") for name in COEFFICIENTS),
-        Field("released", "bool", "stride.released", "out of the mud without a recovery, before swing began"),
+        Field("tare_n", "float64", "weight of the mud that clings to the flipper"),
+        Field("tare_drift_n", "float64", "since the stride before"),
+        Field("extraction_torque_nm", "float64", "largest one of the mud on adduction"),
+        Field("chosen_depth_m", "float64", "insertion depth of the next stride"),
+        Field("index", "uint32", "number of the stride in its walk"),
+        *(Field(f"{name}_samples", "uint32", "distinct ones in the fit") for name in COEFFICIENTS),
+        Field("flipper", "uint8", "0 left, 1 right", words=FLIPPERS),
+        *(Field(f"{name}_valid", "bool", "the coefficient can be used") for name in COEFFICIENTS),
+        *(Field(f"{name}_at_least", "bool", "it is a lower bound") for name in COEFFICIENTS),
+        Field("released", "bool", "out of the mud without a recovery, before swing began"),
     ),
 )  # fmt: skip
+
+
+def stride_row(now_s: float, stride: StrideEstimate, chosen_depth_m: float) -> bytes:
+    """Pack a stride that closed at this time: its estimates have the names of the fields."""
+    values = {field.name: getattr(stride, field.name, None) for field in STRIDE.fields}
+    for name in COEFFICIENTS:
+        estimate = getattr(stride, name)
+        values |= {name: estimate.value, f"{name}_std_error": estimate.std_error, f"{name}_samples": estimate.samples}
+        values |= {f"{name}_valid": estimate.valid, f"{name}_at_least": estimate.at_least}
+    values |= {"stamp_s": now_s, "chosen_depth_m": chosen_depth_m, "flipper": FLIPPERS.index(stride.flipper)}
+    return STRIDE.encode(*values.values())
+
 
 EVENT = RowKind(
     "/event",
@@ -129,21 +196,3 @@ def opening_kinds(opening: Mapping[str, Any]) -> tuple[RowKind, RowKind, RowKind
 TICK = tick_kind(TWO_FLIPPERS)
 ROW_KINDS = row_kinds(TWO_FLIPPERS)
 TICK_KIND, STRIDE_KIND, EVENT_KIND = range(len(ROW_KINDS))  # a row's kind on its way into a file
-
-
-@cache
-def tick_packing(rig: Rig) -> Callable[..., bytes]:
-    """Make the function that packs the row of a tick from the tick, its duration in s, and the loop after it."""
-    return tick_kind(rig).compile(
-        "tick, tick_s, loop",
-        "now_s, target, body, sent = tick.now_s, loop.target, loop.body, loop.sent",
-        f"{', '.join(rig.joints)} = loop.states",
-        f"{', '.join(f'{joint}_nm' for joint in rig.joints)} = sent.torques_nm",
-        f"{', '.join(rig.flippers)}, = loop.learning.loads",
-    )
-
-
-stride_row: Callable[[float, StrideEstimate, float], bytes] = STRIDE.compile(
-    "now_s, stride, chosen_depth_m",
-    *(f"{name} = stride.{name}" for name in COEFFICIENTS),
-)

@@ -7,7 +7,7 @@ a field that the file lacks is NaN, 0, False or an empty text, and a field that 
 
 import re
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import Any
@@ -28,17 +28,13 @@ class LayoutError(ValueError):
 
 @dataclass(frozen=True)
 class Field:
-    """One value of a row, or a fixed-size array with one value for each of `each`.
-
-    `source` is the Python expression that gives the value when a row is packed. In an array's source, `{}` stands for
-    each of the names in `each`. The name ends with the unit.
-    """
+    """One value of a row, or a fixed-size array with one value for each of `each`. The name ends with the unit."""
 
     name: str
     kind: str  # a ROS 2 primitive, or TEXT in the last position of a row
-    source: str = ""
     meaning: str = ""
     each: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()  # of an enumeration, by number from 0
     formerly: tuple[str, ...] = ()  # names of this field in older logs
     array: int = 0  # length of an array in a definition that was read from a file
 
@@ -54,16 +50,6 @@ class Field:
         return (value,) * self.length if self.length else value
 
     @property
-    def words(self) -> dict[int, str]:
-        """The word of each number where the meaning lists them, as "0 left, 1 right" does; empty for other fields."""
-        pairs = [part.partition(" ") for part in self.meaning.split(", ")]
-        return {int(number): word for number, _, word in pairs} if all(pair[0].isdecimal() for pair in pairs) else {}
-
-    @property
-    def sources(self) -> tuple[str, ...]:
-        return tuple(self.source.format(name) for name in self.each) or (self.source,)
-
-    @property
     def line(self) -> str:
         """The field in a ros2msg definition, its meaning as a comment."""
         array = f"[{self.length}]" if self.length else ""
@@ -73,11 +59,19 @@ class Field:
 class RowKind:
     """One channel of the log: its topic, its ROS 2 message name and its fields."""
 
-    def __init__(self, topic: str, schema_name: str, fields: Sequence[Field], definition: str = "") -> None:
+    def __init__(
+        self,
+        topic: str,
+        schema_name: str,
+        fields: Sequence[Field],
+        definition: str = "",
+        metadata: Mapping[str, str] | None = None,
+    ) -> None:
         """`definition` is the text from a file; without it the text follows from the fields."""
         self.topic = topic
         self.schema_name = schema_name
         self.fields = tuple(fields)
+        self.metadata = {field.name: " ".join(field.words) for field in fields if field.words} | dict(metadata or {})
         self.definition = definition or "".join(f"{field.line}\n" for field in fields)
         self.has_text = bool(fields) and fields[-1].kind == TEXT
         self.numbers = self.fields[:-1] if self.has_text else self.fields
@@ -142,18 +136,6 @@ class RowKind:
             values[self.fields[-1].name] = row[text + 4 : text + 3 + length].decode(errors="replace")
         return values
 
-    def compile(self, arguments: str, *preparation: str) -> Callable[..., bytes]:
-        """Makes one function that packs a row from the fields' sources, which use `arguments` and `preparation`.
-
-        It generates the source text of the function, which is as fast as one written for this row kind.
-        """
-        sources = ", ".join(source for field in self.fields for source in field.sources)
-        lines = [f"def pack_row({arguments}):", *preparation, f"return pack(header, {sources})"]
-        names: dict[str, Any] = {"pack": self.layout.pack, "header": CDR_HEADER}
-        exec(compile("\n    ".join(lines), f"<packing of {self.topic}>", "exec"), names)
-        packing: Callable[..., bytes] = names["pack_row"]
-        return packing
-
 
 def read_definition(own: RowKind, definition: str) -> RowKind:
     """The row kind of a file, its fields under the names of this version. Raises LayoutError."""
@@ -174,7 +156,7 @@ def read_definition(own: RowKind, definition: str) -> RowKind:
         known = present.get(field.name, field)
         if (known.length, known.kind == TEXT) != (field.length, field.kind == TEXT):
             raise LayoutError(f"{own.topic} has the field '{field.line}', this version reads '{known.line}'")
-    return RowKind(own.topic, own.schema_name, fields, definition)
+    return RowKind(own.topic, own.schema_name, fields, definition, own.metadata)
 
 
 def _parse_fields(definition: str) -> Iterator[Field]:

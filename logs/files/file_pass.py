@@ -21,6 +21,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from control.records import FLIPPERS
 from firmware_host.log.log_file import ATTACHMENT, METADATA
 from firmware_host.log.log_folder import present_path, why_not_read
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND, rig_of, row_kinds
@@ -162,7 +163,7 @@ class FilePass:
         if number is None:
             return
         try:
-            kind = described_kind(number, self._schemas.get(channel.schema_id))
+            kind = described_kind(number, self._schemas.get(channel.schema_id), channel.metadata)
         except LayoutError as error:
             raise error if checked else ValueError(str(error)) from None
         if self.kinds.setdefault(number, kind).definition != kind.definition:
@@ -226,12 +227,18 @@ def _is_cut(error: Exception, at_the_end: bool) -> bool:
     return isinstance(error, EndOfFile | RecordLengthLimitExceeded) or (isinstance(error, struct.error) and at_the_end)
 
 
-def described_kind(number: int, schema: Schema | None) -> RowKind:
+def described_kind(number: int, schema: Schema | None, metadata: Mapping[str, str]) -> RowKind:
     """Returns the row kind of one of our topics as a file describes it. Raises LayoutError."""
     if schema is None:
         raise LayoutError(f"{ROW_KINDS[number].topic} is not described")
     definition = schema.data.decode(errors="replace")
-    return read_definition(row_kinds(rig_of(definition))[number], definition)
+    rig = rig_of(metadata if "flippers" in metadata else {"flippers": _flippers_of_comments(definition)})
+    return read_definition(row_kinds(rig)[number], definition)
+
+
+def _flippers_of_comments(definition: str) -> str:
+    """Returns the flippers whose joints the comments of a log of version 0.2 name, before they were metadata."""
+    return " ".join(flipper for flipper in FLIPPERS if f"{flipper} sweep" in definition)
 
 
 def _field_names(kinds: Mapping[int, RowKind]) -> list[str]:

@@ -99,7 +99,7 @@ def scan_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Scan
         complete=found.complete,
         unknown_fields=found.unknown_fields(),
         missing_fields=found.missing_fields(),
-        rig=rig_of(kind.definition),
+        rig=rig_of(kind.metadata),
         tick_type=divide_ticks(kind, np.empty(0, f"V{kind.layout.size}")).dtype,
         tally=tally,
         files=(ScannedFile(path, found.size or 0, tally.rows),),

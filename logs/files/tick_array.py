@@ -32,7 +32,7 @@ def divide_ticks(kind: RowKind, stored: NDArray[np.void]) -> Ticks:
     those that this version does not know.
     """
     ticks = np.ascontiguousarray(stored).view(tick_type(kind))
-    own = tick_kind(rig_of(kind.definition))
+    own = tick_kind(rig_of(kind.metadata))
     return ticks if ticks.dtype == tick_type(own) else _with_own_fields(ticks, own)
 
 

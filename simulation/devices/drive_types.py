@@ -7,8 +7,8 @@ from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
 from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.odrive.device import SimulatedOdrive
-from simulation.devices.odrive.device05 import SimulatedOdrive05
 from simulation.devices.odrive.settings import BUILD
+from simulation.devices.odrive05.device import SimulatedOdrive05
 
 SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
     "odrive": SimulatedOdrive,

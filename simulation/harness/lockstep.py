@@ -104,6 +104,7 @@ class Lockstep:
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
         self.tick_number = 0
+        self.acts: list[Callable[[], None]] = []  # called in every step, after the robot's and before the loop's
 
     @property
     def now_s(self) -> float:
@@ -120,6 +121,8 @@ class Lockstep:
         self.late_ticks = 0
         self.tick_number += 1 + missed
         self.robot.advance(self.now_s)
+        for act in tuple(self.acts):
+            act()
         for failure in self.failures.update(self.now_s):
             self.loop.events.report(self.now_s, end_text(failure))
         self.loop.tick(Tick(self.now_s, missed * self.period_s, self.tick_number, missed))

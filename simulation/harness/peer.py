@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import BusError, lock_buses, open_ports
@@ -95,11 +96,18 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _world(options: argparse.Namespace, configuration: Configuration) -> World:
-    """Raises ConfigurationError."""
-    if options.on_blocks:
-        return on_blocks(configuration)
-    return load_world(options.world) if options.world else World(track_of(options.mud or list(MUDS)))
+class Ground(NamedTuple):
+    """Where the robot is: on muds of these water contents, in the world of a file, or on blocks in the air."""
+
+    waters: Sequence[str] | None = None
+    world: Path | None = None
+    on_blocks: bool = False
+
+    def make_world(self, configuration: Configuration) -> World:
+        """Raises ConfigurationError."""
+        if self.on_blocks:
+            return on_blocks(configuration)
+        return load_world(self.world) if self.world else World(track_of(self.waters or list(MUDS)))
 
 
 def take_precedence() -> None:
@@ -118,13 +126,13 @@ def nothing() -> None:
     """Announces nothing."""
 
 
-def simulate(configuration: Configuration, options: argparse.Namespace, announce: Callable[[], None] = nothing) -> int:
+def simulate(configuration: Configuration, ground: Ground, seed: int, announce: Callable[[], None] = nothing) -> int:
     """Simulates the robot until a signal ends the process; returns the exit status.
 
     `announce` is called once the robot has its buses: another one that is simulated on them is left alone.
     """
     try:
-        peer = Peer(configuration, _world(options, configuration), options.seed)
+        peer = Peer(configuration, ground.make_world(configuration), seed)
         announce()
     except ConfigurationError as problem:
         return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
@@ -148,7 +156,8 @@ def _refuse(*messages: str, status: int = 1) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _parse(arguments)
     try:
-        return simulate(load_configuration(options.config), options)
+        ground = Ground(waters=options.mud, world=options.world, on_blocks=options.on_blocks)
+        return simulate(load_configuration(options.config), ground, options.seed)
     except ConfigurationError as problem:
         return _refuse(*problem.problems, status=EXIT_CONFIGURATION)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.parser import add_all_options, build_parser
+from command_line.parser import build_parser, complete
 from tests.command_line.command_lines import run
 
 
@@ -61,7 +61,7 @@ def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentPa
 
 def test_json_is_spelled_alike_everywhere() -> None:
     parser = build_parser()
-    add_all_options(parser)
+    complete(parser)
     found = [action for command in commands_of(parser) for action in command._actions if "--json" in str(action)]
     actions = [action for action in found if action.option_strings == ["--json"]]
     assert len(actions) == len(found) > 20
@@ -70,7 +70,7 @@ def test_json_is_spelled_alike_everywhere() -> None:
 
 def test_every_argument_is_explained_and_every_value_is_named() -> None:
     parser = build_parser()
-    add_all_options(parser)
+    complete(parser)
     actions = [action for command in commands_of(parser) for action in command._actions]
     plain = [each for each in actions if not isinstance(each, argparse._SubParsersAction)]
     assert [each for each in plain if not each.help] == []
@@ -79,6 +79,6 @@ def test_every_argument_is_explained_and_every_value_is_named() -> None:
 
 
 def test_a_command_line_that_names_a_command_is_parsed_as_by_the_complete_parser() -> None:
-    complete = build_parser()
+    all_commands = build_parser()
     for arguments in (["walk", "--depth", "3"], ["log", "list", "."], ["experiment", "walk", "--mud", "47"]):
-        assert build_parser(arguments).parse_args(arguments) == complete.parse_args(arguments)
+        assert build_parser(arguments).parse_args(arguments) == all_commands.parse_args(arguments)

@@ -6,7 +6,6 @@ import grp
 import os
 import threading
 import time
-from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,12 +13,13 @@ from typing import Any
 import pytest
 
 from command_line import exit_codes
-from command_line.operation import confirmed_stop, operation
+from command_line.operation import operation
 from command_line.operation.confirmation import TORQUE_UNKNOWN
 from firmware_host.configuration.configuration import StatusParameters
 from firmware_host.sockets.status_socket import Methods, StatusSocket
 from firmware_host.sockets.user_groups import load_rights
 from operator_client.status_client import NotPermittedError, StatusClient
+from tests.command_line.command_lines import run
 from tests.running_bench import Bench
 
 NOBODY = 65534
@@ -42,38 +42,23 @@ class StoppingClient:
 
 
 @pytest.fixture
-def options(monkeypatch: pytest.MonkeyPatch) -> Namespace:
+def stopping_client(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(operation, "StatusClient", StoppingClient)
-    return Namespace(
-        command="arm",
-        socket=Path("/none"),
-        json=False,
-        strides=0,
-        depth=None,
-        attended=False,
-        force=False,
-        take_over=False,
-    )
 
 
+@pytest.mark.usefixtures("stopping_client")
 @pytest.mark.parametrize("command", ["stop", "disarm"])
-def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(
-    options: Namespace, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    options.command = command
-    assert confirmed_stop.end_motion(options) == exit_codes.TORQUE_UNKNOWN
-    printed = capsys.readouterr()
-    assert "accepted" in printed.err and TORQUE_UNKNOWN in printed.err
+def test_a_stop_is_accepted_but_not_confirmed_where_the_status_is_not_permitted(command: str) -> None:
+    ended = run(command)
+    assert ended.returncode == exit_codes.TORQUE_UNKNOWN
+    assert "accepted" in ended.stderr and TORQUE_UNKNOWN in ended.stderr
 
 
-@pytest.mark.parametrize("attended", [False, True])
-@pytest.mark.parametrize("command", [operation.status, operation.arm, operation.walk, operation.clear, operation.check])
-def test_anything_else_is_not_permitted(
-    options: Namespace, capsys: pytest.CaptureFixture[str], command: Any, attended: bool
-) -> None:
-    options.attended = attended
-    assert command(options) == exit_codes.NOT_PERMITTED
-    assert capsys.readouterr().err == f"mudskipper: {REFUSAL}\n"
+@pytest.mark.usefixtures("stopping_client")
+@pytest.mark.parametrize("command", ["status", "arm", "walk", "walk --attended", "clear", "check"])
+def test_anything_else_is_not_permitted(command: str) -> None:
+    ended = run(*command.split())
+    assert (ended.returncode, ended.stderr) == (exit_codes.NOT_PERMITTED, f"mudskipper: {REFUSAL}\n")
 
 
 def permitted(path: Path, method: str, groups: Sequence[int] = ()) -> bool:

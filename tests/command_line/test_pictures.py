@@ -10,21 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from PIL import Image
 
 import command_line.logs.log_commands
 import experiments.pictures.stride_film
 from command_line import exit_codes
 from command_line.main import main
-from experiments.pictures.colours import OUTCOME_COLOURS
 from experiments.pictures.mud_layout import describe_mud, layout_of_track, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
-from experiments.pictures.walk_plot import MOST_DASHES, plot_walk
+from experiments.pictures.walk_plot import MOST_DASHES, draw_walk, plot_walk
+from experiments.reports.style import OUTCOME_COLOURS
 from logs.files.log_reader import read_log
 from logs.lab.export import write_lab_csv
 from simulation.mud.clay import MUDS, Clay
@@ -50,7 +50,7 @@ def log(two_walks: Path, tmp_path: Path) -> Path:
 # files
 
 
-@pytest.mark.parametrize(("command", "name", "width"), [("plot", "two.png", 1200), ("film", "two-strides.png", 1800)])
+@pytest.mark.parametrize(("command", "name", "width"), [("plot", "two.png", 1200), ("film", "two-strides.png", 1440)])
 def test_a_picture_of_the_last_walk_is_written_next_to_its_log(
     command: str, name: str, width: int, log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -113,19 +113,10 @@ def test_a_cut_log_is_drawn_as_far_as_it_goes(log: Path, capsys: pytest.CaptureF
 # drawn values
 
 
-def drawn(walk: RecordedWalk, path: Path) -> Figure:
-    """Return the figure that `plot_walk` saves."""
-    figures: list[Figure] = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, "savefig", lambda figure, *arguments, **options: figures.append(figure))
-        plot_walk(walk, path)
-    return figures[0]
-
-
 @pytest.fixture(scope="module")
-def figure(two_walks: Path, tmp_path_factory: pytest.TempPathFactory) -> Figure:
+def figure(two_walks: Path) -> Figure:
     """Draw the first walk."""
-    return drawn(read_walk(two_walks, 1), tmp_path_factory.mktemp("figure") / "walk.png")
+    return draw_walk(read_walk(two_walks, 1))
 
 
 def panel(figure: Figure, label: str) -> Axes:
@@ -154,17 +145,18 @@ def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) ->
     np.testing.assert_array_equal(lines["commanded"], 100.0 * walk.depth_command_m)
     chosen_cm = [100.0 * stride["chosen_depth_m"] for stride in walk.own_strides]
     np.testing.assert_array_equal(lines["chosen for the next stride"], chosen_cm)
-    bars = [bar.get_height() for bar in panel(figure, "step").patches if isinstance(bar, Rectangle)]
-    assert bars == pytest.approx([100.0 * stride["step_m"] for stride in walk.own_strides])
+    (bars,) = [each for each in panel(figure, "step").collections if each.get_label() == Outcome.GOOD]
+    assert [path.get_extents().y1 for path in bars.get_paths()] == pytest.approx(
+        [100.0 * stride["step_m"] for stride in walk.own_strides]
+    )
 
 
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
 def test_bars_of_a_coefficient_are_two_standard_errors(two_walks: Path, figure: Figure, name: str) -> None:
     walk = read_walk(two_walks, 1)
     reported = [s for flipper in (0, 1) for s in walk.strides if s["flipper"] == flipper and np.isfinite(s[name])]
-    solid = [line for axes in row_of(figure, f"${name}$") for line in axes.lines if line.get_linestyle() == "-"]
-    heights = [np.asarray(line.get_ydata()) for line in solid]
-    bars = [(each[0::3][number], each[1::3][number]) for each in heights for number in range(len(each) // 3)]
+    marks = [each for axes in row_of(figure, f"${name}$") for each in axes.containers]
+    bars = [bar[:, 1] for mark in marks for bar in mark[2][0].get_segments()]
     assert len(reported) == len(bars) > 1
     for stride, (low, high) in zip(reported, bars, strict=True):
         assert (high + low) / 2.0 == pytest.approx(stride[name] / 1e6)
@@ -176,7 +168,7 @@ def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
     walk = read_walk(two_walks, 1)
     slipping, stuck = walk.own_strides[0] | {"step_m": 0.01}, walk.own_strides[1] | {"released": False}
     slipping["released"] = True
-    figure = drawn(walk._replace(strides=[slipping, stuck]), tmp_path / "walk.png")
+    figure = draw_walk(walk._replace(strides=[slipping, stuck]))
     (mark,) = [line for line in row_of(figure, "depth")[1].lines if line.get_label() == "stuck"]
     row = int(np.searchsorted(walk.time_s, stuck["stamp_s"]))
     assert np.asarray(mark.get_xdata()) == pytest.approx([stuck["stamp_s"]])
@@ -184,21 +176,20 @@ def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
     handles, labels = panel(figure, "step").get_legend_handles_labels()
     bars = dict(zip(labels, handles, strict=True))
     for outcome, stride in ((Outcome.SLIPPING, slipping), (Outcome.STUCK, stuck)):
-        (bar,) = bars[outcome].get_children()
-        assert to_hex(bar.get_facecolor()) == OUTCOME_COLOURS[outcome]
-        assert bar.get_x() == pytest.approx(stride["t_start_s"])
+        assert to_hex(bars[outcome].get_facecolor()[0]) == OUTCOME_COLOURS[outcome]
+        assert bars[outcome].get_paths()[0].get_extents().x0 == pytest.approx(stride["t_start_s"])
 
 
 def test_without_a_known_sweep_no_geometric_step_is_drawn(two_walks: Path, tmp_path: Path) -> None:
     walk = read_walk(two_walks, 1)
     strides = [stride | {"released": True} for stride in walk.strides]
-    figure = drawn(walk._replace(strides=strides, sweep_rad=float("nan")), tmp_path / "walk.png")
+    figure = draw_walk(walk._replace(strides=strides, sweep_rad=float("nan")))
     assert panel(figure, "step").get_legend_handles_labels()[1] == ["unknown"]
 
 
 def test_without_a_pose_there_are_no_panels_of_position(two_walks: Path, tmp_path: Path) -> None:
     walk = read_walk(two_walks, 1)
-    figure = drawn(walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)), tmp_path / "walk.png")
+    figure = draw_walk(walk._replace(body_x_m=np.full(len(walk.time_s), np.nan)))
     labels = [axes.get_ylabel().split()[0] for axes in figure.axes if axes.get_ylabel()]
     assert labels == ["force", "$k_p$", "$k_s$", "$k_e$", "depth"]
 
@@ -238,12 +229,14 @@ def test_many_noticed_muds_are_marked_at_the_top_of_each_panel(
 ) -> None:
     walk = read_walk(two_walks, 1)
     noticed_s = np.linspace(0.0, walk.time_s[-1], muds)
-    figure = drawn(walk._replace(noticed_s=noticed_s.tolist()), tmp_path / "walk.png")
+    figure = draw_walk(walk._replace(noticed_s=noticed_s.tolist()))
     for axes in figure.axes:
-        own = [line for line in axes.lines if line.get_transform() == axes.get_xaxis_transform()]
-        heights = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in own])
-        assert set(heights[np.isfinite(heights)]) == ({0.0, 1.0} if is_across else {1.0})
-        assert {x for line in own for x in np.asarray(line.get_xdata())} == set(noticed_s)
+        across = axes.get_xaxis_transform()
+        lines = [line for each in axes.collections if isinstance(each, LineCollection) for line in each.get_segments()]
+        lines = [line for line in lines if is_across and set(line[:, 1]) == {0.0, 1.0}]
+        marks = [line.get_xdata() for line in axes.lines if line.get_transform() == across]
+        found = [line[0, 0] for line in lines] if is_across else [x for each in marks for x in np.asarray(each)]
+        assert found == pytest.approx(noticed_s)
 
 
 def test_muds_with_equal_values_are_distinguished_by_time_and_those_without_a_value_are_marked(two_walks: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,6 @@ from experiments.reports.text_tables import number
 from firmware_host import daemon
 from operator_client.status_client import DroppedError
 from tests.command_line.command_lines import failure, refusal
-
-NO_SOCKET = Namespace(socket=Path("/none"), json=False, config=Path("/none.toml"))
 
 
 class Client:
@@ -37,13 +34,13 @@ class Client:
         return
 
 
-@pytest.mark.parametrize("command", [operation.status, operation.check, operation.clear])
+@pytest.mark.parametrize("command", ["status", "check", "clear"])
 def test_a_closed_connection_is_not_reported_as_a_missing_daemon(
-    command: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(operation, "StatusClient", Client)
     Client.problem = DroppedError("the daemon closed the connection")
-    assert command(NO_SOCKET) == exit_codes.NO_DAEMON
+    assert main([command]) == exit_codes.NO_DAEMON
     said = capsys.readouterr()
     assert (said.out, said.err) == ("", "mudskipper: the daemon closed the connection\n")
 

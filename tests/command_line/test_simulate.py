@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
+from command_line import shared_options as shared
 from command_line.main import main
-from command_line.options import shared
 from drivers.can.bus_lock import BusRole
 from firmware_host.buses import lock_buses
 from firmware_host.configuration.loading import parse_configuration
@@ -173,7 +173,7 @@ def test_root_does_not_follow_what_another_user_prepared_among_the_temporary_fil
     monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
     monkeypatch.setattr("tempfile.tempdir", str(short_folder))
 
-    def begin(configuration: object, options: object, announce: Callable[[], None]) -> int:
+    def begin(configuration: object, ground: object, seed: int, announce: Callable[[], None]) -> int:
         announce()
         return exit_codes.OK
 

@@ -53,21 +53,6 @@ def test_the_jacobian_is_the_derivative_of_the_rotated_edge(
     assert np.reshape(geometry.jacobian(sweep, adduction), (3, 2)) == pytest.approx(numeric, abs=1e-8)
 
 
-@given(st.floats(0.02, 1.0), sweeps, adductions)
-def test_without_drop_rows_x_and_z_of_the_jacobian_over_the_length_squared_are_the_papers_matrix(
-    length: float, sweep: float, adduction: float
-) -> None:
-    jacobian = FlipperGeometry(length, 0.0, 0.03).jacobian(sweep, adduction)
-    paper = np.array(
-        [
-            [np.cos(sweep), 0.0],
-            [-np.sin(adduction) * np.sin(sweep), np.cos(adduction) * np.cos(sweep)],
-        ]
-    )
-    rows = np.array([[jacobian.x_sweep, jacobian.x_adduction], [jacobian.z_sweep, jacobian.z_adduction]])
-    assert rows / length**2 == pytest.approx(paper / length, rel=1e-13, abs=1e-13)
-
-
 @given(geometries, sweeps, st.floats(-pi, pi))
 def test_the_adduction_of_a_depth_comes_back_from_forward_kinematics(
     geometry: FlipperGeometry, sweep: float, adduction: float
@@ -147,15 +132,6 @@ def test_deepest_and_reachable_agree_at_the_edge(geometry: FlipperGeometry, swee
     assert geometry.vertical_lever_m(sweep, geometry.adduction_rad(sweep, deepest)) == pytest.approx(
         MIN_LEVER_M, abs=1e-9
     )
-
-
-@given(geometries, st.floats(1.0, 60.0), st.floats(-1.0, 1.0))
-def test_the_deepest_depth_can_be_held_over_the_whole_sweep(
-    geometry: FlipperGeometry, sweep_deg: float, fraction: float
-) -> None:
-    deepest = geometry.deepest_m(sweep_deg)
-    assume(geometry.is_reachable(radians(sweep_deg), deepest - 1e-9))
-    assert geometry.is_reachable(fraction * radians(sweep_deg), deepest - 1e-9)
 
 
 def test_an_arm_shorter_than_the_least_lever_reaches_no_depth_below_its_axis() -> None:

@@ -1,7 +1,6 @@
 """The plate's closed forms against a dense grid, exact polygon clipping, and a derivation in sympy."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from fractions import Fraction
 from math import cos, hypot, pi, radians, sin, sqrt
 from typing import NamedTuple
@@ -9,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import sympy
-from hypothesis import assume, example, given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -85,7 +84,6 @@ AWRY = radians(-40.0)  # so far that the plate's edge is far from level
 CORNER = Pose(AUTHORS, 0.3, AWRY, -0.05)
 TOP_CORNER_DRY = Pose(AUTHORS, 0.3, AWRY, 0.8)
 WHOLE = Pose(AUTHORS, 0.3, AWRY, 1.4)
-DRY_POSE = Pose(AUTHORS, 0.3, AWRY, -0.7)
 LEVEL = Pose(AUTHORS, 0.3, 0.0, 0.4)
 
 
@@ -102,13 +100,6 @@ def grid_points(pose: Pose, u: Array, s: Array) -> Array:
     z = np.tensordot(adduction_about_x @ sweep_about_z, in_arm, axes=1)[2]
     depths: Array = -z - g.axis_height_m - pose.surface_m
     return depths
-
-
-def corner_depths(pose: Pose) -> list[float]:
-    """Return the depths of the edge's inner and outer end and of the top's inner and outer end."""
-    half, top = pose.geometry.plate_width_m / 2.0, pose.geometry.plate_height_m
-    ends = np.array([-half, half, -half, half]), np.array([0.0, 0.0, top, top])
-    return [float(depth) for depth in grid_points(pose, *ends)]
 
 
 def grid_integrals(pose: Pose, cells: int = 150) -> tuple[Array, Array]:
@@ -132,31 +123,6 @@ def grid_integrals(pose: Pose, cells: int = 150) -> tuple[Array, Array]:
     curvature = np.array([0, 0, 0, 0, 1, 1]) * 2.0 * area_m2 * (du * du + ds * ds) / 24.0
     error = cell_m2 * 2.0 * (largest * cut).sum(axis=(1, 2)) + curvature
     return cell_m2 * (values * wet).sum(axis=(1, 2)), error + 1e-12 * area_m2  # 22500 roundings
-
-
-@pytest.mark.parametrize(
-    ("pose", "wet_corners"), [(CORNER, 1), (LEVEL, 2), (TOP_CORNER_DRY, 3), (WHOLE, 4), (DRY_POSE, 0)]
-)
-def test_the_named_poses_are_what_they_are_called(pose: Pose, wet_corners: int) -> None:
-    assert sum(depth > 0.0 for depth in corner_depths(pose)) == wet_corners
-
-
-@given(poses)
-@example(CORNER)
-@example(Pose(AUTHORS, 0.3, -AWRY, -0.05))  # the inner corner
-@example(TOP_CORNER_DRY)
-@example(WHOLE)
-@example(LEVEL)
-@example(DRY_POSE)
-def test_the_closed_forms_are_the_integrals_over_a_dense_grid(pose: Pose) -> None:
-    integrals, error = grid_integrals(pose)
-    assert np.all(np.abs(np.array(pose.plate()) - integrals) <= error)
-
-
-def test_the_grid_is_fine_enough_to_notice_a_wrong_form() -> None:
-    for pose in (LEVEL, TOP_CORNER_DRY, WHOLE):
-        integrals, error = grid_integrals(pose)
-        assert np.all(error[[0, 2, 3, 5]] < 0.02 * integrals[[0, 2, 3, 5]])
 
 
 # exact fractions
@@ -244,12 +210,6 @@ def is_zero(expression: sympy.Expr) -> bool:
     return bool(sympy.simplify(expression) == 0)
 
 
-def test_the_depth_of_a_point_is_the_docstrings() -> None:
-    edge = POSITION.subs({U: 0, S: 0})
-    by_plate = -edge[2] - AXIS - U * sympy.cos(ALPHA) * sympy.sin(BETA) - S * sympy.cos(BETA)
-    assert is_zero(-POSITION[2] - AXIS - by_plate)
-
-
 def test_the_normal_is_a_unit_vector_that_points_forward() -> None:
     assert is_zero(NORMAL.dot(NORMAL) - 1)
     assert is_zero(NORMAL[0] - sympy.cos(ALPHA))
@@ -261,33 +221,7 @@ def test_a_load_along_the_normal_turns_the_joints_by_its_arm_and_by_its_drop_tim
     assert is_zero(NORMAL.dot(POSITION.diff(BETA)) + below_arm * sympy.sin(ALPHA))
 
 
-def test_the_path_within_the_plates_plane_per_radian_is_the_docstrings_root() -> None:
-    across = NORMAL.dot(POSITION.diff(BETA))
-    square = POSITION.diff(BETA).dot(POSITION.diff(BETA)) - across**2
-    assert is_zero(square - sympy.cos(ALPHA) ** 2 * ((LENGTH + U) ** 2 + (DROP - S) ** 2))
-
-
 WIDTH, NEAR, FAR, MIDDLE, Q = sympy.symbols("w D_1 D_2 m q", positive=True)
-OUTWARD = sympy.Symbol("t", real=True)  # outward from the middle of the wet part
-COLUMN = (NEAR + FAR) / 2 + (FAR - NEAR) * OUTWARD / WIDTH  # depth of the edge there
-
-
-def column_integral(integrand: sympy.Expr) -> sympy.Expr:
-    """Integrate over the columns of a wet part whose edge's ends are NEAR and FAR deep, MIDDLE outward."""
-    in_column = sympy.integrate(sympy.expand(integrand), (S, 0, COLUMN / Q))
-    return sympy.integrate(sympy.expand(in_column), (OUTWARD, -WIDTH / 2, WIDTH / 2))
-
-
-def test_the_docstrings_integrals_are_those_of_columns_up_to_the_waterline() -> None:
-    zeta, u = COLUMN - Q * S, MIDDLE + OUTWARD
-    area, moment = column_integral(sympy.Integer(1)), column_integral(zeta)
-    mean_square = NEAR**2 + NEAR * FAR + FAR**2
-    assert is_zero(area - WIDTH * (NEAR + FAR) / (2 * Q))
-    assert is_zero(column_integral(u) - MIDDLE * area - WIDTH**2 * (FAR - NEAR) / (12 * Q))
-    assert is_zero(column_integral(S) - WIDTH * mean_square / (6 * Q**2))
-    assert is_zero(moment - WIDTH * mean_square / (6 * Q))
-    assert is_zero(column_integral(zeta * u) - MIDDLE * moment - WIDTH**2 * (FAR**2 - NEAR**2) / (24 * Q))
-    assert is_zero(column_integral(zeta * S) - WIDTH * (NEAR + FAR) * (NEAR**2 + FAR**2) / (24 * Q**2))
 
 
 @given(poses)
@@ -343,22 +277,6 @@ def test_a_plate_above_the_mud_is_dry(
     assert stance_moment_m4(geometry, plate) == stroke_moment_m4(geometry, plate, sweep) == 0.0
 
 
-@given(geometries, sweeps, adductions, st.floats(0.0, 1.0))
-def test_a_plate_wholly_under_is_a_rectangle_at_its_middles_depth(
-    geometry: FlipperGeometry, sweep: float, adduction: float, deeper_m: float
-) -> None:
-    g, q = geometry, cos(adduction)
-    lean = abs(cos(sweep) * sin(adduction)) * g.plate_width_m / 2.0
-    depth_m = g.plate_height_m * q + lean + 1e-9 + deeper_m
-    plate = submerged_plate(g, sweep, adduction, g.depth_m(sweep, adduction) - depth_m)
-    area_m2, middle_m = g.plate_width_m * g.plate_height_m, depth_m - g.plate_height_m * q / 2.0
-    lost = 200.0 * np.finfo(float).eps * rounding_scale(g, depth_m, sin(adduction), q)
-    assert plate.area_m2 == pytest.approx(area_m2, abs=lost[0])
-    assert plate.area_outward_m3 == pytest.approx(0.0, abs=lost[1])
-    assert plate.area_upward_m3 == pytest.approx(area_m2 * g.plate_height_m / 2.0, abs=lost[2])
-    assert plate.depth_moment_m3 == pytest.approx(area_m2 * middle_m, abs=lost[3])
-
-
 @given(poses, st.floats(1e-6, 0.05))
 @example(CORNER, 1e-6)
 @example(TOP_CORNER_DRY, 1e-6)
@@ -389,19 +307,6 @@ def test_a_mirrored_sweep_has_the_same_moments_and_the_opposite_cross_coupling(
 def vanishes(value: float) -> bool:
     """Return whether a value is so small that its powers round."""
     return 0.0 < abs(value) < 1e-6
-
-
-@given(poses, st.sampled_from([0.25, 2.0, 16.0]))
-def test_moments_scale_with_the_fourth_power_of_length(pose: Pose, times: float) -> None:
-    """The factors are powers of two, which do not round."""
-    lengths_m = {name: value for name, value in asdict(pose.geometry).items() if isinstance(value, float)}
-    assume(not any(vanishes(value) for value in (*pose[1:], *lengths_m.values())))
-    larger = FlipperGeometry(plate_corners_m=(), **{name: times * length_m for name, length_m in lengths_m.items()})
-    small, large = pose.plate(), pose._replace(geometry=larger).plate()
-    assert stance_moment_m4(larger, large) == times**4 * stance_moment_m4(pose.geometry, small)
-    stroke_m4 = stroke_moment_m4(pose.geometry, small, pose.sweep_rad)
-    assert stroke_moment_m4(larger, large, pose.sweep_rad) == times**4 * stroke_m4
-    assert cross_coupling(larger, large, pose.sweep_rad) == cross_coupling(pose.geometry, small, pose.sweep_rad)
 
 
 GOLDEN = {  # sweep, adduction, surface: the integrals and the joints' moments, from before plates had other shapes
@@ -454,13 +359,6 @@ def test_a_rectangle_given_by_its_corners_has_the_integrals_of_one_given_by_its_
     one, other = (submerged_part(each, depth_m, per_outward, per_upward) for each in (by_corners, by_sides))
     lost = 50.0 * np.finfo(float).eps * rounding_scale(by_sides, depth_m, per_outward, per_upward)
     assert np.all(np.abs(np.array(one) - np.array(other)) <= lost)
-
-
-@pytest.mark.parametrize("geometry", [AUTHORS, FlipperGeometry(plate_width_m=0.04, plate_height_m=0.03)])
-@given(depth_m=st.floats(0.001, 0.1))
-def test_a_level_rectangle_has_its_own_width_at_every_depth(geometry: FlipperGeometry, depth_m: float) -> None:
-    assert mean_width_m(geometry, depth_m) == moment_width_m(geometry, depth_m) == geometry.plate_width_m
-    assert growth_exponent(geometry, depth_m) == 1.0
 
 
 def test_the_widths_of_a_triangle_and_of_a_trapezoid_are_those_of_their_areas() -> None:

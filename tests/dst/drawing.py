@@ -10,9 +10,9 @@ from random import Random
 from typing import Any
 
 from control.records import JOINTS
+from drivers.fault_injection.failure_table import SCHEDULED
 from drivers.fault_injection.failures import Failures
-from tests.dst import harms
-from tests.dst.scenario import Call, Event, Failure, HangUp, Harm, Scenario, Surroundings, Terminate, end_s
+from tests.dst.scenario import Call, Event, Failure, HangUp, Scenario, Surroundings, Terminate, end_s
 from tests.dst.starts import STUCK_M, STUCK_PA
 
 SHARED = 16
@@ -91,7 +91,7 @@ def _draw_configuration(random: Random, stuck: bool) -> Iterator[tuple[str, Any]
     yield "log.segment_s", random.choice((1.0, 600.0))
 
 
-def _draw_failures(random: Random) -> Iterator[Failure | Harm]:
+def _draw_failures(random: Random) -> Iterator[Failure]:
     count = random.choices(list(FAILURES), list(FAILURES.values()))[0]
     at_s = round(random.uniform(EARLIEST_S, LATEST_S), 3)
     for _ in range(count):
@@ -103,15 +103,16 @@ def _draw_failures(random: Random) -> Iterator[Failure | Harm]:
         at_s = round(at_s + random.choice((0.0, 0.003, 0.01, 0.03, 0.1, 0.3)) * random.random(), 3)
 
 
-def _draw_failure(random: Random, at_s: float) -> Failure | Harm:
+def _draw_failure(random: Random, at_s: float) -> Failure:
     for_s = round(random.choice((0.01, 0.03, 0.1, 0.3, 0.6)) * random.uniform(1.0, 2.0), 3)
     if random.random() < 0.5:
-        return Harm(at_s, random.choice(harms.NAMES), random.choice(JOINTS), for_s)
+        component, kind = random.choice(list(SCHEDULED))
+        return Failure(at_s, component.replace("JOINT", random.choice(JOINTS)), kind, for_s)
     component, kind = random.choice(COMPONENTS[random.choice(FAMILIES)])
     return Failure(at_s, component, kind, for_s)
 
 
-def _flapping(random: Random, event: Failure | Harm) -> Iterator[Failure | Harm]:
+def _flapping(random: Random, event: Failure) -> Iterator[Failure]:
     """Repeats a failure with short gaps, some of them shorter than its detection takes."""
     for_s, gap_s = round(random.uniform(0.01, 0.06), 3), random.uniform(0.005, 0.08)
     for number in range(random.randint(2, 5)):

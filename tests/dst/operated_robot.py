@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import socket
 from collections import deque
-from contextlib import redirect_stderr, suppress
+from contextlib import AbstractContextManager, redirect_stderr, suppress
 from io import StringIO
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgpack
 
+from control.records import JOINTS
+from drivers.fault_injection.failure_table import SCHEDULED, FailureMode
 from firmware_host.daemon import Shutdown, end_safely
 from firmware_host.fault_injection.failure_calls import with_failures
 from firmware_host.operator.operator_calls import Method, OperatorCalls
@@ -24,9 +27,9 @@ from firmware_host.sockets.rpc import REQUEST, RefusedError
 from firmware_host.sockets.socket_file import operators_path
 from firmware_host.sockets.status_socket import StatusSocket
 from simulation.harness.joint_energy import JointEnergy
-from simulation.harness.lockstep import Lockstep
-from tests.dst.harms import Harms
-from tests.dst.scenario import Call, Event, Failure, HangUp, Harm, Terminate
+from tests.dst.scenario import Call, Event, Failure, HangUp, Terminate
+from verification.faults.failing_robot import FailingRobot
+from verification.faults.injection import inject
 
 RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
 PEERS = {
@@ -44,6 +47,15 @@ class Executed(NamedTuple):
 
     method: str
     refused: bool
+
+
+class ActiveFailure(NamedTuple):
+    """A failure that lasts, of those that the daemon does not cause itself."""
+
+    mode: FailureMode
+    joint: str
+    until_s: float
+    injection: AbstractContextManager[None]
 
 
 class Client:
@@ -69,10 +81,10 @@ class Client:
 class OperatedRobot:
     """Owns the robot, the socket and its clients. `calls` are those that the daemon executed in the last tick."""
 
-    def __init__(self, lockstep: Lockstep, folder: Path) -> None:
+    def __init__(self, lockstep: FailingRobot, folder: Path) -> None:
         self.lockstep = lockstep
         self.loop = lockstep.loop
-        self.harms = Harms(lockstep)
+        self.active: list[ActiveFailure] = []
         self.work = JointEnergy(lockstep.robot, self.loop.configuration.joint_ranges)
         self.harmed = False  # something has failed since the start
         self.calls: list[Executed] = []
@@ -97,19 +109,34 @@ class OperatedRobot:
         return self.lockstep.now_s
 
     def apply(self, event: Event) -> None:
-        """Lets an event happen before the next tick."""
-        self.harmed = self.harmed or isinstance(event, Failure | Harm)
+        """Let an event happen before the next tick."""
+        self.harmed = self.harmed or isinstance(event, Failure)
         match event:
             case Call(client=client, method=method, params=params):
                 self.call(client, method, **params)
             case HangUp(client=client) if client in self._clients:
                 self._clients.pop(client).close()
-            case Failure(component=component, kind=kind, for_s=for_s):
-                self.lockstep.fail(component, kind, for_s)
-            case Harm():
-                self.harms.begin(event)
+            case Failure():
+                self._begin(event)
             case Terminate():
                 self._shutdown.request(0, None)
+
+    def _begin(self, failure: Failure) -> None:
+        joint = next((each for each in JOINTS if failure.component.startswith(each)), "")
+        mode = SCHEDULED.get((failure.component.replace(joint, "JOINT") if joint else failure.component, failure.kind))
+        if mode is None:
+            self.lockstep.fail(failure.component, failure.kind, failure.for_s)
+            return
+        joint = joint or JOINTS[0]
+        injection = inject(self.lockstep, mode, joint)
+        injection.__enter__()
+        self.active.append(ActiveFailure(mode, joint, self.now_s + failure.for_s, injection))
+
+    def end_failures(self, until_s: float = inf) -> None:
+        """End the failures that last no longer than this."""
+        for each in [each for each in self.active if each.until_s <= until_s]:
+            self.active.remove(each)
+            each.injection.__exit__(None, None, None)
 
     def call(self, client: str, method: str, **params: Any) -> None:
         if client not in self._clients:
@@ -121,12 +148,12 @@ class OperatedRobot:
         self._clients[client].call(method, params)
 
     def begin_tick(self) -> None:
-        """Ends the harms that are over, before the next tick."""
-        self.harms.update()
+        """End the failures that are over, before the next tick."""
+        self.end_failures(self.now_s)
         self.calls.clear()
 
     def step(self) -> None:
-        """Runs one tick of the robot and of the daemon."""
+        """Run one tick of the robot and of the daemon."""
         if self.ended:
             self.lockstep.tick_number += 1
             self.lockstep.robot.advance(self.now_s)
@@ -145,7 +172,7 @@ class OperatedRobot:
             client.read()
 
     def _noted(self, name: str, method: Method) -> Method:
-        """Returns the method, which also notes its calls."""
+        """Return the method, which also notes its calls."""
 
         def call(params: dict[str, Any], caller: Caller) -> Any:
             try:
@@ -159,7 +186,7 @@ class OperatedRobot:
         return call
 
     def accepted(self, *methods: str) -> bool:
-        """Returns whether one of the methods was accepted in the last tick."""
+        """Return whether one of the methods was accepted in the last tick."""
         return any(call.method in methods and not call.refused for call in self.calls)
 
     def _report_bug(self, message: str) -> None:

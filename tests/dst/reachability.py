@@ -8,15 +8,16 @@ from __future__ import annotations
 from math import cos, radians
 
 from control.records import JOINTS
-from drivers.fault_injection.failures import MOST_DELAY_S, FailureKind
+from drivers.fault_injection.failure_table import FailureKind
+from drivers.fault_injection.failures import MOST_DELAY_S
 from simulation.devices.drive import SimulatedDriveParameters
-from tests.dst.harms import FOREIGN
 from tests.dst.operated_robot import OperatedRobot
 
 WATCHDOG_S = 0.1
 AFTERMATH_S = 0.03  # after a failure's end: delayed frames arrive, and lost requests are repeated
 HEARTBEATS_S = 0.25  # until the loop has seen a drive in closed loop and has commanded it idle again
-LONGEST_LAG_S = 0.02  # of a motor's current after its command (tests/dst/harms.py)
+LONGEST_LAG_S = 0.02  # of a motor's current after its command
+MASTER = "JOINT.master"  # while another program commands a drive, its torque is not ours
 REPEAT_S = 0.1  # between two requests to go idle
 
 
@@ -50,12 +51,11 @@ class Reachability:
             if lag_s < before_s:
                 self._hastened_s[index] = now_s
         self._lags_s = lags_s
-        harms = self._robot.harms
         self.gains = [_gain(drive.parameters) for drive in self._robot.lockstep.robot.drives]
         for index, joint in enumerate(JOINTS):
             if self._failures.failing and any(self._cuts(component) for component in self._paths[index]):
                 self._disturbed_s[index] = now_s
-            if any(active.harm.joint == joint and active.harm.name in FOREIGN for active in harms.active):
+            if any(active.joint == joint and active.mode.component == MASTER for active in self._robot.active):
                 self._foreign_s[index] = now_s
 
     def _current_lags_s(self) -> list[float]:

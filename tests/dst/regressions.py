@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tests.dst.scenario import Call, Failure, Harm, Scenario, Surroundings, Terminate
+from tests.dst.scenario import Call, Failure, Scenario, Surroundings, Terminate
 
 
 class Regression(NamedTuple):
@@ -32,7 +32,7 @@ REGRESSIONS = (
             surroundings=Surroundings(strength_pa=1963, depth_m=0.03),
             start="stance",
             events=(
-                Harm(at_s=0.188, name="inverted motor", joint="right_adduction", for_s=0.826),
+                Failure(at_s=0.188, component="right_adduction.motor", kind="inverted", for_s=0.826),
                 Call(at_s=0.189, client="pilot", method="stop"),
             ),
             for_s=1.064,
@@ -46,7 +46,7 @@ REGRESSIONS = (
             start="idle",
             events=(
                 Call(at_s=0.0, client="pilot", method="arm", params={"force": True}),
-                Harm(at_s=0.241, name="inverted motor", joint="right_sweep", for_s=0.876),
+                Failure(at_s=0.241, component="right_sweep.motor", kind="inverted", for_s=0.876),
                 Call(at_s=0.378, client="pilot", method="walk"),
             ),
             for_s=1.367,
@@ -58,7 +58,7 @@ REGRESSIONS = (
             seed=0,
             surroundings=QUICK,
             start="stance",
-            events=(Harm(at_s=0.0, name="frozen encoder", joint="left_sweep", for_s=1.5),),
+            events=(Failure(at_s=0.0, component="left_sweep.encoder", kind="frozen", for_s=1.5),),
             for_s=1.5,
         ),
     ),
@@ -115,7 +115,7 @@ REGRESSIONS = (
                 ),
             ),
             start="extraction",
-            events=(Harm(at_s=0.217, name="slow current", joint="right_sweep", for_s=0.19),),
+            events=(Failure(at_s=0.217, component="right_sweep.current", kind="lagging", for_s=0.19),),
             for_s=0.457,
         ),
     ),
@@ -167,7 +167,7 @@ REGRESSIONS = (
             start="stance",
             events=(
                 Call(at_s=0.058, client="pilot", method="stop"),
-                Harm(at_s=0.168, name="frozen encoder", joint="right_adduction", for_s=0.805),
+                Failure(at_s=0.168, component="right_adduction.encoder", kind="frozen", for_s=0.805),
             ),
             for_s=1.023,
         ),

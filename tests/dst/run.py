@@ -11,12 +11,12 @@ from tempfile import TemporaryDirectory
 
 from control.faults import FaultKind
 from control.modes import Mode
-from control.records import Phase
+from control.records import JOINTS, Phase
 from tests.dst.log_check import log_problems
 from tests.dst.operated_robot import OperatedRobot
 from tests.dst.promises import PROMISES, Promise, StopInTime
 from tests.dst.reachability import Reachability
-from tests.dst.scenario import Call, Event, Failure, HangUp, Harm, Scenario, Terminate
+from tests.dst.scenario import Call, Event, Failure, HangUp, Scenario, Terminate
 from tests.dst.starts import RecordedRobot, sound_walk
 
 STEWARD = "steward"  # the client that brings the robot to rest and arms it again
@@ -89,7 +89,7 @@ class Run:
 
     def _end_failures(self) -> None:
         self._robot.lockstep.failures.end_all()
-        self._robot.harms.end_all()
+        self._robot.end_failures()
         self._robot.call("guest", "disarm")
 
     def _check_end(self) -> None:
@@ -182,10 +182,9 @@ class Run:
                 self.outcome.covered[f"call {method}"] += 1
                 self.outcome.covered[f"client {client}"] += 1
             case Failure(component=component, kind=kind):
-                family = self._robot.lockstep.failures.families[component]
-                self.outcome.covered[f"failure {family} {kind}"] += 1
-            case Harm(name=name):
-                self.outcome.covered[f"harm {name}"] += 1
+                for joint in JOINTS:
+                    component = component.replace(joint, "JOINT")
+                self.outcome.covered[f"failure {component} {kind}"] += 1
             case HangUp() | Terminate():
                 self.outcome.covered[f"{type(event).__name__.lower()}"] += 1
 

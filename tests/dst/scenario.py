@@ -26,20 +26,11 @@ class HangUp(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """A component fails as with `mudskipper fail`."""
+    """A component fails, as with `mudskipper fail` or as another row of the table of failures says."""
 
     at_s: float
     component: str
     kind: str
-    for_s: float
-
-
-class Harm(NamedTuple):
-    """A physical fault of one joint, its drive or the loop (harms.py)."""
-
-    at_s: float
-    name: str
-    joint: str
     for_s: float
 
 
@@ -49,7 +40,7 @@ class Terminate(NamedTuple):
     at_s: float
 
 
-Event = Call | HangUp | Failure | Harm | Terminate
+Event = Call | HangUp | Failure | Terminate
 
 
 class Surroundings(NamedTuple):
@@ -74,12 +65,12 @@ class Scenario(NamedTuple):
 
 
 def end_s(event: Event) -> float:
-    """Returns when the event is over."""
-    return event.at_s + event.for_s if isinstance(event, Failure | Harm) else event.at_s
+    """Return when the event is over."""
+    return event.at_s + event.for_s if isinstance(event, Failure) else event.at_s
 
 
 def describe(scenario: Scenario) -> str:
-    """Writes a scenario as a readable schedule, one line for each event."""
+    """Write a scenario as a readable schedule, one line for each event."""
     given = scenario.surroundings._asdict().items()
     surroundings = ", ".join(f"{name} = {value}" for name, value in given if value not in (None, (), False))
     lines = [f"seed {scenario.seed}: from {scenario.start}, for {scenario.for_s:.3f} s", f"  in {surroundings}"]
@@ -95,7 +86,5 @@ def _text_of(event: Event) -> str:
             return f"{event.client} hangs up"
         case Failure():
             return f"{event.component} {event.kind} for {event.for_s:g} s"
-        case Harm():
-            return f"{event.name} {event.joint} for {event.for_s:g} s"
         case Terminate():
             return "SIGTERM"

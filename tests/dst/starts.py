@@ -15,11 +15,9 @@ from typing import Any
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
 from control.records import Phase
-from drivers.fault_injection.failures import Failures
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.recorder import NullRecorder
-from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import World
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE
@@ -28,6 +26,7 @@ from simulation.mud.track import Track
 from tests.copied_robots import copy_of
 from tests.dst.scenario import Surroundings
 from tests.folders import ROOT
+from verification.faults.failing_robot import FailingRobot
 
 TRACK_M, STONE_LENGTH_M, STONE_TOP_M = 5.0, 0.2, 0.02
 LONGEST_S = 6.0  # from one start to the next
@@ -52,7 +51,7 @@ class Rows(NullRecorder):
         return True
 
 
-class RecordedRobot(Lockstep):
+class RecordedRobot(FailingRobot):
     """A robot that also owns the rows of its log, and the numbers of its ticks with and without torque."""
 
     def __init__(self, configuration: Configuration, world: World, seed: int) -> None:
@@ -66,7 +65,6 @@ class RecordedRobot(Lockstep):
             recorder=self.rows,
             plant=world.plant(configuration),
             drives=world.drives(configuration),
-            failures=Failures(configuration.bus, seed),
         )
 
     def step(self) -> None:

@@ -8,21 +8,21 @@ from tests.dst.broken_promises import BREAKS
 from tests.dst.drawing import draw_scenario
 from tests.dst.promises import PROMISES
 from tests.dst.run import run_scenario
-from tests.dst.scenario import Call, Event, Failure, Harm, Scenario, Surroundings
+from tests.dst.scenario import Call, Event, Failure, Scenario, Surroundings
 from tests.dst.shrinking import shrink
 from tests.dst.starts import sound_walk
 
 QUICK = Surroundings(configuration=(("motion.path_speed_rad_s", 3.0), ("motion.fade_in_s", 0.1)))
 SHORT_S = 0.3
 SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events and duration that show each break
-    "LimitedMotors": ("stance", (Harm(0.01, "blocked", "left_sweep", 0.2),), SHORT_S),
+    "LimitedMotors": ("stance", (Failure(0.01, "left_sweep.arm", "blocked", 0.2),), SHORT_S),
     "LittleEnergy": ("stance", (Failure(0.05, "bus.left", "stuck", 0.02),), 1.0),
     "DisarmAtOnce": ("stance", (Call(0.05, "guest", "disarm"),), SHORT_S),
     "StopInTime": ("hold", (Call(0.0, "pilot", "walk"), Call(0.1, "guest", "stop")), SHORT_S),
     "ArmedByRequest": ("stance", (Call(0.05, "guest", "disarm"),), 0.8),
     "NoTorqueWithoutMode": ("stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),), SHORT_S),
-    "WithinStops": ("stance", (Harm(0.0, "inverted motor", "left_sweep", 1.2),), 1.2),
-    "BoundedEnergy": ("stance", (Harm(0.0, "inverted motor", "left_sweep", 0.6),), SHORT_S),
+    "WithinStops": ("stance", (Failure(0.0, "left_sweep.motor", "inverted", 1.2),), 1.2),
+    "BoundedEnergy": ("stance", (Failure(0.0, "left_sweep.motor", "inverted", 0.6),), SHORT_S),
     "NoFalseAlarm": ("stance", (), SHORT_S),
     "NoBug": ("hold", (Call(0.05, "guest", "stop"), Call(0.1, "pilot", "clear")), SHORT_S),
     "BackToIdle": ("hold", (Failure(0.05, "left_sweep", "off", 0.05),), SHORT_S),
@@ -58,18 +58,18 @@ def test_a_seed_gives_the_same_run_every_time() -> None:
 
 
 def test_a_failing_schedule_shrinks_to_the_event_that_matters() -> None:
-    harm = Harm(0.2, "hot motor", "left_sweep", 0.4)
-    events = (Call(0.0, "viewer", "status"), Failure(0.1, "pose", "off", 0.3), harm, Call(0.3, "guest", "stop"))
+    hot = Failure(0.2, "left_sweep.motor", "hot", 0.4)
+    events = (Call(0.0, "viewer", "status"), Failure(0.1, "pose", "off", 0.3), hot, Call(0.3, "guest", "stop"))
     scenario = Scenario(1, Surroundings(seed=7, free_body=True), "stance", events, 1.5)
-    smallest = shrink(scenario, lambda each: any(isinstance(event, Harm) for event in each.events))
-    assert [type(event) for event in smallest.events] == [Harm]
+    smallest = shrink(scenario, lambda each: hot.kind in {getattr(event, "kind", "") for event in each.events})
+    assert [event.component for event in smallest.events if isinstance(event, Failure)] == [hot.component]
     assert smallest.surroundings == Surroundings()
     assert smallest.for_s < 0.5
 
 
 def test_a_printed_scenario_is_python() -> None:
-    names = {kind.__name__: kind for kind in (Call, Failure, Harm, Scenario, Surroundings)}
+    names = {kind.__name__: kind for kind in (Call, Failure, Scenario, Surroundings)}
     scenario = Scenario(
-        1, Surroundings(), "hold", (Call(0.0, "guest", "stop"), Harm(0.1, "push", "left_sweep", 0.2)), 1.0
+        1, Surroundings(), "hold", (Call(0.0, "guest", "stop"), Failure(0.1, "left_sweep.arm", "pushed", 0.2)), 1.0
     )
     assert eval(repr(scenario), names) == scenario

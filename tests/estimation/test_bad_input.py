@@ -15,7 +15,7 @@ from control.rate import PERIOD_S
 from control.records import BodyPose, Estimate, Phase, StrideEstimate
 from estimation.estimation_parameters import EstimationParameters, Method
 from estimation.joint_load import FlipperDrive
-from estimation.mud import MudEstimator, MudReading
+from estimation.mud import MudEstimator
 from estimation.recorded_states import recorded_states
 from estimation.strokes.depth_line import COEFFICIENTS_N_M3
 
@@ -82,10 +82,6 @@ def test_the_unaltered_walk_gives_every_coefficient(method: Method) -> None:
     assert_all_consistent(strides)
 
 
-def test_an_estimator_without_samples_knows_nothing() -> None:
-    assert MudReading() == MudReading((), ())
-
-
 @pytest.mark.parametrize("phase", Phase)
 def test_a_single_sample_closes_nothing(phase: Phase, method: Method) -> None:
     assert fed(new_estimator(method), [(0.0, phase, 0.1, -0.5, -5.0, -5.0)]) == []
@@ -98,14 +94,6 @@ def test_constant_samples_give_no_coefficient(current_a: float, method: Method) 
     assert_all_consistent(strides)
     for stride in strides:
         assert not any(each.valid and not each.at_least for each in (stride.k_p, stride.k_s, stride.k_e))
-
-
-def test_samples_of_nothing_but_nan_give_no_coefficient(method: Method) -> None:
-    strides = fed(new_estimator(method), [(t, phase, nan, nan, nan, nan) for t, phase, *_ in walk()])
-    assert len(strides) == STRIDES
-    assert_all_consistent(strides)
-    for stride in strides:
-        assert not (stride.k_p.valid or stride.k_s.valid or stride.k_e.valid)
 
 
 # one bad stroke in a good walk
@@ -242,12 +230,6 @@ def test_a_motor_at_its_limit_that_moved_the_mud_for_a_while_gives_its_strength(
 
 def test_a_walk_backward_in_time_is_survived(method: Method) -> None:
     assert_all_consistent(fed(new_estimator(method), walk()[::-1]))
-
-
-def test_strokes_reversed_under_a_running_clock_are_survived(method: Method) -> None:
-    rows = walk()
-    times = [row[0] for row in rows]
-    assert_all_consistent(fed(new_estimator(method), [(t, *row[1:]) for t, row in zip(times, rows[::-1], strict=True)]))
 
 
 def test_a_clock_that_stands_still_closes_nothing(method: Method) -> None:

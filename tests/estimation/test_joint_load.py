@@ -84,13 +84,6 @@ def test_friction_is_what_the_motor_spends_on_itself() -> None:
     assert (load.sweep_nm, load.adduction_nm) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
-def test_friction_of_one_joint_alone_counts() -> None:
-    friction, free = JointFriction(viscous_nm_s=0.004), FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A)
-    moving = sample(0.1, 2.0, 0.0, 1.0)
-    assert one(free._replace(sweep_friction=friction), moving, moving)[5:7] == pytest.approx((0.008, 0.0))
-    assert one(free._replace(adduction_friction=friction), moving, moving)[5:7] == pytest.approx((0.0, 0.008))
-
-
 def test_friction_of_an_unknown_velocity_leaves_cogging_alone() -> None:
     friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004, cogging_nm=0.01, cogging_per_turn=1)
     drive = FlipperDrive(WEIGHTLESS, SWEEP_NM_A, LIFT_NM_A, friction, friction)
@@ -115,10 +108,6 @@ def test_a_motor_at_its_limit_is_reported(sweep_a: float, lift_a: float, saturat
     assert SATURATION == 0.98
     limited = DRIVE._replace(current_limit_a=10.0)
     assert one(limited, sample(0.0, 0.0, sweep_a, 1.0), sample(0.0, 0.0, lift_a, 1.0)).saturated is saturated
-
-
-def test_a_drive_of_unknown_limit_never_saturates() -> None:
-    assert not one(DRIVE, sample(0.0, 0.0, 1e6, 1.0), sample(0.0, 0.0, 1e6, 1.0)).saturated
 
 
 # inertia
@@ -195,15 +184,6 @@ def test_a_joint_whose_message_is_late_does_not_lose_its_inertia() -> None:
     assert plain is not None
     assert late is not None
     assert late.adduction_nm == plain.adduction_nm != 0.0
-
-
-def test_the_pose_is_that_of_the_acceleration() -> None:
-    loads = JointLoads(GEOMETRY, DRIVE)
-    loads.update(sample(0.1, 1.0, 0.0, 1.0), sample(-0.2, 0.0, 0.0, 1.0))
-    load = loads.update(sample(0.2, 3.0, 0.0, 1.01), sample(-0.4, 0.0, 0.0, 1.01))
-    assert load is not None
-    assert (load.sweep_rad, load.adduction_rad) == pytest.approx((0.15, -0.3))
-    assert load.depth_m == pytest.approx(GEOMETRY.depth_m(0.15, -0.3))
 
 
 @given(angles, angles, st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), currents, currents)
@@ -336,11 +316,6 @@ def test_unknown_velocities_leave_inertia_out(before: float, after: float) -> No
         assert motion(sample(0.1, before, 2.0, 1.0), sample(0.3, after, 4.0, 1.01))[2] == 0.0
 
 
-def test_the_papers_motion_is_at_the_newest_sample() -> None:
-    motion = motion_at(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.01))
-    assert motion == pytest.approx((0.3, 3.0, 200.0, 4.0))
-
-
 def test_an_unknown_joint_does_not_invalidate_the_other_one() -> None:
     loads = JointLoads(GEOMETRY, DRIVE)
     loads.update(sample(0.0, nan, 0.0, 1.0), sample(0.0, 0.0, 0.0, 1.0))
@@ -373,16 +348,6 @@ def test_a_change_of_any_angle_or_current_is_new(index: int, field: str) -> None
     change: dict[str, Any] = {field: 0.5}
     pair[index] = pair[index]._replace(**change)
     assert loads.update(pair[0], pair[1]) is not None
-
-
-def test_repeats_between_two_samples_change_nothing() -> None:
-    first = (sample(0.1, 1.0, 2.0, 1.0), sample(0.2, 1.0, 2.0, 1.0))
-    second = (sample(0.12, 2.0, 3.0, 1.01), sample(0.21, 2.0, 3.0, 1.01))
-    plain, again = JointLoads(GEOMETRY, DRIVE), JointLoads(GEOMETRY, DRIVE)
-    plain.update(*first)
-    for _ in range(4):
-        again.update(*first)
-    assert again.update(*second) == plain.update(*second)
 
 
 def test_a_reset_forgets_the_sample_before() -> None:

@@ -6,7 +6,7 @@ tests; here each flipper must give what it would give alone.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import isfinite, nan, pi, sin
+from math import nan, pi, sin
 
 import pytest
 
@@ -119,20 +119,7 @@ def test_each_joint_has_its_own_torque_constant(method: Method) -> None:
     assert torques == pytest.approx([-0.05, -0.12, -0.21, -0.32])
 
 
-def test_without_any_sample_the_reading_is_empty() -> None:
-    reading = MudReading()
-    assert (reading.loads, reading.strides) == ((), ())
-    assert estimator().mud_estimate == NOTHING_KNOWN
-
-
 # the configured method
-
-
-def test_the_method_paper_gives_the_papers_estimators() -> None:
-    mud = MudEstimator(GEOMETRY, (DRIVE, DRIVE), EstimationParameters(method="paper"), 7.0)
-    for flipper, name in zip(mud.flippers, FLIPPERS, strict=True):
-        assert isinstance(flipper, PaperEstimator)
-        assert (flipper.flipper, flipper.drag_n) == (name, 0.0)
 
 
 def test_the_paper_adds_the_drag_only_if_configured() -> None:
@@ -179,14 +166,6 @@ def test_the_estimate_of_both_is_between_those_of_each() -> None:
     low, high = sorted((mud.mud_estimate.left.k_p.value, mud.mud_estimate.right.k_p.value))
     assert low <= mud.mud_estimate.k_p.value <= high
     assert mud.mud_estimate.k_p.std_error < mud.mud_estimate.left.k_p.std_error
-
-
-@pytest.mark.parametrize("method", ["default", "paper"])
-def test_the_papers_strides_are_remembered_like_ours(method: Method) -> None:
-    mud = estimator(method)
-    strides_of(mud, walk(1), walk(2))
-    assert mud.mud_estimate.left.k_p is not None
-    assert mud.mud_estimate.left.k_p.strides == STRIDES
 
 
 def test_the_map_contains_both_flippers_strides_at_the_body_position() -> None:
@@ -284,13 +263,3 @@ def test_unknown_ages_would_be_taken_for_mud(ages: tuple[Four, Four]) -> None:
 
 def test_a_current_that_is_younger_than_the_command_which_it_answers_needs_no_age() -> None:
     assert max(load_of_a_free_arm_nm(*CURRENTS_OLD, reported=False)) < 1e-9 * LARGEST_NM
-
-
-def test_ages_change_nothing_where_nothing_moves() -> None:
-    mud = estimator()
-    standing = ((0.1, 0.2, 0.3, 0.4), (0.0,) * 4, (1.0, 2.0, 3.0, 4.0))
-    fresh = mud.update(0.0, Phase.REST, recorded_states(0.0, *standing), BodyPose())
-    mud.reset()
-    old = mud.update(0.0, Phase.REST, recorded_states(0.0, *standing, (0.01,) * 4, (0.02,) * 4), BodyPose())
-    assert old == fresh
-    assert all(isfinite(value) for load in fresh.loads for value in load)

@@ -58,19 +58,6 @@ def test_strides_that_differ_by_more_than_their_errors_widen_it_by_their_scatter
     assert scatter > 3.0 * REPEATABILITY / 2.0
 
 
-def test_every_coefficient_has_its_own_field_in_the_row() -> None:
-    (row,) = mapped(stride(reported(1e6), NOT_REPORTED, reported(2e6))).rows()
-    assert row.k_s is None
-    assert row.k_p is not None and row.k_p.value == pytest.approx(1e6)
-    assert row.k_e is not None and row.k_e.value == pytest.approx(2e6)
-
-
-def test_both_flippers_of_a_stride_count() -> None:
-    mud_map = MudMap()
-    mud_map.update(0.01, [stride(k_s=reported(1e6)), stride(k_s=reported(1.1e6))])
-    assert only(mud_map).strides == 2
-
-
 def test_pieces_are_five_centimetres_long_and_known_in_the_order_of_positions() -> None:
     mud_map = MudMap()
     for position_m in (0.12, -0.01, 0.04, 0.06, 0.001, 0.0999):
@@ -135,12 +122,6 @@ def test_a_long_walk_drops_the_pieces_that_were_visited_longest_ago() -> None:
         mud_map.update((number + 0.5) * PIECE_M, [stride(k_s=reported(1e6))])
     pieces = [round(row.position_m / PIECE_M - 0.5) for row in mud_map.rows()]
     assert pieces == [0, *range(4, MOST_PIECES + 3)]
-
-
-def test_reset_empties_the_map() -> None:
-    mud_map = mapped(stride(k_s=reported(1e6)))
-    mud_map.reset()
-    assert mud_map.rows() == ()
 
 
 numbers = st.floats() | st.floats(1e4, 1e8)

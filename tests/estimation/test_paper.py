@@ -13,13 +13,11 @@ import numpy as np
 import pytest
 
 from control.gait.gait import SINGLE_FLIPPER, Gait, stride_duration_s
-from control.gait.recovery import OUT_M, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.parameters.arm_mass import ArmMass
 from control.parameters.gait_parameters import GaitParameters
 from control.rate import PERIOD_S
 from control.records import (
-    NO_LOAD,
     BodyPose,
     DriveState,
     FlipperJoints,
@@ -27,7 +25,6 @@ from control.records import (
     Joints,
     Phase,
     StrideEstimate,
-    same_for_all,
 )
 from estimation.estimation_parameters import EstimationParameters
 from estimation.joint_load import FlipperDrive
@@ -188,18 +185,6 @@ def test_the_law_is_found_through_the_pauses_of_the_single_flipper_protocol() ->
     assert_found(one(triggered(motion(gait=SINGLE_FLIPPER), MUD)), MUD)
 
 
-def test_each_stride_of_a_walk_gives_the_same_law() -> None:
-    single = motion()
-    period_s = single[-1].now_s
-    samples = [
-        sample._replace(now_s=sample.now_s + turn * period_s) for turn in range(3) for sample in triggered(single, MUD)
-    ]
-    strides = closed(samples)
-    assert [stride.index for stride in strides] == [0, 1, 2]
-    for stride in strides:
-        assert_found(stride, MUD)
-
-
 def test_the_load_is_the_force_that_the_mud_exerts() -> None:
     law, flipper = law_of(MUD), estimator()
     for sample in loaded(motion(), law):
@@ -278,15 +263,6 @@ def test_the_bias_of_each_coefficient_is_that_of_the_late_surface(slope_n_m: flo
     assert stride.k_s.value / mud.k_s == pytest.approx((0.03 / (0.03 - late_m)) ** 2)
 
 
-def test_firmer_mud_is_biased_less() -> None:
-    biases = []
-    for slope_n_m in (50.0, 100.0, 160.0, 300.0):
-        mud = Mud(k_p=slope_n_m / EDGE_M2, surface_m=0.0)
-        biases.append(one(loaded(motion(), law_of(mud))).k_p.value / mud.k_p - 1.0)
-    assert biases == sorted(biases, reverse=True)
-    assert biases[-1] > 0.0
-
-
 # noise, duplicates, gaps
 
 
@@ -326,24 +302,12 @@ def test_a_sample_that_is_read_again_counts_once(times: int, mass: ArmMass) -> N
     assert repr(one(repeated, estimator(mass))) == repr(one(samples, estimator(mass)))
 
 
-def test_a_sample_that_is_read_again_shows_the_same_load() -> None:
-    flipper = estimator()
-    for sample in loaded(motion(), law_of(MUD)):
-        load, _ = feed(flipper, sample)
-        assert feed(flipper, sample) == (load, None)
-
-
 @pytest.mark.parametrize("field", ["sweep_rad", "adduction_rad", "sweep_current_a", "adduction_current_a"])
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
 def test_samples_that_are_not_finite_are_skipped(field: str, bad: float) -> None:
     samples, change = triggered(motion(), MUD), cast(dict[str, Any], {field: bad})
     between = [each for sample in samples for each in (sample, sample._replace(**change))]
     assert repr(one(between)) == repr(one(samples))
-
-
-def test_a_sample_that_is_not_finite_has_no_load() -> None:
-    lost = motion()[0]._replace(sweep_current_a=nan)
-    assert feed(estimator(), lost) == (NO_LOAD, None)
 
 
 def test_the_law_is_found_from_every_other_sample() -> None:
@@ -405,33 +369,7 @@ def test_no_drag_is_added_where_the_body_does_not_advance(speed_m_s: float) -> N
     assert reported.k_s == one(samples).k_s
 
 
-def test_without_compensation_no_drag_is_added() -> None:
-    samples = triggered(motion(), MUD)
-    assert one(advancing(samples, 0.2)).k_s == one(samples).k_s
-
-
 # when a stride closes, and what it reports
-
-
-@pytest.mark.parametrize("last", [Phase.INSERTION, Phase.STANCE])
-def test_a_stroke_cut_short_does_not_close(last: Phase) -> None:
-    samples = triggered(motion(), MUD)
-    begun = [sample for sample in samples if sample.phase <= last][:-10]
-    stop = begun[-1]._replace(now_s=begun[-1].now_s + PERIOD_S, phase=Phase.REST)
-    flipper = estimator()
-    assert closed([*begun, stop], flipper) == []
-    assert repr(one(samples, flipper)) == repr(one(samples))
-
-
-def test_an_extraction_cut_short_does_not_close() -> None:
-    samples = triggered(motion(), MUD)
-    begun = [sample for sample in samples if sample.phase <= Phase.EXTRACTION][:-20]
-    stop = begun[-1]._replace(now_s=begun[-1].now_s + PERIOD_S, phase=Phase.REST)
-    assert closed([*begun, stop]) == []
-
-
-def test_a_stride_without_stance_does_not_close() -> None:
-    assert closed(sample for sample in triggered(motion(), MUD) if sample.phase is not Phase.STANCE) == []
 
 
 def test_without_contact_nothing_is_valid_and_every_reason_is_given() -> None:
@@ -444,53 +382,6 @@ def test_without_contact_nothing_is_valid_and_every_reason_is_given() -> None:
     assert stride.released
 
 
-def test_a_flipper_that_comes_up_is_released() -> None:
-    assert one(triggered(motion(), MUD)).released
-
-
-def test_a_flipper_that_stays_down_is_not_released() -> None:
-    samples = triggered(motion(), MUD)
-    bottom = GEOMETRY.adduction_rad(radians(-30.0), 0.03)
-    stuck = [
-        sample._replace(adduction_rad=bottom) if sample.phase is Phase.EXTRACTION else sample for sample in samples
-    ]
-    stride = one(noisy(waiting(stuck), 5, 0.01))
-    assert not stride.released
-    assert stride.k_p.valid
-    assert not stride.k_e.valid
-
-
-@pytest.mark.parametrize(("below_m", "released"), [(1e-6, False), (-1e-6, True)])
-def test_a_flipper_is_released_from_where_its_lowest_corner_counts_as_out(below_m: float, released: bool) -> None:
-    held = waiting(held_at(triggered(motion(), MUD), OUT_M + below_m))
-    assert one(held).released is released
-    assert one(held).surface_m > 0.002  # the height at which the mud was found does not count
-
-
-def test_a_flipper_that_comes_out_at_the_last_moment_is_released() -> None:
-    """Only the last sample before the swing shows it."""
-    samples = held_at(triggered(motion(), MUD), 0.01)
-    assert not one(waiting(samples)).released
-    *_, last = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
-    samples[last] = samples[last]._replace(adduction_rad=0.0)
-    assert one(samples).released
-
-
-def test_a_recovered_flipper_was_not_released_and_the_other_was() -> None:
-    samples = triggered(motion(), MUD)
-    for lowest_depth_m, released in ((0.02, False), (-0.01, True)):
-        (stride,) = closed(recovered(held_at(samples, lowest_depth_m)))
-        assert stride.released is released
-
-
-def test_a_recovery_changes_no_estimate() -> None:
-    samples = held_at(triggered(motion(), MUD), 0.01)
-    stride, longer = one(waiting(samples)), one(recovered(samples))
-    assert longer.k_e == stride.k_e
-    assert longer.extraction_s == pytest.approx(stride.extraction_s)
-    assert longer.extraction_force_n == stride.extraction_force_n
-
-
 def waiting(samples: Sequence[Sample]) -> list[Sample]:
     """Let the flipper stay where its extraction ended, for longer than the time that it has to come out."""
     *_, end = (i for i, sample in enumerate(samples) if sample.phase is Phase.EXTRACTION)
@@ -499,20 +390,6 @@ def waiting(samples: Sequence[Sample]) -> list[Sample]:
         held._replace(now_s=sample.now_s, phase=sample.phase) if i > end and sample.now_s < out_s else sample
         for i, sample in enumerate(samples)
     ]
-
-
-def held_at(samples: Sequence[Sample], lowest_depth_m: float) -> list[Sample]:
-    """Keep the plate's lowest corner from rising above that depth in extraction."""
-
-    def held(sample: Sample) -> Sample:
-        low_rad, high_rad = -1.0, 0.3
-        for _ in range(60):
-            middle_rad = (low_rad + high_rad) / 2.0
-            deeper = lowest_point_m(GEOMETRY, sample.sweep_rad, middle_rad) > lowest_depth_m
-            low_rad, high_rad = (middle_rad, high_rad) if deeper else (low_rad, middle_rad)
-        return sample._replace(adduction_rad=min(sample.adduction_rad, low_rad))
-
-    return [held(sample) if sample.phase is Phase.EXTRACTION else sample for sample in samples]
 
 
 def recovered(samples: Sequence[Sample]) -> list[Sample]:
@@ -530,22 +407,6 @@ def recovered(samples: Sequence[Sample]) -> list[Sample]:
     ]
     after = [sample._replace(now_s=sample.now_s + 1.0) for sample in samples[swing:]]
     return [*samples[:swing], *freed, *after]
-
-
-def test_the_step_is_the_bodys_advance_from_close_to_close() -> None:
-    samples = triggered(motion(strides=3), MUD)
-    moving = [sample._replace(body_x_m=7.0 + 0.05 * sample.now_s) for sample in samples]
-    strides = closed(moving)
-    assert len(strides) == 3
-    first, *later = strides
-    assert first.step_m == pytest.approx(0.05 * (first.t_end_s - moving[0].now_s))
-    for before, after in zip(strides, later, strict=False):
-        assert after.step_m == pytest.approx(0.05 * (after.t_end_s - before.t_end_s))
-
-
-def test_without_a_pose_the_step_is_not_a_number() -> None:
-    lost = [sample._replace(body_x_m=nan) for sample in triggered(motion(), MUD)]
-    assert not isfinite(one(lost).step_m)
 
 
 def test_a_pose_lost_where_a_stride_closes_leaves_two_steps_unknown() -> None:
@@ -567,21 +428,6 @@ def test_a_reset_forgets_the_stride_under_way_and_the_count() -> None:
     assert repr(closed(moving, flipper)) == repr(closed(moving))
 
 
-def test_a_reset_forgets_the_velocities_before_it() -> None:
-    moving = motion()[30]
-    flipper = estimator(HEAVY)
-    feed(flipper, moving._replace(now_s=0.0, adduction_velocity_rad_s=-5.0))
-    flipper.reset()
-    assert feed(flipper, moving) == feed(estimator(HEAVY), moving)
-
-
-def test_the_same_samples_give_the_same_bits() -> None:
-    samples = [sample._replace(body_x_m=0.0) for sample in noisy(triggered(motion(strides=3), MUD), 3, 0.1)]
-    first, again = closed(samples), closed(samples)
-    assert len(first) == 3
-    assert repr(first) == repr(again)
-
-
 # both flippers
 
 
@@ -597,28 +443,3 @@ def both(left: list[Sample], right: list[Sample]) -> list[StrideEstimate]:
         )
         strides += reading.strides
     return strides
-
-
-def test_each_flipper_finds_its_own_mud() -> None:
-    other = Mud(0.5e6, 0.2e6, 1.5e6, 0.001)
-    left, right = both(triggered(motion(), MUD), triggered(motion(), other))
-    assert (left.flipper, right.flipper) == ("left", "right")
-    assert_found(left, MUD)
-    assert_found(right, other)
-
-
-def test_a_silent_flipper_does_not_disturb_the_other_one() -> None:
-    samples = triggered(motion(), MUD)
-    lost = [sample._replace(sweep_rad=nan, adduction_current_a=nan) for sample in samples]
-    assert repr(both(samples, lost)[0]) == repr(both(samples, samples)[0])
-    assert repr(both(lost, samples)[1]) == repr(both(samples, samples)[1])
-
-
-def test_each_joint_has_its_own_torque_constant() -> None:
-    constants = (0.05, 0.06, 0.07, 0.08)
-    drives = (FlipperDrive(WEIGHTLESS, *constants[:2]), FlipperDrive(WEIGHTLESS, *constants[2:]))
-    mud = MudEstimator(GEOMETRY, drives, EstimationParameters(method="paper"))
-    states = same_for_all(DriveState(angle_rad=0.0, velocity_rad_s=0.0, current_a=1.0))
-    reading = mud.update(0.0, Phase.REST, states, BodyPose())
-    torques = [getattr(load, name) for load in reading.loads for name in ("sweep_torque_nm", "adduction_torque_nm")]
-    assert torques == [-constant for constant in constants]

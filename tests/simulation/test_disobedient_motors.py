@@ -1,7 +1,7 @@
 """A motor that does not obey damping, or a pose held too stiffly, ends in a fault soon; a gentle push does not.
 
 Without the monitors of the motion an inverted motor received 20 J and reached 97 rad/s. The fault matrix
-(tests/experiments/faults) has a disobedient motor in every phase of a stride.
+(verification/faults) has a disobedient motor in every phase of a stride.
 """
 
 from dataclasses import replace
@@ -12,8 +12,7 @@ import pytest
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from simulation.harness.joint_energy import JointEnergy
-from verification.faults.bench import FaultBench
-from verification.faults.injectors import damped_against_command, drive_with
+from verification.faults.failing_robot import FaultBench
 from verification.faults.phases import bench_for, enter_phase
 
 
@@ -30,18 +29,11 @@ def energy_of(bench: FaultBench) -> JointEnergy:
 
 def test_damping_with_an_inverted_motor_ends_before_the_joint_is_fast() -> None:
     bench = made("swing")
-    with drive_with(commutation_error_deg=180.0)(bench, "left_adduction"):
+    with bench.drive_changed("left_adduction", commutation_error_deg=180.0):
         energy = energy_of(bench)
         bench.fail("left_sweep.position", "off", 0.01)  # another fault causes damping
         assert bench.run_until(lambda: bench.loop.mode is Mode.FAULT, 1.0)
     assert energy.peak_speed_rad_s < 30.0 and energy.energy_j < 0.3
-
-
-def test_damping_ends_if_a_current_opposes_it() -> None:
-    bench = made("hold")
-    with damped_against_command(bench, "left_sweep"):
-        assert bench.run_until(lambda: "damping_failed" in {fault.name for fault in bench.loop.faults.present}, 0.2)
-        assert bench.loop.mode is Mode.FAULT
 
 
 @pytest.mark.parametrize("stiffness_nm_rad", [50.0, 200.0])

@@ -1,6 +1,6 @@
 """Stones, ridges, layers and random strength of the ground act on the robot's arms and body."""
 
-from math import cos, pi, radians, sin
+from math import cos, pi, sin
 from random import Random
 
 import pytest
@@ -19,7 +19,7 @@ from simulation.mud.layer import Layer
 from simulation.mud.rigid_plate import lowest_point_m
 from simulation.mud.stones import Stone
 from simulation.mud.track import LEVEL, Track
-from simulation.mud.unevenness import RandomStrength, Ridges
+from simulation.mud.unevenness import Ridges
 from tests.control.synthetic_states import NO_TORQUE
 
 
@@ -88,19 +88,6 @@ def test_a_stone_acts_in_addition_to_the_mud_and_only_at_its_position() -> None:
     assert force([stone], 0.55, 0.0) == pytest.approx([a + b for a, b in zip(without, of_stone, strict=True)])
 
 
-def test_a_reset_arm_has_met_no_stone() -> None:
-    """Otherwise the flank that it met before the reset would push it."""
-    plant = Plant(PlantParameters(), Track([(9.0, MUDS["48.5"])], [Stone(-0.005, 9.0, 0.0)]))
-    arm = plant.arms[0]
-    arm.sweep_rad, arm.adduction_rad = -0.04, -0.4
-    plant.step(STEP_S, NO_TORQUE)
-    assert arm.force.thrust_n < -1.0
-    arm.reset()
-    arm.adduction_rad -= 0.002
-    arm.step(STEP_S, 0.0, 0.0, 0.0, 0.0)
-    assert arm.force.thrust_n == pytest.approx(0.0, abs=0.1) and arm.force.upward_n > 0.0
-
-
 def test_ridges_lift_the_mud_under_each_flipper_by_its_own_position_on_top_of_its_own_unevenness() -> None:
     """The flippers are a quarter of a ridge to the front and the rear."""
     disturbed = PlantParameters(disturbances=Disturbances(surface_sd_m=0.001))
@@ -130,14 +117,6 @@ def test_a_flipper_comes_to_rest_as_far_below_a_crest_as_below_a_trough() -> Non
         depths_m.append(depth_m(press(plant, -0.2).arms[0]) + crest_m)
     assert 0.01 < depths_m[0] < 0.013
     assert depths_m[0] == pytest.approx(depths_m[1], abs=0.001)
-
-
-def test_random_strength_is_that_at_the_flipper_s_own_position() -> None:
-    track = Track([(9.0, MUDS["48.5"])], random_strength=RandomStrength(0.3, 0.05, 7))
-    plant = Plant(PlantParameters(), track)
-    plant.arms[0].sweep_rad = radians(30.0)
-    plant.step(STEP_S, NO_TORQUE)
-    assert plant.arms[0].clay == track.clay_at(0.12 * sin(radians(30.0))) != plant.arms[1].clay == track.clay_at(0.0)
 
 
 def test_a_crust_carries_an_arm_that_sinks_without_it() -> None:

@@ -36,16 +36,6 @@ def lockstep(sound: Lockstep) -> Lockstep:
     return copy_of(sound)
 
 
-def test_the_same_failure_is_the_same_to_the_last_bit(sound: Lockstep) -> None:
-    walks = []
-    for lockstep in (copy_of(sound), copy_of(sound)):
-        lockstep.fail("left_sweep", "intermittent", 0.3)
-        lockstep.fail("right_sweep.current", "garbage", 0.3)
-        lockstep.run_for(0.5)
-        walks.append(repr((lockstep.loop.states, lockstep.robot.plant.body_m)))
-    assert walks[0] == walks[1]
-
-
 def test_begin_and_end_stand_in_the_log(configuration: Configuration) -> None:
     recorder = EventRecorder()
     lockstep = Lockstep(configuration, TRACK, recorder=recorder, failures=Failures(configuration.bus))

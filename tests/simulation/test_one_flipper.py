@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from command_line.init.new_file import NewRobot, new_file
 from command_line.live.page_server import robot_facts
 from command_line.watch.history import History
 from command_line.watch.mud_panel import coefficient_lines, force_lines
@@ -85,10 +84,10 @@ def test_its_log_names_its_joints_and_replays_to_the_last_digit_with_its_own_rig
         replay_log(Path("log"), log, simulated_configuration(FIXED))
 
 
-def test_the_definition_of_the_rows_names_the_flippers() -> None:
+def test_the_metadata_of_the_rows_names_the_flippers() -> None:
     for rig in (Rig(), RIGHT, Rig(("left",))):
-        assert rig_of(tick_kind(rig).definition) == rig
-    assert tick_kind(Rig()) is TICK
+        assert rig_of(tick_kind(rig).metadata) == rig
+    assert rig_of({}) == Rig() and tick_kind(Rig()) is TICK
 
 
 def test_one_flipper_moves_a_body_on_a_rail() -> None:
@@ -97,12 +96,6 @@ def test_one_flipper_moves_a_body_on_a_rail() -> None:
     lockstep = Lockstep(configuration, TRACK, plant=plant)
     walk(lockstep, depth_m=0.04)
     assert lockstep.robot.plant.body_m > 0.05
-
-
-def test_two_moteus_walk_with_the_file_that_init_writes() -> None:
-    """Their answers are a tick old: without advanced velocities this walk ended in joint_velocity."""
-    written = parse_configuration(new_file(NewRobot(rig=RIGHT, drive_type="moteus")))
-    assert len(walk(Lockstep(written, TRACK))) == STRIDES
 
 
 def test_viewers_show_the_flippers_that_there_are(walked: Walked, tmp_path: Path) -> None:

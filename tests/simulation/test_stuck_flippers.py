@@ -122,14 +122,6 @@ def test_in_stiff_mud_it_frees_itself_and_a_replay_gives_the_same_strides_to_the
     assert repr(replay_files([path]).strides) == repr(live)
 
 
-def test_one_flipper_alone_is_named_and_its_stride_alone_was_not_released(configuration: Configuration) -> None:
-    robot, recorder = walking(configuration, 2.6, 0.05)
-    robot.robot.plant.arms[1].track = mud(6.0)
-    assert until_phase(robot, Phase.SWING)
-    assert "right flipper" in recorder.about("stuck")[0]
-    assert released(robot) == {"left": True, "right": False}
-
-
 def test_mud_that_never_releases_a_flipper_ends_in_a_fault_without_torque_in_bounded_time(recovering: Lockstep) -> None:
     robot, recorder = recovering, recovering.loop.recorder
     assert isinstance(recorder, EventRecorder)

@@ -86,7 +86,7 @@ def test_a_figure_drifts_beyond_its_tolerance(tolerance: str, within: float, out
         ("{a/list/0/y:.0%} % of {a/x}", "97 % of 2.0"),
         ("{a/none:.1f}", "–"),
         ("{a/list/*/z}", "7"),
-        ("\n\n| {a/x} |\n\n", "\n\n| 2.0 |\n\n"),
+        ("\n\n{for 0; 1} | $ | {a/list/$/y:.0%} |\n\n", "\n\n| 0 | 97 |\n| 1 | 5 |\n\n"),
     ],
 )
 def test_a_template_is_filled(template: str, text: str) -> None:

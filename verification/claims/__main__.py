@@ -174,7 +174,7 @@ def drifted(claim: Claim, old: Mapping[str, Figure], new: Mapping[str, Figure]) 
 def _write(claim: Claim, measured: Measured, figures: dict[str, Figure], root: Path) -> None:
     record = measured.output.get("provenance") or provenance("verification.claims.__main__")
     for picture, written in claim.pictures.items():
-        shutil.copyfile(measured.folder / written, root / "docs" / picture)
+        shutil.copyfile(next(measured.folder.glob(written)), root / "docs" / picture)
     write_result(
         result_path(claim.name, root),
         {"command": claim.command}

@@ -5,8 +5,9 @@ A figure in a page stands behind its template, which Markdown does not show:
     <!--= {trackway/table/3 cm/48.5/mean:.2f} cm/s -->7.45 cm/s<!--/-->
 
 A field in braces is the name of a result, the path of its figure, and a format of Python's. With % the figure is
-multiplied by 100; the sign is left to the template. A pattern that matches several figures gives their range, "2 to 4".
-A template over several lines is a block, such as a whole table.
+multiplied by 100, with M divided by a million; the unit is left to the template. A pattern of several figures gives
+their range, "2 to 4". A template over several lines is a block, such as a whole table. Its line
+`{for 3 cm; 5 cm} | $ | {trackway/table/$/48.5/mean:.2f} |` stands for a line for each of these names, in place of $.
 """
 
 import re
@@ -17,6 +18,8 @@ from verification.claims.results import ROOT, Figure, Result, matches
 
 MARKED = re.compile(r"<!--=(?P<template>.*?)-->(?P<text>.*?)<!--/-->", re.DOTALL)
 FIELD = re.compile(r"\{(?P<name>[^{}/]+)/(?P<pattern>[^{}]+?)(?::(?P<format>[^:{}]*))?\}")
+ROWS = re.compile(r"^\{for (?P<names>[^{}]+)\} *(?P<row>.*)$", re.MULTILINE)
+SCALES = {"%": 100.0, "M": 1e-6}  # by the last letter of a format
 UNKNOWN = "–"
 
 
@@ -31,10 +34,19 @@ def fill(text: str, results: Mapping[str, Result], *, markers: bool = True) -> s
 
     def replace(marked: re.Match[str]) -> str:
         template = marked["template"]
-        filled = FIELD.sub(lambda field: _value(field, results), template.strip(" "))
+        filled = FIELD.sub(lambda field: _value(field, results), _with_rows(template))
         return f"<!--={template}-->{filled}<!--/-->" if markers else filled
 
     return MARKED.sub(replace, text)
+
+
+def _with_rows(template: str) -> str:
+    """Return a template without the spaces around it, with a line for each name of a line that begins with `{for`."""
+
+    def repeat(line: re.Match[str]) -> str:
+        return "\n".join(line["row"].replace("$", name.strip()) for name in line["names"].split(";"))
+
+    return ROWS.sub(repeat, template.strip(" "))
 
 
 def _value(field: re.Match[str], results: Mapping[str, Result]) -> str:
@@ -51,8 +63,8 @@ def _value(field: re.Match[str], results: Mapping[str, Result]) -> str:
 def _text(figure: Figure, form: str) -> str:
     if figure is None:
         return UNKNOWN
-    if form.endswith("%") and isinstance(figure, int | float):
-        return format(100.0 * figure, form[:-1] + "f")
+    if form[-1:] in SCALES and isinstance(figure, int | float):
+        return format(SCALES[form[-1]] * figure, form[:-1] + "f")
     return format(figure, form)
 
 
@@ -64,7 +76,7 @@ def pages_of(name: str, path: str, root: Path = ROOT) -> list[str]:
         if any(
             field["name"] == name and matches(path, field["pattern"])
             for marked in MARKED.finditer(page.read_text(encoding="utf-8"))
-            for field in FIELD.finditer(marked["template"])
+            for field in FIELD.finditer(_with_rows(marked["template"]))
         )
     ]
 

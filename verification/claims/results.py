@@ -33,7 +33,7 @@ class Claim(NamedTuple):
     command: str  # as a reader types it; it writes files to its working folder, and LOGS is a folder of measured logs
     figures: Mapping[str, str]  # tolerance by pattern of path
     quick: bool = False
-    pictures: Mapping[str, str] = {}  # written file, by the picture of the documentation
+    pictures: Mapping[str, str] = {}  # pattern of the written file, by the picture of the documentation
 
 
 class Result(NamedTuple):

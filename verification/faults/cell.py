@@ -14,10 +14,11 @@ from control.modes import ENERGISED, Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.rate import PERIOD_S
 from drivers.drive_types import DEFAULT
-from verification.faults.bench import FaultBench
+from drivers.fault_injection.failure_table import REPORTED_S, FailureMode
 from verification.faults.energy_bounds import DELAY_TICKS, SLEWING_TICKS, WATCHDOG_TICKS
 from verification.faults.evaluation import LONGEST_STOP_S, Cell, problems
-from verification.faults.failure_modes import REPORTED_S, FailureMode
+from verification.faults.failing_robot import FaultBench
+from verification.faults.injection import inject
 from verification.faults.motor_energy import MotorEnergy
 from verification.faults.phases import bench_for, enter_phase
 from verification.faults.protocol_differences import mode_of
@@ -36,7 +37,15 @@ def run_cell(name: str, phase: str, seed: int, drive: str = DEFAULT) -> Cell:
     """Run one cell, which depends on nothing but its arguments; `drive` is the type of the robot's drives."""
     mode, random = mode_of(name, drive), Random(f"{name} {phase} {seed}")
     joint = random.choice(mode.joints(phase))
-    cell = Cell(mode.fault, name, phase, seed, joint, _reaction_text(mode), _bound_ticks(mode))
+    cell = Cell(
+        fault=mode.fault,
+        mode_name=name,
+        phase=phase,
+        seed=seed,
+        joint=joint,
+        reaction=_reaction_text(mode),
+        bound_ticks=_bound_ticks(mode),
+    )
     try:
         _inject_and_measure(mode, cell, random, drive)
     except Exception as problem:  # noqa: BLE001 - an escaped exception is a result of the cell
@@ -50,24 +59,24 @@ def run_cell(name: str, phase: str, seed: int, drive: str = DEFAULT) -> Cell:
 def _inject_and_measure(mode: FailureMode, cell: Cell, random: Random, drive: str) -> None:
     bench = bench_for(cell.phase, random, hopeless=mode.fault == "flipper_stuck", drive=drive)
     enter_phase(bench, cell.phase, random)
-    with mode.inject(bench, cell.joint):
+    with inject(bench, mode, cell.joint):
         measurement = Measurement(bench, mode, cell)
         measurement.run(mode.lasts_s, until_reported=mode.lasts_s == REPORTED_S)
     measurement.run_on()
 
 
 def _reaction_text(mode: FailureMode) -> str:
-    if mode.kind and not mode.waived:
-        return mode.kind.reaction.name.lower()
+    if mode.fault_kind and not mode.waived:
+        return mode.fault_kind.reaction.name.lower()
     return "drives_idle" if mode.ends_loop else "none"
 
 
 def _bound_ticks(mode: FailureMode) -> int | None:
-    if mode.kind and not mode.waived:
-        return mode.bound_ticks or mode.kind.bound_ticks
+    if mode.fault_kind and not mode.waived:
+        return mode.bound_ticks or mode.fault_kind.bound_ticks
     if not mode.ends_loop:
         return None
-    return BUG_BOUND_TICKS if mode.ends_daemon else WATCHDOG_TICKS
+    return BUG_BOUND_TICKS if mode.raises else WATCHDOG_TICKS
 
 
 class Measurement:
@@ -75,7 +84,8 @@ class Measurement:
 
     def __init__(self, bench: FaultBench, mode: FailureMode, cell: Cell) -> None:
         self._bench = bench
-        self._failure_mode = mode
+        self._failure = mode
+        self._kind = mode.fault_kind
         self._cell = cell
         self._steps = 0
         self._first_tick = bench.loop_ticks
@@ -92,7 +102,7 @@ class Measurement:
         self._energy = MotorEnergy(bench, mode)
 
     def run(self, duration_s: float, until_reported: bool = False) -> None:
-        most_ticks = self._failure_mode.kind.bound_ticks * 2 + 10 if until_reported and self._failure_mode.kind else 0
+        most_ticks = self._failure.fault_kind.bound_ticks * 2 + 10 if until_reported and self._failure.fault_kind else 0
         for _ in range(most_ticks or round(duration_s / PERIOD_S)):
             self._step()
             if until_reported and self._cell.reported_ticks is not None:
@@ -101,7 +111,7 @@ class Measurement:
     def run_on(self) -> None:
         """Measure until the robot is at rest, and for a while longer."""
         self._restarted = False
-        kind, loop = self._failure_mode.kind, self._bench.loop
+        kind, loop = self._kind, self._bench.loop
         longest = round((LONGEST_STOP_S + 1.0) / PERIOD_S) if kind and kind.reaction >= Reaction.SOFT_STOP else 0
         for _ in range(longest):
             if loop.mode not in ENERGISED:
@@ -112,10 +122,9 @@ class Measurement:
 
     @property
     def _walks_on(self) -> bool:
-        kind = self._failure_mode.kind
-        if kind is None:
-            return not self._failure_mode.ends_loop
-        return kind.reaction < Reaction.HOLD and self._cell.phase != "idle"
+        if self._kind is None:
+            return not self._failure.ends_loop
+        return self._kind.reaction < Reaction.HOLD and self._cell.phase != "idle"
 
     def _step(self) -> None:
         self._bench.step()
@@ -130,7 +139,7 @@ class Measurement:
         return self._bench.loop_ticks - self._first_tick
 
     def _measure_loop(self) -> None:
-        cell, mode, kind = self._cell, self._bench.loop.mode, self._failure_mode.kind
+        cell, mode, kind = self._cell, self._bench.loop.mode, self._kind
         if kind is not None:
             self._measure_report(kind)
             if cell.reaction_ticks is None and self._has_reacted(kind, mode):
@@ -154,7 +163,7 @@ class Measurement:
         if self._cell.reported_ticks is not None:
             return
         loop = self._bench.loop
-        if any(fault.name in self._failure_mode.names for fault in loop.faults.present):
+        if any(fault.name in self._failure.names for fault in loop.faults.present):
             self._cell.reported_ticks = self._ticks
             refusing = self._cell.phase == "idle" and _blocks_arming(kind)
             forced = self._bench.forced and kind.blocks is not Blocks.UNLESS_FORCED
@@ -201,8 +210,10 @@ class Measurement:
     @property
     def _rearmed(self) -> bool:
         """Return whether a drive is in closed loop for longer than the loop needs to see it and stop it."""
-        mode = self._failure_mode
-        lost_steps = round(mode.lasts_s / PERIOD_S) if mode.loses_commands else 0  # in which it may hear no command
+        mode = self._failure
+        lost_steps = (
+            round(mode.lasts_s / PERIOD_S) if mode.loses_commands and not mode.demands_reaction else 0
+        )  # in which it may hear no command
         if self._disarmed_steps <= FORBIDDEN_TICKS or self._steps <= lost_steps + FORBIDDEN_TICKS:
             return False
         if mode.fault == "drive_energised":  # that is the injected failure
@@ -211,7 +222,7 @@ class Measurement:
 
     @property
     def _longest_off_ticks(self) -> int:
-        unreachable = self._failure_mode.no_commands or self._bench.dead and not self._bench.bug
+        unreachable = self._failure.loses_commands or self._bench.dead and not self._bench.bug
         return WATCHDOG_TICKS if unreachable else DELAY_TICKS
 
     def _measure_damping(self, torque_nm: float) -> None:
@@ -232,7 +243,7 @@ class Measurement:
         self._energy.record(cell)
         if not self._walks_on:
             cell.travel_rad = self._travel_rad
-        if self._failure_mode.ends_loop:
+        if self._failure.ends_loop:
             cell.reaction_ticks = cell.zero_torque_ticks
 
 

@@ -6,8 +6,8 @@ from itertools import chain
 
 from control.controller import DAMPING_NM, DAMPING_S, SOFT_STOP_S
 from control.faults import Blocks, FaultKind, Reaction
+from drivers.fault_injection.failure_table import CONSEQUENCES, FailureMode
 from experiments.reports.counted_nouns import counted
-from verification.faults.failure_modes import CONSEQUENCES, FailureMode
 
 LONGEST_STOP_S = max(SOFT_STOP_S, DAMPING_S) + 0.2
 GOING_ON = ("arming", "hold", "walking", "stopping")
@@ -53,30 +53,30 @@ def problems(cell: Cell, mode: FailureMode) -> Iterator[str]:
         if cell.reported:
             yield f"without a failure it reported {', '.join(cell.reported)}"
         return
-    if mode.waived or not mode.demands_reaction:
+    if not mode.demands_reaction:
         return
     yield from _late(cell)
     expected = {*mode.names, *mode.also, *chain.from_iterable(CONSEQUENCES.get(name, ()) for name in mode.names)}
     others = set(cell.reported) - expected.union(cell.true_too)
     if others:
         yield f"it also reported {', '.join(sorted(others))}"
-    if mode.kind is None or mode.kind.reaction >= Reaction.SOFT_STOP:
+    if mode.fault_kind is None or mode.fault_kind.reaction >= Reaction.SOFT_STOP:
         yield from _not_stopped(cell)
-    elif mode.kind.reaction <= Reaction.WARN and cell.phase != "idle" and not _goes_on(cell, mode.kind):
+    elif mode.fault_kind.reaction <= Reaction.WARN and cell.phase != "idle" and not _goes_on(cell, mode.fault_kind):
         yield f"a warning ended in mode {cell.mode}"
-    if mode.kind and not set(mode.names) & set(cell.reported):
+    if mode.fault_kind and not set(mode.names) & set(cell.reported):
         yield "the log has no event of the fault"
 
 
 def _always_wrong(cell: Cell, mode: FailureMode) -> Iterator[str]:
     """Describe deviations that are wrong with every fault."""
-    if mode.ends_daemon and not cell.exception:
+    if mode.raises and not cell.exception:
         yield "the injected bug did not occur"
-    if cell.exception and not mode.ends_daemon:
+    if cell.exception and not mode.raises:
         yield f"an exception escaped: {cell.exception}"
     if not cell.disarmed:
         yield "torque or closed loop came back by itself"
-    if cell.rows_lost > (1 if mode.ends_daemon else 0) and not mode.loses_rows:
+    if cell.rows_lost > (1 if mode.raises else 0) and not mode.loses_rows:
         yield f"{counted(cell.rows_lost, 'row')} missing in the log"
     yield from _out_of_bounds(cell)
     if cell.damping_torque_nm > DAMPING_NM + 1e-6:

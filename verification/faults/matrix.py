@@ -11,16 +11,15 @@ from functools import partial
 from typing import NamedTuple
 
 from drivers.drive_types import DEFAULT
+from drivers.fault_injection.failure_table import BY_NAME, PHASES, FailureMode
 from experiments.study.workers import Workers, run_parallel
 from experiments.trials.session import Show
 from simulation.harness.drive_presets import DRIVES
 from verification.faults.cell import run_cell
 from verification.faults.evaluation import Cell
-from verification.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
-from verification.faults.phases import PHASES
 from verification.faults.protocol_differences import differences
 
-FAULTS = tuple(dict.fromkeys(mode.fault for mode in FAILURE_MODES))
+FAULTS = tuple(dict.fromkeys(mode.fault for mode in BY_NAME.values()))
 
 
 class CellKey(NamedTuple):
@@ -49,7 +48,7 @@ class Plan:
 
     @property
     def modes(self) -> list[FailureMode]:
-        return [mode for mode in FAILURE_MODES if mode.fault in self.faults and set(mode.phases) & set(self.phases)]
+        return [mode for mode in BY_NAME.values() if mode.fault in self.faults and set(mode.phases) & set(self.phases)]
 
     @property
     def cells(self) -> list[CellKey]:

@@ -18,7 +18,7 @@ from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.configuration import Configuration
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
-from verification.faults.bench import FaultBench
+from verification.faults.failing_robot import FaultBench
 
 LENGTH_M = 5.0
 HOLDING_CLAY = Clay("9 kPa", 9000.0)  # in which an insertion of 5 cm leaves the flippers stuck
@@ -32,11 +32,6 @@ STRIDE_TICKS = {  # of the random delay into a phase of the gait: at most about 
     Phase.SWING: 200,
 }
 SHORT_RECOVERY = RecoveryParameters(attempts=1, grace_s=0.05, pause_s=0.05, attempt_s=0.2)
-
-GAIT = ("insertion", "stance", "extraction", "swing")
-AWAKE = ("arming", "hold", *GAIT, "stopping")
-EVERYWHERE = ("idle", *AWAKE)
-PHASES = (*EVERYWHERE, "recovery")
 
 
 def bench_for(phase: str, random: Random, hopeless: bool = False, drive: str = DEFAULT) -> FaultBench:

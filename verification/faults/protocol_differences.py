@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 from control.faults import FaultKind
 from drivers.drive_types import DRIVE_TYPES
-from verification.faults.failure_modes import ABSENT_DRIVE, BY_NAME, FailureMode
-from verification.faults.injectors import failing, unheard, watchdog_tripped
+from drivers.fault_injection.failure_table import ABSENT_DRIVE, BY_NAME, FailureMode
 
 SHOWN = {"fault": "shown as", "instead": "instead", "also": "also", "pushes_until": "pushes until"}  # changed fields
 
@@ -60,7 +59,7 @@ UNASKED = "a drive that is not asked does not answer"
 ASKED: Table = {  # drives that answer only when asked
     "drive_late": Difference(
         "a command that is lost is a question that is lost, for a tick longer: only answers are lost",
-        {"inject": unheard, "no_commands": False},
+        {"act": ("unheard",), "loses_commands": False},
     ),
     "bus_refuses": _also(UNASKED, *ABSENT_DRIVE, "drive_quiet"),
 }
@@ -90,7 +89,7 @@ MIT: Table = {
     "voltage_under": _waived(NO_VOLTAGE),
     "drive_error, by its watchdog": Difference(
         "a drive without commands sends no answer that could state the error",
-        {"instead": ("drive_silent",), "inject": failing("JOINT.command", "off")},
+        {"instead": ("drive_silent",), "component": "JOINT.command", "kind": "off", "act": ()},
     ),
     "drive_error, by another program's stop": _instead(
         "the command to leave the mode is no error: the drive is without torque", "drive_disarmed"
@@ -123,7 +122,8 @@ RESTARTED = Difference(
 )
 MOTEUS: Table = {
     "drive_error, by its watchdog": Difference(
-        "a drive without commands is not asked either, so its watchdog trips while it is", {"inject": watchdog_tripped}
+        "a drive without commands is not asked either, so its watchdog trips while it is",
+        {"act": ("tripped", "WATCHDOG")},
     ),
     "drive_error, by another program's stop": _instead("a stop is no error", "drive_disarmed"),
     "encoder_stuck, at zero speed": NO_CLAMP,
@@ -169,7 +169,7 @@ BY_TYPE: dict[str, Table] = {"odrive": ODRIVE, "odrive05": ODRIVE05, "moteus": M
 
 
 def differences(drive: str) -> Table:
-    """Returns the differences of a type of drive by the name of the failure mode; `drive` as in `with_drive_type`."""
+    """Return the differences of a type of drive by the name of the failure mode; `drive` as in `with_drive_type`."""
     name, _, model = drive.partition(":")
     asked = ASKED if DRIVE_TYPES[name].query(1) is not None else {}
     given: dict[str, Any] = {"model": model} if model else {}
@@ -179,7 +179,7 @@ def differences(drive: str) -> Table:
 
 
 def mode_of(name: str, drive: str) -> FailureMode:
-    """Returns a failure mode as it is with this type of drive."""
+    """Return a failure mode as it is with this type of drive."""
     difference = differences(drive).get(name)
     mode = BY_NAME[name]
     return replace(mode, why=difference.why, **(difference.changes or {})) if difference else mode

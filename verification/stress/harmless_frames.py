@@ -12,7 +12,7 @@ from drivers.moteus import registers
 from drivers.moteus.codec import Mode, command_id
 from drivers.moteus.registers import Register
 from drivers.odrive import codec as odrive
-from drivers.odrive import codec05 as odrive05
+from drivers.odrive05 import codec as odrive05
 
 ZERO_TORQUES = (bytes(4), bytes.fromhex("00000080"))
 LEAVE = bytes.fromhex("fffffffffffffffd")

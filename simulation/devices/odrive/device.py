@@ -1,4 +1,4 @@
-"""Simulates a motor drive on the bus: ODrive CANSimple 0.6, byte for byte. device05.py has what differs in 0.5.
+"""Simulates a motor drive on the bus: ODrive CANSimple 0.6, byte for byte. The folder odrive05 has what differs in 0.5.
 
 It has the axis state machine (idle, closed loop), the error word with the disarm reason, the watchdog, torque mode with
 the velocity-limit clamp, the current limits and, where it is on, the overspeed trip, cyclic messages, and requests by

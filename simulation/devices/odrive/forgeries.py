@@ -1,12 +1,12 @@
 """Forges ODrive frames that a bus carries in the name of a drive, or to it, though neither drive nor loop sent them.
 
-OLD_FIRMWARE is a firmware other than the drive's type says. Firmware 0.5 reports no settings and no serial number.
+OLD_FIRMWARE is a firmware other than the drive's type says.
 """
 
 from collections.abc import Mapping
 
 from drivers.can.frames import Frame
-from drivers.odrive import codec, codec05
+from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from simulation.devices.drive import Forgery
 
@@ -24,11 +24,6 @@ FORGERIES: Forgeries = {
     Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
     Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
     Forgery.OTHER_DRIVE: (codec.ADDRESS, (0, 0xABCDEF, 0), b""),
-}
-FORGERIES_05: Forgeries = {
-    **COMMON,
-    Forgery.OLD_FIRMWARE: (codec.GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0), b""),
-    Forgery.STARTING: (codec05.HEARTBEAT, (0, AxisState.UNDEFINED, 0, 0, 0), b""),
 }
 
 

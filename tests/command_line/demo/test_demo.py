@@ -115,7 +115,7 @@ def test_impossible_options_are_refused_before_anything_starts(
     tmp_path: Path, arguments: tuple[str, str], status: int, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("command_line.demo.demo._on_signals", lambda: None)
+    monkeypatch.setattr("command_line.demo.demo._end_on_signals", lambda: None)
     try:
         ended: object = main(["demo", "--out", str(tmp_path / "out"), *arguments])
     except SystemExit as problem:

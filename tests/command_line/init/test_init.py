@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
 from command_line import exit_codes
-from command_line.init.init import answers
+from command_line.init import init
 from command_line.init.new_file import NewRobot, new_file
 from command_line.main import main
-from command_line.parser import build_parser
 from control.geometry import FlipperGeometry
 from control.parameters.joint_gains import GAINS_OF_ASKED_DRIVES, JointGains
 from control.records import JOINTS
@@ -23,20 +22,26 @@ from firmware_host.configuration.loading import load_configuration, parse_config
 PLATES = Path(__file__).resolve().parents[3] / "examples" / "plates"
 
 
-def options_of(*arguments: str) -> argparse.Namespace:
-    return build_parser(["init"]).parse_args(["init", *arguments])
-
-
 def answered(lines: Sequence[str], *arguments: str) -> tuple[NewRobot, list[str]]:
     """Return the robot that these answers describe, and the questions that were asked."""
     asked: list[str] = []
+    robots: list[NewRobot] = []
     replies: Iterator[str] = iter(lines)
 
     def read(prompt: str) -> str:
         asked.append(prompt)
         return next(replies, "")
 
-    return answers(options_of(*arguments), read), asked
+    def write(robot: NewRobot) -> str:
+        robots.append(robot)
+        return new_file(robot)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.stdin, "isatty", lambda: True)
+        patch.setattr("builtins.input", read)
+        patch.setattr(init, "new_file", write)
+        assert main(["init", "-", *arguments]) == exit_codes.OK
+    return robots[0], asked
 
 
 @pytest.mark.parametrize("flippers", ["left", "right", "both"])
@@ -101,7 +106,7 @@ def test_a_wrong_answer_is_asked_again(capsys: pytest.CaptureFixture[str]) -> No
     assert (robot.name, robot.rig.flippers, robot.channels) == ("mudcat", ("right",), ("can7",))
     assert robot.node_ids == {"right_sweep": 5, "right_adduction": 6}
     assert robot.geometry == FlipperGeometry(flipper_length_m=0.115)
-    assert printed.splitlines() == [
+    assert [line for line in printed.splitlines() if line.startswith(" ")] == [
         "  middle: must be one of left, right, both",
         "  63: must be a whole number from 0 to 62",
         "  square: No such file or directory",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sysconfig
@@ -32,7 +31,6 @@ from command_line.install.service_plan import (
     plan_installation,
     plan_removal,
 )
-from command_line.parser import build_parser
 from tests.folders import ROOT
 
 PREFIX = Path("/opt/robot/venv")
@@ -63,13 +61,10 @@ class Machine:
         return Outcome(0, "")
 
     def install(self, *options: str) -> int:
-        return install(self._options("install", options), self.run, lambda program: program)
+        return install(dry_run="--dry-run" in options, root=self.root, run=self.run, find=str)
 
     def uninstall(self, *options: str) -> int:
-        return uninstall(self._options("uninstall", options), self.run, lambda program: program)
-
-    def _options(self, command: str, options: Sequence[str]) -> argparse.Namespace:
-        return build_parser().parse_args([command, "--root", str(self.root), *options])
+        return uninstall(purge="--purge" in options, root=self.root, run=self.run, find=str)
 
     def system(self) -> System:
         """Return this folder as a system that is running."""
@@ -238,8 +233,8 @@ def test_a_failure_lists_the_finished_steps_and_the_next_run_does_the_rest(
 def test_a_missing_program_is_reported_before_anything_is_written(
     machine: Machine, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    options = build_parser().parse_args(["install", "--root", str(machine.root)])
-    missing = install(options, machine.run, lambda program: None if program == "systemd-sysusers" else program)
+    found = {"systemctl": "/bin/systemctl", "udevadm": "/bin/udevadm", "networkctl": "/bin/networkctl"}
+    missing = install(root=machine.root, run=machine.run, find=found.get)
     assert missing == exit_codes.UNHEALTHY
     assert "systemd-sysusers: not installed" in capsys.readouterr().err
     assert machine.files() == {}
@@ -253,7 +248,7 @@ def test_without_root_it_is_refused_before_anything_is_written(
     monkeypatch.setattr(installation, "location_problem", lambda locations: "")
     monkeypatch.setattr(installation, "_perform_all", None)  # would raise
     act = install if command == "install" else uninstall
-    assert act(build_parser().parse_args([command]), machine.run) == exit_codes.NOT_PERMITTED
+    assert act(run=machine.run) == exit_codes.NOT_PERMITTED
     assert "sudo" in capsys.readouterr().err
     assert machine.ran == []
 

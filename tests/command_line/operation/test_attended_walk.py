@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -72,7 +71,7 @@ def test_a_walk_that_a_fault_ended_is_refused_with_its_cause(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    assert attended_walk.attend(EndingWalk(*reports), Namespace(command="walk", json=False), {}) == status
+    assert attended_walk.attend(EndingWalk(*reports), False, {}) == status
     printed = capsys.readouterr()
     assert printed.out.splitlines()[-1] == reports[-1]["mode"]
     assert printed.err == (f"mudskipper: {complaint}\n" if complaint else "")
@@ -82,12 +81,11 @@ def test_programs_read_one_object_at_the_end_of_an_attended_walk(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(attended_walk, "RENEWAL_S", 0.0)
-    options = Namespace(command="walk", json=True)
-    assert attended_walk.attend(EndingWalk(report("walking"), report("hold")), options, {}) == exit_codes.OK
+    assert attended_walk.attend(EndingWalk(report("walking"), report("hold")), True, {}) == exit_codes.OK
     assert json.loads(capsys.readouterr().out) == {
         "schema": "operation/1", "command": "walk", "mode": "hold", "notice": "",
     }  # fmt: skip
-    assert attended_walk.attend(EndingWalk(report("fault", "It is silent.")), options, {}) == exit_codes.REFUSED
+    assert attended_walk.attend(EndingWalk(report("fault", "It is silent.")), True, {}) == exit_codes.REFUSED
     assert capsys.readouterr().out == ""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
 from http import HTTPStatus
 from json import loads
 from pathlib import Path
@@ -14,7 +13,7 @@ from command_line import exit_codes
 from command_line.live.page_server import stop_robot
 from command_line.operation import confirmation, operation
 from command_line.operation.confirmation import TORQUE_UNKNOWN, unconfirmed_drives
-from command_line.operation.confirmed_stop import end_motion
+from command_line.operation.confirmed_stop import disarm, stop
 from command_line.watch.orders import send_order
 from control.records import JOINTS
 from operator_client.status_client import NotPermittedError
@@ -24,7 +23,7 @@ Report = dict[str, Any]
 
 
 def ended(command: str, json: bool = False) -> int:
-    return end_motion(Namespace(socket=SOCKET, command=command, json=json))
+    return (stop if command == "stop" else disarm)(socket=SOCKET, json=json)
 
 
 def report(mode: str, closed_loop: bool, age_s: float | None = 0.0, changed: Report | None = None) -> Report:

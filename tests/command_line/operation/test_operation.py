@@ -14,7 +14,7 @@ import pytest
 from command_line import exit_codes
 from command_line.main import main
 from command_line.operation.confirmation import TORQUE_UNKNOWN
-from command_line.options import shared
+from command_line.shared_options import DEFAULT_SOCKET
 from control.modes import Mode
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from logs.files.log_reader import read_log
@@ -176,4 +176,4 @@ def test_the_version_and_a_completion_script_are_printed() -> None:
 def test_the_command_line_and_the_daemon_agree() -> None:
     """The command line keeps copies of the daemon's constants because `status` has to start fast."""
     assert exit_codes.CONFIGURATION == EXIT_CONFIGURATION
-    assert StatusParameters().socket == shared.DEFAULT_SOCKET
+    assert StatusParameters().socket == DEFAULT_SOCKET

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from control.computing.bounded_work import Work, WorkQueue, batched, finish, finished
+from control.computing.bounded_work import Work, WorkQueue, batched
 
 
 def counting(log: list[str], name: str, units: int) -> Work[None]:
@@ -12,19 +12,6 @@ def counting(log: list[str], name: str, units: int) -> Work[None]:
         log.append(f"{name}{unit}")
         if unit < units - 1:
             yield
-
-
-def adding(values: list[int]) -> Work[int]:
-    total = 0
-    for value in values:
-        total += value
-        yield
-    return total
-
-
-def test_finished_work_gives_its_result() -> None:
-    assert finish(adding([1, 2, 3])) == 6
-    assert finish(finished("known")) == "known"
 
 
 @pytest.mark.parametrize("units", [1, 2, 3, 100])
@@ -46,13 +33,6 @@ def test_a_run_takes_no_more_units_than_allowed() -> None:
         queue.run(1)
         sizes.append(len(log))
     assert sizes == [1, 2, 3, 4, 4]
-    assert queue.is_empty
-
-
-def test_an_empty_queue_has_nothing_to_run() -> None:
-    queue = WorkQueue()
-    queue.run(3)
-    queue.finish()
     assert queue.is_empty
 
 

@@ -16,7 +16,7 @@ from control.controller import Controller, WalkOrder
 from control.faults import FaultKind
 from control.gait.gait import PROTOCOLS, stride_duration_s
 from control.gait.joint_path import still
-from control.gait.recovery import AWAY_FRACTION, OUT_M, Gap, Recovery, is_in_mud, lowest_point_m
+from control.gait.recovery import AWAY_FRACTION, Gap, Recovery, is_in_mud, lowest_point_m
 from control.geometry import FlipperGeometry
 from control.limits import JointRange
 from control.modes import Mode
@@ -275,14 +275,6 @@ def test_the_sweep_rocks_with_the_configured_period() -> None:
     assert turns == pytest.approx(PARAMETERS.attempt_s / PARAMETERS.rock_s, abs=1)
 
 
-def test_every_attempt_lifts() -> None:
-    for targets in attempts_at(10.0, lead_deg=45.0):  # the large lead lets the target arrive
-        lifts = [each[1] for each in targets]
-        assert lifts[0].angle_rad == pytest.approx(-0.6)
-        assert all(lift.velocity_rad_s >= 0.0 for lift in lifts)
-        assert lifts[-1].angle_rad > -0.1
-
-
 def test_a_flipper_that_is_out_stays_where_it_is() -> None:
     for targets in attempts_at(10.0):
         assert {each[2:] for each in targets} == {still(Joints(0.0, 0.0, 0.0, 0.0))[2:]}
@@ -375,14 +367,6 @@ def test_the_plates_are_clear_of_the_mud_soon_after_the_swing_began() -> None:
 angles = st.floats(-1.0, 1.0)
 
 
-@given(angles, angles, st.floats(0.05, 2.0))
-def test_a_gap_fades_from_itself_to_nothing(angle_rad: float, velocity_rad_s: float, duration_s: float) -> None:
-    gap = Gap(angle_rad, velocity_rad_s, duration_s)
-    assert gap.after(0.0) == pytest.approx((angle_rad, velocity_rad_s))
-    assert gap.after(duration_s * (1.0 - 1e-9)) == pytest.approx((0.0, 0.0), abs=1e-6)
-    assert gap.after(duration_s) == (0.0, 0.0)
-
-
 @given(angles, angles, st.floats(0.05, 2.0), st.floats(0.01, 0.99))
 def test_the_velocity_of_a_gap_is_its_derivative(
     angle_rad: float, velocity_rad_s: float, duration_s: float, fraction: float
@@ -404,10 +388,3 @@ def test_the_lowest_point_is_the_deeper_corner(sweep_rad: float, adduction_rad: 
         for length_m in (GEOMETRY.flipper_length_m - 0.0125, GEOMETRY.flipper_length_m + 0.0125)
     ]
     assert lowest_point_m(GEOMETRY, sweep_rad, adduction_rad) == pytest.approx(max(ends_m), abs=1e-12)
-
-
-def test_a_level_flipper_is_out_and_one_at_the_surface_is_not_while_its_corner_is_deeper() -> None:
-    assert not is_in_mud(GEOMETRY, REAR_RAD, 0.0)
-    assert lowest_point_m(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, 0.001)) > OUT_M - 0.001
-    assert is_in_mud(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, OUT_M))
-    assert degrees(GEOMETRY.adduction_rad(0.0, 0.0)) < -5.0

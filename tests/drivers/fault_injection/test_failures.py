@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from control.records import JOINTS, NEVER_S
-from drivers.fault_injection.failures import EFFECTS, LONGEST_S, FailureKind, Failures
+from drivers.fault_injection.failure_table import EFFECTS, FailureKind
+from drivers.fault_injection.failures import LONGEST_S, Failures
 
 BUSES = ("left", "right")
 

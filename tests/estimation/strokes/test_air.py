@@ -1,6 +1,6 @@
 """The friction of the sweep joint from swings in air, and the evidence of mud."""
 
-from math import cos, isclose, pi
+from math import cos, pi
 
 import numpy as np
 import pytest
@@ -39,14 +39,6 @@ def test_dry_friction_is_found_under_any_inertia(friction_nm: float, inertia_nm:
     assert air.std_error_nm == MEASURED_NM
 
 
-def test_an_offset_cancels_in_a_swing_of_both_directions() -> None:
-    air = AirSwing()
-    swing(air, 0.05, offset_nm=0.03)
-    swing(air, 0.05, offset_nm=0.03, back=True)
-    air.close()
-    assert air.friction_nm == pytest.approx(0.05, abs=1e-3)
-
-
 def test_dragged_mud_only_adds_so_the_least_swing_counts() -> None:
     air = AirSwing()
     for dragged_nm in (0.0, 0.05, 0.08, 0.03):
@@ -75,15 +67,6 @@ def test_a_short_movement_is_no_swing() -> None:
         air.update(float(sweep_rad), -0.1)
     air.close()
     assert air.std_error_nm == UNKNOWN_FRICTION_NM
-
-
-def test_samples_at_rest_do_not_count() -> None:
-    air = AirSwing()
-    swing(air, 0.05)
-    for _ in range(1000):
-        air.update(0.6, -0.3)
-    air.close()
-    assert isclose(air.friction_nm, 0.05, abs_tol=3e-3)
 
 
 @pytest.mark.parametrize(

@@ -74,14 +74,6 @@ def test_the_rate_of_messages_does_not_change_the_batches() -> None:
     assert np.diff([batch.travel_m for batch in seldom[:-1]]).max() <= STEP_M + per_sample_m
 
 
-def test_a_message_that_is_read_more_often_moves_no_mean() -> None:
-    rows = even(380.0)
-    again = [each for now_s, travel_m in rows for each in [(now_s, travel_m)] * 3]
-    for batch, plain in zip(stroke_of(again).batches, stroke_of(rows).batches, strict=True):
-        assert batch[:5] == pytest.approx(plain[:5], abs=1e-15)
-        assert batch.samples == 3 * plain.samples
-
-
 def test_a_flipper_that_stands_still_adds_to_one_batch() -> None:
     rows = even(380.0, path_m=0.015)
     end_s, end_m = rows[-1]
@@ -89,24 +81,10 @@ def test_a_flipper_that_stands_still_adds_to_one_batch() -> None:
     assert len(stroke_of(held).batches) == len(stroke_of(rows).batches)
 
 
-def test_a_flipper_that_trembles_adds_to_one_batch() -> None:
-    random = np.random.default_rng(1)
-    rows = [(i / 380.0, float(0.4 * STEP_M * random.uniform(-1.0, 1.0))) for i in range(1000)]
-    assert len(stroke_of(rows).batches) == 1
-
-
 def test_a_stroke_without_end_takes_no_more_memory() -> None:
     stroke = stroke_of(even(380.0, path_m=10.0))
     assert len(stroke.batches) == LONGEST
     assert stroke.batches[-1].travel_m < (LONGEST + 10) * STEP_M
-
-
-def test_the_longest_stroke_of_this_robot_is_stored_whole() -> None:
-    """The longest strokes are a sweep of ±60° in steps of 6 mm, and 7 cm of insertion from 1.45 cm above the mud in
-    steps of 1.5 mm.
-    """
-    assert 2.0 * np.deg2rad(60.0) * 0.12 / 0.006 < LONGEST
-    assert (0.07 + 0.0145) / STEP_M < LONGEST
 
 
 def test_a_lost_body_position_loses_only_the_position() -> None:
@@ -150,14 +128,6 @@ def moving(speeds_m_s: list[float]) -> list[float]:
     return [batch.speed_m_s for batch in stroke.moving()]
 
 
-def test_slow_batches_at_either_end_do_not_count_as_moving() -> None:
-    assert moving([0.01, 0.05, 0.09, 0.1, 0.1, 0.11, 0.05, 0.02]) == [0.09, 0.1, 0.1, 0.11]
-
-
-def test_a_slow_batch_in_the_middle_stays() -> None:
-    assert moving([0.01, 0.1, 0.1, 0.0, 0.1, 0.1, 0.01]) == [0.1, 0.1, 0.0, 0.1, 0.1]
-
-
 @given(st.lists(st.floats(0.0, 1.0), max_size=LONGEST))
 def test_what_counts_as_moving_is_one_piece_whose_ends_are_quick(speeds_m_s: list[float]) -> None:
     kept = moving(speeds_m_s)
@@ -169,17 +139,7 @@ def test_what_counts_as_moving_is_one_piece_whose_ends_are_quick(speeds_m_s: lis
         assert any(speeds_m_s[i : i + len(kept)] == kept for i in range(len(speeds_m_s)))
 
 
-def test_a_stroke_that_never_moved_is_stored() -> None:
-    assert moving([0.0, 0.0]) == [0.0, 0.0]
-    assert moving([]) == []
-
-
 # beginning and end
-
-
-def test_the_first_travel_is_stored() -> None:
-    assert stroke_of(even(380.0)).first_m == pytest.approx(-0.0145)
-    assert not isfinite(Stroke(STEP_M).first_m)
 
 
 def test_ending_a_stroke_twice_or_without_samples_adds_nothing() -> None:
@@ -188,11 +148,6 @@ def test_ending_a_stroke_twice_or_without_samples_adds_nothing() -> None:
     stroke.close(9.0, 9.0)
     assert stroke.batches == batches
     assert stroke_of([]).batches == []
-
-
-def test_a_single_sample_is_a_batch_of_its_own() -> None:
-    (batch,) = stroke_of([(1.0, 0.02)]).batches
-    assert batch == Batch(0.02, 0.04, 0.06, 0.08, 0.1, 0.12, False, 1, 0.0)
 
 
 def test_a_reset_forgets_everything() -> None:

@@ -12,7 +12,7 @@ from control.computing.bounded_work import finish
 from control.geometry import FlipperGeometry
 from control.plate_integrals import cross_coupling, stroke_moment_m4, submerged_plate
 from control.records import Estimate
-from estimation.strokes.origin_fit import MIN_BATCHES, OriginFit
+from estimation.strokes.origin_fit import OriginFit
 from estimation.strokes.scatter_memory import ScatterMemory
 from estimation.strokes.stroke import Batch
 from estimation.strokes.stroke_fit import (
@@ -114,11 +114,6 @@ def test_a_stroke_that_keeps_the_law_gives_its_coefficient(k: float, surface_m: 
     assert extracted.value == pytest.approx(k, rel=EXACT)
 
 
-@pytest.mark.parametrize("sweep_rad", [radians(angle) for angle in (-45.0, -15.0, 0.0, 30.0, 40.0)])
-def test_the_law_is_found_at_any_sweep_angle(sweep_rad: float) -> None:
-    assert insertion(down(sweep_rad=sweep_rad, face_nm=0.2)).value == pytest.approx(K, rel=EXACT)
-
-
 def test_a_face_load_that_was_left_in_would_be_taken_for_mud() -> None:
     unfelt = [batch._replace(sweep_nm=0.0) for batch in down(face_nm=0.3)]
     assert abs(insertion(unfelt).value / K - 1.0) > 0.1
@@ -135,30 +130,6 @@ def test_only_batches_in_the_mud_count() -> None:
     ]
     assert insertion(altered_down) == insertion(batches)
     assert extraction(altered_up) == extraction(rising)
-
-
-def test_samples_are_those_of_the_batches_in_the_mud() -> None:
-    inside = sum(travel_m > 0.0 for travel_m in depths())
-    assert insertion(down()).samples == inside * SAMPLES
-
-
-def test_batches_count_by_their_travel_and_not_by_their_number() -> None:
-    """The lower half comes in pieces a quarter as long: where the law bends, counting pieces would read 2 % less. Half
-    a percent remains, since the Huber weights use the median residual of all pieces.
-    """
-    even = [loaded(batch_at(travel_m), K, law=supporting_at_once) for travel_m in depths()]
-    halves = depths(-0.012, 0.015), depths(0.015, 0.03, STEP_M / 4.0)
-    finer = [loaded(batch_at(travel_m), K, law=supporting_at_once) for half in halves for travel_m in half]
-    assert equally_weighted(finer) / equally_weighted(even) < 0.985
-    assert insertion(finer).value == pytest.approx(insertion(even).value, rel=0.005)
-
-
-def equally_weighted(batches: Sequence[Batch]) -> float:
-    """Fit the batches in the mud by least squares with equal weights."""
-    wet = [b for b in batches if b.travel_m > 0.0]
-    plates = [submerged_plate(GEOMETRY, b.sweep_rad, b.adduction_rad) for b in wet]
-    moments = np.array([stroke_moment_m4(GEOMETRY, plate, FRONT_RAD) for plate in plates])
-    return float(moments @ np.array([b.adduction_nm for b in wet]) / (moments @ moments))
 
 
 # parts of batches
@@ -185,11 +156,6 @@ def test_the_travel_of_all_batches_between_two_depths_adds_up_to_the_distance(
     assert sum(max(path_m, 0.0) for path_m in parts_m) == pytest.approx(inside_m, abs=1e-12)
 
 
-def test_one_batch_has_no_travel() -> None:
-    assert travels_m([batch_at(0.01)], -1.0, 1.0) == [0.0]
-    assert travels_m([], -1.0, 1.0) == []
-
-
 @pytest.mark.parametrize("limit", ["surface", "start"])
 def test_a_coefficient_moves_smoothly_as_a_limit_crosses_batches(limit: str) -> None:
     """The limit moves over two batches in steps of 10 µm. A batch that counted wholly or not at all, a twentieth of the
@@ -204,12 +170,6 @@ def test_a_coefficient_moves_smoothly_as_a_limit_crosses_batches(limit: str) -> 
         values.append(extraction(stroke, surface_at(surface_m), start_m=start_m).value)
     steps = np.abs(np.diff(values)) / K
     assert 0.0 < steps.max() < 2e-3
-
-
-def test_an_insertion_moves_smoothly_with_the_surface() -> None:
-    stroke = down(law=supporting_at_once)
-    values = [insertion(stroke, surface_at(1e-5 * i)).value for i in range(400)]
-    assert np.abs(np.diff(values)).max() / K < 2e-3  # as in the test above
 
 
 # the uncertainty
@@ -249,11 +209,6 @@ def systematic(estimate: Estimate) -> float:
     """Return the relative uncertainty without the part of the torque's repeatability."""
     fraction = estimate.std_error / estimate.value
     return float(np.sqrt(fraction * fraction - TORQUE_REPEATABILITY * TORQUE_REPEATABILITY))
-
-
-def test_without_noise_only_the_torques_repeatability_is_left() -> None:
-    for estimate in (insertion(down()), extraction(up())):
-        assert estimate.std_error == pytest.approx(TORQUE_REPEATABILITY * K, rel=1e-6)
 
 
 @pytest.mark.parametrize("error_m", [0.0002, 0.001])
@@ -328,22 +283,6 @@ def test_a_stroke_wholly_in_poses_without_a_vertical_lever_cannot_be_observed() 
     assert insertion(above, surface_at(0.047)) == NOT_THERE
 
 
-@pytest.mark.parametrize("count", range(MIN_BATCHES))
-def test_too_few_batches_are_the_reason(count: int) -> None:
-    reported = insertion(down()[-count:] if count else [])
-    assert reported == NOT_THERE._replace(samples=reported.samples)
-    assert not reported.valid and reported.reason
-
-
-def test_a_stroke_in_the_air_is_the_reason() -> None:
-    assert insertion([batch_at(travel_m) for travel_m in depths(end_m=0.0)]) == NOT_THERE
-
-
-def test_a_force_along_the_motion_is_no_mud() -> None:
-    for reported in (insertion(down(-K)), extraction(up(-K))):
-        assert (reported.valid, reported.reason) == (False, "the force does not oppose the motion")
-
-
 def test_a_fit_is_evaluated_with_its_full_error() -> None:
     reported = evaluated(OriginFit(K, 0.03 * K), 0.04 * K, 7)
     assert reported._replace(std_error=0.0) == Estimate(K, 0.0, 7, True)
@@ -410,9 +349,3 @@ def test_mud_that_did_not_yield_gives_a_lower_bound() -> None:
     assert reported.value == pytest.approx(K, rel=EXACT)
     assert reported.std_error == pytest.approx(TORQUE_REPEATABILITY * K)
     assert reported.samples == 4 * SAMPLES
-
-
-def test_batches_that_withstood_nothing_give_no_bound() -> None:
-    for batches in ([], [batch_at(-0.01)], [loaded(batch_at(0.03), K)]):
-        reported = bound_extraction(GEOMETRY, batches, surface_at(0.0))
-        assert not reported.valid and not reported.at_least

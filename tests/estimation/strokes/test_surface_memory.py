@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.strokes.surface import NO_SURFACE, Surface
-from estimation.strokes.surface_memory import SHARPEST_M, SurfaceMemory, unknown_surface
+from estimation.strokes.surface_memory import SurfaceMemory
 
 BASES = pytest.mark.parametrize("fixed_base", [True, False])
 depth_values, errors = st.floats(-0.02, 0.02), st.floats(1e-5, 0.02)
@@ -107,19 +107,8 @@ def test_slow_messages_make_a_find_count_less(fixed_base: bool) -> None:
 
 
 @BASES
-def test_no_error_at_all_is_survived(fixed_base: bool) -> None:
-    surface = SurfaceMemory(0.0015, fixed_base).update(find(0.001, 0.0), 0.0)
-    assert surface.depth_m == pytest.approx(0.001, rel=1e-3)
-    assert surface.std_error_m == pytest.approx(SHARPEST_M, rel=1e-3)
-
-
-@BASES
 def test_a_reset_forgets_the_trial(fixed_base: bool) -> None:
     memory = SurfaceMemory(0.001, fixed_base)
     first = surfaces(memory, [-0.004, 0.003])
     memory.reset()
     assert surfaces(memory, [-0.004, 0.003]) == first
-
-
-def test_before_any_insertion_the_surface_is_nominal() -> None:
-    assert unknown_surface(0.0015) == Surface(0.0, 0.0015, 0.0, inf, False)

@@ -36,11 +36,6 @@ def taken(poses: list[tuple[float, float]], weight_n: float, noise_nm: float = 0
     return tare
 
 
-def test_before_any_air_the_zero_is_zero() -> None:
-    assert Tare().zero == Zero(0.0, 0.0)
-    assert not isfinite(Tare().drift_n)
-
-
 @given(st.floats(-3.0, 3.0))
 def test_a_weight_is_found_in_any_pose(weight_n: float) -> None:
     zero = taken(swing(), weight_n).zero
@@ -75,13 +70,6 @@ def test_few_samples_give_the_squared_error_of_their_mean() -> None:
     per_nm = 1.0 / GEOMETRY.jacobian(0.0, 0.1).z_adduction
     squares = [taken([(0.0, 0.1)] * 8, WEIGHT_N, NOISE_NM, seed).zero.std_error_n ** 2 for seed in range(1000)]
     assert np.mean(squares) == pytest.approx((per_nm * NOISE_NM) ** 2 / 8.0, rel=0.07)  # four sampling errors
-
-
-def test_a_weight_that_is_there_from_the_start_is_no_scatter() -> None:
-    """The step of the first sample from zero to the weight is no scatter either."""
-    zero = taken(swing(FEWEST), 5.0).zero
-    assert zero.weight_n == pytest.approx(5.0)
-    assert zero.std_error_n == pytest.approx(0.0, abs=1e-9)
 
 
 def test_mud_that_drips_off_is_followed() -> None:
@@ -140,12 +128,6 @@ def test_a_correction_is_weighed_by_its_own_error_against_the_zeros(weight_n: fl
     assert tare.correct(weight_n, std_error_n) == pytest.approx(fraction * weight_n)
     assert tare.zero.weight_n == pytest.approx(before.weight_n + fraction * weight_n)
     assert tare.zero.std_error_n == pytest.approx((1.0 / own + 1.0 / std_error_n**2) ** -0.5)
-
-
-def test_a_correction_of_infinite_error_changes_no_weight() -> None:
-    tare = taken(swing(), WEIGHT_N)
-    assert tare.correct(0.0, inf) == 0.0
-    assert tare.zero.weight_n == pytest.approx(WEIGHT_N)
 
 
 def test_a_swing_through_mud_keeps_the_weight_and_widens_its_error() -> None:

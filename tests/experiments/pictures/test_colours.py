@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from experiments.pictures.colours import FLIPPER_COLOURS, FORWARD, MUD_SHADES, OUTCOME_COLOURS, UP
 from experiments.reports.mud_styles import looks_of
+from experiments.reports.style import FLIPPER_COLOURS, FORWARD, MUD_SHADES, OUTCOME_COLOURS, UP
 
 VISIONS = {  # Machado, Oliveira and Fernandes (2009), severity 1.0, on linear RGB
     "normal": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],

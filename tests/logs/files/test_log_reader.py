@@ -14,8 +14,9 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
+from control.records import Rig
 from firmware_host.log.log_file import LogFile
-from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE, STRIDE_KIND, TICK, TICK_KIND
+from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE, STRIDE_KIND, TICK, TICK_KIND, tick_kind
 from firmware_host.log.schema import RowKind
 from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log
@@ -259,6 +260,11 @@ def test_a_layout_that_this_version_cannot_decode_is_refused(tmp_path: Path, ros
     with pytest.raises(LogError, match="the version of mudskipper that wrote it") as refusal:
         read_log(path)
     assert "recover" not in str(refusal.value)  # it would not help
+
+
+def test_a_log_of_version_0_2_names_its_flippers_in_comments(tmp_path: Path) -> None:
+    kind = tick_kind(Rig(("right",)))
+    assert read_log(write_foreign(tmp_path / "run.mcap", [encode_row(kind)], kind=kind)).rig.flippers == ("right",)
 
 
 def test_other_comments_are_no_other_layout(tmp_path: Path) -> None:

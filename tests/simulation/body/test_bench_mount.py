@@ -59,15 +59,6 @@ def test_a_released_weight_falls_without_making_energy(on_side: bool) -> None:
     assert 0.5 * inertia_kg_m2 * speeds_rad_s[on_side] ** 2 == pytest.approx(fallen_j, rel=0.02)
 
 
-def test_a_held_arm_stays_under_any_torque() -> None:
-    mount = BenchMount(held=True)
-    mount.hang(5.0, 0.2)
-    arm = arm_on(mount)
-    for _ in range(100):
-        arm.step(0.001, 0.0, 0.0, 1.0, -1.0)
-    assert (arm.sweep_rad, arm.adduction_rad, arm.adduction_velocity_rad_s) == (0.0, 0.0, 0.0)
-
-
 def test_a_removed_weight_exerts_no_torque_and_a_weight_is_a_number() -> None:
     mount = loaded(False)
     mount.take_off()

@@ -105,23 +105,6 @@ def test_a_plate_on_a_tipped_body_never_lies_flat() -> None:
     assert right.per_upward == pytest.approx(cos(1.0))
 
 
-@given(states, speeds, sides)
-def test_a_carried_plate_moves_by_the_differences_of_its_positions(
-    state: np.ndarray, rates: np.ndarray, side: float
-) -> None:
-    twist = carried_twist(GEOMETRY, body_in(state, rates).carriages[side < 0.0], *state[4:], *rates[4:])
-    plate, moved_s = turned(*state[2:4]) @ plate_in_body(state[4], state[5], side), 1e-6
-    for u, s in POSITIONS_M:
-        after_m, before_m = (point_in_world(state + sign * moved_s * rates, side, u, s) for sign in (1.0, -1.0))
-        velocity_m_s = (after_m - before_m) / (2.0 * moved_s)
-        reported_m_s = (
-            twist.normal_m_s + twist.normal_per_outward_s * u + twist.normal_per_upward_s * s,
-            twist.outward_m_s + twist.outward_per_upward_s * s,
-            twist.upward_m_s + twist.upward_per_outward_s * u,
-        )
-        assert reported_m_s == pytest.approx((velocity_m_s @ plate[:, :3]).tolist(), abs=1e-7)
-
-
 @given(states, speeds, sides, st.tuples(*[st.floats(-10.0, 10.0)] * 7))
 def test_joints_and_body_get_the_work_that_the_mud_does_on_a_carried_plate(
     state: np.ndarray, rates: np.ndarray, side: float, parts: tuple[float, ...]
@@ -223,15 +206,6 @@ def test_a_quarter_pressed_again_and_again_into_changing_mud_never_adds_energy(
     assert given_j < -0.001 * rounds
 
 
-def test_a_print_carries_no_load_until_the_belly_is_back_in_it_or_was_clear_of_the_mud() -> None:
-    clay, quarter = Clay("any", 1000.0), BellyQuarter(QUARTER_M2, 0.25)
-    bearing_n, floating_n_m = 5.14 * 1000.0 * QUARTER_M2, 17.5e3 * QUARTER_M2
-    for depth_m, fraction in ((0.005, 1.0), (0.0019, 0.0), (0.004, 2.0 / 3.0), (0.0, 0.0), (0.0019, 1.9 / 3.0)):
-        force_n = quarter.step(clay, 1.0, depth_m, 0.0)
-        assert force_n == pytest.approx(fraction * bearing_n + floating_n_m * depth_m)
-        assert quarter.pressed is (fraction > 0.0)
-
-
 def test_adhesion_on_the_belly_and_the_pad_hold_it_until_they_yield() -> None:
     sticking_n = 0.25 * MUDS["48.5"].strength_pa * AREA_M2
     for traction, speed_m_s, seconds in ((0.9 * rate_factor(0.0), 0.0, 2.0), (rate_factor(0.3), 0.3, 8.0)):
@@ -242,16 +216,6 @@ def test_adhesion_on_the_belly_and_the_pad_hold_it_until_they_yield() -> None:
     padded = make_body(pad=DragPad(0.015, 0.02))
     live(padded, 4.0, pushing)
     assert padded.forward_m_s < 0.2  # the pad adds a third
-
-
-def test_mud_sticks_only_to_a_belly_that_presses_on_it() -> None:
-    body, lifting = make_body(), Still(NO_CONTACT._replace(upward_n=0.51 * WEIGHT_N))
-    live(body, 0.5)
-    live(body, 0.5, lifting)
-    assert body.height_m > SHAPE.axis_above_belly_m
-    body.forward_m_s = 0.2
-    live(body, 0.1, lifting)
-    assert body.forward_m_s == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from control.parameters.arm_mass import GRAVITY_M_S2, ArmMass
 from control.records import Joints
 from simulation.body.plant import END_STOPS_RAD, STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
-from simulation.body.rail_body import DRAG_STIFFNESS_N_M
 from simulation.mud.carriage import Carriage
 from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.disturbances import LAB, Disturbances
@@ -52,10 +51,6 @@ def run(plant: Plant, seconds: float, torques_nm: Joints[float] = NO_TORQUE, dt_
     return plant
 
 
-def static_drag_n() -> float:
-    return 2.5 + rate_factor(0.0) * MUDS["48.5"].lateral_n(0.02, 0.015)
-
-
 # arms
 
 
@@ -77,13 +72,6 @@ def test_the_arms_stop_at_their_end_stops(sign: float) -> None:
     sweep_rad, adduction_rad = (sign * stop for stop in END_STOPS_RAD)
     assert plant.angles_rad == (sweep_rad, adduction_rad, sweep_rad, adduction_rad)
     assert plant.velocities_rad_s == NO_TORQUE
-
-
-def test_viscous_friction_slows_an_arm_down() -> None:
-    plant = make_air_plant(PlantParameters(joint_friction_nm_s=0.002, arm_mass=ArmMass(arm_mass_kg=0.0)))
-    plant.arms[0].sweep_velocity_rad_s = 1.0
-    run(plant, 0.2)
-    assert plant.arms[0].sweep_velocity_rad_s == pytest.approx(exp(-1.0), rel=0.01)  # 0.0004 / 0.002 = 0.2 s
 
 
 def test_dry_friction_slows_an_arm_down_evenly_until_it_stands() -> None:
@@ -120,23 +108,7 @@ def test_one_flipper_alone_moves_and_pushes(side: int) -> None:
     assert plant.body_m > 0.01
 
 
-def test_a_flipper_that_carries_mud_is_heavier() -> None:
-    plant = make_air_plant()
-    plant.arms[1].history.clinging_n = 0.5
-    plant.step(STEP_S, NO_TORQUE)
-    light_nm, heavy_nm = (-arm.adduction_velocity_rad_s * INERTIAS_KG_M2[1] / STEP_S for arm in plant.arms)
-    assert heavy_nm == pytest.approx(light_nm + 0.5 * 0.12)  # level arms: the lever is their length
-
-
 # the body
-
-
-@pytest.mark.parametrize("fraction", [0.45, 0.0])
-def test_the_body_stays_under_a_thrust_below_its_drag(fraction: float) -> None:
-    """A sudden push swings an elastic body twice as far."""
-    thrust_n = fraction * static_drag_n()
-    plant = run(make_air_plant(thrust_n=thrust_n), 2.0)
-    assert 0.0 <= plant.body_m <= 2.01 * thrust_n / DRAG_STIFFNESS_N_M
 
 
 def test_the_body_slides_under_a_thrust_above_its_drag_at_the_speed_that_balances() -> None:
@@ -180,12 +152,6 @@ def test_a_reset_brings_everything_back(disturbances: Disturbances, free_body: b
     assert row(plant) != first
     plant.reset()
     assert row(plant) == first
-
-
-def test_the_body_of_a_fixed_base_never_moves() -> None:
-    plant = Plant(PlantParameters(fixed_base=True), TRACK)
-    assert set(row(plant)[::5]) == {0.0}
-    assert plant.body_m_s == 0.0 and max(plant.angles_rad) > 0.1
 
 
 def test_the_flippers_have_histories_of_their_own_and_a_seed_repeats_them() -> None:

@@ -76,13 +76,6 @@ def test_a_drive_whose_watchdog_expired_is_not_commanded_back() -> None:
     assert drives.axis.health.watchdog_expired and not drives.axis.closed_loop
 
 
-def test_gains_are_followed_as_the_firmware_does(drive: SimulatedMit) -> None:
-    ask(drive, codec.ENTER)
-    ask(drive, bytes.fromhex("8000800333000800"))  # kp of 0x333 / 4095 of 500
-    drive.measure(0.01, 0.0)
-    assert drive.torque_nm(0.001) == pytest.approx(-100.0 * 0.01, abs=0.03)
-
-
 # registers
 
 
@@ -216,11 +209,3 @@ def test_old_cubemars_that_all_answer_under_id_0_are_distinguished_by_their_firs
     states = drives.drives.read(drives.now_s)
     assert [state.angle_rad for state in states] == pytest.approx([0.0, 0.1, 0.2, 0.3], abs=1e-3)
     assert drives.drives.malformed_frames == drives.drives.unknown_frames == 0
-
-
-def test_answers_of_another_node_or_another_length_are_malformed() -> None:
-    drives = DrivenDrives(DAMIAO)
-    drives.far.send(Frame(17, codec.encode_answer(Answer(2, 0, 0.0, 0.0, 0.0, 30.0, 30), MODELS["DM4310"])))
-    drives.far.send(Frame(17, bytes(6)))
-    drives.drives.read(drives.now_s)
-    assert drives.drives.malformed_frames == 2 and not drives.state.heard

@@ -1,17 +1,14 @@
 """Motion capture has the stated rate, latency and accuracy of the body's position."""
 
-from math import isfinite, isnan
-
 import numpy as np
 import pytest
 
 from control.controller import WalkOrder
 from control.rate import PERIOD_S
-from control.records import BodyPose
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.plant import Plant
 from simulation.body.plant_parameters import PlantParameters
-from simulation.devices.motion_capture import CameraFrame, MotionCapture, SimulatedPose
+from simulation.devices.motion_capture import CameraFrame, MotionCapture
 from simulation.devices.motion_capture_parameters import OF_THE_PAPER, MotionCaptureParameters
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
@@ -47,14 +44,6 @@ def test_frames_come_at_their_rate_at_any_tick_and_report_the_body_s_position(pl
         assert frame.x_m == pytest.approx(SPEED_M_S * frame.exposed_s, abs=1e-12)
 
 
-def test_at_a_rate_of_zero_every_tick_has_its_frame_with_noise_as_stated(plant: Plant) -> None:
-    arrived = frames_of(MotionCapture(MotionCaptureParameters(noise_m=0.002), 1), plant, 3800)
-    assert [arrival_s for arrival_s, _ in arrived] == [frame.exposed_s for _, frame in arrived]
-    assert len(arrived) == 3800
-    noise_m = [frame.x_m - SPEED_M_S * frame.exposed_s for _, frame in arrived]
-    assert np.std(noise_m) == pytest.approx(0.002, rel=0.05)  # standard error of 3800 draws: 1.2 %
-
-
 def test_frames_arrive_late_by_the_latency_and_in_order_with_the_same_noise(plant: Plant) -> None:
     late = frames_of(MotionCapture(MotionCaptureParameters(rate_hz=120.0, latency_s=0.03), 1), plant, 380)
     late_s = [arrival_s - frame.exposed_s for arrival_s, frame in late]
@@ -78,20 +67,6 @@ def test_a_camera_that_is_held_up_misses_frames_and_keeps_its_rate(plant: Plant)
     capture = MotionCapture(EXACT, 1)
     counts = [len(list(capture.step(now_s, plant))) for now_s in (0.0, 5.0, 5.001, 5.009)]
     assert counts == [1, 1, 0, 1]
-
-
-def test_a_reset_deletes_frames_in_transit_and_restarts_the_noise(plant: Plant) -> None:
-    capture = MotionCapture(MotionCaptureParameters(rate_hz=120.0, latency_s=0.01), 1)
-    first = frames_of(capture, plant, 100)
-    capture.reset()
-    assert frames_of(capture, plant, 100) == first
-
-
-def test_a_pose_that_is_lost_for_six_frames_is_none(plant: Plant) -> None:
-    pose = SimulatedPose(plant, MotionCaptureParameters(rate_hz=1.0, noise_m=0.0), 1)
-    assert pose.read(0.0) == pose.read(0.049) == BodyPose(0.0, 0.0)
-    assert isnan(pose.read(0.051).x_m)
-    assert isfinite(pose.read(1.0).x_m)
 
 
 def test_the_loop_gets_120_positions_a_second_from_such_cameras(configuration: Configuration) -> None:

@@ -6,11 +6,12 @@ from typing import Any
 import pytest
 
 from drivers.can.frames import Frame
-from drivers.odrive import codec, codec05
+from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
+from drivers.odrive05 import codec as codec05
 from simulation.devices.drive import DriveError, Forgery
 from simulation.devices.odrive.device import BOOT_S
-from simulation.devices.odrive.device05 import SimulatedOdrive05
+from simulation.devices.odrive05.device import SimulatedOdrive05
 from tests.drivers.bench.simulated_bus import simulated
 
 NODE = 3

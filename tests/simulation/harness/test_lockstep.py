@@ -5,7 +5,6 @@ import pytest
 from control.controller import WalkOrder
 from control.faults import FaultKind
 from control.modes import Mode, Request
-from control.records import JOINTS
 from drivers.can.frames import Frame
 from firmware_host.configuration.configuration import Configuration
 from simulation.devices.drive import DriveError
@@ -58,14 +57,6 @@ def test_the_same_seed_walks_the_same_strides_to_the_last_bit_and_another_one_ot
     assert not walks[0][0] & walks[2][0]
 
 
-def test_a_plant_and_drives_of_one_s_own_are_used_as_they_are(configuration: Configuration) -> None:
-    plant = plant_of(configuration, joint_coulomb_nm=0.01)
-    drives = drives_of(configuration, cogging_nm=0.005, torque_constant_error=0.03)
-    lockstep = Lockstep(configuration, TRACK, disturbances=LAB, plant=plant, drives=drives)
-    assert lockstep.robot.plant.parameters is plant
-    assert [drive.parameters for drive in lockstep.robot.drives] == [drives[joint] for joint in JOINTS]
-
-
 @pytest.mark.parametrize(("rate_hz", "imperfections"), [(200.0, {}), (380.0, IMPERFECTIONS), (1000.0, {})])
 def test_a_robot_walks_at_any_rate_and_at_its_own_with_everything_that_can_be_wrong(
     configuration: Configuration, rate_hz: float, imperfections: dict[str, float]
@@ -96,16 +87,6 @@ def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Conf
     assert obeyed == []
     lockstep.run_for(1.0)
     assert lockstep.loop.mode is Mode.IDLE and not any(drive.energised for drive in lockstep.robot.drives)
-
-
-def test_it_arms_from_power_on_and_holds_its_pose(holding: Lockstep) -> None:
-    assert holding.now_s < 1.0
-    before_rad = holding.robot.plant.angles_rad
-    holding.run_for(1.0)
-    assert holding.loop.mode is Mode.HOLD
-    assert holding.loop.fault is None
-    assert all(drive.energised for drive in holding.robot.drives)
-    assert holding.robot.plant.angles_rad == pytest.approx(before_rad, abs=0.02)
 
 
 def test_an_order_of_two_strides_walks_two_and_holds_with_flippers_raised(holding: Lockstep) -> None:

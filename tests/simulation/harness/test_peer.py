@@ -70,12 +70,6 @@ def test_commands_that_waited_while_the_robot_was_held_up_feed_its_watchdogs(ben
     assert bench.energised == {True}
 
 
-def test_without_a_command_the_drives_are_idle_after_their_time_also_when_held_up(bench: Bench) -> None:
-    bench.step(HELD_UP_S)
-    bench.step(0.002)
-    assert bench.energised == {False}
-
-
 def test_joints_do_not_move_on_in_time_that_the_robot_has_lost(bench: Bench) -> None:
     for axis in bench.axes:
         axis.send_torque(0.5)

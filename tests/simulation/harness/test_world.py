@@ -18,16 +18,14 @@ from simulation.harness.lockstep import Lockstep
 from simulation.harness.world import (
     FIXED_OF_DRIVE,
     FIXED_OF_ROBOT,
-    STRONGEST_PA,
     WorldText,
     load_world,
     parse_world,
 )
 from simulation.mud.clay import Clay, clay_of_water
-from simulation.mud.disturbances import LAB, NONE
+from simulation.mud.disturbances import LAB
 from simulation.mud.layer import Layer
 from simulation.mud.stones import Stone
-from simulation.mud.track import LEVEL
 from simulation.mud.unevenness import Ridges
 from tests.folders import EXAMPLE_WORLD as EXAMPLE
 
@@ -84,13 +82,6 @@ def test_the_example_shows_every_section() -> None:
     sections = {item.name for item in fields(WorldText)} - {"segment", "stone"}
     for name in ("[[segment]]", "[[segment.layer]]", "[[stone]]", *(f"[{section}]" for section in sections)):
         assert name in shown
-
-
-def test_the_shortest_world_is_one_segment_and_nothing_else() -> None:
-    world = parse_world(SHORTEST)
-    assert [segment.clay for segment in world.track.segments] == [Clay("2000 Pa", 2000.0)]
-    assert (world.track.stones, world.track.ridges) == ((), LEVEL)
-    assert (world.disturbances, world.robot_changes, world.drive_changes) == (NONE, {}, {})
 
 
 @pytest.mark.parametrize(
@@ -160,12 +151,6 @@ def test_all_problems_of_any_kind_are_reported_at_once() -> None:
     )
     keys = ["depth_m", "segment 1.strength_pa", "segment 2.layer 1.bottom_m", "segment 2.start_m", "stone 1.end_m"]
     assert sorted(reported.split(":")[0].split(" = ")[0] for reported in problems_of(wrong)) == keys
-
-
-def test_the_strongest_mud_may_be_reached_by_a_layer_and_not_surpassed() -> None:
-    firm = SHORTEST.replace("2000", f"{STRONGEST_PA / 2.0}")
-    assert parse_world(firm + LAYER.replace("3.0", "2.0")).track.clay_at(0.0).strength_at_pa(0.015) == STRONGEST_PA
-    assert problems_of(firm + LAYER.replace("3.0", "2.01"))
 
 
 @pytest.mark.parametrize("contents", [None, b"\xff\xfe", b"[[segment]\n"])

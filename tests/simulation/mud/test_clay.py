@@ -1,14 +1,13 @@
 """The clay's stresses follow the stated laws, and muds lie between the three that were fitted."""
 
-from itertools import pairwise
-from math import exp, log, nan
+from math import exp, log
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulation.mud.clay import MUDS, Clay, clay_of_water, rate_factor
+from simulation.mud.clay import MUDS, Clay, clay_of_water
 from simulation.mud.layer import Layer
 
 LAYERS = (Layer(0.0, 0.008, 3.0), Layer(0.02, 0.035, 0.4))
@@ -46,13 +45,6 @@ def test_a_layer_begins_at_its_top_and_ends_at_its_bottom_and_is_scaled_with_its
         assert clay.name == CRUSTED.name
 
 
-def test_the_rate_factor_is_one_at_the_reference_speed_and_rises() -> None:
-    assert rate_factor(0.1) == pytest.approx(1.0)
-    assert rate_factor(0.0) == pytest.approx(1.0 / (1.0 + 0.4 * 0.1**0.4))
-    factors = [rate_factor(speed_m_s) for speed_m_s in np.linspace(0.0, 2.0, 50)]
-    assert all(before < after for before, after in pairwise(factors))
-
-
 def test_strengths_lie_on_exponentials_through_the_fitted_muds_and_beyond() -> None:
     dry, middle, wet = ((percent, log(MUDS[f"{percent}"].strength_pa)) for percent in (45.3, 48.5, 53.1))
     for percent in (44.0, 44.1, 45.3, 46.9, 48.5, 50.0, 53.1, 55.2, 56.0):
@@ -60,9 +52,3 @@ def test_strengths_lie_on_exponentials_through_the_fitted_muds_and_beyond() -> N
         clay = clay_of_water(percent)
         assert clay.strength_pa == pytest.approx(exp(y + (next_y - y) / (next_x - x) * (percent - x)))
         assert clay.name == f"{percent:g}"
-
-
-@pytest.mark.parametrize("percent", [43.99, 56.01, -1.0, nan])
-def test_water_contents_outside_of_the_fit_are_refused(percent: float) -> None:
-    with pytest.raises(ValueError, match="44 to 56"):
-        clay_of_water(percent)

@@ -1,6 +1,6 @@
 """Each disturbance has its stated effect on the mud, the arm or the drives, and none if it is off."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import exp, hypot
 from random import Random
 from statistics import mean, pstdev
@@ -27,7 +27,6 @@ from simulation.mud.disturbances import (
     Disturbances,
     StrokeHistory,
     clinging_torques_nm,
-    drive_changes,
 )
 from simulation.mud.track import Track
 
@@ -54,24 +53,6 @@ def raised(history: StrokeHistory) -> StrokeHistory:
 
 def stroke(history: StrokeHistory, depth_m: float = 0.03) -> StrokeHistory:
     return raised(lowered(history, depth_m=depth_m))
-
-
-def test_everything_is_off_by_default() -> None:
-    assert all(getattr(NONE, field.name) == 0.0 for field in fields(NONE))
-    history = history_of()
-    for _ in range(5):
-        stroke(history)
-    assert (history.clinging_n, history.firmness, history.surface_m) == (0.0, 1.0, 0.0)
-
-
-def test_the_drives_take_over_their_part() -> None:
-    assert drive_changes(NONE) == {}
-    assert drive_changes(replace(LAB, current_noise_a=0.3, sample_period_s=0.008, current_limit_a=9.0)) == {
-        "current_noise_a": 0.3,
-        "encoder_period_s": 0.008,
-        "current_period_s": 0.008,
-        "motor_current_limit_a": 9.0,
-    }
 
 
 # clinging mud
@@ -183,18 +164,6 @@ def test_a_trial_s_surface_is_common_to_both_flippers_and_scatters_from_trial_to
     assert both.surface_error_m == hypot(0.0015, 0.0008)
 
 
-def test_the_surface_stays_through_a_stroke_and_never_rises_over_a_plate_outside() -> None:
-    history = history_of(surface_sd_m=0.003)
-    for _ in range(200):
-        met_m = lowered(history).surface_m
-        for lowest_m in (0.01, 0.03, 0.02, met_m + 1e-4):
-            history.step(lowest_m, 0.0)
-            assert history.surface_m == met_m
-        for lowest_m in (met_m - 1e-5, met_m - 1e-5, ABOVE_M):  # it stays just above the mud
-            history.step(lowest_m, 0.0)
-            assert lowest_m <= history.surface_m
-
-
 def test_a_seed_repeats_its_history_after_a_reset_and_another_seed_differs() -> None:
     first, second, other = (StrokeHistory(LAB, seed) for seed in (1, 1, 2))
     found_m = surfaces_m(first, 5)
@@ -241,13 +210,6 @@ def walking(configuration: Configuration, water: str, disturbances: Disturbances
     robot.arm()
     robot.walk(WalkOrder(0.04, adaptive=False))
     return robot
-
-
-@pytest.mark.parametrize("water", MUDS)
-def test_the_robot_walks_in_the_lab_without_a_fault(configuration: Configuration, water: str) -> None:
-    robot = walking(configuration, water, LAB)
-    assert robot.run_until(lambda: robot.robot.plant.body_m > 0.02, 4.0)
-    assert robot.loop.mode is Mode.WALKING and robot.loop.fault is None
 
 
 def test_a_loop_over_rare_messages_oscillates_and_is_stopped(configuration: Configuration) -> None:

@@ -19,7 +19,7 @@ from simulation.mud.flipper_contact import (
     plate_size,
     twist_of,
 )
-from simulation.mud.rigid_plate import PlateSize, Wrench, lowest_point_m
+from simulation.mud.rigid_plate import Wrench, lowest_point_m
 
 GEOMETRY = FlipperGeometry()
 sweeps = st.floats(-0.6, 0.6)
@@ -93,23 +93,9 @@ def held(contact: FlipperContact, sweep_rad: float, depth_m: float) -> ContactFo
     return force
 
 
-def test_a_load_across_the_face_turns_the_adduction_joint_by_its_lever_below_the_arm() -> None:
-    """The authors' stances show this cross-coupling: -e sin α times the normal force, at a depth e below the arm."""
-    for sweep_rad in (0.4, -0.4):
-        force = held(FlipperContact(GEOMETRY), sweep_rad, 0.03)
-        lever_m = force.adduction_nm / (-sin(sweep_rad) * force.normal_n)
-        assert 0.5 * GEOMETRY.drop_m < lever_m < GEOMETRY.drop_m
-        assert abs(force.outward_n) + abs(force.upward_n) < 1e-9
-
-
 def test_above_the_mud_a_flipper_has_no_load_and_forgets_the_last_one() -> None:
     contact = FlipperContact(GEOMETRY)
     assert held(contact, 0.0, 0.03).normal_n > 1.0
     assert held(contact, 0.0, -0.01) == NO_CONTACT
     still = attitude_of(GEOMETRY, 0.0, GEOMETRY.adduction_rad(0.0, 0.03))
     assert contact.step(0.001, MUDS["48.5"], ArmMotion(0.0, 0.0), still) == pytest.approx(NO_CONTACT)
-
-
-def test_the_plate_is_the_one_of_the_geometry() -> None:
-    size = plate_size(FlipperGeometry(plate_width_m=0.03, plate_height_m=0.06, plate_thickness_m=0.005))
-    assert size == PlateSize(0.03, 0.06, 0.005)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from simulation.mud.clay import MUDS, Clay, rate_factor
 from simulation.mud.layer import Layer
-from simulation.mud.mud_springs import LENGTHWAYS_YIELD_M, SIDEWAYS_YIELD_M
+from simulation.mud.mud_springs import SIDEWAYS_YIELD_M
 from simulation.mud.plate_contact import PlateContact
 from simulation.mud.rigid_plate import NO_WRENCH, Attitude, PlateSize, Twist, Wrench
 
@@ -183,12 +183,6 @@ def test_every_strip_has_the_strength_of_the_mud_at_its_own_depth(
     assert wrench[:3] == pytest.approx(dense[:3], abs=0.05 * hypot(*dense[:3]) + 4.0 * slice_n)
 
 
-def test_a_weak_layer_leaves_the_force_of_the_closed_law() -> None:
-    weak = CLAY._replace(layers=(Layer(0.01, 0.02, 0.1),))
-    across_n = -move(PlateContact(SIZE), Twist(normal_m_s=0.1), 0.3, clay=weak).normal_n
-    assert across_n == pytest.approx(weak.lateral_n(0.03, SIZE.width_m), rel=0.01)
-
-
 @pytest.mark.parametrize("attitude", [UPRIGHT, attitude_of(0.03, 0.5, 0.5), attitude_of(0.001, -0.5, 0.7)])
 def test_before_it_yields_mud_is_a_spring_with_a_symmetric_stiffness(attitude: Attitude) -> None:
     """By Betti's theorem the work of one push on another's displacement is mutual."""
@@ -236,28 +230,6 @@ def test_mud_never_returns_more_work_than_it_received(
         for _ in range(steps):
             given_j += work_j(plate, twist, attitude, clay)
             assert given_j < 1e-9
-
-
-def test_a_push_into_deeper_mud_keeps_its_force_and_a_lift_reduces_it() -> None:
-    plate = PlateContact(SIZE)
-    pushed = move(plate, Twist(normal_m_s=0.1), 0.05, Attitude(0.01, 0.0, 1.0))  # a third of the yield
-    deeper = move(plate, STOP, DT_S, Attitude(0.05, 0.0, 1.0))
-    assert deeper.normal_n == pytest.approx(pushed.normal_n)
-    higher = move(plate, STOP, DT_S, Attitude(0.002, 0.0, 1.0))
-    assert 0.0 < higher.normal_n / pushed.normal_n < 0.2
-
-
-@pytest.mark.parametrize(
-    ("axis", "yield_m"),
-    [("normal_m_s", SIDEWAYS_YIELD_M), ("outward_m_s", LENGTHWAYS_YIELD_M), ("upward_m_s", LENGTHWAYS_YIELD_M)],
-)
-def test_a_small_push_springs_back(axis: str, yield_m: float) -> None:
-    plate, steps_s = PlateContact(SIZE), 4 * DT_S
-    speed_m_s = 0.4 * yield_m / steps_s
-    pushed = move(plate, Twist(**{axis: speed_m_s}), steps_s)
-    assert max(abs(force_n) for force_n in pushed[:3]) > 0.3
-    back = move(plate, Twist(**{axis: -speed_m_s}), steps_s)
-    assert back == pytest.approx(NO_WRENCH, abs=1e-12)
 
 
 def test_sideways_loads_build_up_over_the_stated_distance_as_in_the_logs() -> None:

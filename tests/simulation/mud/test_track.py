@@ -57,13 +57,6 @@ def test_random_strength_forgets_itself_over_its_correlation_length() -> None:
         assert correlation == pytest.approx(exp(-lengths), abs=0.05)  # 4000 lengths: three standard errors
 
 
-def test_random_strength_is_the_same_for_a_seed_in_any_order_of_access() -> None:
-    parameters, positions_m = RandomStrength(0.3, 0.1, 3), np.linspace(-0.5, 5.0, 200)
-    forward, backward = strengths_pa(parameters, positions_m), strengths_pa(parameters, positions_m[::-1])
-    assert forward.tolist() == backward[::-1].tolist()
-    assert forward.tolist() != strengths_pa(RandomStrength(0.3, 0.1, 4), positions_m).tolist()
-
-
 def test_random_strength_is_about_each_segment_s_own_with_its_name_and_layers() -> None:
     wandering, swapped = (
         Track([(1.0, a), (1.0, b)], random_strength=RandomStrength(0.3, 0.1, 1))

@@ -55,19 +55,6 @@ def test_it_prints_counts_at_its_rate_with_its_noise(listener: Listener) -> None
     assert stdev(counts) == pytest.approx(420.0, rel=0.15)
 
 
-def test_at_another_baud_rate_it_is_noise(tmp_path: Path) -> None:
-    listener = Listener(tmp_path, AmplifierParameters(), termios.B9600)
-    heard = listener.hear(0.0, 1.0)
-    assert len(heard) > 300
-    assert not any(byte in b"0123456789\n" for byte in heard)
-    listener.close()
-
-
-def test_beyond_its_range_it_stays_at_the_converter_s_end(listener: Listener) -> None:
-    listener.force_n = -25.0
-    assert set(listener.hear(0.0, 0.5).split()) == {b"-8388608"}
-
-
 @pytest.mark.parametrize(("style", "line"), [("newtons", b"Load: 1.0000 N"), ("indicator", b"ST,GS,+00.10197kg")])
 def test_other_amplifiers_print_other_lines(tmp_path: Path, style: str, line: bytes) -> None:
     listener = Listener(tmp_path, AmplifierParameters(style=style, noise_n=0.0))

@@ -89,11 +89,6 @@ def test_a_body_that_is_pushed_back_drags_its_flipper_with_the_same_force(sweep_
         assert force.thrust_n == pytest.approx(shear_n)
 
 
-def test_a_distance_too_short_for_the_mud_to_yield_is_refused() -> None:
-    with pytest.raises(ValueError, match="distance_m"):
-        measure_shear(CLAY, GEOMETRY, 0.0, 0.0, 0.03, 0.5, distance_m=0.02)
-
-
 def test_a_load_cell_finds_a_crust_where_it_is() -> None:
     """Down to the bottom of the crust the edge carries 3 times the load, below it the load without a crust.
 
@@ -109,11 +104,3 @@ def test_a_load_cell_finds_a_crust_where_it_is() -> None:
     edge_n = 2.0 * CLAY.strength_pa * 5.14 * EDGE_M2
     assert (crusted_n - plain_n)[inside] == pytest.approx(edge_n + sides_n[inside], rel=0.01)
     assert (crusted_n - plain_n)[below] == pytest.approx(sides_n[below], rel=0.05)
-
-
-def test_a_reset_cell_is_a_new_one() -> None:
-    cell = LoadCell(CLAY, GEOMETRY, 0.3, lowered_rad(0.3), relaxation=0.1)
-    first = cell.lower(0.03, 0.1)
-    cell.hold(1.0)
-    cell.reset()
-    assert cell.lower(0.03, 0.1) == first

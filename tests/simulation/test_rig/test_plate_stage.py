@@ -96,13 +96,6 @@ def test_a_manual_motion_covers_its_distance_forward_within_its_fastest_speed(pa
     assert min(speeds_m_s) >= -1e-9 and max(speeds_m_s) <= 1.01 * hand.fastest_m_s
 
 
-def test_a_hand_stutters_and_rests() -> None:
-    motion = ManualMotion(0.2, ManualMotionParameters(), Random(3))
-    speeds_m_s = [100.0 * (motion.path_m(i / 100.0) - motion.path_m((i - 1) / 100.0)) for i in range(10, 150)]
-    assert sum(speed < 1e-6 for speed in speeds_m_s) > 5
-    assert max(speeds_m_s) > 2.0 * 0.06
-
-
 def test_an_encoder_on_the_stage_counts_every_stroke_and_nothing_else() -> None:
     stage = PlateStage(Air(), StageParameters(manual=ManualMotionParameters()))
     stage.mean_force_n(0.0)

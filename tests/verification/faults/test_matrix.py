@@ -17,24 +17,23 @@ from control.faults import FaultKind
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
 from drivers.can import stamp_clock
-from drivers.fault_injection.failures import EFFECTS, FailureKind
+from drivers.fault_injection.failure_table import BY_NAME, FAILURE_MODES, PHASES, FailureMode
 from experiments.study.workers import run_parallel
 from simulation.harness.drive_presets import DRIVES
-from verification.faults.bench import FaultBench
 from verification.faults.cell import FORBIDDEN_TICKS, run_cell
 from verification.faults.evaluation import Cell, problems
-from verification.faults.failure_modes import BY_NAME, FAILURE_MODES, FailureMode
-from verification.faults.loop_injectors import bug_in, nothing
+from verification.faults.failing_robot import FaultBench
+from verification.faults.injection import ACTS
 from verification.faults.matrix import FAULTS, CellKey, Plan, report_of
 from verification.faults.motor_energy import REACTING_TICKS
-from verification.faults.phases import PHASES, bench_for, enter_phase
+from verification.faults.phases import bench_for, enter_phase
 from verification.faults.protocol_differences import BY_TYPE, differences, mode_of
 
 
 def one_cell_of_each_fault() -> list[CellKey]:
     """Choose a phase for each fault, preferably an early one, and a type of drive that can have the fault."""
     phases = cycle(("hold", "idle", "stance", "hold", "arming"))
-    firsts = {mode.fault: mode for mode in reversed(FAILURE_MODES)}.values()
+    firsts = {mode.fault: mode for mode in reversed(BY_NAME.values())}.values()
     return [CellKey(mode.name, next((p for _ in PHASES if (p := next(phases)) in mode.phases), mode.phases[0]), 1,
                     "mit" if mode.name in differences("odrive") else "odrive")
             for mode in firsts]  # fmt: skip
@@ -48,23 +47,15 @@ def cells() -> Sequence[Cell]:
         return run_parallel([partial(run_cell, *key) for key in one_cell_of_each_fault()], lambda done, of: None)
 
 
-def test_every_kind_of_fault_has_a_failure_mode() -> None:
+def test_every_kind_of_fault_has_a_failure_mode_and_every_act_an_injector() -> None:
     assert set(FaultKind) <= set(FAULTS)
+    assert {mode.act[0] for mode in FAILURE_MODES if mode.act} <= set(ACTS)
 
 
 def test_the_whole_matrix_has_every_phase() -> None:
     keys = Plan().cells
     assert len(keys) >= 300 and len(set(keys)) == len(keys)
     assert {key.phase for key in keys} == set(PHASES)
-    assert {mode.fault for mode in FAILURE_MODES} - set(FaultKind) == {
-        "none",
-        "wrong_motor",
-        "foreign_torque",
-        "degraded",
-        "daemon_killed",
-        "daemon_hung",
-        "bug_in_the_tick",
-    }
 
 
 def test_the_robot_reacts_to_every_fault_as_its_kind_demands(cells: Sequence[Cell]) -> None:
@@ -77,17 +68,6 @@ def test_a_fault_that_stops_the_robot_leaves_it_without_torque(cells: Sequence[C
     assert len(stopped) > 20
     assert all(cell.zero_torque_ticks is not None and cell.disarmed for cell in stopped)
     assert any(cell.peak_torque_nm > 0.0 for cell in stopped)
-
-
-def test_every_component_that_can_be_slow_lossy_or_full_of_garbage_has_a_failure_mode() -> None:
-    degradable = {
-        (part, kind)
-        for part, kinds in EFFECTS.items()
-        for kind in (FailureKind.SLOW, FailureKind.INTERMITTENT, FailureKind.GARBAGE)
-        if kind in kinds
-    }
-    named = {tuple(mode.how.split()) for mode in FAILURE_MODES if mode.fault == "degraded"}
-    assert degradable - named == {("loop", "slow"), ("clock", "garbage")}  # these have faults of their own
 
 
 def test_a_cell_follows_from_its_name_phase_and_seed() -> None:
@@ -120,7 +100,10 @@ def test_a_failure_that_a_drive_cannot_have_is_reported_and_has_no_cell() -> Non
 
 def test_a_failure_that_shows_as_another_has_the_bounds_of_that_one() -> None:
     mode = mode_of("watchdog_off", "moteus")
-    assert mode.kind is FaultKind.FOREIGN_COMMANDS and mode_of("watchdog_off", "odrive").kind is FaultKind.WATCHDOG_OFF
+    assert (
+        mode.fault_kind is FaultKind.FOREIGN_COMMANDS
+        and mode_of("watchdog_off", "odrive").fault_kind is FaultKind.WATCHDOG_OFF
+    )
     assert Plan(drive="moteus").differences["watchdog_off"].startswith("shown as foreign_commands and also ")
 
 
@@ -224,43 +207,51 @@ def run_mode(monkeypatch: pytest.MonkeyPatch, mode: FailureMode, phase: str = "h
 
 
 def test_a_missing_fault_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
-    cell = run_mode(monkeypatch, replace(BY_NAME["drive_quiet"], inject=nothing))
+    cell = run_mode(monkeypatch, replace(BY_NAME["drive_quiet"], act=("nothing",)))
     assert not cell.ok and "no reaction" in cell.why and "torque at the end" in cell.why
 
 
 def test_an_escaped_exception_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
-    cell = run_mode(monkeypatch, replace(BY_NAME["clock_step"], inject=bug_in("controller.step")))
+    cell = run_mode(monkeypatch, replace(BY_NAME["clock_step"], act=("bug_in", "controller.step")))
     assert "an exception escaped: DeliberateBugError: controller.step" in cell.why
 
 
 def test_a_fault_in_the_control_group_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
-    cell = run_mode(monkeypatch, replace(BY_NAME["none"], inject=BY_NAME["voltage_low"].inject))
+    cell = run_mode(monkeypatch, replace(BY_NAME["none"], act=(), drive=BY_NAME["voltage_low"].drive))
     assert cell.why == ["without a failure it reported voltage_low"]
-
-
-LOW_SUPPLY = BY_NAME["voltage_under"]
-
-
-@contextmanager
-def arming_again(bench: FaultBench, joint: str) -> Iterator[None]:
-    """Request torque in every step, also after the fault."""
-
-    def ask() -> None:
-        bench.loop.request(Request.ARM, bench.now_s)
-
-    bench._acts.append(ask)
-    with LOW_SUPPLY.inject(bench, joint):
-        yield
 
 
 @pytest.mark.parametrize("phase", ["idle", "hold"])
 def test_a_robot_that_arms_again_fails_the_cell(phase: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    cell = run_mode(monkeypatch, replace(LOW_SUPPLY, inject=arming_again), phase)
+    """An act requests torque in every step, also after the fault."""
+    low_supply, requested = BY_NAME["voltage_under"], list[str | None]()
+
+    @contextmanager
+    def arm_again(bench: FaultBench, joint: str) -> Iterator[None]:
+        bench.acts.append(lambda: requested.append(bench.loop.request(Request.ARM, bench.now_s)))
+        with bench.drive_changed(joint, **low_supply.drive):
+            yield
+
+    monkeypatch.setitem(ACTS, "arm_again", arm_again)
+    cell = run_mode(monkeypatch, replace(low_supply, act=("arm_again",)), phase)
     assert "torque or closed loop came back by itself" in cell.why
 
 
-GOOD = Cell("drive_quiet", "drive_quiet", "hold", 1, "left_sweep", "damping", 5, 4, 4, ["drive_quiet"], "fault", 0.3,
-            zero_torque_ticks=100)  # fmt: skip
+GOOD = Cell(
+    fault="drive_quiet",
+    mode_name="drive_quiet",
+    phase="hold",
+    seed=1,
+    joint="left_sweep",
+    reaction="damping",
+    bound_ticks=5,
+    reaction_ticks=4,
+    reported_ticks=4,
+    reported=["drive_quiet"],
+    mode="fault",
+    peak_torque_nm=0.3,
+    zero_torque_ticks=100,
+)
 
 
 def test_a_good_cell_has_no_problem() -> None:
@@ -308,7 +299,7 @@ def test_a_stalled_loop_misses_its_ticks_while_the_robot_moves_on() -> None:
     bench = make_bench()
     bench.run_for(0.1)
     made, missed = bench.loop_ticks, bench.loop.missed_ticks
-    bench.stalled_steps = 5
+    bench.stall(5)
     for _ in range(6):
         bench.step()
     assert (bench.loop_ticks, bench.loop.missed_ticks) == (made + 1, missed + 5)

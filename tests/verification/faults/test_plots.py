@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from drivers.fault_injection.failure_table import BY_NAME
 from verification.faults.evaluation import Cell
-from verification.faults.failure_modes import FAILURE_MODES
 from verification.faults.matrix import Plan, report_of
 from verification.faults.plots import plot_faults
 
@@ -15,7 +15,7 @@ from verification.faults.plots import plot_faults
 def make_cells(ok: bool) -> list[Cell]:
     return [
         Cell(mode.fault, mode.name, phase, 1, "left_sweep", "warn", bound, reaction_ticks=bound and 4, ok=ok)
-        for mode in FAILURE_MODES[::8]
+        for mode in list(BY_NAME.values())[::8]
         for phase in mode.phases
         for bound in [None if mode.fault == "none" else 5]
     ]

@@ -1,0 +1,367 @@
+"""One ODrive with firmware 0.5 as a joint: counts before it has moved, held currents, errors, its watchdog."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import isnan, pi
+from typing import Any
+
+import pytest
+
+from control.rate import PERIOD_S
+from control.records import DriveState, Joints
+from drivers.can.frames import Frame
+from drivers.can.mock_bus import MockBus
+from drivers.drive import DriveHealth
+from drivers.drive_types import make_drives
+from drivers.odrive import codec
+from drivers.odrive.codec import Message, arbitration_id
+from drivers.odrive05 import codec as codec05
+from drivers.odrive05.axis import Odrive05Axis
+from drivers.odrive05.parameters import Odrive05Parameters
+
+JOINT, NODE = "left_sweep", 3
+COUNTS = Frame(arbitration_id(NODE, codec05.GET_ENCODER_COUNT), is_remote=True)
+VERSION = Frame(arbitration_id(NODE, codec.GET_VERSION), is_remote=True)
+CLEAR = Frame(arbitration_id(NODE, codec05.CLEAR_ERRORS))
+ZERO = Frame(arbitration_id(NODE, codec.SET_INPUT_TORQUE), bytes(4))
+IDLE, CLOSED_LOOP = 1, 8
+EXPIRED, ENCODER = codec05.ERROR_WATCHDOG, codec05.ERROR_ENCODER
+HEARTBEAT_TICKS = 38
+
+
+class Bench:
+    """One drive whose reports the tests write, and a clock that ticks as the loop does."""
+
+    def __init__(self, **changes: Any) -> None:
+        bus = MockBus()
+        self.far = bus.open()
+        parameters = Odrive05Parameters("one", NODE, **changes)
+        self.drives = make_drives({JOINT: parameters}, {"one": bus.open()})
+        self.now_s = 0.0
+        self.state_of_axis, self.error, self.parts = IDLE, 0, (0, 0, 0)
+        self.expires = True  # after a tenth of a second without a frame
+        self.counts: int | None = 0
+        self.estimates = (0.0, 0.0)
+        self.sent: list[Frame] = []
+        self._silent_ticks = self._tick = 0
+
+    @property
+    def axis(self) -> Odrive05Axis:
+        axis = self.drives.axes[0]
+        assert isinstance(axis, Odrive05Axis)
+        return axis
+
+    @property
+    def state(self) -> DriveState:
+        return self.axis.state
+
+    @property
+    def health(self) -> DriveHealth:
+        return self.drives.health[0]
+
+    def report(self, message: Message, *values: float) -> None:
+        self.far.send(Frame(arbitration_id(NODE, message), message.encode(*values)))
+
+    def read(self) -> None:
+        self.now_s += PERIOD_S
+        self.drives.read(self.now_s)
+
+    def tick(self, poll: bool = False) -> list[Frame]:
+        """Reports motion, and a heartbeat when it is due; returns what the program sends then."""
+        self._tick += 1
+        if self.expires and self._silent_ticks > HEARTBEAT_TICKS:
+            self.error |= EXPIRED
+        self.report(codec.GET_ENCODER_ESTIMATES, *self.estimates)
+        if self.counts is not None and COUNTS in self.sent:
+            self.report(codec05.GET_ENCODER_COUNT, self.counts, self.counts % 8192)
+        if self._tick % HEARTBEAT_TICKS == 0:
+            self.report(codec05.HEARTBEAT, self.error, self.state_of_axis, *self.parts)
+        self.read()
+        if poll:
+            self.drives.poll()
+        else:
+            self.drives.send(Joints(0.0), PERIOD_S)
+        self.sent = self.far.receive()
+        if CLEAR in self.sent:
+            self.error = 0
+        self._silent_ticks = 0 if self.sent else self._silent_ticks + 1
+        return self.sent
+
+    def run(self, duration_s: float = 1.0, poll: bool = False) -> list[list[Frame]]:
+        return [self.tick(poll) for _ in range(round(duration_s / PERIOD_S))]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.mark.parametrize("poll", [False, True])
+def test_before_it_was_in_closed_loop_its_position_is_that_of_its_counts(bench: Bench, poll: bool) -> None:
+    bench.counts = -4096
+    bench.run(poll=poll)
+    assert bench.state.angle_rad == pytest.approx(-pi)
+    assert bench.state.velocity_rad_s == 0.0
+    assert bench.now_s - bench.state.angle_stamp_s < 2.0 * PERIOD_S
+    assert COUNTS in bench.sent
+
+
+@pytest.mark.parametrize(("sign", "zero_turn"), [(1, 0.0), (-1, 0.25)])
+def test_counts_and_estimates_give_the_same_angle(sign: int, zero_turn: float) -> None:
+    bench = Bench(sign=sign, zero_turn=zero_turn, encoder_counts=4000)
+    bench.counts = 1000
+    bench.run()
+    counted_rad = bench.state.angle_rad
+    bench.estimates = (0.25, 1.0)
+    bench.tick()
+    assert bench.state.angle_rad == pytest.approx(counted_rad) == sign * (0.25 - zero_turn) * 2.0 * pi
+    assert bench.state.velocity_rad_s == pytest.approx(sign * 2.0 * pi)
+    assert COUNTS not in bench.tick()  # the estimates are enough
+
+
+def test_zeros_of_a_drive_in_closed_loop_are_a_position(bench: Bench) -> None:
+    bench.run()
+    bench.state_of_axis, bench.counts = CLOSED_LOOP, 4000
+    bench.run(0.2)
+    assert (bench.state.angle_rad, bench.state.velocity_rad_s) == (0.0, 0.0)
+    assert bench.now_s - bench.state.angle_stamp_s < PERIOD_S
+
+
+def test_a_joint_that_is_moved_has_the_velocity_between_two_counts(bench: Bench) -> None:
+    bench.run()
+    for _ in range(20):
+        assert bench.counts is not None
+        bench.counts += 20
+        bench.tick()
+    assert bench.state.velocity_rad_s == pytest.approx(20 / 8192 * 2.0 * pi / PERIOD_S)
+    bench.counts = 4000  # a jump
+    bench.tick()
+    assert bench.state.velocity_rad_s == 0.0
+
+
+def test_the_position_waits_until_the_watchdog_is_proven_and_the_drive_is_left_in_silence_once(bench: Bench) -> None:
+    sent = []
+    while isnan(bench.health.watchdog_s):
+        assert isnan(bench.state.angle_rad)
+        sent.append(bench.tick())
+    assert bench.health.watchdog_s == 0.1 and bench.now_s < 1.0
+    silent = [not frames for frames in sent]
+    assert sum(before and not after for before, after in pairwise(silent)) == 1
+    assert sum(silent) > HEARTBEAT_TICKS
+    assert all(bench.run(0.5))  # and never again
+    assert not isnan(bench.state.angle_rad)
+
+
+@pytest.mark.parametrize("poll", [False, True])
+def test_a_watchdog_that_expired_before_is_cleared_tried_again_and_is_no_error(bench: Bench, poll: bool) -> None:
+    bench.error = EXPIRED
+    sent = bench.run(poll=poll)
+    assert sum(frames.count(CLEAR) for frames in sent) == 1
+    assert bench.health.watchdog_s == 0.1
+    assert (bench.state.error_flags, bench.health.errors, bench.health.watchdog_expired) == (0, "", False)
+
+
+def test_other_errors_are_neither_cleared_nor_hidden_by_the_watchdog_s(bench: Bench) -> None:
+    bench.error = EXPIRED | ENCODER
+    sent = bench.run()
+    assert not any(CLEAR in frames for frames in sent)
+    assert isnan(bench.health.watchdog_s) and bench.state.error_flags == ENCODER
+    bench.drives.clear_errors()
+    bench.far.receive()
+    bench.error = 0
+    bench.run()
+    assert bench.health.watchdog_s == 0.1
+
+
+def test_a_watchdog_that_does_not_expire_is_off_until_errors_are_cleared(bench: Bench) -> None:
+    bench.expires = False
+    bench.run()
+    assert bench.health.watchdog_s == 0.0
+    bench.expires = True
+    bench.run()
+    assert bench.health.watchdog_s == 0.0
+    bench.drives.clear_errors()
+    bench.run()
+    assert bench.health.watchdog_s == 0.1
+
+
+def test_a_watchdog_that_expires_with_torque_on_is_an_error(bench: Bench) -> None:
+    bench.run()
+    bench.error, bench.state_of_axis = 0, CLOSED_LOOP
+    bench.run(0.2)
+    bench.error, bench.state_of_axis = EXPIRED, IDLE
+    bench.run(0.2)
+    assert bench.state.error_flags == EXPIRED
+    assert bench.health.watchdog_expired and bench.health.active_errors == "watchdog expired"
+
+
+def test_arming_clears_a_watchdog_that_expired_while_idle_first(bench: Bench) -> None:
+    bench.run()
+    assert bench.error == EXPIRED  # since the proof
+    bench.drives.arm(bench.now_s, at_once=True)
+    sent = bench.far.receive()
+    assert sent[0] == CLEAR and sent.count(CLEAR) == 1
+    bench.error = 0
+    bench.run(0.2)
+    bench.drives.arm(bench.now_s, at_once=True)
+    assert CLEAR not in bench.far.receive()
+
+
+def test_while_it_is_to_follow_no_silence_begins_even_where_arming_was_forced(bench: Bench) -> None:
+    bench.expires = False
+    bench.run(0.15)
+    assert isnan(bench.health.watchdog_s)
+    bench.drives.arm(bench.now_s)
+    bench.far.receive()
+    assert all(bench.run(0.5))
+    bench.state_of_axis = CLOSED_LOOP
+    assert all(ZERO in frames for frames in bench.run(0.5))
+    assert isnan(bench.health.watchdog_s)
+
+
+def test_an_idle_drive_repeats_its_last_current_which_is_none(bench: Bench) -> None:
+    bench.state_of_axis = CLOSED_LOOP
+    bench.run(0.2)
+    for current_a in (2.0, 2.5, 2.5):
+        bench.report(codec.GET_IQ, 2.0, current_a)
+        bench.read()
+        assert bench.state.current_a == current_a  # two equal ones with torque on are both measured
+    bench.state_of_axis = IDLE
+    bench.run(0.2)
+    assert bench.state.current_a == 0.0
+    for current_a, reported_a in ((2.5, 0.0), (2.5, 0.0), (40.0, 40.0), (2.5, 2.5), (2.5, 0.0)):
+        bench.report(codec.GET_IQ, 2.0, current_a)
+        bench.read()
+        assert bench.state.current_a == reported_a
+
+
+def test_the_set_point_that_an_idle_drive_repeats_until_its_heartbeat_is_no_mismatch(bench: Bench) -> None:
+    """Its set-point still follows the commands, also those of another program; its current repeats."""
+    bench.run()
+    bench.state_of_axis = CLOSED_LOOP
+    bench.run(0.2)
+
+    def run(currents_a: list[float]) -> None:
+        for current_a in currents_a:
+            bench.report(codec.GET_IQ, 8.0 + current_a, current_a)
+            bench.tick()
+
+    run([8.0] * 30)
+    assert not bench.health.setpoint_problem
+    bench.run(0.1)
+    run([8.0 + 0.01 * index for index in range(30)])  # a drive that follows it
+    assert bench.health.setpoint_problem
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_the_encoder_s_direction_turns_currents_into_the_sign_of_torque_and_position(sign: int, direction: int) -> None:
+    bench = Bench(sign=sign, encoder_direction=direction)
+    bench.state_of_axis = CLOSED_LOOP
+    bench.run(0.3)
+    bench.drives.gate.open()
+    for noise_a in (0.1, 0.0) * 200:
+        bench.drives.send(Joints(0.2), PERIOD_S)
+        bench.report(codec.GET_IQ, sign * direction * 0.2 / 0.083, sign * direction * (2.0 + noise_a))
+        bench.read()
+    assert bench.state.current_a == 2.0
+    assert bench.health.setpoint_problem == ""
+    for noise_a in (0.1, 0.0) * 200:
+        bench.drives.send(Joints(0.2), PERIOD_S)
+        bench.report(codec.GET_IQ, -sign * direction * 0.2 / 0.083, noise_a)
+        bench.read()
+    assert "-0.2 N·m" in bench.health.setpoint_problem
+
+
+def test_errors_of_the_parts_are_named_and_only_where_they_have_failed(bench: Bench) -> None:
+    bench.report(codec05.GET_MOTOR_ERROR, 0x8)
+    bench.report(codec05.GET_ENCODER_ERROR, 0x4)
+    bench.report(codec05.GET_CONTROLLER_ERROR, 0x1)
+    bench.run(0.2)
+    assert bench.health.errors == ""
+    bench.parts = (1, 0, 1)
+    bench.run(0.2)
+    assert bench.state.error_flags == codec05.ERROR_MOTOR | codec05.ERROR_CONTROLLER
+    named = "motor failed, controller failed; motor: gate driver fault; controller: overspeed"
+    assert bench.health.active_errors == bench.health.errors == named
+
+
+def test_a_drive_that_answers_for_its_counts_and_not_for_its_version_has_this_firmware(bench: Bench) -> None:
+    assert (bench.health.firmware, bench.health.firmware_supported) == ("", False)
+    bench.drives.request_settings(1.0)
+    assert bench.far.receive() == [VERSION, COUNTS]
+    bench.report(codec05.GET_ENCODER_COUNT, 0, 0)
+    bench.read()
+    assert (bench.health.firmware, bench.health.firmware_supported) == ("0.5", True)
+
+
+def test_a_drive_with_a_version_has_another_firmware(bench: Bench) -> None:
+    bench.report(codec.GET_VERSION, 2, 4, 4, 58, 0, 6, 11, 0)
+    bench.report(codec05.GET_ENCODER_COUNT, 0, 0)
+    bench.read()
+    assert (bench.health.firmware, bench.health.firmware_supported) == ("0.6.11", False)
+    assert bench.health.supported_firmware == "0.5"
+
+
+def test_counts_that_do_not_fit_the_position_name_the_key(bench: Bench) -> None:
+    bench.run()
+    bench.estimates, bench.counts = (1.5, 0.0), round(1.5 * 8192)
+    for problem in (False, True):
+        bench.tick()
+        bench.report(codec05.GET_ENCODER_COUNT, bench.counts, 0)
+        bench.read()
+        assert ("encoder_counts = 8192" in bench.health.setting_problem) is problem
+        bench.counts = round(1.5 * 4000)
+
+
+def test_a_restart_forgets_what_was_proven(bench: Bench) -> None:
+    bench.run()
+    for _ in range(200):
+        bench.read()
+    bench.error = 0
+    bench.run(0.15)
+    assert bench.health.restarts == 1
+    assert isnan(bench.health.watchdog_s)
+    bench.run()
+    assert bench.health.watchdog_s == 0.1 and bench.health.firmware_supported
+
+
+def test_zeros_after_a_restart_are_no_position_although_the_last_heartbeat_said_closed_loop(bench: Bench) -> None:
+    bench.run()
+    bench.state_of_axis, bench.estimates = CLOSED_LOOP, (0.3, 0.0)
+    bench.run(0.5)
+    for _ in range(200):
+        bench.read()
+    bench.state_of_axis, bench.estimates, bench.counts = IDLE, (0.0, 0.0), 2458
+    for _ in range(2 * HEARTBEAT_TICKS):
+        bench.tick()
+        assert bench.state.angle_rad == pytest.approx(0.6 * pi, abs=1e-3) and not bench.state.closed_loop
+        assert bench.health.setting_problem == ""
+    bench.run()
+    assert bench.state.angle_rad == pytest.approx(0.6 * pi, abs=1e-3) and bench.health.setting_problem == ""
+    assert bench.health.restarts == 1
+
+
+def test_commands_of_another_program_are_counted_and_emergency_stops_are_not(bench: Bench) -> None:
+    commands = {*codec05.COMMANDS} - {codec.ESTOP.command}
+    for command in range(32):
+        if command in codec05.COMMANDS:
+            bench.far.send(Frame(NODE << 5 | command, bytes(4)))
+    bench.read()
+    assert bench.health.foreign_commands == len(commands)
+
+
+def test_nothing_is_asked_of_a_drive_that_was_never_heard(bench: Bench) -> None:
+    for _ in range(100):
+        bench.read()
+        bench.drives.poll()
+    assert bench.far.receive() == []
+
+
+def test_a_reset_forgets_everything(bench: Bench) -> None:
+    before = bench.health
+    bench.run()
+    bench.drives.reset()
+    assert str(bench.health) == str(before)
+    assert isnan(bench.state.angle_rad) and not bench.state.heard
