@@ -49,7 +49,7 @@ def compare_muds(flipper: Mapping[str, Any], muds: Mapping[str, Mapping[str, Mud
                         "sensed_std_error": error,
                         "truth": truth.value,
                         "truth_std_error": truth.std_error,
-                        "at_least": bool(estimate.get("at_least")),  # the flipper's value is a lower bound
+                        "at_least": bool((estimate or {}).get("at_least")),  # the flipper's value is a lower bound
                         "ratio": ratio,
                         "ratio_std_error": ratio * hypot(error / value, truth.std_error / truth.value),
                     }
