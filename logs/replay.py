@@ -147,19 +147,10 @@ class RunningReplay:
 
 
 def _packed(fits: StrideFits) -> StrideFits:
-    """Computes the fits now: a stride's samples are smaller than the ticks that they are computed from."""
-    return StrideFits(*(partial(_same, _packed_samples(samples())) for samples in fits))
-
-
-def _packed_samples(samples: FitSamples | None) -> FitSamples | None:
-    if samples is None:
-        return None
-    moments, torques, weights = (array("d", values) for values in samples[:-1])
-    return FitSamples(moments, torques, weights, samples.slope)
-
-
-def _same(samples: FitSamples | None) -> FitSamples | None:
-    return samples
+    """Compute the fits now: a stride's samples are smaller than the ticks that they are computed from."""
+    found = [samples() for samples in fits]
+    packed = [each and FitSamples(*(array("d", values) for values in each[:-1]), each.slope) for each in found]
+    return StrideFits(*(partial(lambda samples: samples, each) for each in packed))
 
 
 def configuration_of(path: Path, text: str) -> Configuration:

@@ -10,8 +10,7 @@ from pathlib import Path
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import chosen_vertical, complain_of, show_lab_log
-from command_line.logs.refusals import UsageError, explain_errors
-from command_line.logs.unfinished import complain_of_end
+from command_line.logs.refusals import UsageError, complain_of_end, explain_errors
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides

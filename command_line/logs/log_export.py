@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 from command_line import exit_codes
-from command_line.logs.refusals import UsageError, explain_errors
-from command_line.logs.unfinished import complain_of_end
+from command_line.logs.refusals import UsageError, complain_of_end, explain_errors
 from command_line.screen import watched
 from logs.files.log_error import LogError
 from logs.files.scanned_log import ScannedLog, scan_logs

@@ -53,10 +53,11 @@ def read_body_track(
     forward = _find_forward(rows, position_m, up)
     advance_m = unknown if forward is None else position_m @ forward
     height_m = position_m[:, up] if BODY_COLUMNS[up] in columns else unknown
-    track = BodyTrack(advance_m, height_m, _find_pitch(table, lost, forward, up))
+    pitch_rad = unknown if forward is None else np.arcsin(_rise(table, lost, forward, up))
+    tilt_rad = np.arccos(_rise(table, lost, np.eye(len(AXES))[up], up))  # of the body's vertical, to any side
     findings = [*_report_lost(rows, columns[0], lost), *_report_height(rows, height_m, BODY_COLUMNS[up])]
     findings += _report_direction(rows, position_m, up, columns[0])
-    return track, [*findings, *_report_tilt(rows, _find_tilt(table, lost, up), track.pitch_rad)]
+    return BodyTrack(advance_m, height_m, pitch_rad), [*findings, *_report_tilt(rows, tilt_rad, pitch_rad)]
 
 
 def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
@@ -77,18 +78,6 @@ def _find_forward(rows: LogRows, position_m: Floats, up: int) -> Floats | None:
     stance_m[up] = 0.0
     distance_m = float(np.linalg.norm(stance_m))
     return stance_m / distance_m if distance_m > 0.0 else None
-
-
-def _find_pitch(table: CsvTable, lost: Truths, forward: Floats | None, up: int) -> Floats:
-    """Returns by how much the body's forward direction rose since the first known pose."""
-    if forward is None:
-        return np.full(len(lost), UNKNOWN)
-    return np.arcsin(_rise(table, lost, forward, up))
-
-
-def _find_tilt(table: CsvTable, lost: Truths, up: int) -> Floats:
-    """Returns by how much the body's vertical leaned over, to any side, since the first known pose."""
-    return np.arccos(_rise(table, lost, np.eye(len(AXES))[up], up))
 
 
 def _rise(table: CsvTable, lost: Truths, direction: Floats, up: int) -> Floats:

@@ -11,7 +11,7 @@ import re
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,26 +149,18 @@ def _parse_rows(path: Path, numbered: list[tuple[int, str]], width: int, places:
             raise ValueError
         return np.loadtxt(rows, delimiter=",", comments=None, ndmin=2, usecols=places)
     except ValueError:
-        return np.array([_parse_row(path, number, row.split(","), width, places) for number, row in numbered])
+        return np.array([_parse_row(path, line, row.split(","), width, places) for line, row in numbered])
 
 
 def _parse_row(path: Path, line: int, cells: Cells, width: int, places: list[int]) -> list[float]:
-    """Parses a row that may have empty cells. Raises LogError where it is malformed."""
+    """Parse a row that may have empty cells, which are NaN. Raises LogError where it is malformed."""
     if len(cells) != width:
         raise LogError(f"{path}: line {line} has {len(cells)} fields, the columns are {width}")
-    return [_parse_cell(path, line, cells[place]) for place in places]
-
-
-def _parse_cell(path: Path, line: int, cell: str) -> float:
-    if _is_number(cell):
-        return float(cell)
-    if cell.strip():
-        _refuse_cell(path, line, cell)
-    return math.nan
-
-
-def _refuse_cell(path: Path, line: int, cell: str) -> NoReturn:
-    raise LogError(f"{path}: line {line}: '{cell}' is not a number")
+    wanted = [cells[place] for place in places]
+    for cell in wanted:
+        if cell.strip() and not _is_number(cell):
+            raise LogError(f"{path}: line {line}: '{cell}' is not a number")
+    return [float(cell) if cell.strip() else math.nan for cell in wanted]
 
 
 def _drop_rows(path: Path, table: CsvTable) -> CsvTable:

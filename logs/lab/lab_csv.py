@@ -69,11 +69,17 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     phase, found = _read_phases(path, table)
     rows = LogRows(path, table.column[TIME], table.line, phase)
     angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
-    flippers = _find_flippers(angle_rad)
-    _blank_absent(angle_rad, current_a, flippers)
-    commanded_m = _commanded_depth(table)
+    joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
+    moved = {name: bool(joint_moved[2 * number : 2 * number + 2].any()) for number, name in enumerate(FLIPPERS)}
+    absent = np.repeat([not moved[name] for name in FLIPPERS], 2)
+    angle_rad[:, absent] = current_a[:, absent] = UNKNOWN  # the authors log zeros for absent motors
+    commanded_m = table.column.get(DEPTH_COLUMN, np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)))
     current_limit_a = _find_limit_a(current_a)
-    found += _check_joints(rows, angle_rad, current_a, commanded_m, table.gait.get("extraction_height", UNKNOWN))
+    found += check_ranges(rows, angle_rad, current_a)
+    check_swapped_joints(rows, angle_rad)
+    found += drop_stuck_signals(rows, angle_rad, current_a)
+    found += orient(rows, angle_rad, current_a)
+    found += check_zero(rows, angle_rad, commanded_m, table.gait.get("extraction_height", UNKNOWN))
     track, found_in_track = read_body_track(rows, table, vertical)
     return LabLog(
         stamp_s=rows.time_s,
@@ -82,7 +88,7 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
         current_a=current_a,
         body_x_m=track.advance_m,
         gait=table.gait,
-        flippers=flippers,
+        flippers=tuple(name for name in FLIPPERS if moved[name]),
         current_limit_a=current_limit_a,
         commanded_depth_m=commanded_m,
         body_height_m=track.height_m,
@@ -90,17 +96,6 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
         missing_settings=table.missing_settings,
         findings=(*table.findings, *found, *found_in_track),
     )
-
-
-def _check_joints(
-    rows: LogRows, angle_rad: Floats, current_a: Floats, commanded_m: Floats, extraction_m: float
-) -> list[Finding]:
-    """Orients the joints' signals and invalidates wrong samples, in place. Raises LogError where all are wrong."""
-    found = check_ranges(rows, angle_rad, current_a)
-    check_swapped_joints(rows, angle_rad)
-    found += drop_stuck_signals(rows, angle_rad, current_a)
-    found += orient(rows, angle_rad, current_a)
-    return [*found, *check_zero(rows, angle_rad, commanded_m, extraction_m)]
 
 
 def _refuse_missing(path: Path, table: CsvTable) -> None:
@@ -115,11 +110,6 @@ def _stack(table: CsvTable, names: tuple[str, ...]) -> Floats:
     """Returns the columns side by side, NaN for those that the file does not have."""
     absent = np.full(len(table.line), np.nan)
     return np.column_stack([table.column.get(name, absent) for name in names])
-
-
-def _commanded_depth(table: CsvTable) -> Floats:
-    depth_m = table.column.get(DEPTH_COLUMN)
-    return np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)) if depth_m is None else depth_m
 
 
 def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
@@ -139,20 +129,6 @@ def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
     if count > MOST_UNKNOWN * len(state):
         raise LogError(f"{path}: {found}")
     return phase, [found]
-
-
-def _find_flippers(angle_rad: Floats) -> tuple[str, ...]:
-    """Returns the flippers that moved."""
-    joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
-    return tuple(name for number, name in enumerate(FLIPPERS) if joint_moved[2 * number : 2 * number + 2].any())
-
-
-def _blank_absent(angle_rad: Floats, current_a: Floats, flippers: tuple[str, ...]) -> None:
-    """Replaces the zeros that the authors logged for absent motors."""
-    for number, name in enumerate(FLIPPERS):
-        if name not in flippers:
-            angle_rad[:, 2 * number : 2 * number + 2] = UNKNOWN
-            current_a[:, 2 * number : 2 * number + 2] = UNKNOWN
 
 
 def _find_limit_a(current_a: Floats) -> float:

@@ -31,7 +31,9 @@ def drop_backward_rows(path: Path, table: CsvTable) -> CsvTable:
             raise LogError(f"{path}: {found}")
         findings.append(found)
     column = {name: values[kept] for name, values in table.column.items()}
-    _refuse_slow(path, column[TIME])
+    step_s = float(np.median(np.diff(column[TIME]))) if len(kept) > 1 else 0.0
+    if step_s > LONGEST_STEP_S:
+        raise LogError(f"{path}: column {TIME}: rows are {step_s:g} s apart; times are in seconds")
     return table._replace(column=column, line=table.line[kept], findings=tuple(findings))
 
 
@@ -51,9 +53,3 @@ def longest_ascent(values: Floats) -> Integers:
     while before[kept[-1]] >= 0:
         kept.append(int(before[kept[-1]]))
     return np.array(kept[::-1])
-
-
-def _refuse_slow(path: Path, time_s: Floats) -> None:
-    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
-    if step_s > LONGEST_STEP_S:
-        raise LogError(f"{path}: column {TIME}: rows are {step_s:g} s apart; times are in seconds")

@@ -84,8 +84,10 @@ def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> l
         stuck += [(position, angles, held) for held in held_angles]
         stale = [held for held in _stale(rows, angles, currents) if not clipped[held.start]]
         stuck += [(position, angles, held) for held in stale] + [(current, currents, held) for held in stale]
-    findings = [_report_stuck(rows, column, held) for column, _, held in stuck]
-    for _, values, held in stuck:
+    findings = []
+    for column, values, held in stuck:
+        text = f"has the same value for {_duration_s(rows, held):.2f} s, so it is left out there"
+        findings.append(rows.finding(FindingKind.STUCK_SIGNAL, column, held.start, text))
         values[held] = np.nan
     return findings
 
@@ -116,8 +118,3 @@ def _held(values: NDArray[np.float64] | NDArray[np.complex128]) -> list[slice]:
 
 def _duration_s(rows: LogRows, held: slice) -> float:
     return float(rows.time_s[held.stop - 1] - rows.time_s[held.start])
-
-
-def _report_stuck(rows: LogRows, column: str, held: slice) -> Finding:
-    text = f"has the same value for {_duration_s(rows, held):.2f} s, so it is left out there"
-    return rows.finding(FindingKind.STUCK_SIGNAL, column, held.start, text)
