@@ -54,7 +54,7 @@ def _write_csv(log: ScannedLog, options: Options) -> list[Path]:
 
 
 def _not_written(path: Path, problem: OSError) -> LogError:
-    """Returns the message for a file or folder that stays as it was; pyarrow's own text names no file."""
+    """Return the message for a file or folder that stays as it was; pyarrow's own text names no file."""
     reason = os.strerror(problem.errno) if problem.errno else str(problem)
     return LogError(f"{path}: nothing was written: {reason}")
 

@@ -19,7 +19,7 @@ class UsageError(Exception):
 
 
 def explain_errors(command: Command) -> Command:
-    """Makes a command print the message of an error and return its exit status."""
+    """Make a command print the message of an error and return its exit status."""
 
     @wraps(command)
     def run(options: argparse.Namespace) -> int:

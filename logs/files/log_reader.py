@@ -54,7 +54,7 @@ class TickPass:
         self._cut: LogCutError | None = None
 
     def __iter__(self) -> Iterator[Ticks]:
-        """Yields blocks of ticks, up to a cut. Raises LogError."""
+        """Yield blocks of ticks, up to a cut. Raises LogError."""
         done = 0
         try:
             for ticks in self._log.blocks():
@@ -75,7 +75,7 @@ class TickPass:
             raise self._cut
 
     def feed(self, *consumers: Callable[[Ticks], None]) -> bool:
-        """Feeds every consumer; returns whether the log is complete. Raises LogError."""
+        """Feed every consumer; returns whether the log is complete. Raises LogError."""
         for ticks in self:
             for consume in consumers:
                 consume(ticks)
@@ -83,12 +83,12 @@ class TickPass:
 
 
 def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf, fields: Sequence[str] = ()) -> Log:
-    """Reads one file; of the rows before `from_s` it reads only the first chunk. Raises LogError."""
+    """Read one file; of the rows before `from_s` it reads only the first chunk. Raises LogError."""
     return read_logs([path], watch, from_s, fields)
 
 
 def read_logs(paths: Sequence[Path], watch: Watch = unwatched, from_s: float = -inf, fields: Sequence[str] = ()) -> Log:
-    """Reads one log, or joins several segments of one run: all fields of a tick, or some. Raises LogError."""
+    """Read one log, or joins several segments of one run: all fields of a tick, or some. Raises LogError."""
     scanned = scan_logs(paths, watch, from_s)
     types, names = scanned.tick_type, scanned.tick_type.names or ()
     for name in fields:

@@ -45,7 +45,7 @@ class CsvTable(NamedTuple):
 
 
 def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
-    """Reads the time, the state and those of the wanted columns that the file has. Raises LogError."""
+    """Read the time, the state and those of the wanted columns that the file has. Raises LogError."""
     lines = _split_lines(path, _unpack(path))
     head = _find_names(path, lines)
     names = [name.strip() for name in lines[head].split(",")]
@@ -66,7 +66,7 @@ def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
 
 
 def _unpack(path: Path) -> bytes:
-    """Returns the contents, decompressed if they are compressed; the name does not matter."""
+    """Return the contents, decompressed if they are compressed; the name does not matter."""
     pieces: list[bytes] = []
     try:
         with path.open("rb") as file:
@@ -83,7 +83,7 @@ def _unpack(path: Path) -> bytes:
 
 
 def _split_lines(path: Path, contents: bytes) -> list[str]:
-    """Returns the lines without their ends, which are those of any system."""
+    """Return the lines without their ends, which are those of any system."""
     try:
         text = contents.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -93,7 +93,7 @@ def _split_lines(path: Path, contents: bytes) -> list[str]:
 
 
 def _find_names(path: Path, lines: list[str]) -> int:
-    """Returns the index of the line with the column names: the first one that names time and state."""
+    """Return the index of the line with the column names: the first one that names time and state."""
     for index, line in enumerate(lines[: LONGEST_HEAD + 1]):
         if {TIME, STATE} <= {name.strip() for name in line.split(",")}:
             return index
@@ -101,7 +101,7 @@ def _find_names(path: Path, lines: list[str]) -> int:
 
 
 def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], list[Finding]]:
-    """Returns the settings that are numbers, the names without one, and what is reported about them."""
+    """Return the settings that are numbers, the names without one, and what is reported about them."""
     names, values = _split_settings([line for line in head if line.strip()])
     if len(names) != len(values):
         count = f"{len(names)} names and {len(values)} values"
@@ -119,7 +119,7 @@ def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], 
 
 
 def _split_settings(head: list[str]) -> tuple[Cells, Cells]:
-    """Returns the names and the values of the settings as they stand in the head; both empty without a head."""
+    """Return the names and the values of the settings as they stand in the head; both empty without a head."""
     if len(head) == 1 and head[0].startswith(GAIT_HEADER):
         head = list(head[0].removeprefix(GAIT_HEADER).partition("|")[::2])
     if len(head) != 2:
@@ -137,7 +137,7 @@ def _is_number(text: str) -> bool:
 
 
 def _is_torn(row: str, width: int, places: list[int]) -> bool:
-    """Returns whether a row breaks off: it has too few cells, or one that is not a number."""
+    """Return whether a row breaks off: it has too few cells, or one that is not a number."""
     cells = row.split(",")
     return len(cells) != width or not all(_is_number(cells[place]) or not cells[place].strip() for place in places)
 
@@ -164,7 +164,7 @@ def _parse_row(path: Path, line: int, cells: Cells, width: int, places: list[int
 
 
 def _drop_rows(path: Path, table: CsvTable) -> CsvTable:
-    """Drops the rows without a time or a state, and reports the cells that are empty in the others."""
+    """Drop the rows without a time or a state, and reports the cells that are empty in the others."""
     findings = list(table.findings)
     known = np.isfinite(table.column[TIME]) & np.isfinite(table.column[STATE])
     if np.count_nonzero(known) < MOST_DROPPED * len(known):

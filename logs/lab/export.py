@@ -73,5 +73,5 @@ def _columns(ticks: Ticks, rig: Rig, start_s: Floats, has_position: bool) -> dic
 
 
 def _of_joint(values: Floats, rig: Rig, joint: str) -> Floats:
-    """Returns the values of one joint; zeros for an absent motor, as the authors log it."""
+    """Return the values of one joint; zeros for an absent motor, as the authors log it."""
     return values[:, rig.joints.index(joint)] if joint in rig.joints else np.zeros(len(values))

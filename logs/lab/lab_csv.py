@@ -58,12 +58,12 @@ class LabLog(NamedTuple):
 
 
 def is_lab_csv(path: Path) -> bool:
-    """Returns whether a file's name is that of a CSV, compressed or not."""
+    """Return whether a file's name is that of a CSV, compressed or not."""
     return path.name.endswith((".csv", ".csv.gz"))
 
 
 def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
-    """Reads a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
+    """Read a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
     table = drop_backward_rows(path, read_table(path, READ_COLUMNS))
     _refuse_missing(path, table)
     phase, found = _read_phases(path, table)
@@ -99,7 +99,7 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
 
 
 def _refuse_missing(path: Path, table: CsvTable) -> None:
-    """Refuses a file without the positions and currents of at least one flipper. Raises LogError."""
+    """Refuse a file without the positions and currents of at least one flipper. Raises LogError."""
     needed = [(*POSITION_COLUMNS[i : i + 2], *CURRENT_COLUMNS[i : i + 2]) for i in range(0, len(POSITION_COLUMNS), 2)]
     if not any(set(names) <= table.column.keys() for names in needed):
         missing = ", ".join(name for names in needed for name in names if name not in table.column)
@@ -107,13 +107,13 @@ def _refuse_missing(path: Path, table: CsvTable) -> None:
 
 
 def _stack(table: CsvTable, names: tuple[str, ...]) -> Floats:
-    """Returns the columns side by side, NaN for those that the file does not have."""
+    """Return the columns side by side, NaN for those that the file does not have."""
     absent = np.full(len(table.line), np.nan)
     return np.column_stack([table.column.get(name, absent) for name in names])
 
 
 def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
-    """Returns the phase of each row; a state that is not known is a pause. Raises LogError where most are unknown."""
+    """Return the phase of each row; a state that is not known is a pause. Raises LogError where most are unknown."""
     state = table.column[STATE]
     known = np.isin(state, list(PHASE_OF_STATE))
     phase_from_lowest = np.array([PHASE_OF_STATE[number] for number in sorted(PHASE_OF_STATE)], dtype=np.int64)
@@ -132,7 +132,7 @@ def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
 
 
 def _find_limit_a(current_a: Floats) -> float:
-    """Returns the largest current if one joint shows it in many rows: then the drive clipped it."""
+    """Return the largest current if one joint shows it in many rows: then the drive clipped it."""
     size_a = np.nan_to_num(np.abs(current_a))
     peak_a = float(size_a.max(initial=0.0))
     at_peak = size_a >= AT_PEAK * peak_a

@@ -18,7 +18,7 @@ LONGEST_STEP_S = 0.5  # median time between rows; a stride takes about 1 s
 
 
 def drop_backward_rows(path: Path, table: CsvTable) -> CsvTable:
-    """Keeps the longest series of rows whose times do not fall. Raises LogError where the times are of no use."""
+    """Keep the longest series of rows whose times do not fall. Raises LogError where the times are of no use."""
     time_s = table.column[TIME]
     kept = longest_ascent(time_s)
     findings = list(table.findings)
@@ -38,7 +38,7 @@ def drop_backward_rows(path: Path, table: CsvTable) -> CsvTable:
 
 
 def longest_ascent(values: Floats) -> Integers:
-    """Returns the indices of the longest series of values that does not fall (patience sorting)."""
+    """Return the indices of the longest series of values that does not fall (patience sorting)."""
     if np.all(np.diff(values) >= 0.0):
         return np.arange(len(values))
     ends: list[float] = []  # the smallest value that ends an ascent of each length
