@@ -65,28 +65,28 @@ class TransmitGate:
         self._outlets: list[GatedPort] = []
 
     def outlet(self, port: CanPort, tables: Iterable[GateTable]) -> GatedPort:
-        """Makes the path to one bus, for the drives on it."""
+        """Make the path to one bus, for the drives on it."""
         outlet = GatedPort(self, port, tables)
         self._outlets.append(outlet)
         return outlet
 
     def open(self) -> None:
-        """Lets torque pass, for arming; the first torque counts from zero."""
+        """Let torque pass, for arming; the first torque counts from zero."""
         if not self.is_open:
             for outlet in self._outlets:
                 outlet.forget_torques()
         self.is_open = True
 
     def close(self) -> None:
-        """Lets only zero torque pass."""
+        """Let only zero torque pass."""
         self.is_open = False
 
     def allow_step(self, elapsed_s: float) -> None:
-        """Sets the largest step of the next torques: the slew rate times `elapsed_s`, the time since the last ones."""
+        """Set the largest step of the next torques: the slew rate times `elapsed_s`, the time since the last ones."""
         self._step_nm = self._torque_rate_nm_s * elapsed_s + ROUNDING_NM
 
     def torque_problem(self, torque_nm: float, before_nm: float, code_step_nm: float = 0.0) -> str:
-        """Returns why a torque may not follow the one before; empty where it may. NaN is beyond every bound.
+        """Return why a torque may not follow the one before; empty where it may. NaN is beyond every bound.
 
         Both were rounded to codes that are `code_step_nm` apart: by half of it, or by all of it where a code is zero.
         """
@@ -111,7 +111,7 @@ class GatedPort:
     """The gated path to one bus. Owns the torque that left last for each drive on it."""
 
     def __init__(self, gate: TransmitGate, port: CanPort, tables: Iterable[GateTable]) -> None:
-        """Joins the tables of the drives on one bus; raises ValueError where they want frames of different kinds."""
+        """Join the tables of the drives on one bus; raises ValueError where they want frames of different kinds."""
         self._gate = gate
         self._port = port
         self._tables = {table.torque_id: table for table in tables}
@@ -166,7 +166,7 @@ class GatedPort:
         self._port.send(frame)
 
     def _broken_rule(self, frame: Frame) -> str:
-        """Says why a frame that commands no torque may not leave."""
+        """Say why a frame that commands no torque may not leave."""
         if frame.is_remote or frame.is_error:
             return "it is none of the requests that the tables of this bus list"
         if (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:

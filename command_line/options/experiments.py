@@ -57,21 +57,10 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
     estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
     _add_campaign(names)
     _add_actuator(names)
-    _add_trackway(names)
-    _add_sweep(names)
-    _add_faults(names)
     _add_flipper(names)
     _add_walk(names)
     _add_loadcell(names)
     _add_lablogs(names)
-    fit = add(
-        names,
-        "mud-fit",
-        "experiments.trackway.run_mud_fit",
-        "The simulator's muds, fitted to the paper's fixed depths.",
-    )
-    _add_report(fit, "the muds are the simulator's", "write JSON there")
-    fit.add_argument("--seeds", type=SEEDS, default=2, metavar="N", help="walks of each point (default: 2)")
 
 
 def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -> None:
@@ -262,50 +251,3 @@ def _add_stage_encoder(loadcell: argparse.ArgumentParser) -> None:
     option("--position-step", type=between(0.01, 10000.0, "um"), metavar="UM", help="travel per count, of either sign")
     option("--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)")
     option("--position-label", default="", metavar="TEXT", help="at the beginning of each of its lines")
-
-
-def _add_trackway(names: Commands) -> None:
-    trackway = add(
-        names, "trackway", "experiments.trackway.run_trackway", "Three muds in a row, at fixed and at adapted depths."
-    )
-    _add_report(
-        trackway,
-        "robot and muds are simulated; without it the daemon's robot walks",
-        "for report, pictures and log; continues there",
-    )
-    add_socket(trackway)
-    _add_workers(trackway)
-    option = trackway.add_argument
-    option("--trials", "--seeds", type=SEEDS, metavar="N", help="of each gait (default: 3, as the paper)")
-    option("--method", action="append", metavar="NAME", help="of adaptation, repeatable to compare (default: default)")
-    option("--compartment", type=between(0.2, 100.0), metavar="M", help="length of each simulated mud (default: 0.61)")
-    option(
-        "--mud",
-        type=mud_length,
-        action="append",
-        metavar="NAME[=CM]",
-        help="of a real trackway, and its length (default: 61), one after the other (default: the paper's)",
-    )
-
-
-def _add_sweep(names: Commands) -> None:
-    sweep = add(names, "sweep", "experiments.trackway.run_sweep", "Speed against depth in muds of any strength.")
-    _add_report(sweep, "robot and muds are simulated", "write JSON and picture there")
-    _add_workers(sweep)
-    option = sweep.add_argument
-    option("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="repeatable (default: 12)")
-    option("--method", action="append", metavar="NAME", help="of adaptation, repeatable (default: all)")
-    option("--seeds", type=SEEDS, default=2, metavar="N", help="walks of each point (default: 2)")
-
-
-def _add_faults(names: Commands) -> None:
-    faults = add(
-        names, "faults", "experiments.faults.run_faults", "Every fault in every phase, with the bounds of its reaction."
-    )
-    _add_report(faults, "the faults happen to a simulated robot", "write JSON and picture there")
-    _add_workers(faults)
-    option = faults.add_argument
-    option("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
-    option("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
-    option("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
-    option("--drive", default="odrive", metavar="TYPE", help="type of the robot's drives, such as mit:AK80-9")

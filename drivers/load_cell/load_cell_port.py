@@ -22,7 +22,7 @@ class LoadCellPort:
     """Reads samples of force. Owns its serial line and the counters, which only grow."""
 
     def __init__(self, path: str, baud: int, line_format: LineFormat, calibration: LoadCellCalibration) -> None:
-        """Opens the line; raises SerialLineError where it does not open."""
+        """Open the line; raises SerialLineError where it does not open."""
         self.line_format, self.calibration = line_format, calibration
         self.lines = self.malformed_lines = self.overloads = 0
         self.last_malformed = ""
@@ -33,7 +33,7 @@ class LoadCellPort:
         return self.line.arrivals(lambda line: self.line_format.decode(line) is not None)
 
     def read(self, now_s: float) -> list[Sample]:
-        """Returns all samples that have arrived, oldest first; never waits."""
+        """Return all samples that have arrived, oldest first; never waits."""
         self.line.reopen(now_s)
         samples = []
         for stamp_s, line in self.line.read_stamped(now_s):
@@ -53,7 +53,7 @@ class LoadCellPort:
         return Sample(stamp_s, self.calibration.force_n(self._in_unit(reading)))
 
     def _in_unit(self, reading: Reading) -> float:
-        """Converts a reading whose line names another unit than the calibration."""
+        """Convert a reading whose line names another unit than the calibration."""
         own, wanted = reading.unit, self.calibration.unit.lower()
         if own == wanted or own not in NEWTONS or wanted not in NEWTONS:
             return reading.value

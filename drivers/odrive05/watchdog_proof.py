@@ -36,14 +36,14 @@ class WatchdogProof:
 
     @property
     def must_clear(self) -> bool:
-        """Returns whether the watchdog expired earlier: it could not show that it does again.
+        """Return whether the watchdog expired earlier: it could not show that it does again.
 
         The errors of a whole board are cleared. By then its other drive has reported its own.
         """
         return self._expired >= IN_A_ROW
 
     def on_heartbeat(self, expired: bool, fit: bool, read_s: float, read_before_s: float) -> None:
-        """Handles a heartbeat. `fit`: the drive is idle and without other errors, and is to remain so."""
+        """Handle a heartbeat. `fit`: the drive is idle and without other errors, and is to remain so."""
         if self.concluded:
             return
         if not fit or read_s - read_before_s > LATE_S:

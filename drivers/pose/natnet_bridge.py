@@ -32,7 +32,7 @@ class NatNetBridge:
     """Implements PositionStream. Owns the program, and its newest report. Start it before the loop's priority rises."""
 
     def __init__(self, parameters: NatNetParameters, direction: Direction) -> None:
-        """Starts the program and waits until its sockets are open; raises PoseSourceError where they do not open."""
+        """Start the program and waits until its sockets are open; raises PoseSourceError where they do not open."""
         self._link, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         arguments = json.dumps([asdict(parameters), direction])
         command = [sys.executable, "-P", "-m", "drivers.pose.natnet_bridge", arguments]
@@ -52,7 +52,7 @@ class NatNetBridge:
         self._link.setblocking(False)
 
     def receive(self, now_s: float) -> Iterator[tuple[float, float]]:
-        """Yields the positions that the program has passed on since, oldest first; never waits."""
+        """Yield the positions that the program has passed on since, oldest first; never waits."""
         for _ in range(MOST_MESSAGES_PER_READ):
             try:
                 message = self._link.recv(LONGEST_MESSAGE)
@@ -64,7 +64,7 @@ class NatNetBridge:
                 self._on_message(message)
 
     def _on_message(self, message: bytes) -> None:
-        """Handles a report; an empty message means that the program has ended."""
+        """Handle a report; an empty message means that the program has ended."""
         if message:
             self._report = PoseReport(*json.loads(message))
         else:
@@ -79,7 +79,7 @@ class NatNetBridge:
 
 
 def serve(client: NatNetClient, link: socket.socket) -> None:
-    """Passes positions and reports on until the loop's side closes."""
+    """Pass positions and reports on until the loop's side closes."""
     sent, sent_s = NO_SOURCE, 0.0
     while True:
         ready, _, _ = select.select([link, *client.sockets.opened], [], [], REPORT_S)

@@ -33,7 +33,7 @@ class RailEncoder:
     """Implements PoseSource. Owns its serial line, its counts, and the newest pose."""
 
     def __init__(self, parameters: RailEncoderParameters, origin_m: float = 0.0) -> None:
-        """Opens the device; raises PoseSourceError. `origin_m` is the counter's position where x is zero."""
+        """Open the device; raises PoseSourceError. `origin_m` is the counter's position where x is zero."""
         self.parameters = parameters
         device = parameters.device
         try:
@@ -45,7 +45,7 @@ class RailEncoder:
         self.reset()
 
     def reset(self) -> None:
-        """Restores the state after opening."""
+        """Restore the state after opening."""
         self._pose = BodyPose()
         self._counts.reset()
         self.line.reset()
@@ -69,7 +69,7 @@ class RailEncoder:
         return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
 
     def reopen(self, now_s: float) -> bool:
-        """Tries to open a lost device again, every RETRY_S; returns whether it did."""
+        """Try to open a lost device again, every RETRY_S; return whether it did."""
         return self.line.reopen(now_s)
 
     def report(self) -> PoseReport:

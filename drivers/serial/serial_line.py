@@ -46,7 +46,7 @@ class SerialLine:
     """Owns the open device, which is None while it is gone, and the incomplete line."""
 
     def __init__(self, path: str, baud: int, longest_bytes: int = LONGEST_LINE_BYTES, retry_s: float = RETRY_S) -> None:
-        """Opens the device; raises SerialLineError where it does not open."""
+        """Open the device; raises SerialLineError where it does not open."""
         self.path, self.baud = path, baud
         self.unpluggings = 0
         self.problem: SerialLineError | None = None  # the newest one
@@ -62,7 +62,7 @@ class SerialLine:
         self.reset()
 
     def reset(self) -> None:
-        """Restores the state after opening."""
+        """Restore the state after opening."""
         self._incomplete = b""
         self._from_its_start = False  # whether the incomplete line was received from its beginning
         self.recent: deque[bytes] = deque(maxlen=RECENT_LINES)
@@ -77,7 +77,7 @@ class SerialLine:
         return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_fraction(lines))
 
     def read(self, now_s: float) -> list[bytes]:
-        """Returns all complete lines without their ends, oldest first; none where the device is gone. Never waits."""
+        """Return all complete lines without their ends, oldest first; none where the device is gone. Never waits."""
         if self._device is None:
             return []
         try:
@@ -94,7 +94,7 @@ class SerialLine:
         return heard
 
     def _fetch(self) -> bytes:
-        """Returns all bytes that have arrived. Raises OSError where the device is gone."""
+        """Return all bytes that have arrived. Raises OSError where the device is gone."""
         events = self._poll.poll(0)
         if not events:
             return b""
@@ -117,7 +117,7 @@ class SerialLine:
         self._retry_at_s = now_s + self._retry_s
 
     def reopen(self, now_s: float) -> bool:
-        """Tries to open a lost device again, every `retry_s`; returns whether it did."""
+        """Try to open a lost device again, every `retry_s`; return whether it did."""
         if self._device is not None or now_s < self._retry_at_s:
             return False
         self._retry_at_s = now_s + self._retry_s
@@ -136,13 +136,13 @@ class SerialLine:
 
 
 def text_fraction(lines: Iterable[bytes]) -> float:
-    """Returns the fraction of bytes that is text; it is small at a wrong baud rate."""
+    """Return the fraction of bytes that is text; it is small at a wrong baud rate."""
     letters = b"".join(lines)
     return sum(32 <= letter < 127 or letter in b"\t\r\n" for letter in letters) / len(letters) if letters else 0.0
 
 
 def open_serial(path: str, baud: int) -> Any:
-    """Opens a port of pyserial for exclusive use. Raises SerialLineError."""
+    """Open a port of pyserial for exclusive use. Raises SerialLineError."""
     try:
         import serial
     except ModuleNotFoundError:
@@ -181,7 +181,7 @@ def _ports_text() -> str:
 
 
 def list_ports() -> list[str]:
-    """Lists the serial ports of this computer, by their persistent names where they have one."""
+    """List the serial ports of this computer, by their persistent names where they have one."""
     from serial.tools import list_ports as serial_ports
 
     persistent = {}

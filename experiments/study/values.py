@@ -31,6 +31,13 @@ def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
     return _number_where(lambda value: low <= value <= high, f"from {low:.15g} to {high:.15g}{unit and ' '}{unit}")
 
 
+def above(low: float, high: float | None = None, unit: str = "") -> Callable[[str], float]:
+    """Returns a parser of numbers above `low`, and up to `high` where there is one."""
+    highest, most = (inf, "") if high is None else (high, f" and at most {high:.15g}")
+    must_be = f"more than {low:.15g}{most}{unit and ' '}{unit}"
+    return _number_where(lambda value: low < value <= highest and isfinite(value), must_be)
+
+
 def whole(low: int, high: int) -> Callable[[str], int]:
     """Returns a parser of whole numbers from `low` to `high`."""
     must_be = f"a whole number from {low} to {high}"
