@@ -148,8 +148,10 @@ class RunningReplay:
 
 def _packed(fits: StrideFits) -> StrideFits:
     """Compute the fits now: a stride's samples are smaller than the ticks that they are computed from."""
-    found = [samples() for samples in fits]
-    packed = [each and FitSamples(*(array("d", values) for values in each[:-1]), each.slope) for each in found]
+    packed: list[FitSamples | None] = []
+    for found in (samples() for samples in fits):
+        columns = [array("d", values) for values in found[:-1]] if found else []
+        packed.append(FitSamples(columns[0], columns[1], columns[2], found.slope) if found else None)
     return StrideFits(*(partial(lambda samples: samples, each) for each in packed))
 
 
