@@ -28,7 +28,7 @@ class AnswerCounter:
         self._unanswered = min(self._unanswered + 1, MOST_UNANSWERED)
 
     def on_answer(self, read_s: float, read_before_s: float) -> bool:
-        """Returns whether the drive was silent for so long that it has restarted."""
+        """Return whether the drive was silent for so long that it has restarted."""
         restarted = read_before_s - self._asked_s > RESTART_SILENCE_S
         self._asked_s = read_s
         if self._unanswered:
@@ -39,5 +39,5 @@ class AnswerCounter:
         return restarted
 
     def duplicates(self, read_s: float) -> bool:
-        """Returns whether two drives seem to share this id."""
+        """Return whether two drives seem to share this id."""
         return self._surplus >= SURPLUS_ANSWERS and read_s - self._surplus_s < SURPLUS_S

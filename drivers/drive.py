@@ -48,16 +48,16 @@ class DriveParameters:
 
     @property
     def asking_ends_torque(self) -> bool:
-        """Whether the drive can only be asked for its signals by a command, which ends its torque."""
+        """Return whether only a command, which ends the drive's torque, can ask for its signals."""
         return False
 
     @property
     def reports_settings(self) -> bool:
-        """Whether its protocol can read the drive's watchdog, version and serial number back."""
+        """Return whether its protocol can read the drive's watchdog, version and serial number back."""
         return True
 
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
-        """Yields reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
+        """Yield reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
         if self.current_limit_a < torque_nm / self.torque_constant_nm_a:
             needed_a = ceil(100.0 * torque_nm / self.torque_constant_nm_a) / 100.0
             yield (
@@ -116,7 +116,7 @@ class DriveAxis(Protocol):
 
     @property
     def closed_loop(self) -> bool:
-        """Returns whether the drive follows torque, by its newest report."""
+        """Return whether the drive follows torque, by its newest report."""
 
     @property
     def receivers(self) -> Mapping[int, Callable[[bytes, float], None]]:
@@ -131,10 +131,10 @@ class DriveAxis(Protocol):
     def reset(self) -> None: ...
 
     def begin_read(self, now_s: float) -> None:
-        """Begins a read: the frames that follow arrived between the previous call and `now_s`."""
+        """Begin a read: the frames that follow arrived between the previous call and `now_s`."""
 
     def poll(self) -> None:
-        """Asks for all signals, where the drive reports only when asked."""
+        """Ask for all signals, where the drive reports only when asked."""
 
     def send_torque(self, torque_nm: float) -> None: ...
 
@@ -142,14 +142,14 @@ class DriveAxis(Protocol):
         """The last torques may not have left, so the drive may follow older ones."""
 
     def prepare(self) -> None:
-        """Sets what the drive needs to follow torque; it stays idle."""
+        """Set what the drive needs to follow torque; it stays idle."""
 
     def close_loop(self) -> None: ...
 
     def disarm(self) -> None:
-        """Commands zero torque and idle."""
+        """Command zero torque and idle."""
 
     def clear_errors(self) -> None: ...
 
     def request_settings(self, now_s: float) -> None:
-        """Asks for settings that are unknown or were read long ago. It is called in every tick while idle."""
+        """Ask for settings that are unknown or were read long ago. It is called in every tick while idle."""

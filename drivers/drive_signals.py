@@ -35,7 +35,7 @@ class DriveSignals(ABC):
         self._health: DriveHealth | None = None
 
     def begin_read(self, now_s: float) -> None:
-        """Begins a read: the frames that follow arrived between the previous call and `now_s`."""
+        """Begin a read: the frames that follow arrived between the previous call and `now_s`."""
         self._read_before_s, self._read_s = self._read_s, now_s
 
     def forget_commands(self) -> None:
@@ -47,7 +47,7 @@ class DriveSignals(ABC):
 
     @property
     def state(self) -> DriveState:
-        return DriveState(
+        return DriveState(  # by position: it is built for every drive in every tick
             self._angle_rad,
             self._velocity_rad_s,
             self._angle_stamp_s,
@@ -75,7 +75,7 @@ class DriveSignals(ABC):
         return health
 
     def _build_health(self) -> DriveHealth:
-        """Reports what is alike with every protocol; a protocol adds the rest."""
+        """Report what is alike with every protocol; a protocol adds the rest."""
         return DriveHealth(
             joint=self.joint,
             restarts=self.restarts,
@@ -87,4 +87,4 @@ class DriveSignals(ABC):
     @property
     @abstractmethod
     def duplicates(self) -> bool:
-        """Returns whether two drives seem to share this id."""
+        """Return whether two drives seem to share this id."""

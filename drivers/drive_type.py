@@ -48,36 +48,36 @@ class DriveType(ABC):
     def make_axis(
         self, joint: str, parameters: DriveParameters, outlet: Outlet, endpoints: Sequence[WatchdogEndpoints]
     ) -> DriveAxis:
-        """Makes one drive as a joint. `endpoints` are of interest to a protocol that reads a watchdog by number."""
+        """Make one drive as a joint. `endpoints` are of interest to a protocol that reads a watchdog by number."""
         axis: DriveAxis = self.axis(joint, parameters, outlet)
         return axis
 
     @abstractmethod
     def identifiers(self, parameters: DriveParameters) -> frozenset[int]:
-        """Returns every arbitration id that this drive sends or obeys; with the bit FD for CAN FD frames."""
+        """Return every arbitration id that this drive sends or obeys; with the bit FD for CAN FD frames."""
 
     @abstractmethod
     def gate_table(self, parameters: Any) -> GateTable:
-        """Lists everything that may leave for one drive, of which `parameters` are those of this type."""
+        """List everything that may leave for one drive, of which `parameters` are those of this type."""
 
     @abstractmethod
     def announces(self, node_id: int) -> Frame:
-        """Returns a frame that only a drive of this type sends under this id, by itself or when asked."""
+        """Return a frame that only a drive of this type sends under this id, by itself or when asked."""
 
     @abstractmethod
     def read_frame(self, frame: Frame) -> FrameContent | None:
-        """Returns the content of a frame by its id; None for frames of another kind than the protocol uses."""
+        """Return the content of a frame by its id; None for frames of another kind than the protocol uses."""
 
     def query(self, node_id: int) -> Frame | None:
-        """Returns the frame that asks a drive for all signals; None where drives report by themselves."""
+        """Return the frame that asks a drive for all signals; None where drives report by themselves."""
         return None
 
     def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
-        """Returns frames that other programs may send while torque is on, by name: they must not feed a watchdog."""
+        """Return frames that other programs may send while torque is on, by name: they must not feed a watchdog."""
         return {}
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        """Returns the payload of a frame that reports errors, with these error flags added and the drive set to `idle`.
+        """Return the payload of a frame that reports errors, with these error flags added and the drive set to `idle`.
 
         A payload that cannot be decoded is returned unchanged.
         """

@@ -47,7 +47,7 @@ def make_drives(
     limits: JointLimits | None = None,
     endpoints: Sequence[WatchdogEndpoints] = (),
 ) -> Drives:
-    """Makes the robot's drives from their parameters by joint, on ports by the name of the bus.
+    """Make the robot's drives from their parameters by joint, on ports by the name of the bus.
 
     `limits` are what the gate lets pass; `endpoints` belong to further builds of the drives' firmware.
     """
@@ -65,7 +65,7 @@ def make_drives(
 
 
 def _other_types(parameters: Mapping[str, DriveParameters], bus: str) -> dict[int, tuple[str, str]]:
-    """Returns the joint and the other type of drive that a frame with an arbitration id announces under its node id."""
+    """Return the joint and the other type of drive that a frame with an arbitration id announces under its node id."""
     return {
         announced.arbitration_id | FD * announced.is_fd: (joint, name)
         for joint, drive in parameters.items()
@@ -77,7 +77,7 @@ def _other_types(parameters: Mapping[str, DriveParameters], bus: str) -> dict[in
 
 
 def collisions(parameters: Mapping[str, DriveParameters]) -> Iterator[tuple[str, str, int]]:
-    """Yields two joints and an arbitration id that their drives, of different types on one bus, both use.
+    """Yield two joints and an arbitration id that their drives, of different types on one bus, both use.
 
     Drives of one type never collide while their node ids differ: what they share, they address by the payload.
     """
@@ -89,7 +89,7 @@ def collisions(parameters: Mapping[str, DriveParameters]) -> Iterator[tuple[str,
 
 
 def read_frame(frame: Frame, drives: Iterable[DriveParameters]) -> FrameContent | None:
-    """Returns the content of a frame on the bus of these drives, by the first of their protocols that knows it."""
+    """Return the content of a frame on the bus of these drives, by the first of their protocols that knows it."""
     for name in dict.fromkeys(drive.type for drive in drives):
         content = DRIVE_TYPES[name].read_frame(frame)
         if content is not None:
@@ -98,6 +98,6 @@ def read_frame(frame: Frame, drives: Iterable[DriveParameters]) -> FrameContent 
 
 
 def traffic_of(drives: Iterable[DriveParameters]) -> list[FrameRate]:
-    """Lists everything that these drives send and receive all the time."""
+    """List everything that these drives send and receive all the time."""
     types = (DRIVE_TYPES[drive.type] for drive in drives)
     return [message for each in types for message in (each.command, *each.reports)]

@@ -29,7 +29,7 @@ class Drives:
         gate: TransmitGate,
         others: Mapping[str, Mapping[int, tuple[str, str]]] | None = None,
     ) -> None:
-        """Joins the axes with the ports.
+        """Join the axes with the ports.
 
         `others`: by bus and arbitration id of a frame that only another type of drive sends, the joint that has its
         node id, and that type.
@@ -51,7 +51,7 @@ class Drives:
         self.reset()
 
     def _note(self, joint: str, protocol: str) -> Callable[[bytes, float], None]:
-        """Makes the handler of frames that only a drive of another type sends."""
+        """Make the handler of frames that only a drive of another type sends."""
 
         def note(data: bytes, now_s: float) -> None:
             self._other_protocols[joint] = protocol
@@ -71,12 +71,12 @@ class Drives:
         self._idling_lost = False  # the bus refused a command to idle, even if the drives report idle
 
     def poll(self) -> None:
-        """Asks the drives that report only when asked; the others are asked nothing. `send` asks them as well."""
+        """Ask the drives that report only when asked; the others are asked nothing. `send` asks them as well."""
         for axis in self.axes:
             axis.poll()
 
     def read(self, now_s: float) -> DriveStates:
-        """Reads all frames that have arrived; returns the newest of every signal."""
+        """Read all frames that have arrived; return the newest of every signal."""
         for axis in self.axes:
             axis.begin_read(now_s)
         for port, receivers in self._receivers:
@@ -100,7 +100,7 @@ class Drives:
 
     @property
     def heard(self) -> bool:
-        """Returns whether every drive has sent every signal that control depends on at least once."""
+        """Return whether every drive has sent every signal that control depends on at least once."""
         return all(axis.state.heard for axis in self.axes)
 
     @property
@@ -121,7 +121,7 @@ class Drives:
         return self.gate.last_refusal
 
     def send(self, torques_nm: Torques, elapsed_s: float) -> None:
-        """Commands all torques. They may differ from the ones before by the slew rate times `elapsed_s`."""
+        """Command all torques. They may differ from the ones before by the slew rate times `elapsed_s`."""
         self.gate.allow_step(elapsed_s)
         for axis, torque_nm in zip(self.axes, torques_nm, strict=True):
             axis.send_torque(torque_nm)
@@ -132,11 +132,11 @@ class Drives:
                 axis.forget_commands()
 
     def send_torque(self, joint: str, torque_nm: float) -> None:
-        """Commands one joint alone, within the step that the last `send` allowed."""
+        """Command one joint alone, within the step that the last `send` allowed."""
         self._axis_of[joint].send_torque(torque_nm)
 
     def arm(self, now_s: float, at_once: bool = False) -> None:
-        """Opens the gate and prepares all drives `at_once`; later asks the others for closed loop, every REPEAT_S.
+        """Open the gate and prepare all drives `at_once`; later ask the others for closed loop, every REPEAT_S.
 
         A drive is prepared again before it is asked, and none is asked while the bus loses frames.
         """
@@ -154,7 +154,7 @@ class Drives:
             axis.close_loop()
 
     def disarm(self, now_s: float, at_once: bool = False) -> None:
-        """Closes the gate; commands zero torque and idle `at_once`, later every REPEAT_S.
+        """Close the gate; commands zero torque and idle `at_once`, later every REPEAT_S.
 
         Later it commands the drives still in closed loop, and all of them where the bus refused the last command.
         """
@@ -169,7 +169,7 @@ class Drives:
         self._idling_lost = self._lost > lost_before
 
     def force_idle(self, repeats: int) -> None:
-        """Commands zero torque and idle to every drive, `repeats` times. Never raises."""
+        """Command zero torque and idle to every drive, `repeats` times. Never raises."""
         self.gate.close()
         for axis in self.axes * repeats:
             with suppress(Exception):  # one bus may be what broke; the others' drives still have to receive it
@@ -180,7 +180,7 @@ class Drives:
             axis.clear_errors()
 
     def request_settings(self, now_s: float) -> None:
-        """Asks for firmware, watchdog and other settings, now and then: a restart forgets them, and they may change."""
+        """Ask for firmware, watchdog and other settings, now and then: a restart forgets them, and they may change."""
         for axis in self.axes:
             axis.request_settings(now_s)
 
@@ -192,7 +192,7 @@ class Drives:
 def _both(
     first: Callable[[bytes, float], None], second: Callable[[bytes, float], None]
 ) -> Callable[[bytes, float], None]:
-    """Makes the handler of an id that drives share; each finds its own frames by their payload."""
+    """Make the handler of an id that drives share; each finds its own frames by their payload."""
 
     def receive(data: bytes, now_s: float) -> None:
         first(data, now_s)

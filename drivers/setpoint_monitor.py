@@ -60,7 +60,7 @@ class SetpointMonitor:
         self.example = (0.0, 0.0)  # set-point and command of the last report that differed
 
     def forget_commands(self) -> None:
-        """Accepts every set-point until enough commands have been sent: some may not have left."""
+        """Accept every set-point until enough commands have been sent: some may not have left."""
         self._newest_nm = inf
         self._commands.extend((inf, -inf) * (self._commands.maxlen or 1))
 
@@ -69,12 +69,13 @@ class SetpointMonitor:
         self._commands.append(torque_nm)
 
     def on_report(self, setpoint_nm: float, velocity_rad_s: float) -> None:
-        """Compares a report of a drive in closed loop."""
+        """Compare a report of a drive in closed loop."""
         difference_nm = setpoint_nm - self._newest_nm
         if -self._tolerance_nm < difference_nm < self._tolerance_nm or self._may_follow(setpoint_nm, velocity_rad_s):
             self._differed = False
             if self._score:
-                self._fall()
+                self._score -= 1
+                self.found = self.found and self._score > 0
             return
         again, self._differed = self._differed, True
         if again and self._measured:
@@ -87,7 +88,7 @@ class SetpointMonitor:
             self._rise(1)
 
     def _may_follow(self, setpoint_nm: float, velocity_rad_s: float) -> bool:
-        """Returns whether the set-point belongs to one of the last commands, or the drive may clamp it."""
+        """Return whether the set-point belongs to one of the last commands, or the drive may clamp it."""
         lowest_nm, highest_nm = min(self._commands), max(self._commands)
         largest_nm = max(-lowest_nm, highest_nm)
         tolerance_nm = self._tolerance_nm + TOLERANCE_FRACTION * largest_nm
@@ -98,19 +99,15 @@ class SetpointMonitor:
         return True
 
     def _may_clamp(self, velocity_rad_s: float, torque_nm: float) -> bool:
-        """Returns whether a drive that turns this fast forward may reduce this torque, down to braking."""
+        """Return whether a drive that turns this fast forward may reduce this torque, down to braking."""
         return (self._clamp_from_rad_s - velocity_rad_s) * self._clamp_nm_s_rad < torque_nm
-
-    def _fall(self) -> None:
-        self._score -= 1
-        self.found = self.found and self._score > 0
 
     def _rise(self, reports: int) -> None:
         self._score = min(self._score + WEIGHT * reports, 2 * FOUND)
         self.found = self.found or self._score >= FOUND
 
     def problem(self, sign: int) -> str:
-        """Returns what was found, for people, with the joint's torques; empty while the drive follows its commands."""
+        """Return what was found, for people, with the joint's torques; empty while the drive follows its commands."""
         if not self.found:
             return ""
         followed_nm, commanded_nm = (sign * torque_nm for torque_nm in self.example)

@@ -65,28 +65,28 @@ class TransmitGate:
         self._outlets: list[GatedPort] = []
 
     def outlet(self, port: CanPort, tables: Iterable[GateTable]) -> GatedPort:
-        """Makes the path to one bus, for the drives on it."""
+        """Make the path to one bus, for the drives on it."""
         outlet = GatedPort(self, port, tables)
         self._outlets.append(outlet)
         return outlet
 
     def open(self) -> None:
-        """Lets torque pass, for arming; the first torque counts from zero."""
+        """Let torque pass, for arming; the first torque counts from zero."""
         if not self.is_open:
             for outlet in self._outlets:
                 outlet.forget_torques()
         self.is_open = True
 
     def close(self) -> None:
-        """Lets only zero torque pass."""
+        """Let only zero torque pass."""
         self.is_open = False
 
     def allow_step(self, elapsed_s: float) -> None:
-        """Sets the largest step of the next torques: the slew rate times `elapsed_s`, the time since the last ones."""
+        """Set the largest step of the next torques: the slew rate times `elapsed_s`, the time since the last ones."""
         self._step_nm = self._torque_rate_nm_s * elapsed_s + ROUNDING_NM
 
     def torque_problem(self, torque_nm: float, before_nm: float, code_step_nm: float = 0.0) -> str:
-        """Returns why a torque may not follow the one before; empty where it may. NaN is beyond every bound.
+        """Return why a torque may not follow the one before; empty where it may. NaN is beyond every bound.
 
         Both were rounded to codes that are `code_step_nm` apart: by half of it, or by all of it where a code is zero.
         """
@@ -111,7 +111,7 @@ class GatedPort:
     """The gated path to one bus. Owns the torque that left last for each drive on it."""
 
     def __init__(self, gate: TransmitGate, port: CanPort, tables: Iterable[GateTable]) -> None:
-        """Joins the tables of the drives on one bus; raises ValueError where they want frames of different kinds."""
+        """Join the tables of the drives on one bus; raises ValueError where they want frames of different kinds."""
         self._gate = gate
         self._port = port
         self._tables = {table.torque_id: table for table in tables}
@@ -157,19 +157,22 @@ class GatedPort:
             NOT_ARMED if idle else self._gate.torque_problem(torque_nm, self._sent_nm[identifier], table.torque_step_nm)
         )
         if problem:
-            what = f"{_text_of(frame)}, {torque_nm:.4g} N·m to node {table.node_id},"
-            unlisted = "" if torque_nm == torque_nm else "it is neither a listed frame nor a torque command, and "
-            replaced = "the frame that keeps it idle" if idle else "zero torque"
-            self._gate.refuse(f"{what} was replaced by {replaced}: {unlisted}{problem}.")
+            is_torque = torque_nm == torque_nm
+            torque = f" ({torque_nm:.4g} N·m)" if is_torque else ""
+            rule = problem if is_torque else "it is neither a listed frame nor a torque command"
+            replacement = "the frame that keeps it idle" if idle else "zero torque"
+            self._gate.refuse(
+                f"{_text_of(frame)}{torque} to node {table.node_id} was replaced by {replacement}: {rule}."
+            )
             torque_nm, frame = 0.0, frame._replace(data=idle or table.zero_torque)
         self._sent_nm[identifier] = torque_nm
         self._port.send(frame)
 
     def _broken_rule(self, frame: Frame) -> str:
-        """Says why a frame that commands no torque may not leave."""
-        if frame.is_remote or frame.is_error:
+        """Say why a frame that commands no torque may not leave."""
+        if frame.is_remote:
             return "it is none of the requests that the tables of this bus list"
-        if (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:
+        if frame.is_error or (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:
             return "the drives of this bus take frames of another kind"
         if frame.arbitration_id not in self._listed:
             return "the tables of this bus do not list its id"

@@ -39,21 +39,21 @@ class BenchPort:
 
     @property
     def send_problem(self) -> str:
-        """Why frames did not leave; empty while all did."""
+        """Return why frames did not leave; empty while all did."""
         return self._port.last_send_error if self._port.failed_sends else ""
 
     def sleep(self, duration_s: float) -> None:
         self._sleep(duration_s)
 
     def listen(self, duration_s: float) -> list[Frame]:
-        """Returns all frames of that time."""
+        """Return all frames of that time."""
         return self._receive(lambda frames: False, duration_s)
 
     def send(self, frame: Frame) -> None:
         self._port.send(frame)
 
     def ask(self, question: Frame, is_answer: Callable[[Frame], bool], what: str, longest_s: float = ANSWER_S) -> Frame:
-        """Returns the first answer. Raises NoAnswerError, which names `what` was asked for."""
+        """Return the first answer. Raises NoAnswerError, which names `what` was asked for."""
         self._port.receive()  # older frames are no answers
         self._port.send(question)
         frames = self._receive(lambda frames: any(map(is_answer, frames)), longest_s)
@@ -63,7 +63,7 @@ class BenchPort:
         raise NoAnswerError(f"no answer to {what}" + (f" ({self.send_problem})" if self.send_problem else ""))
 
     def ask_all(self, questions: Iterable[Frame], longest_s: float = ANSWER_S) -> list[Frame]:
-        """Returns all frames that arrive from the first question until `longest_s` after the last one."""
+        """Return all frames that arrive from the first question until `longest_s` after the last one."""
         frames = list(self._port.receive())
         for question in questions:
             self._port.send(question)
@@ -71,7 +71,7 @@ class BenchPort:
         return frames + self.listen(longest_s)
 
     def _receive(self, done: Callable[[list[Frame]], bool], longest_s: float) -> list[Frame]:
-        """Returns the frames that arrive until `done` with them, or for `longest_s`."""
+        """Return the frames that arrive until `done` with them, or for `longest_s`."""
         deadline_s = self._now() + longest_s
         frames = [frame for frame in self._port.receive() if not frame.is_error]
         while not done(frames) and (left_s := deadline_s - self._now()) > 0.0:

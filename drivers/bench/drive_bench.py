@@ -30,16 +30,16 @@ class DriveBench(ABC):
     disturbs: ClassVar[str] = ""  # why its questions may disturb drives of other protocols; empty where they do not
 
     def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
-        """Returns the ids of drives that send by themselves; none where they only answer."""
+        """Return the ids of drives that send by themselves; none where they only answer."""
         return set()
 
     @abstractmethod
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
-        """Asks every id, without a frame that could command torque. Ids that were `heard` are found in any case.
+        """Ask every id, without a frame that could command torque. Ids that were `heard` are found in any case.
 
         Two drives that answer under one id are two entries.
         """
 
     @abstractmethod
     def open_setup(self, port: BenchPort, facts: SetupFacts) -> DriveSetup:
-        """Raises ValueError for a document that is none of the makers'."""
+        """Return the set-up of one drive; raises ValueError for a document that is none of the makers'."""

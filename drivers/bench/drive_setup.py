@@ -32,13 +32,15 @@ class Setting(NamedTuple):
 
 
 def exactly(key: str, wanted: float, source: str, read_only: str = "", fraction: float = SAME_FRACTION) -> Setting:
-    """Returns a setting that must be equal to `wanted`, up to a fraction of it."""
+    """Return a setting that must be equal to `wanted`, up to a fraction of it."""
     margin = fraction * abs(wanted)
-    return Setting(key, wanted, wanted - margin, wanted + margin, source, read_only)
+    return Setting(
+        key=key, wanted=wanted, least=wanted - margin, most=wanted + margin, source=source, read_only=read_only
+    )
 
 
 def same(value: float, expected: float) -> bool:
-    """Returns whether a drive has taken a value; NaN is a value, of a watchdog that is off."""
+    """Return whether a drive has taken a value; NaN is a value, of a watchdog that is off."""
     if expected != expected:
         return value != value
     return abs(value - expected) <= SAME_FRACTION * abs(expected)
@@ -55,10 +57,10 @@ class DriveSetup(ABC):
 
     @abstractmethod
     def identify(self) -> FoundDrive:
-        """Asks for what is known of this drive; it comes before everything else."""
+        """Ask for what is known of this drive; it comes before everything else."""
 
     def activity(self) -> str:
-        """Returns what the drive does, where it is not idle; empty for an idle one."""
+        """Return what the drive does, where it is not idle; empty for an idle one."""
         return ""
 
     def settings(self) -> Sequence[Setting]:
@@ -68,11 +70,11 @@ class DriveSetup(ABC):
         raise CannotReadError(self.cannot)
 
     def write(self, key: str, value: float) -> None:
-        """Writes to the drive's memory. Raises CannotReadError."""
+        """Write to the drive's memory. Raises CannotReadError."""
         raise CannotReadError(self.cannot)
 
     def save(self) -> None:
-        """Stores all settings, and returns once the drive answers again."""
+        """Store all settings, and return once the drive answers again."""
         raise CannotReadError(self.cannot)
 
 

@@ -33,7 +33,7 @@ def search(
     chosen: Collection[str] = (),
     show: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> SearchResult:
-    """Asks in the order of `benches`; protocols that are `chosen` alone, and then in any case."""
+    """Ask in the order of `benches`; protocols that are `chosen` alone, and then in any case."""
     found: list[FoundDrive] = []
     not_asked: dict[str, str] = {}
     asked = {name: bench for name, bench in benches.items() if name in chosen or not chosen}
@@ -58,7 +58,7 @@ def _why_not_asked(bench: DriveBench, carries_fd: bool, others: Sequence[FoundDr
 
 
 def id_problems(found: Sequence[FoundDrive]) -> Iterator[str]:
-    """Yields the ids that answer twice, or in two protocols."""
+    """Yield the ids that answer twice, or in two protocols."""
     for (node_id, name), count in sorted(Counter((each.node_id, each.type) for each in found).items()):
         if count > 1:
             numbers = ", ".join(each.serial_number or "?" for each in found if (node_id, name) == each[1::-1])
@@ -70,7 +70,7 @@ def id_problems(found: Sequence[FoundDrive]) -> Iterator[str]:
 
 
 def expectation_problems(found: Sequence[FoundDrive], expected: Mapping[str, DriveParameters]) -> Iterator[str]:
-    """Yields the joints on this bus whose drive was not found, or not as configured."""
+    """Yield the joints on this bus whose drive was not found, or not as configured."""
     for joint, drive in expected.items():
         same_id = [each for each in found if each.node_id == drive.node_id]
         numbers = [each.serial_number for each in same_id if each.type == drive.type]

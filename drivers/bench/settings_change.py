@@ -48,7 +48,7 @@ def change_settings(
     interrupted: Callable[[], bool],
     names: Names,
 ) -> Change:
-    """Writes and stores `new`; `old` are the values of the same keys before. A drive that is not idle is left alone."""
+    """Write and store `new`; `old` are the values of the same keys before. A drive that is not idle is left alone."""
     try:
         if activity := drive.activity():
             return Change(Outcome.OLD, f"it is not idle ({activity}): nothing was written")

@@ -38,14 +38,14 @@ class BusLoad(NamedTuple):
 
 
 def frame_bits(data_bytes: int, is_extended: bool = False) -> tuple[int, int]:
-    """Returns the number of bits of a CAN 2.0 frame without any stuffing, and with as much as there can be."""
+    """Return the number of bits of a CAN 2.0 frame without any stuffing, and with as much as there can be."""
     stuffed = 34 + 8 * data_bytes + 20 * is_extended
     least = stuffed + 13
     return least, least + (stuffed - 1) // 4
 
 
 def frame_times_s(frame: FrameRate, rates: BitRates) -> tuple[float, float]:
-    """Returns how long a frame takes without any stuffing, and with as much as there can be."""
+    """Return how long a frame takes without any stuffing, and with as much as there can be."""
     if not frame.is_fd:
         least, most = frame_bits(frame.data_bytes, frame.is_extended)
         return least / rates.nominal_bit_s, most / rates.nominal_bit_s

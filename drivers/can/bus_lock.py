@@ -51,7 +51,7 @@ class BusLock:
 
 
 def _lock_name(role: BusRole, interface: str, channel: str) -> bytes:
-    """Returns the same name for every path to one device, and another one for other users' local buses."""
+    """Return the same name for every path to one device, and another one for other users' local buses."""
     if "/" in channel:
         channel = os.path.realpath(channel.split("@")[0])  # slcan: device@bit rate
     elif interface == LOCAL_INTERFACE:
@@ -61,7 +61,7 @@ def _lock_name(role: BusRole, interface: str, channel: str) -> bytes:
 
 
 def _owner_of(name: bytes) -> str:
-    """Names the process that owns a lock. The kernel reports who listens without its help."""
+    """Name the process that owns a lock. The kernel reports who listens without its help."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.setblocking(False)
         try:

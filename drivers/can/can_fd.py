@@ -18,14 +18,14 @@ CLASSIC_INTERFACES = frozenset(
 
 
 def carries_fd(folder: Path) -> bool | None:
-    """Returns whether the interface of a folder of /sys/class/net carries CAN FD; None where that is unknown."""
+    """Return whether the interface of a folder of /sys/class/net carries CAN FD; None where that is unknown."""
     with suppress(OSError, ValueError):
         return int((folder / "mtu").read_text()) >= FD_MTU
     return None
 
 
 def fd_options(interface: str, channel: str, root: Path = Path("/")) -> dict[str, Any]:
-    """Returns the options that open an interface for CAN FD; raises ValueError where it carries none."""
+    """Return the options that open an interface for CAN FD; raises ValueError where it carries none."""
     if interface in CLASSIC_INTERFACES:
         raise ValueError(
             f"{interface} carries no CAN FD, which its drives need; use an adapter with SocketCAN and CAN FD"

@@ -40,13 +40,13 @@ class CanPort(Protocol):
     last_send_error: str
 
     def listen_to(self, ids: Iterable[int]) -> None:
-        """Keeps frames of other ids away, where the port can."""
+        """Keep frames of other ids away, where the port can."""
 
     def receive(self) -> Sequence[Frame]:
-        """Returns all data frames that have arrived, oldest first; never waits."""
+        """Return all data frames that have arrived, oldest first; never waits."""
 
     def send(self, frame: Frame) -> None:
-        """Queues a frame without waiting. Without room it is dropped and counted; the next tick sends a newer one."""
+        """Queue a frame without waiting. Without room it is dropped and counted; the next tick sends a newer one."""
 
     def close(self) -> None: ...
 
@@ -87,7 +87,7 @@ class PythonCanPort(PortHealth):
         return frames if self._clock.offset_s() > NEVER_S else without_stamps(frames)
 
     def _drained(self) -> bool:
-        """Returns whether a `recv` without a frame means that none has arrived."""
+        """Return whether a `recv` without a frame means that none has arrived."""
         return True
 
     def send(self, frame: Frame) -> None:
@@ -126,7 +126,7 @@ class SlcanPort(PythonCanPort):
 
 
 def frame_from(message: can.Message, clock_s: float = 0.0) -> Frame:
-    """Converts a message of python-can. `clock_s` is the monotonic clock minus the wall clock, which stamped it."""
+    """Convert a message of python-can. `clock_s` is the monotonic clock minus the wall clock, which stamped it."""
     return Frame(
         arbitration_id=message.arbitration_id,
         data=bytes(message.data),
@@ -152,7 +152,7 @@ def message_from(frame: Frame) -> can.Message:
 
 
 def open_port(interface: str, channel: str, options: dict[str, str | int | float | bool], fd: bool = False) -> CanPort:
-    """Opens an interface; raises python-can's own errors where it does not open: see firmware_host/buses.py.
+    """Open an interface; raises python-can's own errors where it does not open: see firmware_host/buses.py.
 
     With `fd` it also carries CAN FD frames; ValueError is raised where it cannot.
 

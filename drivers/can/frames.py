@@ -37,12 +37,12 @@ class Frame(NamedTuple):
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is a data frame of CAN 2.0 with a standard identifier."""
+        """Return whether it is a data frame of CAN 2.0 with a standard identifier."""
         return not (self.is_remote or self.is_error or self.is_extended or self.is_fd)
 
 
 def encode_frame(frame: Frame) -> bytes:
-    """Returns 16 bytes, or 72 of a CAN FD frame. Raises ValueError for a frame that does not exist on CAN."""
+    """Return 16 bytes, or 72 of a CAN FD frame. Raises ValueError for a frame that does not exist on CAN."""
     identifier, data, is_remote, is_error, is_extended, _, is_fd, bit_rate_switch = frame
     largest = EXTENDED_MASK if is_extended or is_error else STANDARD_MASK
     if not 0 <= identifier <= largest:
@@ -67,7 +67,7 @@ def _encode_fd(frame: Frame, word: int) -> bytes:
 
 
 def decode_frame(data: bytes) -> Frame:
-    """Decodes 16 or 72 bytes; raises ValueError for bytes that are no frame."""
+    """Decode 16 or 72 bytes; raises ValueError for bytes that are no frame."""
     if len(data) == FD_FRAME_LAYOUT.size:
         return _decode_fd(data)
     if len(data) != FRAME_LAYOUT.size:
@@ -79,7 +79,13 @@ def decode_frame(data: bytes) -> Frame:
     is_remote = word & REMOTE_FLAG != 0
     is_error = word & ERROR_FLAG != 0
     identifier = word & (EXTENDED_MASK if is_extended or is_error else STANDARD_MASK)
-    return Frame(identifier, b"" if is_remote else payload[:length], is_remote, is_error, is_extended)
+    return Frame(
+        arbitration_id=identifier,
+        data=b"" if is_remote else payload[:length],
+        is_remote=is_remote,
+        is_error=is_error,
+        is_extended=is_extended,
+    )
 
 
 def _decode_fd(data: bytes) -> Frame:

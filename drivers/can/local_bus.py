@@ -63,7 +63,7 @@ class LocalLink:
         return self._epoll.fileno()
 
     def send(self, data: bytes) -> None:
-        """Sends one encoded frame to every other node that has room."""
+        """Send one encoded frame to every other node that has room."""
         if self._joining.poll(0, 1):
             self._accept()
         for peer in tuple(self._peers.values()):
@@ -72,13 +72,14 @@ class LocalLink:
             except BlockingIOError:
                 self.lost_frames += 1
             except OSError:
-                self._read_last(peer)
+                while self._read(peer):  # the frames that the node sent before it left
+                    pass
             else:
                 if written != len(data):  # never observed; all following bytes would be misread
                     self._drop(peer)
 
     def receive(self, timeout_s: float | None = 0.0) -> bytes | None:
-        """Returns the next encoded frame, or None after the time-out, and also when a node joined or left."""
+        """Return the next encoded frame, or None after the time-out, and also when a node joined or left."""
         arrived = self._arrived
         if not arrived:
             self._read_ready(timeout_s)
@@ -151,7 +152,7 @@ class LocalLink:
                 self._read_ready(0.0)  # the new node may have sent already
 
     def _read(self, peer: Peer) -> bool:
-        """Reads what a peer has sent so far. Returns False if there was nothing, or the peer is gone."""
+        """Read what a peer has sent so far. Returns False if there was nothing, or the peer is gone."""
         try:
             chunk = peer.connection.recv(CHUNK_BYTES)
         except BlockingIOError:
@@ -164,13 +165,8 @@ class LocalLink:
         self._split(peer, peer.rest + chunk)
         return True
 
-    def _read_last(self, peer: Peer) -> None:
-        """Reads the frames that a node sent before it left."""
-        while self._read(peer):
-            pass
-
     def _split(self, peer: Peer, stream: bytes) -> None:
-        """Queues the complete frames of a peer's stream, and stores the incomplete last one."""
+        """Queue the complete frames of a peer's stream, and store the incomplete last one."""
         begin, end = 0, _end_of_frame(stream, 0)
         frames: list[bytes] = []
         while end <= len(stream):
@@ -216,7 +212,7 @@ class LocalBus(can.BusABC):
         self._link.send(encode_frame(frame_from(msg)))
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        """Applies the filters here, because can.BusABC would treat a filtered frame like an empty bus."""
+        """Apply the filters here, because can.BusABC would treat a filtered frame like an empty bus."""
         while (data := self._link.receive(timeout)) is not None:
             message = self._decode(data)
             if self._matches_filters(message):
@@ -239,14 +235,14 @@ class LocalBus(can.BusABC):
 
 
 def _end_of_frame(stream: bytes, begin: int) -> int:
-    """Returns the end of the frame that begins at `begin`; it may lie beyond the bytes that have arrived."""
+    """Return the end of the frame that begins at `begin`; it may lie beyond the bytes that have arrived."""
     if begin + FLAGS_BYTE < len(stream) and stream[begin + FLAGS_BYTE] & FD_FORMAT:
         return begin + FD_FRAME_BYTES
     return begin + FRAME_BYTES
 
 
 def make_channel_folder(channel: str | Path) -> Path:
-    """Returns the folder of a channel: an absolute path itself, or a plain name in this user's private folder."""
+    """Return the folder of a channel: an absolute path itself, or a plain name in this user's private folder."""
     folder = Path(channel)
     if not folder.is_absolute():
         if folder.name != str(channel) or folder.name in ("", ".."):
@@ -256,7 +252,7 @@ def make_channel_folder(channel: str | Path) -> Path:
 
 
 def _free_path(folder: Path) -> Path:
-    """Returns an unused name; a process in another container may have the same process id."""
+    """Return an unused name; a process in another container may have the same process id."""
     paths = (folder / f"{os.getpid()}-{number}.node" for number in count())
     path = next(path for path in paths if not path.exists())
     if len(os.fsencode(path)) > PATH_MAX_BYTES:

@@ -43,7 +43,7 @@ class MockPort(PortHealth):
                 port.queue.append(frame)
 
     def open_peer(self) -> MockPort:
-        """Opens another node on the same bus."""
+        """Open another node on the same bus."""
         return self._bus.open()
 
     def close(self) -> None:

@@ -87,7 +87,7 @@ def _reported_state(class_bits: int, data: bytes) -> BusState | None:
 
 
 def next_state(state: BusState, class_bits: int, reported: BusState | None) -> BusState:
-    """Returns the state after an error frame that reports a state. Only a restart leads out of bus-off."""
+    """Return the state after an error frame that reports a state. Only a restart leads out of bus-off."""
     if reported is None or (state is BusState.OFF and not class_bits & RESTARTED):
         return state
     return reported
@@ -112,12 +112,12 @@ class PortHealth:
         self.state = next_state(self.state, class_bits, error.state)
 
     def on_frame(self, from_peer: bool) -> None:
-        """Handles a frame on a port that is off."""
+        """Handle a frame on a port that is off."""
         if from_peer or self._gone:
             self.state, self._gone = BusState.ACTIVE, False
 
     def on_failed_read(self, problem: Exception) -> bool:
-        """Counts the failure; returns whether the interface is gone."""
+        """Count the failure; return whether the interface is gone."""
         self.error_frames += 1
         self.last_error = _text_of(problem)
         return self._on_gone(problem)
@@ -135,7 +135,7 @@ class PortHealth:
 
 
 def _error_number(problem: BaseException | None) -> int | None:
-    """Returns the errno, which python-can's own errors carry as `error_code` or in their cause."""
+    """Return the errno, which python-can's own errors carry as `error_code` or in their cause."""
     if problem is None:
         return None
     number: int | None = getattr(problem, "errno", None) or getattr(problem, "error_code", None)

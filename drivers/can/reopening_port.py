@@ -79,7 +79,7 @@ class ReopeningPort:
         self.last_send_error = port.last_send_error or self.last_send_error
 
     def reopen(self, now_s: float) -> bool:
-        """Opens the bus again where it has been off for RETRY_S; returns whether it did."""
+        """Open the bus again where it has been off for RETRY_S; return whether it did."""
         if self.state is not BusState.OFF:
             self._due_s = None
             return False
@@ -103,7 +103,7 @@ class ReopeningPort:
         return True
 
     def close(self) -> None:
-        """Closes the inner port, also where its device is gone, for which serial adapters raise errors."""
+        """Close the inner port, also where its device is gone, for which serial adapters raise errors."""
         port, self._port = self._port, None
         if port is not None:
             self._failed_before, self._errors_before = self.failed_sends, self.error_frames

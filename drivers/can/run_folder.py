@@ -71,7 +71,7 @@ def _untrusted_level(folder: Path) -> Path | None:
 
 
 def _own(folder: Path) -> Path:
-    """Raises PermissionError for a folder or link of another user, and NotADirectoryError."""
+    """Return the folder; raises PermissionError for one, or a link, of another user, and NotADirectoryError."""
     status = folder.lstat()
     if status.st_uid != os.geteuid():
         reason = f"belongs to user {status.st_uid}, not to user {os.geteuid()} who runs this"
@@ -82,7 +82,7 @@ def _own(folder: Path) -> Path:
 
 
 def _private(folder: Path) -> Path:
-    """Raises PermissionError with the level that another user could use, or NotADirectoryError."""
+    """Return the folder; raises PermissionError with a level that another user could use, or NotADirectoryError."""
     if level := _untrusted_level(_own(folder)):
         raise PermissionError(errno.EPERM, f"other users may write to it: run 'chmod go-w {level}'", str(level))
     return folder

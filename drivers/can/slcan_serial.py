@@ -44,13 +44,13 @@ class SlcanSerial:
                 self.refusals += self._arrived.count(REFUSAL)
 
     def read(self, size: int = 1) -> bytes:
-        """Returns up to `size` of the bytes that `in_waiting` has found."""
+        """Return up to `size` of the bytes that `in_waiting` has found."""
         begin = self._position
         self._position = min(begin + size, len(self._arrived))
         return self._arrived[begin : self._position]
 
     def write(self, line: bytes) -> None:
-        """Writes a line; raises BlockingIOError and writes nothing of it while the kernel's buffer is full."""
+        """Write a line; raises BlockingIOError and writes nothing of it while the kernel's buffer is full."""
         self._has_written = True
         if self._unsent:
             self._unsent = self._unsent[os.write(self._file, self._unsent) :]

@@ -59,7 +59,7 @@ class SocketcanPort(PortHealth):
         self._kernel_count = 0
 
     def listen_to(self, ids: Iterable[int]) -> None:
-        """Sets the kernel's filters. If the kernel refuses them, python-can logs it, and all frames are received."""
+        """Set the kernel's filters. If the kernel refuses them, python-can logs it, and all frames are received."""
         extended = {each: each > STANDARD_MASK for each in ids}
         self._bus.set_filters(
             [
@@ -88,7 +88,10 @@ class SocketcanPort(PortHealth):
         return frames if self._clock.offset_s() > NEVER_S else without_stamps(frames)
 
     def _on_frame(self, encoded: bytes, ancillary: list[tuple[int, int, bytes]], clock_s: float) -> Frame | None:
-        """Returns the frame, or None for an error frame and for bytes that are no frame."""
+        """Return the frame, or None for an error frame and for bytes that are no frame.
+
+        Frames are built by position, because this runs for each frame of a tick.
+        """
         stamp_s = NEVER_S
         for _, kind, value in ancillary:
             if kind == SO_TIMESTAMPNS:
@@ -111,7 +114,7 @@ class SocketcanPort(PortHealth):
         return Frame(identifier, b"" if is_remote else payload[:length], is_remote, False, is_extended, stamp_s)
 
     def _on_long_frame(self, encoded: bytes, stamp_s: float) -> Frame | None:
-        """Returns a CAN FD frame, or None for anything else, which counts as a failed read."""
+        """Return a CAN FD frame, or None for anything else, which counts as a failed read."""
         try:
             frame = decode_frame(encoded)
         except ValueError as problem:

@@ -24,7 +24,7 @@ class StampClock:
         self._offset_s = monotonic() - wall_clock()
 
     def offset_s(self) -> float:
-        """Returns the monotonic clock minus the wall clock; NEVER_S where that has moved since the last call.
+        """Return the monotonic clock minus the wall clock; NEVER_S where that has moved since the last call.
 
         A stamp plus this offset is a stamp of the monotonic clock, or NEVER_S.
         """

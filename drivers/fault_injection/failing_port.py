@@ -56,7 +56,7 @@ class DelayLine:
         return self._key(frame) in self.waiting
 
     def pop_arrived(self, now_s: float) -> list[Frame]:
-        """Removes and returns the frames that have arrived by now."""
+        """Remove and return the frames that have arrived by now."""
         arrived: list[Frame] = []
         for key, line in list(self.waiting.items()):
             while line and line[0][0] <= now_s:
@@ -108,6 +108,7 @@ class FailingPort:
 
     def _arrived(self, frames: Sequence[Frame]) -> list[Frame]:
         failures, failure = self._failures, self._failures.of(self._bus)
+        random = failures.random
         arrived = [frame._replace(stamp_s=failures.now_s) for frame in self._incoming.pop_arrived(self._due_s)]
         for frame in frames:
             changed = self._after_failures(frame)
@@ -116,13 +117,16 @@ class FailingPort:
             if not self._delays(changed, self._senders_of(changed)[0], self._incoming):
                 arrived.append(changed)
         if failure and failure.kind is FailureKind.GARBAGE:
-            arrived += _random_frames(failures.random)
+            arrived += [
+                Frame(random.randint(0, STANDARD_MASK), random.randbytes(random.randint(0, DATA_MAX_BYTES)))
+                for _ in range(random.randint(0, MOST_RANDOM_FRAMES))
+            ]
         if failure and failure.kind in STATES:
             self._forged_error_frames += 1
         return arrived
 
     def _delays(self, frame: Frame, components: Sequence[str], line: DelayLine) -> bool:
-        """Delays the frame where its component is slow or an earlier frame waits; returns whether it did."""
+        """Delay the frame where its component is slow or an earlier frame waits; return whether it did."""
         failures = self._failures
         failing = (failures.of(component) for component in components)
         late = any(failure is not None and failure.kind is FailureKind.SLOW for failure in failing)
@@ -132,7 +136,7 @@ class FailingPort:
         return False
 
     def _senders_of(self, frame: Frame) -> tuple[tuple[str, ...], FrameContent | None]:
-        """Returns the components whose failures change a frame from the bus, in this order, and its content."""
+        """Return the components whose failures change a frame from the bus, in this order, and its content."""
         content = self._content(frame)
         joint = self._joints.get(content.node_id) if content else None
         if content is None or joint is None:
@@ -148,7 +152,7 @@ class FailingPort:
         return self._failures.now_s if self._failures.failing else inf
 
     def _after_failures(self, frame: Frame) -> Frame | None:
-        """Returns the frame as the active failures change it, or None where they lose it."""
+        """Return the frame as the active failures change it, or None where they lose it."""
         components, content = self._senders_of(frame)
         for component in components:
             failure = self._failures.of(component)
@@ -169,7 +173,7 @@ class FailingPort:
         return frame
 
     def _with_failed_span(self, frame: Frame, failure: Failure, span: Span) -> bytes:
-        """Changes one signal of a payload that contains several."""
+        """Change one signal of a payload that contains several."""
         data, own = frame.data, frame._replace(data=frame.data[span.begin : span.end])
         changed = self._after_failure(own, failure, of_bus=False)
         if changed is None:
@@ -178,25 +182,20 @@ class FailingPort:
         return data[: span.begin] + changed + data[span.end :]
 
     def _after_failure(self, frame: Frame, failure: Failure, of_bus: bool) -> bytes | None:
-        """Returns the changed payload, or None. A bus corrupts half of its frames, and a stuck one still hears."""
+        """Return the changed payload, or None. A bus corrupts half of its frames, and a stuck one still hears."""
         if failure.kind in SILENT or failure.kind is FailureKind.INTERMITTENT and self._failures.loses():
             return None
         if failure.kind is FailureKind.GARBAGE and (not of_bus or self._failures.loses()):
             return corrupted(frame.data, self._failures.random)
         if failure.kind is FailureKind.STUCK and not of_bus:
-            return self._first_since(failure, frame)
+            key = failure.component, frame.arbitration_id
+            if self._frozen.get(key, (None,))[0] is not failure:
+                self._frozen[key] = failure, frame.data
+            return self._frozen[key][1]
         return frame.data
 
-    def _first_since(self, failure: Failure, frame: Frame) -> bytes:
-        key = failure.component, frame.arbitration_id
-        since, data = self._frozen.get(key, (None, b""))
-        if since is not failure:
-            data = frame.data
-            self._frozen[key] = failure, data
-        return data
-
     def _with_error(self, frame: Frame, failure: Failure, drive: DriveParameters) -> bytes:
-        """Adds an error to a heartbeat or an error report; returns one that is malformed already as it is."""
+        """Add an error to a heartbeat or an error report; return one that is malformed already as it is."""
         kind = failure.kind
         if kind is FailureKind.INTERMITTENT and self._failures.loses():
             return frame.data
@@ -224,15 +223,14 @@ class FailingPort:
             if failure is None:
                 continue
             if component == self._bus and failure.kind in REFUSING:
-                return self._refuse(f"{REFUSING[failure.kind]} (on purpose)")
+                self._refused_sends += 1
+                self.last_send_error = f"{REFUSING[failure.kind]} (on purpose)"
+                self._count()
+                return
             if failure.kind is FailureKind.OFF or failure.kind is FailureKind.INTERMITTENT and self._failures.loses():
-                return None
-        return None if self._delays(frame, components, self._outgoing) else self._pass(frame)
-
-    def _refuse(self, why: str) -> None:
-        self._refused_sends += 1
-        self.last_send_error = why
-        self._count()
+                return
+        if not self._delays(frame, components, self._outgoing):
+            self._pass(frame)
 
     def _deliver(self) -> None:
         for frame in self._outgoing.pop_arrived(self._due_s):
@@ -252,14 +250,14 @@ class FailingPort:
 def failing_ports(
     ports: Mapping[str, CanPort], drives: Mapping[str, DriveParameters], failures: Failures | None
 ) -> Mapping[str, CanPort]:
-    """Returns the ports themselves where no failures may be injected."""
+    """Return the ports themselves where no failures may be injected."""
     if failures is None:
         return ports
     return {name: FailingPort(name, port, drives, failures) for name, port in ports.items()}
 
 
 def corrupted(data: bytes, random: Random) -> bytes:
-    """Draws random bytes, plausible numbers, numbers that are not finite or huge, or another length."""
+    """Draw random bytes, plausible numbers, numbers that are not finite or huge, or another length."""
     kind = random.randrange(4)
     if kind == 0:
         return random.randbytes(random.choice([size for size in range(DATA_MAX_BYTES + 1) if size != len(data)]))
@@ -267,10 +265,3 @@ def corrupted(data: bytes, random: Random) -> bytes:
         return random.randbytes(len(data))
     number = random.choice(NO_NUMBERS) if kind == 2 else random.uniform(-FAR_TURNS, FAR_TURNS)
     return (2 * ONE_FLOAT.pack(number))[: len(data)]
-
-
-def _random_frames(random: Random) -> list[Frame]:
-    return [
-        Frame(random.randint(0, STANDARD_MASK), random.randbytes(random.randint(0, DATA_MAX_BYTES)))
-        for _ in range(random.randint(0, MOST_RANDOM_FRAMES))
-    ]

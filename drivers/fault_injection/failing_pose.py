@@ -46,7 +46,7 @@ class FailingPose:
         return BodyPose()
 
     def _delayed(self, body: BodyPose, now_s: float) -> BodyPose:
-        """Stamps the pose when it is read, because a late camera does not report its delay."""
+        """Stamp the pose when it is read, because a late camera does not report its delay."""
         self._late.append((now_s + LATE_S, body))
         while len(self._late) > 1 and self._late[1][0] <= now_s:
             self._late.popleft()

@@ -57,7 +57,7 @@ class Failures:
         self.now_s = NEVER_S
 
     def begin(self, component: str, kind: str, now_s: float, for_s: float = USUAL_S) -> str | None:
-        """Begins a failure in place of any other of this component. Returns why it is refused, or None."""
+        """Begin a failure in place of any other of this component. Returns why it is refused, or None."""
         refused = self.refusal(component, kind, for_s)
         if refused is None:
             self.failing[component] = Failure(component, FailureKind(kind), now_s + for_s)
@@ -74,7 +74,7 @@ class Failures:
         return None
 
     def update(self, now_s: float) -> list[Failure]:
-        """Advances the time, first in every tick. Returns the failures that have just ended by themselves."""
+        """Advance the time, first in every tick. Returns the failures that have just ended by themselves."""
         self.now_s = now_s
         if not self.failing:
             return []
@@ -96,17 +96,17 @@ class Failures:
         return self.failing.get(component)
 
     def table(self) -> Iterator[tuple[str, FailureKind, str]]:
-        """Yields every component, each kind of failure that it can have, and the effect."""
+        """Yield every component, each kind of failure that it can have, and the effect."""
         for component, family in self.families.items():
             for kind, effect in EFFECTS[family].items():
                 yield component, kind, effect
 
     def loses(self) -> bool:
-        """Draws whether an intermittent message is lost."""
+        """Draw whether an intermittent message is lost."""
         return self.random.random() < LOST_FRACTION
 
     def arrival_s(self) -> float:
-        """Draws when a slow message that leaves now arrives."""
+        """Draw when a slow message that leaves now arrives."""
         return self.now_s + self.random.uniform(LEAST_DELAY_S, MOST_DELAY_S)
 
 

@@ -50,13 +50,19 @@ class Weighing(NamedTuple):
 
 
 def weigh(force_n: float, readings: list[float]) -> Weighing:
-    """Averages the readings under a load. Raises CalibrationError for too few of them."""
+    """Average the readings under a load. Raises CalibrationError for too few of them."""
     if len(readings) < 4:
         raise CalibrationError(f"only {len(readings)} readings under {force_n:.3g} N: is the amplifier still sending?")
     half = len(readings) // 2
     (first, first_error), (second, second_error) = _mean(readings[:half]), _mean(readings[half:])
     mean, error = _mean(readings)
-    return Weighing(force_n, mean, error, second - first, hypot(first_error, second_error))
+    return Weighing(
+        force_n=force_n,
+        reading=mean,
+        std_error=error,
+        drift=second - first,
+        drift_std_error=hypot(first_error, second_error),
+    )
 
 
 def _mean(values: list[float]) -> tuple[float, float]:
@@ -66,7 +72,7 @@ def _mean(values: list[float]) -> tuple[float, float]:
 
 
 def calibrate(unit: str, light: Weighing, heavy: Weighing) -> LoadCellCalibration:
-    """Fits the line through two loads. Raises CalibrationError where they do not determine the span."""
+    """Fit the line through two loads. Raises CalibrationError where they do not determine the span."""
     difference_n, span = heavy.force_n - light.force_n, heavy.reading - light.reading
     if abs(difference_n) < LEAST_DIFFERENCE_N:
         raise CalibrationError(
@@ -81,12 +87,17 @@ def calibrate(unit: str, light: Weighing, heavy: Weighing) -> LoadCellCalibratio
         )
     per_newton, slope_error = span / difference_n, error / abs(difference_n)
     zero = light.reading - per_newton * light.force_n
-    zero_error = hypot(light.std_error, slope_error * light.force_n)
-    return LoadCellCalibration(unit, per_newton, zero, slope_error, zero_error)
+    return LoadCellCalibration(
+        unit=unit,
+        per_newton=per_newton,
+        zero=zero,
+        per_newton_std_error=slope_error,
+        zero_std_error=hypot(light.std_error, slope_error * light.force_n),
+    )
 
 
 def remarks_about(calibration: LoadCellCalibration, light: Weighing, heavy: Weighing) -> list[str]:
-    """Lists what the operator should know about a calibration."""
+    """List what the operator should know about a calibration."""
     remarks = []
     span = abs(heavy.reading - light.reading)
     for weighing in (light, heavy):
@@ -99,7 +110,7 @@ def remarks_about(calibration: LoadCellCalibration, light: Weighing, heavy: Weig
 
 
 def calibration_of_unit(unit: str, scale: float | None) -> LoadCellCalibration | None:
-    """Makes the calibration of an amplifier that prints weights or forces; `scale` is in newtons per unit.
+    """Make the calibration of an amplifier that prints weights or forces; `scale` is in newtons per unit.
 
     Returns None where neither the unit nor `scale` is known.
     """
@@ -112,7 +123,7 @@ def write_calibration(path: Path, calibration: LoadCellCalibration) -> None:
 
 
 def read_calibration(path: Path) -> LoadCellCalibration:
-    """Reads a calibration file; raises CalibrationError for another file, and OSError."""
+    """Read a calibration file; raises CalibrationError for another file, and OSError."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as problem:

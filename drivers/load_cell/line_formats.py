@@ -55,7 +55,7 @@ class LineFormat:
     """
 
     def __init__(self, name: str) -> None:
-        """Compiles the format; raises ValueError for an unknown one."""
+        """Compile the format; raises ValueError for an unknown one."""
         named = PATTERNS | COLUMNS
         if name not in named and "(?P<value>" not in name:
             raise ValueError(f"format {name!r}: must be {FORMATS}")
@@ -66,7 +66,7 @@ class LineFormat:
             raise ValueError(f"format {name!r}: not a regular expression: {problem}") from problem
 
     def decode(self, line: bytes) -> Reading | None:
-        """Returns the reading, or None where the line does not have this format."""
+        """Return the reading, or None where the line does not have this format."""
         text = printable(line)
         if text is None:
             return None
@@ -91,7 +91,7 @@ def _column(text: str, column: int) -> str:
 
 
 def printable(line: bytes) -> str | None:
-    """Returns the line as stripped text, or None where it contains other bytes."""
+    """Return the line as stripped text, or None where it contains other bytes."""
     try:
         text = line.decode("ascii").strip()
     except UnicodeDecodeError:
@@ -100,7 +100,7 @@ def printable(line: bytes) -> str | None:
 
 
 def find_format(lines: Sequence[bytes]) -> LineFormat | None:
-    """Returns the named format that decodes most of these lines, at least half; None where neither does.
+    """Return the named format that decodes most of these lines, at least half; None where neither does.
 
     Columns are never chosen, because only the operator knows which one is the load.
     """

@@ -4,6 +4,7 @@ The amplifier sends lines of text at its own rate. Reading never waits. A malfor
 display, and an unplugged adapter is opened again as soon as it is back (serial_line.py).
 """
 
+from math import nan
 from typing import NamedTuple
 
 from drivers.load_cell.calibration import LoadCellCalibration
@@ -22,7 +23,7 @@ class LoadCellPort:
     """Reads samples of force. Owns its serial line and the counters, which only grow."""
 
     def __init__(self, path: str, baud: int, line_format: LineFormat, calibration: LoadCellCalibration) -> None:
-        """Opens the line; raises SerialLineError where it does not open."""
+        """Open the line; raises SerialLineError where it does not open."""
         self.line_format, self.calibration = line_format, calibration
         self.lines = self.malformed_lines = self.overloads = 0
         self.last_malformed = ""
@@ -33,27 +34,24 @@ class LoadCellPort:
         return self.line.arrivals(lambda line: self.line_format.decode(line) is not None)
 
     def read(self, now_s: float) -> list[Sample]:
-        """Returns all samples that have arrived, oldest first; never waits."""
+        """Return all samples that have arrived, oldest first; never waits."""
         self.line.reopen(now_s)
         samples = []
         for stamp_s, line in self.line.read_stamped(now_s):
             reading = self.line_format.decode(line)
             self.lines += 1
-            if reading is not None:
-                samples.append(self._sample(stamp_s, reading))
-            else:
+            if reading is None:
                 self.malformed_lines += 1
                 self.last_malformed = printable(line[:60]) or repr(line[:30])[2:-1]
+            elif reading.overloaded:
+                self.overloads += 1
+                samples.append(Sample(stamp_s, nan, overloaded=True))
+            else:
+                samples.append(Sample(stamp_s, self.calibration.force_n(self._in_unit(reading))))
         return samples
 
-    def _sample(self, stamp_s: float, reading: Reading) -> Sample:
-        if reading.overloaded:
-            self.overloads += 1
-            return Sample(stamp_s, float("nan"), True)
-        return Sample(stamp_s, self.calibration.force_n(self._in_unit(reading)))
-
     def _in_unit(self, reading: Reading) -> float:
-        """Converts a reading whose line names another unit than the calibration."""
+        """Convert a reading whose line names another unit than the calibration."""
         own, wanted = reading.unit, self.calibration.unit.lower()
         if own == wanted or own not in NEWTONS or wanted not in NEWTONS:
             return reading.value

@@ -31,7 +31,7 @@ class LineClock:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets the period, after the device was away."""
+        """Forget the period, after the device was away."""
         self.period_s: float | None = None  # until enough lines have arrived
         self._stamp_s: float | None = None
         self._measure_again()
@@ -42,13 +42,13 @@ class LineClock:
         return None if self.period_s is None else 1.0 / self.period_s
 
     def _measure_again(self) -> None:
-        """Begins to measure the period; the previous one stays in use meanwhile."""
+        """Begin to measure the period; the previous one stays in use meanwhile."""
         self._is_measured = False
         self._reads: deque[tuple[float, int]] = deque(maxlen=REMEMBERED_READS)  # time, and number of lines until then
         self._lines = 0
 
     def stamps_s(self, lines: int, now_s: float) -> list[float]:
-        """Returns the stamps of this many lines, all read now, oldest first."""
+        """Return the stamps of this many lines, all read now, oldest first."""
         stamps_s = [self._next_stamp_s(now_s, later) for later in range(lines - 1, -1, -1)]
         if lines:
             self._lines += lines
@@ -88,7 +88,7 @@ class SampledLine(SerialLine):
     """A serial line whose device measures at a steady rate. Owns its clock."""
 
     def __init__(self, path: str, baud: int) -> None:
-        """Opens the line; raises SerialLineError where it does not open."""
+        """Open the line; raises SerialLineError where it does not open."""
         self.clock = LineClock(baud)
         super().__init__(path, baud)
 
@@ -97,6 +97,6 @@ class SampledLine(SerialLine):
         self.clock.reset()
 
     def read_stamped(self, now_s: float) -> list[tuple[float, bytes]]:
-        """Returns all complete lines, oldest first, each with the time at which it was measured."""
+        """Return all complete lines, oldest first, each with the time at which it was measured."""
         lines = self.read(now_s)
         return list(zip(self.clock.stamps_s(len(lines), now_s), lines, strict=True))

@@ -31,7 +31,7 @@ class StageEncoder:
     """Reads the positions. Owns its serial line and its counts."""
 
     def __init__(self, settings: StageEncoderSettings) -> None:
-        """Opens the line; raises SerialLineError where it does not open."""
+        """Open the line; raises SerialLineError where it does not open."""
         self.settings = settings
         self.line = SampledLine(settings.path, settings.baud)
         self.counts = EncoderCounts(settings.metres_per_count, settings.label)
@@ -51,11 +51,11 @@ class StageEncoder:
         return self.line.arrivals(lambda line: self.counts.decode(line) is not None)
 
     def silent_for_s(self, now_s: float) -> float:
-        """Returns for how long no count has arrived."""
+        """Return for how long no count has arrived."""
         return 0.0 if self._heard_s is None else now_s - self._heard_s
 
     def read(self, now_s: float) -> list[StagePosition]:
-        """Returns all positions that have arrived, oldest first; never waits."""
+        """Return all positions that have arrived, oldest first; never waits."""
         if self.line.reopen(now_s):
             self.counts.reset()
         accepted = [(stamp_s, self.counts.accept(line, stamp_s)) for stamp_s, line in self.line.read_stamped(now_s)]

@@ -64,7 +64,7 @@ class MitAxis(DriveSignals):
         return {node_id: self._receive_shared, MASTER_ID: self._receive_master}
 
     def _receive(self, data: bytes, now_s: float) -> None:
-        """Handles what arrives under a Damiao's MST_ID. Only an idle drive is asked for registers."""
+        """Handle what arrives under a Damiao's MST_ID. Only an idle drive is asked for registers."""
         if codec.is_register_answer(data, self.parameters.node_id):
             _, _, register, value = codec.decode_register(data)
             self.settings.on_register(register, value)
@@ -73,7 +73,7 @@ class MitAxis(DriveSignals):
             self._receive_answer(data, now_s)
 
     def _receive_shared(self, data: bytes, now_s: float) -> None:
-        """Handles what arrives under a CubeMars's id, of which its answers begin with that id."""
+        """Handle what arrives under a CubeMars's id, of which its answers begin with that id."""
         if len(data) == codec.ANSWER_BYTES and data[0] != self.parameters.node_id:
             self._receive_foreign(data, now_s)
         else:
@@ -109,7 +109,7 @@ class MitAxis(DriveSignals):
         self.setpoints.on_heartbeat(self.closed_loop)
 
     def _receive_status(self, status: int, flags: int) -> None:
-        """Handles status and fault. A drive that left the mode by itself is not commanded back into it."""
+        """Handle status and fault. A drive that left the mode by itself is not commanded back into it."""
         if status != self._status or flags != self._error_flags:
             self._status, self._error_flags, self._health = status, flags, None
         if flags or self.closed_loop and status != codec.ENABLED:
@@ -117,7 +117,7 @@ class MitAxis(DriveSignals):
         self.closed_loop = status == codec.ENABLED
 
     def _receive_foreign(self, data: bytes, now_s: float) -> None:
-        """Counts commands of another program, which the drive answers too. It may have left the mode by one."""
+        """Count commands of another program, which the drive answers too. It may have left the mode by one."""
         self._answers.on_question(self._read_s)
         if data == codec.LEAVE:
             self._following = False
@@ -161,7 +161,7 @@ class MitAxis(DriveSignals):
         self._transmit(codec.LEAVE)
 
     def send_torque(self, torque_nm: float) -> None:
-        """Commands torque; to a drive that is to be idle zero torque is no command, but the one to leave the mode."""
+        """Command torque; to a drive that is to be idle zero torque is no command, but the one to leave the mode."""
         motor_nm = self._sign * torque_nm
         self.setpoints.on_command(motor_nm)
         if self._following or torque_nm != 0.0:
@@ -170,7 +170,7 @@ class MitAxis(DriveSignals):
             self._transmit(codec.LEAVE)
 
     def prepare(self) -> None:
-        """Replaces the command that the drive remembers, which it would follow as soon as it enters the mode."""
+        """Replace the command that the drive remembers, which it would follow as soon as it enters the mode."""
         self._transmit(codec.encode_torque(0.0, self._ranges.torque_nm))
 
     def close_loop(self) -> None:
@@ -182,7 +182,7 @@ class MitAxis(DriveSignals):
         self._transmit(codec.LEAVE)
 
     def clear_errors(self) -> None:
-        """Clears a Damiao's errors; those of a CubeMars end with their cause or with its supply."""
+        """Clear a Damiao's errors; those of a CubeMars end with their cause or with its supply."""
         self._transmit(codec.CLEAR if self._ranges.has_registers else codec.LEAVE)
 
     def request_settings(self, now_s: float) -> None:

@@ -62,7 +62,7 @@ def _read_registers(port: BenchPort, node_ids: Iterable[int]) -> dict[int, Value
 
 
 def _found(node_id: int, ids: Sequence[int], values: Values) -> Iterator[FoundDrive]:
-    """Yields one drive for each answer to one question; a Damiao has registers, a CubeMars none."""
+    """Yield one drive for each answer to one question; a Damiao has registers, a CubeMars none."""
     if not values:
         for _ in ids:
             yield FoundDrive(NAME, node_id, "a CubeMars, or firmware without registers")

@@ -68,12 +68,12 @@ class Answer(NamedTuple):
 
 
 def feedback_id(node_id: int, model: Model) -> int:
-    """Returns the id under which a drive answers: a CubeMars its own; a Damiao as the set-up page sets MST_ID."""
+    """Return the id under which a drive answers: a CubeMars its own; a Damiao as the set-up page sets MST_ID."""
     return node_id + 16 if model.has_registers else node_id
 
 
 def encode_torque(torque_nm: float, range_nm: float) -> bytes:
-    """Encodes torque alone, kp = kd = 0. What lies beyond the range gets its ends; NaN is no payload that may leave."""
+    """Encode torque alone, kp = kd = 0. What lies beyond the range gets its ends; NaN is no payload that may leave."""
     if torque_nm != torque_nm:
         return b""
     torque_nm = -range_nm if torque_nm < -range_nm else range_nm if torque_nm > range_nm else torque_nm
@@ -82,7 +82,7 @@ def encode_torque(torque_nm: float, range_nm: float) -> bytes:
 
 
 def decode_torque(data: bytes, range_nm: float) -> float:
-    """Returns the torque of exactly one such command, zero for ZERO_CODE; NaN for any other payload."""
+    """Return the torque of exactly one such command, zero for ZERO_CODE; NaN for any other payload."""
     if len(data) != ANSWER_BYTES or data[:6] != _PURE_TORQUE or data[6] > 0xF:
         return nan
     code = data[6] << 8 | data[7]
@@ -94,16 +94,16 @@ def _decode(code: float, limit: float, codes: int) -> float:
 
 
 def _encode(value: float, limit: float, codes: int) -> int:
-    """Truncates, as a drive does, and ends at the range."""
+    """Truncate, as a drive does, and end at the range."""
     return int((min(max(value, -limit), limit) + limit) * codes / (2.0 * limit))
 
 
 def decode_answer(data: bytes, model: Model) -> Answer:
-    """Raises MalformedMessageError for another length."""
+    """Decode an answer; raises MalformedMessageError for another length."""
     if len(data) != ANSWER_BYTES:
         raise MalformedMessageError(f"an answer of {len(data)} bytes")
     head, position, velocity, middle, torque, temperature, last = _ANSWER.unpack(data)
-    return Answer(
+    return Answer(  # by position: it is built for every drive in every tick
         head & 0xF,
         head >> 4,
         _decode(position + 0.5, model.position_rad, POSITION_CODES),
@@ -133,7 +133,7 @@ def encode_register(node_id: int, kind: int, register: int, value: bytes) -> byt
 
 
 def decode_register(data: bytes) -> tuple[int, int, int, bytes]:
-    """Returns node, kind, register and value; raises MalformedMessageError for another length."""
+    """Return node, kind, register and value; raises MalformedMessageError for another length."""
     if len(data) != ANSWER_BYTES:
         raise MalformedMessageError(f"a register frame of {len(data)} bytes")
     node_id, kind, register, value = _REGISTER_FRAME.unpack(data)
@@ -141,10 +141,10 @@ def decode_register(data: bytes) -> tuple[int, int, int, bytes]:
 
 
 def is_register_answer(data: bytes, node_id: int) -> bool:
-    """Returns whether an answer of a Damiao carries a register. So may that of one at its range's end."""
+    """Return whether an answer of a Damiao carries a register. So may that of one at its range's end."""
     return len(data) == ANSWER_BYTES and data[0] == node_id and data[1] == 0 and data[2] in (READ, WRITE)
 
 
 def error_text(flags: int) -> str:
-    """Names a drive's fault; empty for none."""
+    """Name a drive's fault; empty for none."""
     return FAULT_NAMES.get(flags, f"fault {flags}") if flags else ""

@@ -47,7 +47,15 @@ class Mit(DriveType):
         return Frame(node_id, codec.LEAVE)
 
     def announces(self, node_id: int) -> Frame:
-        answer = codec.Answer(node_id & LARGEST_ID, codec.DISABLED, 0.0, 0.0, 0.0, 0.0, 0)
+        answer = codec.Answer(
+            node_id=node_id & LARGEST_ID,
+            status=codec.DISABLED,
+            position_rad=0.0,
+            velocity_rad_s=0.0,
+            torque_nm=0.0,
+            temperature_c=0.0,
+            last=0,
+        )
         return Frame((node_id & LARGEST_ID) + DAMIAO_OFFSET, codec.encode_answer(answer, MODEL))
 
     def read_frame(self, frame: Frame) -> FrameContent | None:
@@ -76,7 +84,7 @@ class Mit(DriveType):
         }
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        """Sets a Damiao's status, or the fault of a CubeMars."""
+        """Set a Damiao's status, or the fault of a CubeMars."""
         data, of_damiao = frame.data, frame.arbitration_id > LARGEST_ID
         if len(data) != codec.ANSWER_BYTES:
             return data

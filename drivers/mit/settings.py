@@ -43,7 +43,7 @@ class MitSettings:
 
     @property
     def supported(self) -> bool:
-        """Returns whether the drive has said which firmware it has; a CubeMars cannot."""
+        """Return whether the drive has said which firmware it has; a CubeMars cannot."""
         return SOFTWARE in self._values or not self._readable
 
     @property
@@ -67,11 +67,11 @@ class MitSettings:
 
     @property
     def problem(self) -> str:
-        """Why the drive's settings do not fit the configuration: what was found and what to do; empty where they do."""
+        """Return why settings do not fit the configuration, with what was found and what to do; empty where they do."""
         return "; ".join(_problems(self._values, self._parameters))
 
     def due_request(self, now_s: float) -> bytes:
-        """Returns the payload of the next request; empty where nothing is due. It is called in every tick."""
+        """Return the payload of the next request; empty where nothing is due. It is called in every tick."""
         if not self._readable:
             return b""
         if self._next == len(REGISTERS) or self._waiting and now_s - self._asked_s > ANSWER_S:
@@ -84,7 +84,7 @@ class MitSettings:
         return codec.encode_read(self._parameters.node_id, REGISTERS[self._next])
 
     def on_register(self, register: int, value: bytes) -> None:
-        """Handles an answer, also one that was not asked for. A drive without a firmware version is only starting."""
+        """Handle an answer, also one that was not asked for. A drive without a firmware version is only starting."""
         number = float((FLOAT if register in FLOATS else WORD).unpack(value)[0])
         if register == SOFTWARE and not number:
             self.forget()

@@ -58,7 +58,13 @@ def wanted_settings(drive: MitParameters, longest_watchdog_s: float) -> Sequence
         exactly("PMAX", ranges.position_rad, "model", fraction=SAME_FRACTION),
         exactly("VMAX", ranges.velocity_rad_s, "model", fraction=SAME_FRACTION),
         exactly("TMAX", ranges.torque_nm, torque_key, fraction=SAME_FRACTION),
-        Setting("TIMEOUT", watchdog, 1.0, round(longest_watchdog_s * units), "faults.longest_watchdog_s, in 50 µs"),
+        Setting(
+            key="TIMEOUT",
+            wanted=watchdog,
+            least=1.0,
+            most=round(longest_watchdog_s * units),
+            source="faults.longest_watchdog_s, in 50 µs",
+        ),
     )
 
 
@@ -82,7 +88,7 @@ def is_register(frame: Frame, node_id: int) -> bool:
 
 
 def models_of(values: Mapping[int, float]) -> list[str]:
-    """Returns the models with registers that are delivered with these ranges."""
+    """Return the models with registers that are delivered with these ranges."""
     found = [values.get(register, 0.0) for register in (PMAX, VMAX, TMAX)]
     return [
         name
@@ -114,7 +120,7 @@ class DamiaoSetup(DriveSetup):
         )
 
     def activity(self) -> str:
-        """Asks by the command to leave the mode, the only question there is: it also ends the drive's torque."""
+        """Ask by the command to leave the mode, the only question there is: it also ends the drive's torque."""
         node_id = self._parameters.node_id
         answer = self._port.ask(
             Frame(node_id, codec.LEAVE),

@@ -92,15 +92,15 @@ class MoteusAxis(DriveSignals):
 
     @property
     def _asked_s(self) -> float:
-        """When the newest answer was asked for: every tick asks after it has read."""
+        """Return when the newest answer was asked for: every tick asks after it has read."""
         return self._read_before_s if self._read_before_s > NEVER_S else self._read_s
 
     def _measured_s(self, stamp_s: float) -> float:
-        """Returns when the drive measured: just before its answer, or where that has no stamp, when it was asked."""
+        """Return when the drive measured: just before its answer, or where that has no stamp, when it was asked."""
         return stamp_s if stamp_s != self._read_s else min(stamp_s, self._asked_s)
 
     def _receive_mode(self, mode: int, fault: int, now_s: float) -> None:
-        """Handles mode and fault. A drive that left position mode by itself is not commanded back into it.
+        """Handle mode and fault. A drive that left position mode by itself is not commanded back into it.
 
         It counts as in closed loop if any answer of a read says so: other commands and stops may alternate.
         """
@@ -127,7 +127,7 @@ class MoteusAxis(DriveSignals):
         self._health = None
 
     def _receive_foreign(self, data: bytes, now_s: float) -> None:
-        """Counts commands of another program; its questions get answers too."""
+        """Count commands of another program; its questions get answers too."""
         subframes = list(registers.decode_frame(data))
         if any(each.kind == registers.READ and each.register == Register.MODE for each in subframes):
             self._answers.on_question(self._read_s)
@@ -145,7 +145,7 @@ class MoteusAxis(DriveSignals):
 
     @property
     def duplicates(self) -> bool:
-        """Returns whether two drives seem to share this id."""
+        """Return whether two drives seem to share this id."""
         return self._answers.duplicates(self._read_s)
 
     def _build_health(self) -> DriveHealth:
@@ -170,7 +170,7 @@ class MoteusAxis(DriveSignals):
         self._transmit(codec.QUERY_ALONE)
 
     def send_torque(self, torque_nm: float) -> None:
-        """Commands torque; to a drive that is to be idle zero torque is no command, but a question, or a stop."""
+        """Command torque; to a drive that is to be idle zero torque is no command, but a question, or a stop."""
         if not -LARGEST_FLOAT < torque_nm < LARGEST_FLOAT:  # binary32 cannot represent it; the gate refuses NaN
             torque_nm = nan
         motor_nm = self._sign * torque_nm
@@ -182,7 +182,7 @@ class MoteusAxis(DriveSignals):
 
     @property
     def _is_disturbed(self) -> bool:
-        """Returns whether a drive that is to be idle follows torque, or soon may: another program commands it.
+        """Return whether a drive that is to be idle follows torque, or soon may: another program commands it.
 
         Its next command starts the drive again between two ticks. In the other modes a drive obeys none until a stop.
         """
@@ -192,7 +192,7 @@ class MoteusAxis(DriveSignals):
         """Does nothing: every torque command states the mode and all that it depends on."""
 
     def close_loop(self) -> None:
-        """Lets the torque commands that follow, and not the questions, leave."""
+        """Let the torque commands that follow, and not the questions, leave."""
         self._following, self._reason, self._health = True, 0, None
 
     def disarm(self) -> None:
@@ -200,7 +200,7 @@ class MoteusAxis(DriveSignals):
         self._transmit(codec.STOP_AND_QUERY)
 
     def clear_errors(self) -> None:
-        """Stops the drive, which clears a fault and the latched time-out."""
+        """Stop the drive, which clears a fault and the latched time-out."""
         self._reason, self._health = 0, None
         self._transmit(codec.STOP_AND_QUERY)
 

@@ -87,6 +87,18 @@ class Reply(NamedTuple):
     board_temperature_c: float = 0.0
 
 
+AT_REST = Reply(
+    mode=Mode.STOPPED,
+    position_turn=0.0,
+    velocity_turn_s=0.0,
+    q_current_a=0.0,
+    motor_temperature_c=0.0,
+    voltage_v=24.0,
+    fault=0,
+    control_torque_nm=0.0,
+)
+
+
 def command_id(node_id: int) -> int:
     return REPLY_WANTED | node_id
 
@@ -100,14 +112,14 @@ def reply_id(node_id: int) -> int:
 
 
 def error_flags(mode: int, fault: int) -> int:
-    """Returns the drive's fault, or TIMEOUT_FLAG; 0 for the limits that the same register names in other modes."""
+    """Return the drive's fault, or TIMEOUT_FLAG; 0 for the limits that the same register names in other modes."""
     if mode == Mode.TIMEOUT:
         return TIMEOUT_FLAG
     return (fault or UNKNOWN_FAULT) if mode == Mode.FAULT else 0
 
 
 def error_text(flags: int) -> str:
-    """Names a drive's fault; empty for none."""
+    """Name a drive's fault; empty for none."""
     return FAULT_NAMES.get(flags, f"fault {flags}") if flags else ""
 
 
@@ -116,7 +128,7 @@ def encode_torque(torque_nm: float) -> bytes:
 
 
 def decode_torque(data: bytes) -> float:
-    """Returns the torque of exactly one such command; NaN for any other payload."""
+    """Return the torque of exactly one such command; NaN for any other payload."""
     end = len(_TORQUE_HEAD)
     if len(data) != TORQUE_BYTES or data[:end] != _TORQUE_HEAD or data[end + _FLOAT.size :] != _TORQUE_TAIL:
         return nan
@@ -147,7 +159,7 @@ def encode_reply(reply: Reply) -> bytes:
 
 
 def decode_reply(data: bytes) -> Reply:
-    """Raises MalformedMessageError for a payload that does not answer QUERY."""
+    """Decode a reply; raises MalformedMessageError for a payload that does not answer QUERY."""
     try:
         a, mode, b, position, velocity, c, current, d, motor, e, voltage, board, fault, f, torque, g = _REPLY.unpack(
             data
@@ -156,7 +168,7 @@ def decode_reply(data: bytes) -> Reply:
         raise MalformedMessageError(f"a reply of {len(data)} bytes") from problem
     if (a, b, c, d, e, f, g) != _REPLY_HEADS:
         raise MalformedMessageError("a reply of other registers")
-    return Reply(
+    return Reply(  # by position: it is built for every drive in every tick
         mode,
         position,
         velocity,

@@ -12,7 +12,7 @@ from drivers.drive_type import DriveType, FrameContent, Span
 from drivers.moteus import codec
 from drivers.moteus.axis import MoteusAxis
 from drivers.moteus.bench import MoteusBench
-from drivers.moteus.codec import Mode, Reply
+from drivers.moteus.codec import Mode
 from drivers.moteus.gate_table import KIND, gate_table
 from drivers.moteus.parameters import LARGEST_ID, SMALLEST_ID, MoteusParameters
 from drivers.transmit_gate import GateTable
@@ -54,7 +54,7 @@ class Moteus(DriveType):
         return codec.command_frame(node_id, codec.QUERY_ALONE)
 
     def announces(self, node_id: int) -> Frame:
-        identifier, reply = codec.reply_id(node_id), Reply(Mode.STOPPED, 0.0, 0.0, 0.0, 0.0, 24.0, 0, 0.0)
+        identifier, reply = codec.reply_id(node_id), codec.AT_REST
         return Frame(
             identifier, codec.encode_reply(reply), is_extended=identifier > 0x7FF, is_fd=True, bit_rate_switch=True
         )

@@ -97,7 +97,7 @@ class Subframe(NamedTuple):
 
 
 def padded(data: bytes) -> bytes:
-    """Fills a payload up to the next length that CAN FD has."""
+    """Fill a payload up to the next length that CAN FD has."""
     length = min((each for each in FD_LENGTHS if each >= len(data)), default=-1)
     if length < 0:
         raise ValueError(f"A CAN FD frame has up to {max(FD_LENGTHS)} bytes of data, not {len(data)}.")
@@ -109,7 +109,7 @@ def encode_read(resolution: Resolution, register: int, count: int = 1) -> bytes:
 
 
 def encode_values(kind: int, resolution: Resolution, register: int, values: Sequence[float]) -> bytes:
-    """Encodes a write or a reply of consecutive registers."""
+    """Encode a write or a reply of consecutive registers."""
     codes = (_encode_value(resolution, register + index, value) for index, value in enumerate(values))
     return _head(kind, resolution, register, len(values)) + b"".join(codes)
 
@@ -129,7 +129,7 @@ def _head(kind: int, resolution: Resolution, register: int, count: int) -> bytes
 
 
 def _encode_value(resolution: Resolution, register: int, value: float) -> bytes:
-    """Scales and truncates as moteus does; a number that is not finite becomes the most negative integer."""
+    """Scale and truncates as moteus does; a number that is not finite becomes the most negative integer."""
     layout = LAYOUTS[resolution]
     if resolution is Resolution.FLOAT:
         return layout.pack(value)
@@ -150,7 +150,7 @@ def _varuint(number: int) -> bytes:
 
 
 def decode_frame(data: bytes) -> Iterator[Subframe]:
-    """Yields the subframes of a payload; raises MalformedMessageError where it reaches one that is none."""
+    """Yield the subframes of a payload; raises MalformedMessageError where it reaches one that is none."""
     reader = _Reader(data)
     while reader.position < len(data):
         head = reader.take(1)[0]
@@ -181,13 +181,13 @@ def _decode_registers(reader: "_Reader", kind: int, resolution: Resolution, shor
     count = short or reader.varuint()
     register = reader.varuint() if count else 0
     if kind == READ:
-        return Subframe(kind, resolution, register, count)
+        return Subframe(kind=kind, resolution=resolution, register=register, length=count)
     layout = LAYOUTS[resolution]
     if reader.position + count * layout.size > len(reader.data):
         raise MalformedMessageError(f"{count} registers do not fit")
     values = (layout.unpack(reader.take(layout.size))[0] for _ in range(count))
     scaled = (_scaled(resolution, register + index, value) for index, value in enumerate(values))
-    return Subframe(kind, resolution, register, count, tuple(scaled))
+    return Subframe(kind=kind, resolution=resolution, register=register, length=count, values=tuple(scaled))
 
 
 def _scaled(resolution: Resolution, register: int, code: float) -> float:
@@ -222,7 +222,7 @@ class _Reader:
 
 
 def replied_values(subframes: Iterable[Subframe]) -> dict[int, float]:
-    """Returns the values of all replies by register."""
+    """Return the values of all replies by register."""
     return {
         each.register + index: value
         for each in subframes

@@ -34,7 +34,7 @@ HOLDS_POSITION = 10  # the timeout mode in which a drive holds its position with
 
 
 def encode_question(key: str) -> bytes:
-    """Asks for one setting, and for as much of the answer as there is already."""
+    """Ask for one setting, and for as much of the answer as there is already."""
     text = registers.encode_console(registers.CONSOLE_INPUT, f"conf get {key}\n".encode())
     return registers.padded(text + registers.encode_console_poll(MOST_CONSOLE_BYTES))
 
@@ -80,11 +80,11 @@ class MoteusSettings:
 
     @property
     def problem(self) -> str:
-        """Why the drive's settings do not fit the configuration: what was found and what to do; empty where they do."""
+        """Return why settings do not fit the configuration, with what was found and what to do; empty where they do."""
         return "; ".join(_problems(self._values, self._parameters))
 
     def due_request(self, now_s: float) -> bytes:
-        """Returns the payload of the next request; empty where nothing is due. It is called in every tick."""
+        """Return the payload of the next request; empty where nothing is due. It is called in every tick."""
         if now_s - self._identity_s >= (REFRESH_S if self.firmware else REPEAT_UNKNOWN_S):
             self._identity_s = now_s
             return IDENTITY
@@ -109,7 +109,7 @@ class MoteusSettings:
             self.serial_number = "".join(f"{int(part or 0) & 0xFFFFFFFF:08x}" for part in parts)
 
     def on_console(self, text: bytes, now_s: float) -> None:
-        """Handles the output of the console, of which an answer is one line."""
+        """Handle the output of the console, of which an answer is one line."""
         if not self._reading:
             return
         if text:
@@ -132,7 +132,7 @@ class MoteusSettings:
 
 
 def _number(line: bytes) -> float:
-    """Returns NaN also for an error text, which fits no setting and, as a watchdog, is none."""
+    """Return NaN also for an error text, which fits no setting and, as a watchdog, is none."""
     try:
         return float(line)
     except ValueError:

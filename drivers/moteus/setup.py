@@ -50,7 +50,13 @@ def wanted_settings(drive: MoteusParameters, longest_watchdog_s: float) -> Seque
         exactly(KV, kv, "torque_constant_nm_a", MEASURED, SAME_TORQUE_FRACTION),
         exactly(RATIO, 1.0, GUIDE),
         exactly(TIMEOUT_MODE, BRAKES, GUIDE),
-        Setting(WATCHDOG, watchdog_s, 0.001, longest_watchdog_s, "faults.longest_watchdog_s"),
+        Setting(
+            key=WATCHDOG,
+            wanted=watchdog_s,
+            least=0.001,
+            most=longest_watchdog_s,
+            source="faults.longest_watchdog_s",
+        ),
     )
 
 
@@ -60,7 +66,7 @@ def is_reply(frame: Frame) -> bool:
 
 
 def found_drive(frame: Frame) -> FoundDrive | None:
-    """Returns the drive that answers with the registers of its identity; None for any other frame."""
+    """Return the drive that answers with the registers of its identity; None for any other frame."""
     values = _values(frame)
     node_id = frame.arbitration_id >> 8
     settings = MoteusSettings(MoteusParameters("", node_id))
@@ -108,7 +114,7 @@ class MoteusSetup(DriveSetup):
             raise CannotReadError(f"{key}: the drive answers '{line}'") from None
 
     def write(self, key: str, value: float) -> None:
-        """Writes a whole number without a point, as the drive's integers need; NaN is `nan`."""
+        """Write a whole number without a point, as the drive's integers need; NaN is `nan`."""
         self._require_ok(f"conf set {key} {f'{value:.0f}' if value % 1.0 == 0.0 else f'{value:.9g}'}")
 
     def save(self) -> None:
@@ -121,7 +127,7 @@ class MoteusSetup(DriveSetup):
             raise CannotReadError(f"'{command}': the drive answers '{line}'")
 
     def _command(self, text: str, longest_s: float = LONGEST_LINE_S) -> str:
-        """Returns the line that answers a command, after discarding older output."""
+        """Return the line that answers a command, after discarding older output."""
         for _ in range(MOST_POLLS):
             if not self._poll(POLL, text):
                 break
@@ -137,7 +143,7 @@ class MoteusSetup(DriveSetup):
         return output.partition(b"\n")[0].decode(errors="replace").strip()
 
     def _poll(self, data: bytes, text: str) -> bytes:
-        """Returns the output that the drive has now."""
+        """Return the output that the drive has now."""
         answer = self._ask(data, f"'{text}'", lambda frame: _output(frame) is not None)
         return _output(answer) or b""
 
@@ -157,7 +163,7 @@ def _values(frame: Frame) -> dict[int, float]:
 
 
 def _output(frame: Frame) -> bytes | None:
-    """Returns the console's text in an answer; None for another answer."""
+    """Return the console's text in an answer; None for another answer."""
     with suppress(MalformedMessageError):
         texts = [each.text for each in registers.decode_frame(frame.data) if each.kind == registers.CONSOLE_OUTPUT]
         return b"".join(texts) if texts else None

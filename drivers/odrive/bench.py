@@ -48,14 +48,14 @@ class OdriveBench(CanSimpleBench):
 
 
 def ask(port: BenchPort, node_ids: Iterable[int], message: Message) -> dict[int, list[Frame]]:
-    """Asks these ids for a message by remote frames; returns the answers by id."""
+    """Ask these ids for a message by remote frames; return the answers by id."""
     questions = [Frame(arbitration_id(node_id, message), is_remote=True) for node_id in node_ids]
     least_bytes = 7 if message is codec.ADDRESS else DATA_MAX_BYTES
     return answers(port.ask_all(questions), message, least_bytes)
 
 
 def answers(frames: Iterable[Frame], message: Message, least_bytes: int) -> dict[int, list[Frame]]:
-    """Returns the frames that carry a message, by the id of their drive."""
+    """Return the frames that carry a message, by the id of their drive."""
     found: dict[int, list[Frame]] = {}
     for frame in frames:
         is_message = frame.is_plain and frame.arbitration_id & codec.LAST_COMMAND == message.command

@@ -101,11 +101,11 @@ class CanSimpleAxis(DriveSignals):
             self.setpoints.on_report(setpoint_a * self._setpoint_nm_a, self._sign * self._velocity_rad_s)
 
     def _idle_current_a(self, data: bytes, measured_a: float) -> float:
-        """Returns the current of an idle drive, which reports that it measures none."""
+        """Return the current of an idle drive, which reports that it measures none."""
         return 0.0 if isnan(measured_a) else measured_a
 
     def _receive_state(self, state: int, initializing: bool, now_s: float) -> None:
-        """Handles the axis state of a heartbeat."""
+        """Handle the axis state of a heartbeat."""
         if now_s - self._heartbeat_stamp_s > RESTART_SILENCE_S:
             self._on_silence()
         if state == AxisState.UNDEFINED or initializing:
@@ -120,7 +120,7 @@ class CanSimpleAxis(DriveSignals):
         self._health = None
 
     def _on_silence(self) -> None:
-        """Counts a restart if all messages were missing, not one of them alone, while this program was reading."""
+        """Count a restart if all messages were missing, not one of them alone, while this program was reading."""
         heard_s = max(self._angle_stamp_s, self._current_stamp_s, self._heartbeat_stamp_s)
         if isfinite(heard_s) and self._read_before_s - heard_s > RESTART_SILENCE_S:
             self._on_restart()
@@ -145,11 +145,11 @@ class CanSimpleAxis(DriveSignals):
 
     @property
     def duplicates(self) -> bool:
-        """Returns whether two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
+        """Return whether two drives seem to share this id: see drivers/odrive/duplicate_node_monitor.py."""
         return self._duplicates.found
 
     def _build_health(self) -> DriveHealth:
-        """Adds the axis state; a firmware adds its version, watchdog and errors."""
+        """Add the axis state; a firmware adds its version, watchdog and errors."""
         return super()._build_health()._replace(busy_state=f"axis state {self.busy_state}" if self.busy_state else "")
 
     def send_torque(self, torque_nm: float) -> None:
@@ -160,7 +160,7 @@ class CanSimpleAxis(DriveSignals):
         self._outlet.send(Frame(self._torque_id, codec.SET_INPUT_TORQUE.encode(motor_nm)))
 
     def prepare(self) -> None:
-        """Sets torque mode, limits, velocity gain and zero torque.
+        """Set torque mode, limits, velocity gain and zero torque.
 
         In torque mode ODrive clamps torque to (velocity limit - velocity) times its velocity gain without reporting
         it. Both are set so that the clamp lies above every torque for a joint within its own velocity limit, and

@@ -25,7 +25,7 @@ class Message:
         return self._struct.pack(*values)
 
     def decode(self, data: bytes) -> tuple[Any, ...]:
-        """Returns the values; raises MalformedMessageError for a payload that is shorter or longer than the layout."""
+        """Return the values; raises MalformedMessageError for a payload that is shorter or longer than the layout."""
         try:
             return self._struct.unpack(data)
         except error as problem:
@@ -103,7 +103,7 @@ ERROR_NAMES = {
 
 
 def error_text(flags: int, known: Mapping[int, str] = ERROR_NAMES) -> str:
-    """Names the active errors; unknown bits appear as a number."""
+    """Name the active errors; unknown bits appear as a number."""
     names = [name for bit, name in known.items() if flags & bit]
     unknown = flags & ~sum(known)
     return ", ".join(names + ([f"unknown flag 0x{unknown:x}"] if unknown else []))
@@ -120,13 +120,13 @@ def encode_address(node_id: int, serial_number: int) -> bytes:
 
 
 def decode_serial_number(data: bytes) -> str:
-    """Returns the serial number of an Address message as ODrive's tools print it: 12 hexadecimal digits."""
+    """Return the serial number of an Address message as ODrive's tools print it: 12 hexadecimal digits."""
     _, low, high = ADDRESS.decode(data[:7] if len(data) == DATA_MAX_BYTES else data)
     return f"{high << SERIAL_NUMBER_LOW_BITS | low:012x}"
 
 
 def decode_sdo(data: bytes) -> tuple[int, bytes]:
-    """Returns the endpoint that a drive was asked for and the bytes of its value. Frames may be padded to eight."""
+    """Return the endpoint that a drive was asked for and the bytes of its value. Frames may be padded to eight."""
     if not SDO_HEAD_BYTES < len(data) <= 2 * SDO_HEAD_BYTES:
         raise MalformedMessageError(f"command 0x{TX_SDO.command:02x} with {len(data)} bytes")
     _, endpoint, _ = TX_SDO.decode(data[:SDO_HEAD_BYTES])

@@ -34,7 +34,7 @@ class DuplicateNodeMonitor:
         self._contradicted_s = NEVER_S
 
     def on_heartbeat(self, read_s: float, read_before_s: float) -> None:
-        """Handles a heartbeat that arrived after `read_before_s` and was read at `read_s`."""
+        """Handle a heartbeat that arrived after `read_before_s` and was read at `read_s`."""
         earliest_s = self._earliest_s
         self._frequent = len(earliest_s) == HEARTBEATS and read_s - earliest_s[0] < self._span_s
         earliest_s.append(read_before_s)
@@ -43,7 +43,7 @@ class DuplicateNodeMonitor:
         self._update_found()
 
     def on_reading(self, turns: float, read_s: float) -> None:
-        """Counts a reading that is far from the previous one and equals the one before that."""
+        """Count a reading that is far from the previous one and equals the one before that."""
         jump = turns - self._turns
         if jump > JUMP_TURNS or jump < -JUMP_TURNS:
             returned = abs(turns - self._turns_before) < SAME_TURNS

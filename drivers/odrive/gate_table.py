@@ -28,7 +28,7 @@ def cansimple_table(
     requests: tuple[Message, ...],
     checks: Mapping[Message, Callable[[bytes], bool]],
 ) -> GateTable:
-    """Lists what the firmwares have in common, and what one of them adds."""
+    """List what the firmwares have in common, and what one of them adds."""
     always: dict[Message, bytes] = {
         codec.SET_LIMITS: codec.SET_LIMITS.encode(drive.velocity_limit_turn_s, drive.current_limit_a),
         codec.SET_VEL_GAINS: codec.SET_VEL_GAINS.encode(drive.velocity_gain_nm_s_turn, 0.0),
@@ -58,5 +58,5 @@ def _decode_torque(data: bytes) -> float:
 
 
 def _reads_parameter(data: bytes) -> bool:
-    """Returns whether a payload reads a parameter: opcode and reserved byte are zero, and no value follows to write."""
+    """Return whether a payload reads a parameter: opcode and reserved byte are zero, and no value follows to write."""
     return len(data) == READ_BYTES and data[0] == codec.SDO_READ and data[3] == 0

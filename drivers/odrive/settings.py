@@ -68,7 +68,7 @@ class DriveSettings:
             self._watchdog_timeout_s = timeout_s
 
     def due_requests(self, node_id: int, now_s: float) -> Iterator[Frame]:
-        """Yields the frames that ask for settings: unknown ones every REPEAT_UNKNOWN_S, all others every REFRESH_S."""
+        """Yield the frames that ask for settings: unknown ones every REPEAT_UNKNOWN_S, all others every REFRESH_S."""
         if self._is_due("version", self.version is not None, now_s):
             yield Frame(arbitration_id(node_id, codec.GET_VERSION), is_remote=True)
         endpoints = self.watchdog_endpoints
@@ -87,7 +87,7 @@ class DriveSettings:
 
     @property
     def identified(self) -> bool:
-        """Returns whether the serial number is known, or none is expected."""
+        """Return whether the serial number is known, or none is expected."""
         return bool(self.serial_number) or not self.expected_serial_number
 
     @property

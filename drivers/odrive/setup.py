@@ -7,6 +7,7 @@ ODrive's CANSimple documentation, and examples/can_restore_config.py of odrivero
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from struct import Struct, error
 from typing import Any, NamedTuple
 
@@ -52,7 +53,7 @@ class Build(NamedTuple):
 
 
 def build_of_file(document: Any) -> Build:
-    """Returns the table of a flat_endpoints.json. Raises ValueError for another document."""
+    """Return the table of a flat_endpoints.json. Raises ValueError for another document."""
     try:
         numbers = {
             key: Number(int(each["id"]), LAYOUTS[each["type"]])
@@ -77,13 +78,16 @@ def wanted_settings(drive: OdriveParameters, longest_watchdog_s: float) -> Seque
     watchdog_s = min(WATCHDOG_S, longest_watchdog_s)
     return (
         exactly(f"{CAN}.node_id", drive.node_id, "node_id", "it answers under this id"),
-        *(Setting(f"{CAN}.{name}_msg_rate_ms", 2.0, 1.0, 2.0, GUIDE) for name in ("encoder", "iq")),
+        *(_period(name, 2.0) for name in ("encoder", "iq")),
         exactly(f"{CAN}.heartbeat_msg_rate_ms", heartbeat_ms, "heartbeat_period_s"),
-        *(
-            Setting(f"{CAN}.{name}_msg_rate_ms", 100.0, 1.0, 100.0, GUIDE)
-            for name in ("error", "temperature", "bus_voltage")
+        *(_period(name, 100.0) for name in ("error", "temperature", "bus_voltage")),
+        Setting(
+            key=TIMEOUT,
+            wanted=watchdog_s,
+            least=0.001,
+            most=longest_watchdog_s,
+            source="faults.longest_watchdog_s",
         ),
-        Setting(TIMEOUT, watchdog_s, 0.001, longest_watchdog_s, "faults.longest_watchdog_s"),
         exactly(ENABLE, 1.0, GUIDE),
         exactly(f"{MOTOR}.torque_constant", drive.torque_constant_nm_a, "torque_constant_nm_a"),
         exactly(f"{MOTOR}.current_soft_max", drive.current_limit_a, "current_limit_a"),
@@ -92,8 +96,13 @@ def wanted_settings(drive: OdriveParameters, longest_watchdog_s: float) -> Seque
     )
 
 
+def _period(message: str, longest_ms: float) -> Setting:
+    key = f"{CAN}.{message}_msg_rate_ms"
+    return Setting(key=key, wanted=longest_ms, least=1.0, most=longest_ms, source=GUIDE)
+
+
 def found_drive(node_id: int, version: Sequence[int], serial_number: str = "") -> FoundDrive:
-    """Returns the drive that reports this version: the values of GET_VERSION."""
+    """Return the drive that reports this version: the values of GET_VERSION."""
     firmware, hardware = (".".join(map(str, version[part])) for part in (slice(4, 7), slice(1, 4)))
     supported = tuple(version[4:6]) == SUPPORTED
     return FoundDrive(
@@ -146,7 +155,7 @@ class OdriveSetup(DriveSetup):
         question = codec.RX_SDO.encode(codec.SDO_READ, number.endpoint, 0)
         answer = self._port.ask(
             Frame(arbitration_id(self._parameters.node_id, codec.RX_SDO), question),
-            lambda frame: self._is_from(frame, codec.TX_SDO) and _endpoint(frame.data) == number.endpoint,
+            lambda frame: self._is_from(frame, codec.TX_SDO) and _answers(frame.data, number.endpoint),
             key,
         )
         try:
@@ -156,7 +165,7 @@ class OdriveSetup(DriveSetup):
         return float(value)
 
     def write(self, key: str, value: float) -> None:
-        """Writes; firmware from 0.6.11 on confirms it, older ones do not, so the value is read back."""
+        """Write; firmware from 0.6.11 on confirms it, older ones do not, so the value is read back."""
         number = self._number(key)
         data = number.layout.pack(value if number.layout.format == "<f" else round(value))
         head = codec.RX_SDO.encode(SDO_WRITE, number.endpoint, 0)
@@ -171,7 +180,7 @@ class OdriveSetup(DriveSetup):
             raise NoAnswerError(f"it did not answer within {RESTART_S:g} s of its restart")
 
     def _comes_to(self, answering: bool, longest_s: float) -> bool:
-        """Asks for the version again and again; returns whether the drive came to answer, or to be silent, in time."""
+        """Ask for the version again and again; return whether the drive came to answer, or to be silent, in time."""
         begun_s = self._port.now_s
         while self._port.now_s - begun_s < longest_s:
             try:
@@ -198,8 +207,7 @@ class OdriveSetup(DriveSetup):
         return frame.is_plain and frame.arbitration_id == arbitration_id(self._parameters.node_id, message)
 
 
-def _endpoint(data: bytes) -> int:
-    try:
-        return codec.decode_sdo(data)[0]
-    except MalformedMessageError:
-        return -1
+def _answers(data: bytes, endpoint: int) -> bool:
+    with suppress(MalformedMessageError):
+        return codec.decode_sdo(data)[0] == endpoint
+    return False

@@ -111,7 +111,7 @@ class Odrive05Axis(CanSimpleAxis):
         self._turns = turns
 
     def _turns_s(self, moved_turns: float, elapsed_s: float) -> float:
-        """Returns the velocity between two positions; zero after a gap, and after a jump that no joint can make."""
+        """Return the velocity between two positions; zero after a gap, and after a jump that no joint can make."""
         if not 0.0 < elapsed_s < LONGEST_GAP_S or abs(moved_turns) > JUMP_TURNS:
             return 0.0
         return moved_turns / elapsed_s
@@ -126,12 +126,12 @@ class Odrive05Axis(CanSimpleAxis):
             self._counts_problem, self._health = problem, None
 
     def _receive_current(self, data: bytes, now_s: float) -> None:
-        """Ignores the set-point next to a current with the same bits as the one before: only an idle drive sends it."""
+        """Ignore the set-point next to a current with the same bits as the one before: only an idle drive sends it."""
         repeated, self._measured_data = data[4:] == self._measured_data, data[4:]
         super()._receive_current(NO_SETPOINT + data[4:] if repeated and self.closed_loop else data, now_s)
 
     def _idle_current_a(self, data: bytes, measured_a: float) -> float:
-        """Returns the current of an idle drive: none, unless it differs from the one that was reported before."""
+        """Return the current of an idle drive: none, unless it differs from the one that was reported before."""
         repeated, self._idle_data = self._idle_data in (b"", data[4:]), data[4:]
         return 0.0 if repeated else super()._idle_current_a(data, measured_a)
 
@@ -166,7 +166,7 @@ class Odrive05Axis(CanSimpleAxis):
             self._ask()
 
     def poll(self) -> None:
-        """Asks an idle drive for its counts while it reports no position, or its watchdog is not proven.
+        """Ask an idle drive for its counts while it reports no position, or its watchdog is not proven.
 
         A drive with firmware 0.6 has none, and reports its version.
         """
@@ -204,7 +204,7 @@ class Odrive05Axis(CanSimpleAxis):
         super().clear_errors()
 
     def request_settings(self, now_s: float) -> None:
-        """Asks for the version, which only firmware 0.6 has, and for the counts, which only firmware 0.5 has."""
+        """Ask for the version, which only firmware 0.6 has, and for the counts, which only firmware 0.5 has."""
         if self._proof.silent:
             return
         for frame in self.settings.due_requests(self.parameters.node_id, now_s):

@@ -97,7 +97,7 @@ CONTROLLER_ERRORS = {
 
 
 def axis_flags(error: int, motor: int, encoder: int, controller: int) -> int:
-    """Returns the axis error of a heartbeat, with the flags of those parts that have one of their own."""
+    """Return the axis error of a heartbeat, with the flags of those parts that have one of their own."""
     if motor & PART_FLAG:
         error |= ERROR_MOTOR
     if encoder & PART_FLAG:
@@ -106,7 +106,7 @@ def axis_flags(error: int, motor: int, encoder: int, controller: int) -> int:
 
 
 def errors_text(flags: int, motor: int, encoder: int, controller: int) -> str:
-    """Names the errors of the axis, and those of the parts that it says have failed."""
+    """Name the errors of the axis, and those of the parts that it says have failed."""
     parts = (
         (flags & ERROR_MOTOR, "motor", error_text(motor, MOTOR_ERRORS)),
         (flags & ERROR_ENCODER, "encoder", error_text(encoder, ENCODER_ERRORS)),

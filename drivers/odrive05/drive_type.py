@@ -36,7 +36,7 @@ class Odrive05(CanSimple):
         return gate_table(parameters)
 
     def announces(self, node_id: int) -> Frame:
-        """Returns the counts of an encoder, which firmware 0.6 does not report."""
+        """Return the counts of an encoder, which firmware 0.6 does not report."""
         return Frame(arbitration_id(node_id, codec.GET_ENCODER_COUNT), codec.GET_ENCODER_COUNT.encode(0, 0))
 
     def harmless_frames(self, node_id: int) -> Mapping[str, Frame]:
@@ -44,7 +44,7 @@ class Odrive05(CanSimple):
         return {"reports of another drive": self.announces(UNUSED_NODE)}
 
     def with_error(self, frame: Frame, flags: int, idle: bool) -> bytes:
-        """Changes heartbeats; the errors of motor, encoder and controller are details of them."""
+        """Change heartbeats; the errors of motor, encoder and controller are details of them."""
         if frame.arbitration_id & LAST_COMMAND != codec.HEARTBEAT.command:
             return frame.data
         with suppress(MalformedMessageError):

@@ -36,26 +36,24 @@ class WatchdogProof:
 
     @property
     def must_clear(self) -> bool:
-        """Returns whether the watchdog expired earlier: it could not show that it does again.
+        """Return whether the watchdog expired earlier: it could not show that it does again.
 
         The errors of a whole board are cleared. By then its other drive has reported its own.
         """
         return self._expired >= IN_A_ROW
 
     def on_heartbeat(self, expired: bool, fit: bool, read_s: float, read_before_s: float) -> None:
-        """Handles a heartbeat. `fit`: the drive is idle and without other errors, and is to remain so."""
+        """Handle a heartbeat. `fit`: the drive is idle and without other errors, and is to remain so."""
         if self.concluded:
             return
         if not fit or read_s - read_before_s > LATE_S:
             self.begin_again()
         elif self.silent:
-            self._conclude(expired, read_s - self._silent_since_s)
+            silence_s = read_s - self._silent_since_s
+            if expired or silence_s > self._longest_s:
+                self.begin_again()
+                self.watchdog_s = min(self._timeout_s, silence_s) if expired else 0.0
         else:
             self._sound, self._expired = (0, self._expired + 1) if expired else (self._sound + 1, 0)
             self.silent = self._sound >= IN_A_ROW
             self._silent_since_s = read_before_s  # every tick sends after it has read
-
-    def _conclude(self, expired: bool, silence_s: float) -> None:
-        if expired or silence_s > self._longest_s:
-            self.begin_again()
-            self.watchdog_s = min(self._timeout_s, silence_s) if expired else 0.0

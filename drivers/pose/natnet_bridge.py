@@ -23,6 +23,7 @@ from drivers.pose.natnet_sockets import Direction, NatNetParameters
 from drivers.pose.pose_port import MOST_MESSAGES_PER_READ, NO_SOURCE, POSE, PoseReport, PoseSourceError
 
 LONGEST_START_S = 20.0  # of the program, on a busy computer
+LONGEST_END_S = 2.0
 REPORT_S = 0.25
 LONGEST_MESSAGE = 4096
 ENDED, RESTART = "the program that receives NatNet has ended.", "restart the daemon"
@@ -32,7 +33,7 @@ class NatNetBridge:
     """Implements PositionStream. Owns the program, and its newest report. Start it before the loop's priority rises."""
 
     def __init__(self, parameters: NatNetParameters, direction: Direction) -> None:
-        """Starts the program and waits until its sockets are open; raises PoseSourceError where they do not open."""
+        """Start the program and waits until its sockets are open; raises PoseSourceError where they do not open."""
         self._link, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         arguments = json.dumps([asdict(parameters), direction])
         command = [sys.executable, "-P", "-m", "drivers.pose.natnet_bridge", arguments]
@@ -44,15 +45,16 @@ class NatNetBridge:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
             far.close()
         self._link.settimeout(LONGEST_START_S)
-        self._report = NO_SOURCE
-        self._on_message(self._link.recv(LONGEST_MESSAGE))
+        self._report = NO_SOURCE._replace(trouble="the program that receives NatNet did not start")
+        with suppress(TimeoutError):
+            self._on_message(self._link.recv(LONGEST_MESSAGE))
         if not self._report.source:
             self.close()
             raise PoseSourceError(self._report.trouble)
         self._link.setblocking(False)
 
     def receive(self, now_s: float) -> Iterator[tuple[float, float]]:
-        """Yields the positions that the program has passed on since, oldest first; never waits."""
+        """Yield the positions that the program has passed on since, oldest first; never waits."""
         for _ in range(MOST_MESSAGES_PER_READ):
             try:
                 message = self._link.recv(LONGEST_MESSAGE)
@@ -64,7 +66,7 @@ class NatNetBridge:
                 self._on_message(message)
 
     def _on_message(self, message: bytes) -> None:
-        """Handles a report; an empty message means that the program has ended."""
+        """Handle a report; an empty message means that the program has ended."""
         if message:
             self._report = PoseReport(*json.loads(message))
         else:
@@ -74,12 +76,16 @@ class NatNetBridge:
         return self._report
 
     def close(self) -> None:
+        """End the program, which notices that this side closes."""
         self._link.close()
-        self._program.wait(LONGEST_START_S)
+        try:
+            self._program.wait(LONGEST_END_S)
+        except subprocess.TimeoutExpired:
+            self._program.kill()
 
 
 def serve(client: NatNetClient, link: socket.socket) -> None:
-    """Passes positions and reports on until the loop's side closes."""
+    """Pass positions and reports on until the loop's side closes."""
     sent, sent_s = NO_SOURCE, 0.0
     while True:
         ready, _, _ = select.select([link, *client.sockets.opened], [], [], REPORT_S)

@@ -44,7 +44,7 @@ class NatNetClient:
     """Implements PositionStream. Owns the sockets, the server's reports, and what was seen last."""
 
     def __init__(self, parameters: NatNetParameters, direction: Direction) -> None:
-        """Opens the sockets; raises PoseSourceError. `direction` is that of x, a unit vector in the cameras' frame."""
+        """Open the sockets; raises PoseSourceError. `direction` is that of x, a unit vector in the cameras' frame."""
         self.parameters = parameters
         self._direction = direction
         self.malformed = self.lost = 0
@@ -67,7 +67,7 @@ class NatNetClient:
         self._delay = LeastDelay()
 
     def receive(self, now_s: float) -> Iterator[tuple[float, float]]:
-        """Yields the positions that have arrived, oldest first: the time of exposure, and metres along the direction.
+        """Yield the positions that have arrived, oldest first: the time of exposure, and metres along the direction.
 
         Requests are sent where they are due.
         """
@@ -93,7 +93,7 @@ class NatNetClient:
             self.sockets.request(REQUEST_MODEL)
 
     def _on_message(self, packet: bytes, now_s: float) -> Iterator[tuple[float, float]]:
-        """Handles a packet of the server; raises MalformedPacketError."""
+        """Handle a packet of the server; raises MalformedPacketError."""
         message = message_of(packet)
         if message == FRAME:
             self._heard_s = now_s
@@ -151,7 +151,7 @@ class NatNetClient:
         )
 
     def _trouble(self) -> tuple[str, str]:
-        """Returns why no position arrives, and what to do about it."""
+        """Return why no position arrives, and what to do about it."""
         parameters = self.parameters
         if self._unreadable:
             return (
@@ -184,6 +184,6 @@ class NatNetClient:
 
 
 def _source_text(parameters: NatNetParameters) -> str:
-    """Names where the frames come from, for people."""
+    """Name where the frames come from, for people."""
     by = f"in group {parameters.group}, port {parameters.port}" if parameters.group else f"from {parameters.server}"
     return f"{by} on {parameters.interface}" if parameters.interface else by

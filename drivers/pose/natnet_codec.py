@@ -27,8 +27,7 @@ a body is tracked. The description of models (5): i32 descriptions, each i32 kin
 Other kinds are skipped by their size. Before 4.1 they do not contain it, so there the reader stops at the first of
 them; Motive sends marker sets and rigid bodies first.
 
-No library is used: those on PyPI build an object for every marker, block or start their own threads, and raise in the
-middle of a truncated packet. The best maintained one, natnet, serves the tests as a reference.
+No library is used: natnet_bridge.py says why.
 """
 
 import struct
@@ -97,13 +96,13 @@ DECODING_ERRORS = (struct.error, ValueError, OverflowError)
 
 
 def encode_request(message: int, text: bytes = b"") -> bytes:
-    """Encodes CONNECT, REQUEST_MODEL or KEEP_ALIVE. A server answers CONNECT by its information."""
+    """Encode CONNECT, REQUEST_MODEL or KEEP_ALIVE. A server answers CONNECT by its information."""
     payload = b"Ping\0" if message == CONNECT else text
     return HEADER.pack(message, len(payload)) + payload
 
 
 def message_of(packet: bytes) -> int:
-    """Returns the kind of message. Raises MalformedPacketError for a packet that ends before its payload."""
+    """Return the kind of message. Raises MalformedPacketError for a packet that ends before its payload."""
     if len(packet) < HEADER.size:
         raise MalformedPacketError("no header")
     message, size = HEADER.unpack_from(packet)
@@ -113,7 +112,7 @@ def message_of(packet: bytes) -> int:
 
 
 def decode_server_info(packet: bytes) -> ServerInfo:
-    """Decodes a server's information; raises MalformedPacketError."""
+    """Decode a server's information; raises MalformedPacketError."""
     try:
         name = packet[HEADER.size : HEADER.size + NAME_BYTES].partition(b"\0")[0].decode(errors="replace")
         major, minor = SERVER_VERSIONS.unpack_from(packet, HEADER.size + NAME_BYTES)[4:6]
@@ -126,7 +125,7 @@ def decode_server_info(packet: bytes) -> ServerInfo:
 
 
 def _read_count(packet: bytes, offset: int) -> tuple[int, int]:
-    """Returns a count, and the offset of the bytes after it."""
+    """Return a count, and the offset of the bytes after it."""
     (count,) = INTEGER.unpack_from(packet, offset)
     if count < 0:
         raise MalformedPacketError("a negative count")
@@ -150,7 +149,7 @@ class FrameLayout:
         self.end = Struct(f"<II{software}{ticks}{precision}H")
 
     def decode_frame(self, packet: bytes, identity: int) -> MotionFrame:
-        """Decodes a frame with the rigid body of that streaming id; 0: the first. Raises MalformedPacketError."""
+        """Decode a frame with the rigid body of that streaming id; 0: the first. Raises MalformedPacketError."""
         try:
             return self._frame(packet, identity)
         except DECODING_ERRORS as problem:
@@ -165,15 +164,22 @@ class FrameLayout:
         if not isfinite(end[2]):
             raise MalformedPacketError("a time that is not finite")
         exposed, sent = (end[3], end[5]) if self.has_ticks else (0, 0)
-        return MotionFrame(number, body, end[2], exposed, sent, bool(end[-1] & MODELS_CHANGED))
+        return MotionFrame(
+            number=number,
+            body=body,
+            software_s=end[2],
+            exposed_ticks=exposed,
+            sent_ticks=sent,
+            models_changed=bool(end[-1] & MODELS_CHANGED),
+        )
 
     def _begin_section(self, packet: bytes, offset: int) -> tuple[int, int]:
-        """Returns the number of items in a section, and where the first one begins."""
+        """Return the number of items in a section, and where the first one begins."""
         count, offset = _read_count(packet, offset)
         return count, offset + INTEGER.size * self.has_sizes
 
     def _skip(self, packet: bytes, offset: int) -> int:
-        """Returns the end of a section that contains its size."""
+        """Return the end of a section that contains its size."""
         count, size = TWO_INTEGERS.unpack_from(packet, offset)
         if count < 0 or size < 0:
             raise MalformedPacketError("a negative size")
@@ -190,7 +196,7 @@ class FrameLayout:
         return offset
 
     def _find_body(self, packet: bytes, offset: int, identity: int) -> tuple[RigidBody | None, int]:
-        """Returns the requested body, and the end of the section."""
+        """Return the requested body, and the end of the section."""
         count, offset = self._begin_section(packet, offset)
         found = None
         for _ in range(count):
@@ -208,7 +214,7 @@ class FrameLayout:
         return offset + MARKER_BYTES * markers
 
     def _skip_to_end(self, packet: bytes, offset: int) -> int:
-        """Skips skeletons, assets, labelled markers, force plates and devices."""
+        """Skip skeletons, assets, labelled markers, force plates and devices."""
         if self.has_sizes:
             for _ in range(5):
                 offset = self._skip(packet, offset)
@@ -232,7 +238,7 @@ class FrameLayout:
         return offset
 
     def _skip_channels(self, packet: bytes, offset: int) -> int:
-        """Skips the channels of force plates or of devices."""
+        """Skip the channels of force plates or of devices."""
         count, offset = self._begin_section(packet, offset)
         for _ in range(count):
             channels, offset = self._begin_section(packet, offset + INTEGER.size)
@@ -245,11 +251,17 @@ class FrameLayout:
 def _rigid_body(numbers: tuple[float, ...], mean_error_m: float, flags: int) -> RigidBody:
     identity, x_m, y_m, z_m, qx, qy, qz, qw = numbers
     tracked = bool(flags & TRACKED) and isfinite(x_m + y_m + z_m)
-    return RigidBody(int(identity), (x_m, y_m, z_m), (qx, qy, qz, qw), mean_error_m, tracked)
+    return RigidBody(
+        identity=int(identity),
+        position_m=(x_m, y_m, z_m),
+        quaternion=(qx, qy, qz, qw),
+        mean_error_m=mean_error_m,
+        tracked=tracked,
+    )
 
 
 def decode_bodies(packet: bytes, version: NatNetVersion) -> dict[str, int]:
-    """Returns the streaming ids of rigid bodies by name. Raises MalformedPacketError."""
+    """Return the streaming ids of rigid bodies by name. Raises MalformedPacketError."""
     try:
         return dict(_bodies(packet, version))
     except DECODING_ERRORS as problem:
@@ -264,20 +276,15 @@ def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
         offset += INTEGER.size
         size, offset = _read_count(packet, offset) if has_sizes else (0, offset)
         if kind == RIGID_BODY:
-            yield _name(packet, offset)
+            end = packet.index(0, offset)
+            yield packet[offset:end].decode(errors="replace"), INTEGER.unpack_from(packet, end + 1)[0]
         elif not has_sizes and kind != MARKER_SET:
             return
         offset = offset + size if has_sizes else _end_of(packet, offset, kind, version)
 
 
-def _name(packet: bytes, offset: int) -> tuple[str, int]:
-    end = packet.index(0, offset)
-    (identity,) = INTEGER.unpack_from(packet, end + 1)
-    return packet[offset:end].decode(errors="replace"), identity
-
-
 def _end_of(packet: bytes, offset: int, kind: int, version: NatNetVersion) -> int:
-    """Returns the end of a description that does not contain its size."""
+    """Return the end of a description that does not contain its size."""
     offset = packet.index(0, offset) + 1
     if kind == RIGID_BODY:
         offset += TWO_INTEGERS.size + VECTOR_BYTES

@@ -38,7 +38,7 @@ class NatNetParameters:
 
 
 def parse_axis(axis: object) -> Direction | None:
-    """Returns a unit vector from "x", "-z" or three numbers; None for anything else."""
+    """Return a unit vector from "x", "-z" or three numbers; None for anything else."""
     if isinstance(axis, str):
         direction = AXES.get(axis.removeprefix("-"))
         if direction is None or not axis.startswith("-"):
@@ -55,7 +55,7 @@ def parse_axis(axis: object) -> Direction | None:
 
 
 def parse_version(text: str) -> NatNetVersion | None:
-    """Returns None for a text that is no version, and for unsupported versions."""
+    """Return None for a text that is no version, and for unsupported versions."""
     major, dot, minor = text.partition(".")
     if not (dot and major.isdecimal() and minor.isdecimal() and len(text) < 8):
         return None
@@ -67,7 +67,7 @@ class NatNetSockets:
     """Exchanges packets with the server. Owns the sockets of one client."""
 
     def __init__(self, parameters: NatNetParameters) -> None:
-        """Opens the sockets; raises OSError."""
+        """Open the sockets; raises OSError."""
         self._server = (parameters.server, parameters.command_port)
         self.opened: list[socket.socket] = []
         try:
@@ -85,7 +85,7 @@ class NatNetSockets:
             asking.bind((_address_of(parameters.interface), 0))
 
     def packets(self) -> Iterator[tuple[bytes, str]]:
-        """Yields the packets that have arrived, and the address of each sender."""
+        """Yield the packets that have arrived, and the address of each sender."""
         for arriving in self.opened:
             for _ in range(MOST_PACKETS_PER_READ):
                 try:
@@ -95,7 +95,7 @@ class NatNetSockets:
                 yield packet, str(sender[0])
 
     def request(self, message: int) -> None:
-        """Sends a request to the server. Without a network it is lost, and the caller repeats it later."""
+        """Send a request to the server. Without a network it is lost, and the caller repeats it later."""
         with suppress(OSError):
             self.opened[-1].sendto(encode_request(message), self._server)
 
@@ -105,7 +105,7 @@ class NatNetSockets:
 
 
 def _udp_socket(interface: str) -> socket.socket:
-    """Opens a socket that never waits, on the named interface; raises OSError."""
+    """Open a socket that never waits, on the named interface; raises OSError."""
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     opened.setblocking(False)
     if interface and not is_address(interface):
@@ -114,7 +114,7 @@ def _udp_socket(interface: str) -> socket.socket:
 
 
 def _join(parameters: NatNetParameters) -> socket.socket:
-    """Opens a socket bound to the group's address, so it receives nothing else. Raises OSError."""
+    """Open a socket bound to the group's address, so it receives nothing else. Raises OSError."""
     opened = _udp_socket(parameters.interface)
     try:
         # Other programs on this computer may receive as well.
@@ -136,7 +136,7 @@ def _address_of(interface: str) -> str:
 
 
 def is_address(text: str) -> bool:
-    """Returns whether a text is an IPv4 address."""
+    """Return whether a text is an IPv4 address."""
     try:
         ipaddress.IPv4Address(text)
     except ValueError:

@@ -51,17 +51,17 @@ NO_SOURCE = PoseReport()
 
 class PoseSource(Protocol):
     def read(self, now_s: float) -> BodyPose:
-        """Returns the newest pose, or an empty one where none is known."""
+        """Return the newest pose, or an empty one where none is known."""
 
     def report(self) -> PoseReport:
-        """Returns the state at the last `read`, for `status` and `check`."""
+        """Return the state at the last `read`, for `status` and `check`."""
 
 
 class OpenedPose(PoseSource, Protocol):
     """A source that the daemon has opened."""
 
     def reopen(self, now_s: float) -> bool:
-        """Tries to open a lost source again; returns whether it did. Only called while nothing moves."""
+        """Try to open a lost source again; return whether it did. Only called while nothing moves."""
 
     def close(self) -> None: ...
 
@@ -86,7 +86,7 @@ class PosePort:
     """Receives poses at `path`. A pose older than STALE_S does not count."""
 
     def __init__(self, path: Path) -> None:
-        """Opens the socket; raises PoseSourceError where it cannot."""
+        """Open the socket; raises PoseSourceError where it cannot."""
         self._path = path
         self._socket = _listen(path)
         self.poses = self.malformed_messages = 0

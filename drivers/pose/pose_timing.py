@@ -29,7 +29,7 @@ class LeastDelay:
         self._since_s = NEVER_S
 
     def update(self, arrival_s: float, sent_s: float) -> float:
-        """Returns the offset that converts the sender's clock to this computer's."""
+        """Return the offset that converts the sender's clock to this computer's."""
         delay_s = arrival_s - sent_s
         if delay_s - min(self._least_s, self._before_s) > RESTARTED_S:
             self.reset()
@@ -49,7 +49,7 @@ class PoseForecast:
         self._positions: deque[tuple[float, float]] = deque()
 
     def add(self, stamp_s: float, x_m: float) -> bool:
-        """Adds a position; returns whether it is plausible after the previous one. If not, it becomes the first."""
+        """Add a position; return whether it is plausible after the previous one. If not, it becomes the first."""
         positions = self._positions
         follows = bool(positions) and stamp_s > positions[-1][0] and abs(x_m - positions[-1][1]) <= JUMP_M
         if not follows:
@@ -60,7 +60,7 @@ class PoseForecast:
         return follows
 
     def at(self, now_s: float) -> float:
-        """Returns the position in metres at `now_s`; NaN before the first one."""
+        """Return the position in metres at `now_s`; NaN before the first one."""
         if not self._positions:
             return UNKNOWN
         (first_s, first_m), (last_s, last_m) = self._positions[0], self._positions[-1]

@@ -4,9 +4,8 @@ encoder_counts.py decodes the lines and rejects implausible counts; serial_line.
 unplugged port is opened again between two ticks and only while nothing moves, because that may take milliseconds.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from control.bounds import Bounds, Meaning
 from control.records import NEVER_S, BodyPose
@@ -33,17 +32,12 @@ class RailEncoderParameters:
 class RailEncoder:
     """Implements PoseSource. Owns its serial line, its counts, and the newest pose."""
 
-    def __init__(
-        self,
-        parameters: RailEncoderParameters,
-        origin_m: float = 0.0,
-        open_device: Callable[[str, int], Any] | None = None,
-    ) -> None:
-        """Opens the device; raises PoseSourceError. `origin_m` is the counter's position where x is zero."""
+    def __init__(self, parameters: RailEncoderParameters, origin_m: float = 0.0) -> None:
+        """Open the device; raises PoseSourceError. `origin_m` is the counter's position where x is zero."""
         self.parameters = parameters
         device = parameters.device
         try:
-            self.line = SerialLine(device, parameters.bit_rate, LONGEST_LINE_BYTES, RETRY_S, open_device)
+            self.line = SerialLine(device, parameters.bit_rate, LONGEST_LINE_BYTES, RETRY_S)
         except SerialLineError as problem:
             raise PoseSourceError(f"the rail encoder {device} does not open: {problem.why}") from None
         self._counts = EncoderCounts(parameters.metres_per_count, parameters.label, origin_m)
@@ -51,7 +45,7 @@ class RailEncoder:
         self.reset()
 
     def reset(self) -> None:
-        """Restores the state after opening."""
+        """Restore the state after opening."""
         self._pose = BodyPose()
         self._counts.reset()
         self.line.reset()
@@ -75,7 +69,7 @@ class RailEncoder:
         return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
 
     def reopen(self, now_s: float) -> bool:
-        """Tries to open a lost device again, every RETRY_S; returns whether it did."""
+        """Try to open a lost device again, every RETRY_S; return whether it did."""
         return self.line.reopen(now_s)
 
     def report(self) -> PoseReport:

@@ -30,12 +30,12 @@ class EncoderCounts:
         self._stamp_s = NEVER_S
 
     def decode(self, line: bytes) -> float | None:
-        """Returns the position, accepted or not; None where the line is no count."""
+        """Return the position, accepted or not; None where the line is no count."""
         count = self._line.fullmatch(line)
         return int(count[1]) * self._metres_per_count - self._origin_m if count else None
 
     def accept(self, line: bytes, stamp_s: float) -> float | None:
-        """Returns the position where it is plausible, else None."""
+        """Return the position where it is plausible, else None."""
         position_m = self.decode(line)
         if position_m is None or not self._is_plausible(position_m, stamp_s):
             self.malformed += 1

@@ -45,21 +45,13 @@ class SerialLineError(Exception):
 class SerialLine:
     """Owns the open device, which is None while it is gone, and the incomplete line."""
 
-    def __init__(
-        self,
-        path: str,
-        baud: int,
-        longest_bytes: int = LONGEST_LINE_BYTES,
-        retry_s: float = RETRY_S,
-        open_device: Callable[[str, int], Any] | None = None,
-    ) -> None:
-        """Opens the device; raises SerialLineError where it does not open."""
+    def __init__(self, path: str, baud: int, longest_bytes: int = LONGEST_LINE_BYTES, retry_s: float = RETRY_S) -> None:
+        """Open the device; raises SerialLineError where it does not open."""
         self.path, self.baud = path, baud
         self.unpluggings = 0
         self.problem: SerialLineError | None = None  # the newest one
-        self._open_device = open_device or open_serial
         self._longest_bytes, self._retry_s, self._retry_at_s = longest_bytes, retry_s, NEVER_S
-        self._use(self._open_device(path, baud))
+        self._use(open_serial(path, baud))
 
     def _use(self, device: Any) -> None:
         self._device: Any = device
@@ -70,7 +62,7 @@ class SerialLine:
         self.reset()
 
     def reset(self) -> None:
-        """Restores the state after opening."""
+        """Restore the state after opening."""
         self._incomplete = b""
         self._from_its_start = False  # whether the incomplete line was received from its beginning
         self.recent: deque[bytes] = deque(maxlen=RECENT_LINES)
@@ -85,13 +77,16 @@ class SerialLine:
         return Arrivals(len(lines), readable / len(lines) if lines else 0.0, text_fraction(lines))
 
     def read(self, now_s: float) -> list[bytes]:
-        """Returns all complete lines without their ends, oldest first; none where the device is gone. Never waits."""
+        """Return all complete lines without their ends, oldest first; none where the device is gone. Never waits."""
         if self._device is None:
             return []
         try:
             *lines, self._incomplete = LINE_ENDS.split(self._incomplete + self._fetch())
         except OSError as problem:
-            self._lose(problem, now_s)
+            self.unpluggings += 1
+            self.problem = SerialLineError(problem.strerror or str(problem))
+            self.close()
+            self._retry_at_s = now_s + self._retry_s
             return []
         heard = [line for line in (lines if self._from_its_start else lines[1:]) if line.strip()]
         self._from_its_start = self._from_its_start or bool(lines)
@@ -102,35 +97,25 @@ class SerialLine:
         return heard
 
     def _fetch(self) -> bytes:
-        """Returns all bytes that have arrived. Raises OSError where the device is gone."""
+        """Return all bytes that have arrived. Raises OSError where the device is gone."""
         events = self._poll.poll(0)
         if not events:
             return b""
         if self._device.in_waiting:  # an empty read does not mean that the device is gone
-            return self._read_file()
+            with suppress(BlockingIOError):  # another program has read it
+                return os.read(self._file, MOST_BYTES_PER_READ)
+            return b""
         if events[0][1] & GONE or not self._device.in_waiting:  # a device that is gone is readable and has no bytes
             raise OSError(errno.EIO, os.strerror(errno.EIO))
         return b""
 
-    def _read_file(self) -> bytes:
-        try:
-            return os.read(self._file, MOST_BYTES_PER_READ)
-        except BlockingIOError:  # another program has read it
-            return b""
-
-    def _lose(self, problem: OSError, now_s: float) -> None:
-        self.unpluggings += 1
-        self.problem = SerialLineError(problem.strerror or str(problem))
-        self.close()
-        self._retry_at_s = now_s + self._retry_s
-
     def reopen(self, now_s: float) -> bool:
-        """Tries to open a lost device again, every `retry_s`; returns whether it did."""
+        """Try to open a lost device again, every `retry_s`; return whether it did."""
         if self._device is not None or now_s < self._retry_at_s:
             return False
         self._retry_at_s = now_s + self._retry_s
         try:
-            self._use(self._open_device(self.path, self.baud))
+            self._use(open_serial(self.path, self.baud))
         except SerialLineError as problem:
             self.problem = problem
             return False
@@ -144,13 +129,13 @@ class SerialLine:
 
 
 def text_fraction(lines: Iterable[bytes]) -> float:
-    """Returns the fraction of bytes that is text; it is small at a wrong baud rate."""
+    """Return the fraction of bytes that is text; it is small at a wrong baud rate."""
     letters = b"".join(lines)
     return sum(32 <= letter < 127 or letter in b"\t\r\n" for letter in letters) / len(letters) if letters else 0.0
 
 
 def open_serial(path: str, baud: int) -> Any:
-    """Opens a port of pyserial for exclusive use. Raises SerialLineError."""
+    """Open a port of pyserial for exclusive use. Raises SerialLineError."""
     try:
         import serial
     except ModuleNotFoundError:
@@ -189,7 +174,7 @@ def _ports_text() -> str:
 
 
 def list_ports() -> list[str]:
-    """Lists the serial ports of this computer, by their persistent names where they have one."""
+    """List the serial ports of this computer, by their persistent names where they have one."""
     from serial.tools import list_ports as serial_ports
 
     persistent = {}

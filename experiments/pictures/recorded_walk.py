@@ -73,7 +73,7 @@ class RecordedWalk(NamedTuple):
     complete: bool = True  # False if the writer of the log was interrupted, or still writes
     cut: str = ""  # how the walk may extend beyond this log
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
-    series: Mapping[str, Mapping[str, Floats]] = {}  # of every flipper that moved, the left one first
+    series: Mapping[str, Mapping[str, Any]] = {}  # of every flipper that moved, the left one first
     source: TraceSource | None = None  # of a walk that has not every row of the log
 
     @property
@@ -154,7 +154,7 @@ def walk_of_trace(
 
 def _columns_of(rows: Rows, start_s: float, rig: Rig, flipper: str) -> dict[str, Any]:
     """Return the arrays of a walk in which `flipper` is shown."""
-    series = {
+    series: dict[str, dict[str, Any]] = {
         name: {
             "sweep_angle_rad": rows["angle_rad"][:, 2 * number],
             "adduction_angle_rad": rows["angle_rad"][:, 2 * number + 1],
@@ -222,7 +222,7 @@ def walk_of_lab(path: Path, lab: LabLog, number: int = 0) -> RecordedWalk:
         rows += [STRIDE.decode(stride_row(stride.t_end_s, stride, nan)) for stride in own]
         if reading.strides and estimator.mud_estimate.boundary:
             noticed_s.append(now_s - start_s)
-    series = {
+    series: dict[str, dict[str, Any]] = {
         flipper: {
             "sweep_angle_rad": lab.angle_rad[:, 2 * place],
             "adduction_angle_rad": lab.angle_rad[:, 2 * place + 1],

@@ -29,7 +29,7 @@ def draw_strip(walk: RecordedWalk, strides: Sequence[Stride]) -> Figure:
     farthest_m = max(_farthest_m(walk, stride) for stride in strides)
     width_m = 2.0 * MARGIN_M + SPACING_M * (len(captions) - 1) + farthest_m
     height_in = WIDTH_IN * (DEEPEST_M + HIGHEST_M) / width_m * len(strides) + HEAD_IN + FOOT_IN
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout="none")
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="none")  # type: ignore[arg-type]  # a valid value
     panels = figure.subplots(len(strides), 1, squeeze=False)
     figure.subplots_adjust(0.0, FOOT_IN / height_in, 1.0, 1.0 - HEAD_IN / height_in, hspace=0.0)
     for panel, stride in zip(panels[:, 0], strides, strict=True):

@@ -6,6 +6,7 @@ mud_layout.py says where the names come from. The flippers stand side by side, w
 Marks of one kind are one artist: an hour has thousands of strides, and an artist of its own takes ten kilobytes.
 """
 
+from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -41,6 +42,7 @@ MARKS: dict[str, Any] = {"color": INK, "linestyle": "", "marker": "|", "markersi
 SHORTEST_S = 0.1  # least length of the time axis
 ROOM_FOR_LETTER = 0.018  # of the width of a panel
 HEADROOM = 1.6  # top of a panel as a multiple of its largest value; error bars may be cut
+Draw = Callable[[Axes, RecordedWalk], None]
 LEGEND: dict[str, Any] = {
     "loc": "lower right",
     "bbox_to_anchor": (1.0, 0.95),
@@ -59,8 +61,10 @@ def plot_walk(walk: RecordedWalk, path: Path, layout: MudLayout | None = None) -
 def draw_walk(walk: RecordedWalk, layout: MudLayout | None = None) -> Figure:
     """Draw a walk, each flipper in a column. `layout` names the muds where it is known."""
     sides, regions = walk.sides, mud_regions(walk, layout)
-    of_body = {"body (m)": _draw_position, "step (cm)": _draw_steps} if np.any(np.isfinite(walk.body_x_m)) else {}
-    of_flipper = {
+    of_body: dict[str, Draw] = (
+        {"body (m)": _draw_position, "step (cm)": _draw_steps} if np.any(np.isfinite(walk.body_x_m)) else {}
+    )
+    of_flipper: dict[str, Draw] = {
         "force (N)": _draw_forces,
         **{f"${name}$ (N/cm³)": partial(_draw_coefficient, name=name) for name in COEFFICIENTS},
         "depth (cm)": _draw_depth,

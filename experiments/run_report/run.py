@@ -1,4 +1,4 @@
-"""A recorded run for a report: its walks, and its strides with mud, outcome, estimates and fits.
+"""A recorded run for a report: its walks, its strides with mud and outcome, and their estimates with the fits.
 
 A stride lasts from its insertion to the next one; the last of a walk has no duration. Its mud is the one that is named
 there (mud_layout.py), the label in the name of a CSV such as 12.5N, or else the one that the robot noticed, described
@@ -8,24 +8,26 @@ by its k_p.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pandas import DataFrame
 
 from control.records import FLIPPERS, UNKNOWN
 from estimation.strokes.fit_samples import FitSamples, StrideFits
 from experiments.lablogs.log_choice import LABEL
-from experiments.pictures.mud_layout import MudLayout, mud_regions
+from experiments.pictures.mud_layout import MudLayout, MudRegion, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, walk_of_lab, walk_of_trace
-from experiments.pictures.stride_choice import Outcome, Stride, outcome_of
+from experiments.pictures.stride_choice import Stride, outcome_of
 from experiments.pictures.walk_trace import WalkTraces
+from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_label
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.fault_history import LoggedCause, read_causes
 from logs.files.log_error import LogError, Watch
 from logs.files.log_reader import TickPass
-from logs.files.log_summary import begin_s, log_summary
 from logs.files.scanned_log import ScannedLog, join_logs, scan_log
 from logs.lab.body_track import VERTICAL_AXIS
 from logs.lab.lab_csv import is_lab_csv, read_lab_csv
@@ -33,6 +35,8 @@ from logs.replay import Replay, RunningReplay, configuration_of, replay_lab
 
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
 AUTHORS = "the paper's authors"
+STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces")
+ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", "estimate", "samples")
 
 
 class MudsFrom(StrEnum):
@@ -44,107 +48,66 @@ class MudsFrom(StrEnum):
 
 
 @dataclass(frozen=True)
-class ReportedStride:
-    """One stride of the robot. Rows and fits are by flipper."""
-
-    walk: int  # from 1
-    index: int
-    mud: str  # empty where it is not certain
-    start_s: float  # since the beginning of the log
-    duration_s: float  # NaN of the last stride of a walk
-    step_m: float  # NaN without a pose
-    outcome: Outcome
-    rows: Mapping[str, Stride]
-    fits: Mapping[str, StrideFits]
-
-    @property
-    def depth_m(self) -> float:
-        return max(float(row["depth_m"]) for row in self.rows.values())
-
-    def samples(self, flipper: str, name: str) -> FitSamples | None:
-        """Return the samples of a fit; None for a bound, or where this version would estimate otherwise."""
-        if flipper not in self.fits:
-            return None
-        samples: FitSamples | None = getattr(self.fits[flipper], name)()
-        value = self.rows[flipper][name]
-        return samples if samples and abs(samples.slope - value) <= SAME * abs(value) else None
-
-
-@dataclass(frozen=True)
 class Run:
     """Everything that a report shows of one run."""
 
     name: str  # of the first file, without its ending
     paths: Sequence[Path]
     robot: str
-    started: str
     log: ScannedLog | None  # None for a CSV of the authors
     replay: Replay
     layout: MudLayout | None  # None where the robot noticed the muds
     muds_from: MudsFrom
     walks: Sequence[RecordedWalk]
-    strides: Sequence[ReportedStride]
+    strides: DataFrame  # STRIDES; the mud is empty where it is not certain, duration and step are NaN where unknown
+    estimates: DataFrame  # ESTIMATES: a row for each coefficient of each flipper; `samples` of a fit, or None
     causes: Sequence[LoggedCause]
-    flippers: Sequence[str]
-
-    @property
-    def path(self) -> Path:
-        return self.paths[0]
 
 
-@dataclass(frozen=True)
-class Source:
-    """The files of one run, and their log where it is one of this project."""
-
-    paths: Sequence[Path]
-    log: ScannedLog | None
-
-
-def read_sources(files: Sequence[Path], watch: Watch) -> list[Source]:
-    """Read logs, and join the segments of each run. Raises LogError."""
-    runs: dict[str, list[tuple[Path, ScannedLog | None]]] = {}
+def read_runs(
+    files: Sequence[Path], layout: MudLayout | None, watch: Watch, vertical: CaptureAxis = VERTICAL_AXIS
+) -> list[Run]:
+    """Read logs, join the segments of each run, replay them and describe their strides. Raises LogError."""
+    runs: dict[str, dict[Path, ScannedLog | None]] = {}
     for path in files:
         if not (path.suffix == ".mcap" or is_lab_csv(path)):
             raise LogError(f"{path}: not a log: its name must end with .mcap, .csv or .csv.gz")
-        if any(path.absolute() == known.absolute() for run in runs.values() for known, _ in run):
+        if any(path.absolute() == known.absolute() for run in runs.values() for known in run):
             raise LogError(f"{path}: given twice")
         log = None if is_lab_csv(path) else scan_log(path, watch)
-        runs.setdefault((log and log.metadata.get("run_id")) or str(path), []).append((path, log))
-    return [_source(run) for run in runs.values()]
+        runs.setdefault((log and log.metadata.get("run_id")) or str(path), {})[path] = log
+    joined = [(list(run), [log for log in run.values() if log]) for run in runs.values()]
+    sources = [(paths, join_logs(paths, logs) if logs else None) for paths, logs in joined]
+    return [_read_run(paths, log, layout, watch, vertical) for paths, log in sources]
 
 
-def _source(run: Sequence[tuple[Path, ScannedLog | None]]) -> Source:
-    paths, logs = [path for path, _ in run], [log for _, log in run if log]
-    return Source(paths, join_logs(paths, logs) if logs else None)
-
-
-def read_run(source: Source, layout: MudLayout | None, watch: Watch, vertical: CaptureAxis = VERTICAL_AXIS) -> Run:
-    """Replay a run and describe its strides. Raises LogError."""
-    path, log = source.paths[0], source.log
+def _read_run(
+    paths: Sequence[Path], log: ScannedLog | None, layout: MudLayout | None, watch: Watch, vertical: CaptureAxis
+) -> Run:
+    path = paths[0]
+    label = LABEL.search(path.name) if log is None else None
     if log is None:
         lab = read_lab_csv(path, vertical)
         replay, walks = replay_lab(lab), [walk_of_lab(path, lab)] if lab.flippers else []
     else:
         replay, walks = _read_ticks(path, log, watch)
-    label = LABEL.search(path.name) if log is None else None
     muds_from = MudsFrom.NAMES if layout else MudsFrom.FILE if label else MudsFrom.ROBOT
     if layout is None and label:
         layout = MudLayout((f"{label[1][:-1]} N",), (inf,))
     layout = _placed(path, layout, walks)
-    summary = log_summary(log) if log else {}
+    strides, estimates = _describe_strides(replay, walks, layout)
     return Run(
         name=path.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap"),
-        paths=source.paths,
-        robot=str(summary.get("robot", AUTHORS)),
-        started=str(summary.get("started", "")),
+        paths=paths,
+        robot=log.metadata.get("robot", "") if log else AUTHORS,
         log=log,
         replay=replay,
         layout=layout,
         muds_from=muds_from,
         walks=walks,
-        strides=_strides_of(replay, walks, layout),
+        strides=DataFrame(strides, columns=list(STRIDES)),
+        estimates=DataFrame(estimates, columns=list(ESTIMATES)),
         causes=read_causes(log.events, log.configuration_text) if log else [],
-        flippers=replay.flippers,
     )
 
 
@@ -167,70 +130,70 @@ def _placed(path: Path, layout: MudLayout | None, walks: Sequence[RecordedWalk])
     return layout.beginning_at(float(known[0])) if len(known) else layout
 
 
-def _strides_of(replay: Replay, walks: Sequence[RecordedWalk], layout: MudLayout | None) -> list[ReportedStride]:
+def _describe_strides(
+    replay: Replay, walks: Sequence[RecordedWalk], layout: MudLayout | None
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the rows of STRIDES and of ESTIMATES."""
     starts_s = [walk.begun_s for walk in walks]
     fits: dict[tuple[int, int, str], StrideFits] = {}
-    for estimate, found in zip(replay.strides, replay.fits, strict=True):
-        number = int(np.searchsorted(starts_s, estimate.t_end_s - replay.begin_s))
-        fits[number, estimate.index, estimate.flipper] = found
-    return [
-        stride
-        for number, walk in enumerate(walks, 1)
-        for stride in _strides_of_walk(number, walk, _mud_names(walk, layout), fits)
-    ]
+    for replayed, of_stride in zip(replay.strides, replay.fits, strict=True):
+        number = int(np.searchsorted(starts_s, replayed.t_end_s - replay.begin_s))
+        fits[number, replayed.index, replayed.flipper] = of_stride
+    strides, estimates = [], []
+    for number, walk in enumerate(walks, 1):
+        regions = mud_regions(walk, None) if layout is None else []
+        by_index: dict[int, dict[str, Stride]] = {}
+        for row in sorted(walk.strides, key=lambda row: int(row["index"])):
+            by_index.setdefault(row["index"], {})[FLIPPERS[row["flipper"]]] = row
+        first_rows = [next(iter(rows.values())) for rows in by_index.values()]
+        ends_s = [*(first["t_start_s"] for first in first_rows[1:]), UNKNOWN]
+        for (index, rows), first, end_s in zip(by_index.items(), first_rows, ends_s, strict=True):
+            mud = _mud_of(walk, layout, regions, first)
+            stride = {"walk": number, "index": index, "mud": mud}
+            strides.append(stride | _motion_of(walk, rows, first, end_s))
+            for flipper in (name for name in replay.flippers if name in rows):
+                found = fits.get((number, index, flipper))
+                for name in COEFFICIENTS:
+                    samples = getattr(found, name)() if found else None
+                    estimate = estimate_of_row(rows[flipper], name)
+                    of_flipper = {"flipper": flipper, "coefficient": name, "estimate": estimate}
+                    estimates.append(stride | of_flipper | {"samples": _if_same(samples, rows[flipper][name])})
+    return strides, estimates
 
 
-def _strides_of_walk(
-    number: int, walk: RecordedWalk, names: Mapping[int, str], fits: Mapping[tuple[int, int, str], StrideFits]
-) -> list[ReportedStride]:
-    strides, by_index = [], _by_index(walk)
-    starts_s = [next(iter(rows.values()))["t_start_s"] for rows in by_index.values()]
-    for (index, rows), start_s, next_s in zip(by_index.items(), starts_s, [*starts_s[1:], UNKNOWN], strict=True):
-        first = next(iter(rows.values()))
-        together = first | {"released": all(row["released"] for row in rows.values())}
-        strides.append(
-            ReportedStride(
-                walk=number,
-                index=index,
-                mud=names[index],
-                start_s=walk.begun_s + start_s,
-                duration_s=next_s - start_s,
-                step_m=first["step_m"],
-                outcome=outcome_of(together, walk.geometric_step_m),
-                rows=rows,
-                fits={name: fits[number, index, name] for name in rows if (number, index, name) in fits},
-            )
-        )
-    return strides
-
-
-def _by_index(walk: RecordedWalk) -> dict[int, dict[str, Stride]]:
-    """Return the rows of each stride by flipper, in the order of the strides."""
-    found: dict[int, dict[str, Stride]] = {}
-    for row in walk.strides:
-        found.setdefault(row["index"], {})[FLIPPERS[row["flipper"]]] = row
-    return dict(sorted(found.items()))
-
-
-def _mud_names(walk: RecordedWalk, layout: MudLayout | None) -> dict[int, str]:
-    """Name the mud of each stride."""
-    first_rows = {index: next(iter(rows.values())) for index, rows in _by_index(walk).items()}
-    if layout is not None:
-        return {index: _named(walk, layout, row) for index, row in first_rows.items()}
-    regions = mud_regions(walk, None)
+def _motion_of(walk: RecordedWalk, rows: Mapping[str, Stride], first: Stride, end_s: float) -> dict[str, Any]:
+    together = first | {"released": all(row["released"] for row in rows.values())}
     return {
-        index: next((each.name for each in reversed(regions) if each.start_s <= row["t_start_s"]), "")
-        for index, row in first_rows.items()
+        "start_s": walk.begun_s + first["t_start_s"],
+        "duration_s": end_s - first["t_start_s"],
+        "step_m": first["step_m"],
+        "depth_m": max(float(row["depth_m"]) for row in rows.values()),
+        "outcome": str(outcome_of(together, walk.geometric_step_m)),
+        "two_surfaces": any(isfinite(row.get("other_surface_m", nan)) for row in rows.values()),
     }
 
 
-def _named(walk: RecordedWalk, layout: MudLayout, row: Stride) -> str:
+def _if_same(samples: FitSamples | None, value: float) -> FitSamples | None:
+    """Return no samples of a bound, or where this version would estimate otherwise."""
+    return samples if samples and abs(samples.slope - value) <= SAME * abs(value) else None
+
+
+def _mud_of(walk: RecordedWalk, layout: MudLayout | None, regions: Sequence[MudRegion], row: Stride) -> str:
+    if layout is None:
+        return next((each.name for each in reversed(regions) if each.start_s <= row["t_start_s"]), "")
     if len(layout.names) == 1 and not isfinite(row["position_m"] + walk.geometric_step_m):
         return mud_label(layout.names[0])
-    reach_m = walk.geometric_step_m / 2.0
     slip_m = max(0.0, walk.geometric_step_m - row["step_m"])
-    return mud_label(layout.mud_at(row["position_m"] + reach_m, slip_m))
+    return mud_label(layout.mud_at(row["position_m"] + walk.geometric_step_m / 2.0, slip_m))
 
 
-def log_begin_s(run: Run) -> float:
-    return begin_s(run.log) if run.log else run.replay.begin_s
+def estimate_of_row(row: Stride, name: str) -> dict[str, Any]:
+    """Return one coefficient of a row as the daemon reports an estimate."""
+    value, std_error = (float(row[key]) for key in (name, f"{name}_std_error"))
+    return {
+        "value": value if isfinite(value) else None,
+        "std_error": std_error if isfinite(std_error) else None,
+        "valid": bool(row[f"{name}_valid"]) and isfinite(value),
+        "at_least": bool(row[f"{name}_at_least"]),
+        "reason": "",
+    }

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin
 REQUIRED: Any = object()  # the default of an option that must be given
 
 
-class OptionError(Exception):
+class OptionError(ArgumentTypeError):
     """Options that do not fit together, or a value that cannot be used; the text says which, and what is allowed."""
 
 
@@ -29,7 +29,8 @@ class Option(NamedTuple):
     unit: str = ""
     metavar: str = ""
     also: str = ""  # a second name, such as "--seeds"
-    parse: Callable[[str], Any] | None = None  # the text of a value; raises argparse.ArgumentTypeError
+    joined: bool = False  # one text has all values of a tuple, such as A,B
+    parse: Callable[[str], Any] | None = None  # the text of a value, or of all joined ones; raises OptionError
     above: float = -inf  # a lower bound that is not allowed itself
     choices: Sequence[str] = ()  # that are not known before the program runs, as those of a Literal are
     default: Callable[[], Any] | None = None  # computes the default when the command line is read
@@ -99,7 +100,7 @@ def declared_options(function: Callable[..., Any]) -> Iterator[DeclaredOption]:
 def _declared(name: str, kind: Any, option: Option, default: Any, named: bool) -> DeclaredOption:
     if NoneType in get_args(kind):
         kind = next(each for each in get_args(kind) if each is not NoneType)
-    repeatable = get_origin(kind) is tuple and get_args(kind)[-1] is Ellipsis
+    repeatable = get_origin(kind) is tuple and get_args(kind)[-1] is Ellipsis and not option.joined
     kind = get_args(kind)[0] if repeatable else kind
     choices = get_args(kind) if get_origin(kind) is Literal else tuple(option.choices)
     return DeclaredOption(

@@ -31,6 +31,13 @@ def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
     return _number_where(lambda value: low <= value <= high, f"from {low:.15g} to {high:.15g}{unit and ' '}{unit}")
 
 
+def above(low: float, high: float | None = None, unit: str = "") -> Callable[[str], float]:
+    """Returns a parser of numbers above `low`, and up to `high` where there is one."""
+    highest, most = (inf, "") if high is None else (high, f" and at most {high:.15g}")
+    must_be = f"more than {low:.15g}{most}{unit and ' '}{unit}"
+    return _number_where(lambda value: low < value <= highest and isfinite(value), must_be)
+
+
 def whole(low: int, high: int) -> Callable[[str], int]:
     """Returns a parser of whole numbers from `low` to `high`."""
     must_be = f"a whole number from {low} to {high}"
@@ -65,19 +72,6 @@ def group_rule(text: str) -> tuple[str, str]:
     if not (pattern and name):
         raise argparse.ArgumentTypeError(f"{text}: must be a pattern and a name, such as 'single_12.5N*=soft'")
     return pattern, name
-
-
-def plate_cm(text: str) -> tuple[float, float, float]:
-    """Parses 3x3.5 or, with its thickness, 3x3.5x0.4."""
-    sides = text.lower().removesuffix("cm").split("x")
-    if len(sides) not in (2, 3):
-        raise argparse.ArgumentTypeError(f"{text}: must be width x height, or width x height x thickness, in cm")
-    width, height, thickness = (_number(side) for side in [*sides, "0.4"][:3])
-    if not (0.2 <= width <= 50.0 and 0.2 <= height <= 50.0 and 0.02 <= thickness <= 10.0):
-        raise argparse.ArgumentTypeError(
-            f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10 cm"
-        )
-    return width, height, thickness
 
 
 def weights_g(text: str) -> tuple[float, ...]:

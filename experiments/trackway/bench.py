@@ -9,12 +9,13 @@ The strides are read from the log, and the table is the same as for the simulate
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
 from itertools import accumulate
-from math import isfinite, radians, sin
+from math import isfinite, nan, radians, sin
 from typing import NamedTuple
 
 from experiments.reports.counted_nouns import counted
+from experiments.reports.mud_names import mud_name
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import (
     RAISING_S,
@@ -28,13 +29,15 @@ from experiments.robot.bench_robot import (
     wait_until,
 )
 from experiments.study.notebook import Entry
+from experiments.study.option import OptionError
+from experiments.study.session import Show
 from experiments.trackway.depth_rule import DepthRule, constant_depth
-from experiments.trackway.report import ADAPTIVE, FIXED_DEPTHS_M, Settings, TrackwayReport, table_report
-from experiments.trackway.simulation import STUCK_S
+from experiments.trackway.table_one import ADAPTIVE, FIXED_DEPTHS_M, Summary, table_one
+from experiments.trackway.track_walk import STUCK_S
 from experiments.trackway.walk import Walk, WalkedStride, logged_strides, speed_m_s, walk_of
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.session import Show
 from firmware_host.configuration.configuration import Configuration
+from simulation.mud.track import COMPARTMENT_M
 
 PATIENCE_S = 900.0  # longest time of a whole walk
 UNSEEN_S = 2.0  # longest time without a pose, before or during a walk: the end of the track is unknown then
@@ -51,6 +54,24 @@ class Mud:
     length_m: float
 
 
+def parse_mud(text: str) -> Mud:
+    """Parse NAME or NAME=CM; the default length is that of the paper."""
+    name, _, length_cm = text.partition("=")
+    try:
+        value = float(length_cm or 100.0 * COMPARTMENT_M)
+    except ValueError:
+        value = nan
+    if not (name and 20.0 <= value <= 10000.0):
+        raise OptionError(f"{text}: must be a mud and its length from 20 to 10000 cm, such as 47.6=61")
+    return Mud(mud_name(name), value / 100.0)
+
+
+def require_own_names(muds: Sequence[Mud]) -> None:
+    """Raises OptionError where two muds have the same name."""
+    if len({mud.name for mud in muds}) < len(muds):
+        raise OptionError("--mud: two muds have the same name; give each its own")
+
+
 class LoggedTime(NamedTuple):
     """The time of a walk in the logs."""
 
@@ -65,19 +86,9 @@ class End(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BenchSettings(Settings):
-    muds: Sequence[Mud]
+class Trackway:
+    """The muds of a real trackway, and the trials on it."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class BenchReport(TrackwayReport):
-    settings: BenchSettings
-    left_out: int  # trials
-    strides_without_position: int = field(metadata={"key": "strides_without_place"})
-
-
-@dataclass(frozen=True)
-class Plan:
     muds: tuple[Mud, ...]
     trials: int = 3  # of each gait, as in the paper
     depths_m: tuple[float, ...] = tuple(FIXED_DEPTHS_M.values())
@@ -111,26 +122,26 @@ class Plan:
         return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if position_m < end_m), PAST_END)
 
 
-def run(bench: Bench, plan: Plan, show: Show) -> None:
+def run(bench: Bench, trackway: Trackway, show: Show) -> None:
     """Walk every trial that is not in the notebook yet. Raises BenchError."""
-    conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
+    conduct_trials(bench, trackway.planned, lambda trial: measure(bench, trackway, trial), show)
 
 
-def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
+def measure(bench: Bench, trackway: Trackway, trial: PlannedTrial) -> Entry:
     """Walk one trial, from torque on to torque off. Raises InvalidTrialError for one that was stopped, BenchError."""
-    robot, rule = bench.robot, plan.rules[trial.group]
+    robot, rule = bench.robot, trackway.rules[trial.group]
     _require_pose(robot)
     arm(robot, bench.operator)
     before = _require_pose(robot)
     start_m = before["body_x_m"]
     robot.call("walk", **({} if rule.method else {"depth_m": rule.depth_m}))
-    end = _follow(robot, plan, start_m)
+    end = _follow(robot, trackway, start_m)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if not end.why and after["mode"] != "hold":
         end = End(mode_reason(after), stopped=True)
     disarm(robot)
     log = robot.record(before["now_s"], after["now_s"])
-    strides = logged_strides(log, robot.configuration, lambda position_m: plan.mud_at(position_m - start_m))
+    strides = logged_strides(log, robot.configuration, lambda position_m: trackway.mud_at(position_m - start_m))
     walk = Walk([stride._replace(position_m=stride.position_m - start_m) for stride in strides], end.why)
     logged = LoggedTime(log.metadata["run_id"], before["now_s"], after["now_s"])
     if end.stopped:
@@ -151,10 +162,10 @@ def _require_pose(robot: BenchRobot) -> Status:
     return status
 
 
-def _follow(robot: BenchRobot, plan: Plan, start_m: float) -> End:
+def _follow(robot: BenchRobot, trackway: Trackway, start_m: float) -> End:
     """Wait until the walk is over, or stop it."""
     zero_m = start_m - reach_of(robot.configuration)
-    end, status = follow_walk(robot, lambda now_s: Progress(plan, zero_m, now_s).evaluate)
+    end, status = follow_walk(robot, lambda now_s: Progress(trackway, zero_m, now_s).evaluate)
     return End(mode_reason(status), stopped=True) if end is None else end
 
 
@@ -166,10 +177,10 @@ def reach_of(configuration: Configuration) -> float:
 class Progress:
     """Owns the mud that the plates are in, since when, and when the last pose arrived."""
 
-    def __init__(self, plan: Plan, zero_m: float, now_s: float) -> None:
+    def __init__(self, trackway: Trackway, zero_m: float, now_s: float) -> None:
         """`zero_m` is the position of the body at which the plates go down at the beginning of the trackway."""
-        self._plan, self._zero_m = plan, zero_m
-        self._mud = plan.muds[0].name
+        self._trackway, self._zero_m = trackway, zero_m
+        self._mud = trackway.muds[0].name
         self._begun_s = self._entered_s = self._seen_s = now_s
 
     def evaluate(self, status: Status) -> End | None:
@@ -179,7 +190,7 @@ class Progress:
             return End(UNSEEN, stopped=True) if now_s - self._seen_s > UNSEEN_S else None
         self._seen_s = now_s
         plates_m = body_m - self._zero_m
-        mud = self._plan.mud_at(plates_m)
+        mud = self._trackway.mud_at(plates_m)
         if mud != self._mud:
             self._mud, self._entered_s = mud, now_s
         if mud == PAST_END and status["phase"] == "insertion":
@@ -203,28 +214,33 @@ def _with_pose(walk: Walk) -> list[WalkedStride]:
     return [stride for stride in walk.strides if isfinite(stride.step_m)]
 
 
-def first_walks(plan: Plan, entries: Mapping[str, Entry]) -> dict[str, LoggedTime]:
+def first_walks(trackway: Trackway, entries: Mapping[str, Entry]) -> dict[str, LoggedTime]:
     """Return the first walk of each gait that counts, by its key in the notebook."""
     first: dict[str, tuple[str, LoggedTime]] = {}
-    for trial in plan.planned:
+    for trial in trackway.planned:
         entry = entries.get(trial.key)
         if entry and entry["strides"] and "logged" in entry:
             first.setdefault(trial.group, (trial.key, LoggedTime(*entry["logged"])))
     return dict(first.values())
 
 
-def report_of(plan: Plan, entries: Mapping[str, Entry], arm_m: float) -> BenchReport:
+def report_of(trackway: Trackway, entries: Mapping[str, Entry], arm_m: float) -> Summary:
     """Report the trials that count. Strides without a position are only counted; those past the end are left out."""
-    walks: dict[str, list[Walk]] = {rule: [] for rule in plan.rules}
-    ends: dict[str, Counter[str]] = {rule: Counter() for rule in plan.rules}
-    counting, without_pose = [trial for trial in plan.planned if trial.key in entries], 0
+    walks: dict[str, list[Walk]] = {rule: [] for rule in trackway.rules}
+    ends: dict[str, Counter[str]] = {rule: Counter() for rule in trackway.rules}
+    counting, without_pose = [trial for trial in trackway.planned if trial.key in entries], 0
     for trial in counting:
         walk = walk_of(entries[trial.key])
         located = _with_pose(walk)
         without_pose += len(walk.strides) - len(located)
         walks[trial.group].append(Walk([stride for stride in located if stride.mud != PAST_END], walk.fault))
         ends[trial.group][walk.fault or "past the end"] += 1
-    lengths_cm = {mud.name: 100.0 * mud.length_m for mud in plan.muds}
-    report = table_report(walks, arm_m, ends, BenchSettings(plan.trials, lengths_cm, plan.muds))
-    left_out = len(plan.planned) - len(counting)
-    return BenchReport(**vars(report), left_out=left_out, strides_without_position=without_pose)
+    settings = {
+        "seeds": trackway.trials,
+        "mud_length_cm": {mud.name: 100.0 * mud.length_m for mud in trackway.muds},
+        "muds": [asdict(mud) for mud in trackway.muds],
+    }
+    return table_one(walks, arm_m, ends, settings) | {
+        "left_out": len(trackway.planned) - len(counting),
+        "strides_without_position": without_pose,
+    }

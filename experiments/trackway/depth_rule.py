@@ -5,7 +5,7 @@ is walked by this project's robot with all of its features.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, NamedTuple, cast, get_args
 
 from control.controller import WalkOrder
@@ -14,11 +14,13 @@ from control.parameters.recovery_parameters import RecoveryParameters
 from experiments.trackway.walk import Walk, WalkedStride, walk_in
 from experiments.trials.trial import WALKING, configuration_of
 from firmware_host.configuration.configuration import Configuration
+from firmware_host.configuration.toml_records import parse_document
 from simulation.harness.lockstep import Lockstep, plant_of
+from simulation.mud.clay import MUDS
 from simulation.mud.disturbances import TRACKWAY, Disturbances
 from simulation.mud.track import Track
 
-METHODS: tuple[str, ...] = get_args(Method)
+METHODS: tuple[Method, ...] = get_args(Method)
 PAPER = "paper"
 
 
@@ -36,11 +38,17 @@ def constant_depth(depth_m: float) -> DepthRule:
     return DepthRule(f"{100.0 * depth_m:g} cm", depth_m)
 
 
-def chosen_by(method: str, name: str = "") -> DepthRule:
-    """Raises ValueError for an unknown method."""
-    if method not in METHODS:
-        raise ValueError(f"method {method!r}: must be one of {', '.join(METHODS)}")
-    return DepthRule(name or method, configuration_of(WALKING).adaptation.initial_depth_m, method)
+def chosen_by(method: str) -> DepthRule:
+    return DepthRule(method, configuration_of(WALKING).adaptation.initial_depth_m, method)
+
+
+def walking_world() -> dict[str, Any]:
+    """Return what walks depend on besides their parameters, as it was read."""
+    return {
+        "configuration": parse_document(configuration_of(WALKING).text),
+        "disturbances": asdict(TRACKWAY),
+        "muds": [[clay.name, clay.strength_pa] for clay in MUDS.values()],
+    }
 
 
 def arm_m() -> float:

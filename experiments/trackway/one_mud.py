@@ -4,14 +4,15 @@ The first stride starts from a standing body on untouched ground and is not coun
 its first two strides and is evaluated from the third on.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 from statistics import fmean
-from typing import NamedTuple
+from typing import Any
 
-from experiments.trackway.depth_rule import DepthRule, constant_depth, walk_by
-from experiments.trackway.walk import Walk, WalkedStride, speed_m_s
+from pandas import DataFrame
+
+from experiments.trackway.depth_rule import chosen_by, constant_depth, walk_by
+from experiments.trackway.walk import Walk, WalkedStride, speed_m_s, walk_of
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track
 
@@ -19,28 +20,19 @@ ENDLESS_M = 100.0
 CONSTANT_STRIDES = 7
 STARTING, LEARNING = 1, 2  # strides that are not counted
 SHALLOWEST_M, DEEPEST_M = 0.015, 0.05  # the range of the adaptation
+DEPTHS_M = tuple(round(SHALLOWEST_M + i * 0.0025, 6) for i in range(15))
 
 
-class MudWalk(NamedTuple):
-    """An order for one walk."""
+def walk_in_mud(
+    strength_pa: float, seed: int, depth_m: float = 0.0, method: str = "", count: int = CONSTANT_STRIDES, **plant: Any
+) -> dict[str, Any]:
+    """Return the entry of a walk of `count` strides at a constant depth, or by a method of adaptation.
 
-    clay: Clay
-    rule: DepthRule
-    seed: int
-    strides: int = CONSTANT_STRIDES
-
-
-@dataclass(frozen=True)
-class BestDepth:
-    """The fastest constant depth and its speed in cm/s."""
-
-    depth_cm: float
-    mean: float
-
-
-def run_mud_walk(order: MudWalk) -> Walk:
-    track = Track([(ENDLESS_M, order.clay)])
-    return walk_by(order.rule, track, order.seed, partial(has_strides, order.strides))
+    `plant` changes parameters of the simulated robot's body.
+    """
+    rule = chosen_by(method) if method else constant_depth(depth_m)
+    track = Track([(ENDLESS_M, Clay("mud", strength_pa))])
+    return walk_by(rule, track, seed, partial(has_strides, count), **plant).entry
 
 
 def has_strides(count: int, strides: Sequence[WalkedStride]) -> bool:
@@ -53,28 +45,29 @@ def speed_cm_s(walk: Walk, skipped: int = STARTING) -> float:
     return 100.0 * speed_m_s(counted) if counted else 0.0
 
 
-def depths_m(step_m: float) -> tuple[float, ...]:
-    count = int((DEEPEST_M - SHALLOWEST_M) / step_m + 1e-9) + 1
-    return tuple(round(SHALLOWEST_M + i * step_m, 6) for i in range(count))
-
-
-def constant_walks(clays: Iterable[Clay], depths: Sequence[float], seeds: int) -> list[MudWalk]:
+def constant_rows(strengths_pa: Sequence[float], seeds: int) -> list[dict[str, Any]]:
+    """Return the rows of `walk_in_mud` at each constant depth."""
     return [
-        MudWalk(clay, constant_depth(depth_m), seed)
-        for clay in clays
-        for depth_m in depths
+        {"strength_pa": strength_pa, "depth_m": depth_m, "seed": seed}
+        for strength_pa in strengths_pa
+        for depth_m in DEPTHS_M
         for seed in range(1, seeds + 1)
     ]
 
 
-def mean_speeds_cm_s(orders: Sequence[MudWalk], walks: Sequence[Walk]) -> dict[str, dict[float, float]]:
-    """Average over the seeds, by mud and depth in metres."""
-    speeds: dict[str, dict[float, list[float]]] = {}
-    for order, walk in zip(orders, walks, strict=True):
-        speeds.setdefault(order.clay.name, {}).setdefault(order.rule.depth_m, []).append(speed_cm_s(walk))
-    return {mud: {depth: fmean(values) for depth, values in by_depth.items()} for mud, by_depth in speeds.items()}
+def walks_in(measured: DataFrame) -> list[Walk]:
+    """Return the walks of rows that were run."""
+    return [walk_of(row) for row in measured.to_dict("records")]
 
 
-def best_depth(speeds: Mapping[float, float]) -> BestDepth:
+def mean_speeds_cm_s(constant: DataFrame) -> dict[float, float]:
+    """Return the mean speed over the seeds in one mud by depth in metres."""
+    return {
+        depth_m: fmean(speed_cm_s(walk) for walk in walks_in(walks)) for depth_m, walks in constant.groupby("depth_m")
+    }
+
+
+def best_depth(speeds: dict[float, float]) -> dict[str, float]:
+    """Return the fastest constant depth, and its speed in cm/s as `mean`."""
     depth_m = max(speeds, key=lambda each: speeds[each])
-    return BestDepth(round(100.0 * depth_m, 4), round(speeds[depth_m], 3))
+    return {"depth_cm": round(100.0 * depth_m, 4), "mean": round(speeds[depth_m], 3)}

@@ -16,7 +16,7 @@ adds a tenth to the strength, as in clay practice. (So a held insertion in the s
 3 s, and reaches 2.7 N at 3 cm; the authors' logs of the mud that they call 12.5N show 2.5 to 2.8 N.)
 
 The three strengths are fitted to the six fixed-depth speeds of the paper's Table I, together with the damping of the
-body's rail, by experiments/mud_fit/mud_fit.py; the adaptive speeds are not used. Four fitted numbers reproduce six
+body's rail, by experiments/studies/mud_fit.py; the adaptive speeds are not used. Four fitted numbers reproduce six
 speeds: such a mud suffices, but others may do so too. 45.3 % comes out hardly firmer than 48.5 %, which its water
 content would not suggest: a motor that just fails at 5 cm gives only a lower bound.
 

@@ -1,42 +1,226 @@
-"""The transmit gate between a port and a mock bus, for the frames of a protocol byte by byte."""
+"""The transmit gate between a port and a mock bus, and the frames of every protocol for it, byte by byte."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from struct import pack, unpack
+from collections.abc import Callable, Iterable, Sequence
+from struct import pack
+from typing import NamedTuple
 
 from control.parameters.joint_limits import JointLimits
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
+from drivers.mit import codec as mit
+from drivers.mit import gate_table as mit_table
+from drivers.mit.models import MODELS
+from drivers.mit.parameters import MitParameters
+from drivers.mit.settings import REGISTERS
+from drivers.moteus import codec as moteus
+from drivers.moteus import gate_table as moteus_table
+from drivers.moteus import registers
+from drivers.moteus.parameters import MoteusParameters
+from drivers.moteus.settings import IDENTITY, POLL, QUESTIONS
+from drivers.odrive import gate_table as odrive_table
+from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive05 import gate_table as odrive05_table
+from drivers.odrive05.parameters import Odrive05Parameters
 from drivers.transmit_gate import GateTable, TransmitGate
 
 LIMITS = JointLimits(torque_nm=0.75, torque_rate_nm_s=100.0)
 STEP_S = 0.002  # so that a step is 0.2 N·m
+NODE, OTHER_NODE = 2, 3
+ZERO, IDLE, CLOSED_LOOP = bytes(4), b"\1\0\0\0", b"\x08\0\0\0"
+TORQUE_MODE = bytes.fromhex("01000000 01000000")
+CONFIGURED = bytes.fromhex("00000041 0000c040")  # 8 turns/s, 6 A
+GAINS = bytes.fromhex("0000003f 00000000")  # 0.5 N·m per turn/s, no integrator
+
+
+class Protocol(NamedTuple):
+    """What one node of a protocol may be sent; `torque` encodes a torque."""
+
+    table: GateTable
+    torque: Callable[[float], bytes]
+    always: Sequence[Frame]  # may leave open or closed
+    while_open: Sequence[Frame]
+    never: Sequence[Frame]  # under other ids than that of the torque: nothing leaves
+    no_torque: Sequence[bytes]  # under the id of the torque: replaced by zero torque, or by `idle` while closed
+    idle: bytes = b""
+
+    def torque_frame(self, data: bytes) -> Frame:
+        return Frame(self.table.torque_id, data, False, False, self.table.kind[0], is_fd=self.table.kind[1],
+                     bit_rate_switch=self.table.kind[2])  # fmt: skip
+
+
+def odrive(node: int = NODE) -> Protocol:
+    first = node << 5
+    drive = OdriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0)
+    return Protocol(
+        table=odrive_table.gate_table(drive),
+        torque=lambda torque_nm: pack("<f", torque_nm),
+        always=[
+            *_always_of_odrive(first),
+            Frame(first | 0x18, b"\0"),
+            Frame(first | 0x04, bytes.fromhex("00 c8 01 00")),
+            Frame(first | 0x06, is_remote=True),
+        ],
+        while_open=[Frame(first | 0x07, CLOSED_LOOP)],
+        never=[
+            *_never_of_odrive(first),
+            Frame(first | 0x18, b"\1"),
+            Frame(first | 0x18),
+            Frame(first | 0x04, bytes.fromhex("01 c8 01 00")),  # writes
+            Frame(first | 0x04, bytes.fromhex("00 c8 01 01")),
+            Frame(first | 0x04, bytes.fromhex("00 c8 01")),
+            Frame(first | 0x04, bytes.fromhex("00 c8 01 00 00")),
+            Frame(first | 0x04, is_remote=True),
+            Frame(first | 0x09, is_remote=True),
+        ],
+        no_torque=[b"", bytes(3), bytes(5), bytes(8)],
+    )
+
+
+def odrive05(node: int = NODE) -> Protocol:
+    first = node << 5
+    drive = Odrive05Parameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0)
+    return odrive(node)._replace(
+        table=odrive05_table.gate_table(drive),
+        always=[*_always_of_odrive(first), Frame(first | 0x18), Frame(first | 0x0A, is_remote=True)],
+        never=[
+            *_never_of_odrive(first),
+            Frame(first | 0x18, b"\0"),  # as firmware 0.6 is asked
+            Frame(first | 0x06, is_remote=True),  # 0.6 is asked for its serial number so; 0.5 would take a new node id
+            Frame(first | 0x06, bytes.fromhex("03000000")),
+            Frame(first | 0x04, bytes.fromhex("00 c8 01 00")),  # 0.6 is asked for a parameter so
+            Frame(first | 0x16, is_remote=True),  # reboots as well
+            Frame(first | 0x0A),  # a request as well, but not of this program's form
+            Frame(first | 0x03, is_remote=True),
+            Frame(first | 0x10),  # calibration of cogging
+        ],
+    )
+
+
+def _always_of_odrive(first: int) -> list[Frame]:
+    return [
+        Frame(first | 0x07, IDLE),
+        Frame(first | 0x0B, TORQUE_MODE),
+        Frame(first | 0x0F, CONFIGURED),
+        Frame(first | 0x1B, GAINS),
+        Frame(first | 0x0E, ZERO),
+        Frame(first | 0x0E, bytes.fromhex("00000080")),  # minus zero
+        Frame(first | 0x00, is_remote=True),
+    ]
+
+
+def _never_of_odrive(first: int) -> list[Frame]:
+    return [
+        Frame(first | 0x0C, bytes(8)),  # position
+        Frame(first | 0x0D, bytes(8)),  # velocity
+        Frame(first | 0x02),  # emergency stop: not used
+        Frame(first | 0x16, b"\0"),  # reboot
+        Frame(first | 0x1F),  # firmware update
+        Frame(first | 0x19, bytes(4)),  # a new angle
+        Frame(first | 0x07, b"\3\0\0\0"),  # calibration
+        Frame(first | 0x07, b"\1"),
+        Frame(first | 0x07, IDLE + b"\0"),
+        Frame(first | 0x07, is_remote=True),
+        Frame(first | 0x0B, bytes.fromhex("03000000 01000000")),  # position control
+        Frame(first | 0x0B, bytes.fromhex("01000000 06000000")),  # torque ramp
+        Frame(first | 0x0B, CLOSED_LOOP),
+        Frame(first | 0x0F, bytes.fromhex("01000041 0000c040")),  # the least bit more than 8 turns/s
+        Frame(first | 0x0F, bytes.fromhex("00000041 0100c040")),
+        Frame(first | 0x0F, CONFIGURED + b"\0"),
+        Frame(first | 0x1B, bytes.fromhex("0000003f 0000803f")),  # an integrator
+        Frame(first | 0x1B, bytes.fromhex("0000803f 00000000")),
+        Frame(first | 0x0E, is_remote=True),
+        Frame(first | 0x00),
+        Frame(first | 0x00, b"\0", is_remote=True),
+    ]
+
+
+def of_moteus(node: int = NODE) -> Protocol:
+    console = [b"d stop\n", b"conf set servo.default_timeout_s nan\n", b"conf write\n"]
+    return Protocol(
+        table=moteus_table.gate_table(MoteusParameters("left", node)),
+        torque=moteus.encode_torque,
+        always=[
+            moteus.command_frame(node, data)
+            for data in (moteus.QUERY_ALONE, moteus.STOP_AND_QUERY, IDENTITY, POLL, *QUESTIONS)
+        ],
+        while_open=[],
+        never=[moteus.command_frame(node, moteus.QUERY_ALONE)._replace(arbitration_id=node)],
+        no_torque=[
+            b"",
+            moteus.STOP,  # without asking
+            bytes.fromhex("01000a"),  # position mode with the defaults: kp and kd
+            bytes.fromhex("01000f"),
+            *(registers.padded(registers.encode_console(registers.CONSOLE_INPUT, text)) for text in console),
+            2 * moteus.QUERY_ALONE,
+            moteus.encode_torque(0.1) + bytes([registers.NOP]),
+        ],
+        idle=moteus.QUERY_ALONE,
+    )
+
+
+def damiao(node: int = NODE, model: str = "DM4310") -> Protocol:
+    range_nm = MODELS[model].torque_nm
+    written = [(kind, register) for kind in (mit.WRITE, mit.STORE) for register in REGISTERS]
+    return Protocol(
+        table=mit_table.gate_table(MitParameters("left", node, model=model)),
+        torque=lambda torque_nm: mit.encode_torque(torque_nm, range_nm),
+        always=[
+            Frame(node, mit.LEAVE),
+            Frame(node, mit.CLEAR),
+            *(Frame(mit.REGISTER_ID, mit.encode_read(node, register)) for register in REGISTERS),
+        ],
+        while_open=[Frame(node, mit.ENTER)],
+        never=[Frame(mit.REGISTER_ID, mit.encode_register(node, *each, bytes(4))) for each in written],
+        no_torque=[
+            b"",
+            mit.SET_ZERO,
+            bytes.fromhex("fffffffffffffff8"),
+            bytes.fromhex("8000800000100800"),  # kd
+            bytes.fromhex("8000800100000800"),  # kp
+            bytes.fromhex("8000800000001800"),  # kd's lowest bit
+            bytes.fromhex("8001800000000800"),  # another position
+            bytes.fromhex("8000801000000800"),  # another velocity
+            bytes.fromhex("80008000000008"),
+            bytes.fromhex("800080000000080000"),
+        ],
+        idle=mit.LEAVE,
+    )
+
+
+def cubemars(node: int = NODE) -> Protocol:
+    """A CubeMars is sent no command that only a Damiao knows."""
+    other = damiao(node, "AK80-9")
+    return other._replace(
+        always=[Frame(node, mit.LEAVE)],
+        never=[*other.never, *other.always[2:]],
+        no_torque=[*other.no_torque, mit.CLEAR],
+    )
+
+
+PROTOCOLS: dict[str, Callable[[int], Protocol]] = {
+    "odrive": odrive,
+    "odrive05": odrive05,
+    "moteus": of_moteus,
+    "damiao": damiao,
+    "cubemars": cubemars,
+}
 
 
 class GateBench:
     """`port` passes the gate, `far` receives what leaves it. The gate is closed."""
 
-    def __init__(self, tables: Iterable[GateTable], limits: JointLimits = LIMITS) -> None:
+    def __init__(self, tables: Iterable[GateTable], limits: JointLimits = LIMITS, is_open: bool = False) -> None:
         bus = MockBus()
         self.far = bus.open()
         self.gate = TransmitGate(limits)
         self.port = self.gate.outlet(bus.open(), tables)
         self.gate.allow_step(STEP_S)
+        if is_open:
+            self.gate.open()
 
     def passed(self, frame: Frame) -> list[Frame]:
         """Send a frame and return what leaves."""
         self.port.send(frame)
         return self.far.receive()
-
-
-class OdriveGateBench(GateBench):
-    def send(self, frame: Frame) -> list[Frame]:
-        return self.passed(frame)
-
-    def torque(self, torque_nm: float, identifier: int) -> float:
-        """Send a torque and return the torque that leaves."""
-        (frame,) = self.send(Frame(identifier, pack("<f", torque_nm)))
-        assert frame.arbitration_id == identifier
-        sent_nm: float = unpack("<f", frame.data)[0]
-        return sent_nm

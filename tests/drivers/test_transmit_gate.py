@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
-from math import inf, isfinite, nan
+from math import isfinite, nan
 from pathlib import Path
-from struct import pack
+from struct import pack, unpack
 
 import pytest
 from hypothesis import given, settings
@@ -15,40 +15,27 @@ from control.parameters.joint_limits import JointLimits
 from control.records import NEVER_S
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from drivers.odrive.gate_table import gate_table
-from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import FrameKind, GateTable, TransmitGate
-from tests.drivers.gate_bench import LIMITS, OdriveGateBench
+from tests.drivers.gate_bench import CLOSED_LOOP, CONFIGURED, IDLE, LIMITS, TORQUE_MODE, ZERO, GateBench, odrive
 from tests.folders import ROOT
 
 MOTOR, OTHER = 0x04E, 0x06E  # torque of nodes 2 and 3
-ZERO = bytes(4)
-IDLE, CLOSED_LOOP = b"\1\0\0\0", b"\x08\0\0\0"
-TORQUE_MODE = bytes.fromhex("01000000 01000000")
-CONFIGURED = bytes.fromhex("00000041 0000c040")  # 8 turns/s, 6 A
-GAINS = bytes.fromhex("0000003f 00000000")  # 0.5 N·m per turn/s, no integrator
-HARMLESS = [
-    Frame(0x047, IDLE),
-    Frame(0x04B, TORQUE_MODE),
-    Frame(0x04F, CONFIGURED),
-    Frame(0x05B, GAINS),
-    Frame(0x058, b"\0"),
-    Frame(0x04E, ZERO),
-    Frame(0x04E, bytes.fromhex("00000080")),  # minus zero
-    Frame(0x044, bytes.fromhex("00 c8 01 00")),
-    Frame(0x064, bytes.fromhex("00 00 00 00")),
-    Frame(0x040, is_remote=True),
-    Frame(0x060, is_remote=True),
-]
+DRIVES = [odrive(2), odrive(3)]
+HARMLESS_IDS = {frame.arbitration_id for drive in DRIVES for frame in drive.always}
 
 
-class Bench(OdriveGateBench):
+class Bench(GateBench):
+    """The gate with two ODrives."""
+
     def __init__(self, limits: JointLimits = LIMITS) -> None:
-        drives = [OdriveParameters("left", node, velocity_limit_turn_s=8.0, current_limit_a=6.0) for node in (2, 3)]
-        super().__init__(map(gate_table, drives), limits)
+        super().__init__([drive.table for drive in DRIVES], limits)
 
     def torque(self, torque_nm: float, identifier: int = MOTOR) -> float:
-        return super().torque(torque_nm, identifier)
+        """Send a torque and return the torque that leaves."""
+        (frame,) = self.passed(Frame(identifier, pack("<f", torque_nm)))
+        assert frame.arbitration_id == identifier
+        sent_nm: float = unpack("<f", frame.data)[0]
+        return sent_nm
 
 
 @pytest.fixture
@@ -63,71 +50,6 @@ def armed() -> Bench:
     return bench
 
 
-@pytest.mark.parametrize("is_open", [False, True])
-@pytest.mark.parametrize("frame", HARMLESS)
-def test_our_own_frames_pass_unchanged_open_or_closed(bench: Bench, frame: Frame, is_open: bool) -> None:
-    if is_open:
-        bench.gate.open()
-    assert bench.send(frame) == [frame]
-    assert (bench.gate.refused, bench.gate.last_refusal) == (0, "")
-
-
-REFUSED = [
-    Frame(0x02E, ZERO),  # another node
-    Frame(0x04D, bytes(8)),  # velocity
-    Frame(0x04C, bytes(8)),  # position
-    Frame(0x042),  # emergency stop: not used
-    Frame(0x056, b"\0"),  # reboot
-    Frame(0x05F),  # firmware update
-    Frame(0x047, b"\3\0\0\0"),  # calibration
-    Frame(0x05B, bytes.fromhex("0000003f 0000803f")),  # an integrator
-    Frame(0x05B, bytes.fromhex("0000803f 00000000")),
-    Frame(0x047, b"\1"),
-    Frame(0x047, b"\1\0\0\0\0"),
-    Frame(0x047, IDLE, is_extended=True),
-    Frame(0x047, IDLE, is_error=True),
-    Frame(0x047, IDLE, is_remote=True),
-    Frame(0x047, IDLE, is_fd=True),
-    Frame(0x047, IDLE, bit_rate_switch=True),
-    Frame(0x04E, ZERO, is_fd=True),
-    Frame(0x040, is_remote=True, is_fd=True),
-    Frame(0x04B, bytes.fromhex("03000000 01000000")),  # position control
-    Frame(0x04B, bytes.fromhex("01000000 06000000")),  # torque ramp
-    Frame(0x04B, CLOSED_LOOP),
-    Frame(0x04F, bytes.fromhex("01000041 0000c040")),  # the least bit more than 8 turns/s
-    Frame(0x04F, bytes.fromhex("00000041 0100c040")),
-    Frame(0x04F, CONFIGURED + b"\0"),
-    Frame(0x058, b"\1"),
-    Frame(0x058),
-    Frame(0x044, bytes.fromhex("01 c8 01 00")),  # writes
-    Frame(0x044, bytes.fromhex("00 c8 01 01")),
-    Frame(0x044, bytes.fromhex("00 c8 01")),
-    Frame(0x044, bytes.fromhex("00 c8 01 00 00")),
-    Frame(0x044, bytes.fromhex("01 c8 01 00 00 00 00 00")),
-    Frame(0x044, is_remote=True),
-    Frame(0x04E, is_remote=True),
-    Frame(0x04E, ZERO, is_extended=True),
-    Frame(0x04E, ZERO, is_error=True),
-    Frame(0x040),
-    Frame(0x040, is_extended=True),
-    Frame(0x040, is_error=True),
-    Frame(0x040, is_remote=True, is_extended=True),
-    Frame(0x040, is_remote=True, is_error=True),
-    Frame(0x040, b"\0", is_remote=True),
-    Frame(0x049, is_remote=True),
-]
-
-
-@pytest.mark.parametrize("is_open", [False, True])
-@pytest.mark.parametrize("frame", REFUSED)
-def test_anything_else_is_not_sent_but_counted(bench: Bench, frame: Frame, is_open: bool) -> None:
-    if is_open:
-        bench.gate.open()
-    assert bench.send(frame) == []
-    assert bench.gate.refused == 1
-    assert bench.gate.last_refusal.startswith(f"Frame 0x{frame.arbitration_id:03x}")
-
-
 @pytest.mark.parametrize(
     ("frame", "text", "rule"),
     [
@@ -135,32 +57,23 @@ def test_anything_else_is_not_sent_but_counted(bench: Bench, frame: Frame, is_op
         (Frame(0x04F), "Frame 0x04f", "payload"),
         (Frame(0x047, CLOSED_LOOP), "Frame 0x047 08 00 00 00", "armed"),
         (Frame(0x18FEF100, b"\2", is_extended=True), "Frame 0x18fef100 extended 02", "kind"),
+        (Frame(0x047, IDLE, is_error=True), "Frame 0x047 error 01 00 00 00", "kind"),
         (Frame(0x004, is_error=True, is_remote=True), "Frame 0x004 error remote", "requests"),
         (Frame(0x005, b"\3", is_fd=True, bit_rate_switch=True), "Frame 0x005 FD bit-rate-switch 03", "kind"),
     ],
 )
 def test_a_refusal_names_the_frame_and_the_rule_that_it_broke(bench: Bench, frame: Frame, text: str, rule: str) -> None:
-    bench.send(frame)
-    bench.send(frame)
+    bench.passed(frame)
+    bench.passed(frame)
     refused, _, reason = bench.gate.last_refusal.partition(" was not sent: ")
     assert refused == text and rule in reason
-    assert bench.gate.refused == 2
-
-
-def test_closed_loop_is_asked_for_through_an_open_gate_only(bench: Bench) -> None:
-    asking = Frame(0x047, CLOSED_LOOP)
-    assert bench.send(asking) == []
-    bench.gate.open()
-    assert bench.send(asking) == [asking]
-    bench.gate.close()
-    assert bench.send(asking) == []
     assert bench.gate.refused == 2
 
 
 def test_only_the_message_for_the_axis_state_asks_for_closed_loop(armed: Bench) -> None:
     """As a torque the same bytes are 1e-44 N·m."""
     for command in range(32):
-        passed = armed.send(Frame(2 << 5 | command, CLOSED_LOOP))
+        passed = armed.passed(Frame(2 << 5 | command, CLOSED_LOOP))
         assert [frame.data for frame in passed] == ([CLOSED_LOOP] if command in (7, 14) else [])
 
 
@@ -179,15 +92,6 @@ def test_a_gate_is_closed_until_it_is_opened_and_lets_zero_pass_only(bench: Benc
     assert bench.gate.refused == 3
 
 
-@pytest.mark.parametrize("torque_nm", [nan, inf, -inf, 0.7501, -0.7501, 3.4e38])
-def test_a_value_that_is_no_number_or_beyond_the_limit_becomes_zero(torque_nm: float) -> None:
-    bench = Bench(JointLimits(torque_nm=0.75, torque_rate_nm_s=1e9))
-    bench.gate.open()
-    assert bench.torque(torque_nm) == 0.0
-    assert bench.gate.refused == 1
-    assert f"{torque_nm:.4g} N·m" in bench.gate.last_refusal and "0.75 N·m" in bench.gate.last_refusal
-
-
 @pytest.mark.parametrize("limit_nm", [0.75, 0.7, 0.3, 5.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_limit_itself_passes_in_both_directions_also_where_binary32_rounds_it_up(
@@ -198,19 +102,6 @@ def test_the_limit_itself_passes_in_both_directions_also_where_binary32_rounds_i
     assert bench.torque(sign * limit_nm) == pytest.approx(sign * limit_nm)
     assert bench.torque(sign * (limit_nm + 4e-6)) == 0.0
     assert bench.gate.refused == 1
-
-
-@pytest.mark.parametrize("data", [b"", ZERO[:3], bytes(5), bytes(8)])
-def test_a_torque_of_another_length_becomes_zero(armed: Bench, data: bytes) -> None:
-    assert armed.send(Frame(MOTOR, data)) == [Frame(MOTOR, ZERO)]
-    assert armed.gate.refused == 1
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_torque_moves_away_from_zero_by_one_step_at_most(armed: Bench, sign: float) -> None:
-    for torque_nm in (0.2, 0.4, 0.6, 0.65, 0.75):
-        assert armed.torque(sign * torque_nm) == pytest.approx(sign * torque_nm)
-    assert armed.gate.refused == 0
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -265,7 +156,7 @@ def test_the_bounds_themselves_belong_to_what_may_pass() -> None:
 
 def test_no_torque_passes_before_a_step_was_allowed() -> None:
     gate, bus = TransmitGate(LIMITS), MockBus()
-    far, port = bus.open(), gate.outlet(bus.open(), [gate_table(OdriveParameters("left", 2))])
+    far, port = bus.open(), gate.outlet(bus.open(), [odrive().table])
     gate.open()
     port.send(Frame(MOTOR, pack("<f", 1e-7)))
     assert far.receive() == [Frame(MOTOR, ZERO)]
@@ -280,7 +171,7 @@ def test_every_drive_has_its_own_torque_before(armed: Bench) -> None:
 
 def test_the_first_torque_after_arming_counts_from_zero_on_every_bus(armed: Bench) -> None:
     bus = MockBus()
-    far, second = bus.open(), armed.gate.outlet(bus.open(), [gate_table(OdriveParameters("right", 2))])
+    far, second = bus.open(), armed.gate.outlet(bus.open(), [odrive().table])
     second.send(Frame(MOTOR, pack("<f", 0.4)))
     assert far.receive() == [Frame(MOTOR, ZERO)]
     for torque_nm in (0.2, 0.4):
@@ -308,7 +199,7 @@ def test_closing_at_full_torque_lets_zero_leave_at_once(armed: Bench) -> None:
     assert armed.gate.refused == 0
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([MOTOR, OTHER]), st.floats(width=32)), max_size=30), st.booleans())
 def test_every_torque_that_leaves_is_within_limit_and_slew(torques: list[tuple[int, float]], is_open: bool) -> None:
     bench = Bench()
@@ -334,14 +225,13 @@ ANY_FRAME = st.builds(
 )
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(ANY_FRAME)
 def test_no_frame_raises_and_none_passes_a_closed_gate_but_harmless_ones(frame: Frame) -> None:
     bench = Bench()
-    passed = bench.send(frame)
+    passed = bench.passed(frame)
     for other in passed:
-        known = other.arbitration_id in {each.arbitration_id for each in HARMLESS} | {0x067, 0x06B, 0x06E, 0x06F, 0x078}
-        assert known
+        assert other.arbitration_id in HARMLESS_IDS
         assert not other.is_extended and not other.is_error
         assert other.data != CLOSED_LOOP
         assert other.arbitration_id not in (MOTOR, OTHER) or other.data in (ZERO, bytes.fromhex("00000080"))
@@ -392,20 +282,20 @@ def test_a_protocol_of_64_bytes_is_gated_as_strictly() -> None:
     bench.far, bench.port = bus.open(), bench.gate.outlet(bus.open(), [FD_TABLE])
     follow, idle = fd_frame(FD_MODE, FD_FOLLOW), fd_frame(FD_MODE, FD_IDLE)
     zero, small, larger = (fd_frame(FD_MOTOR, fd_torque(torque_mnm)) for torque_mnm in (0, 200, 600))
-    assert [bench.send(frame) for frame in (follow, idle, small)] == [[], [idle], [zero]]
+    assert [bench.passed(frame) for frame in (follow, idle, small)] == [[], [idle], [zero]]
     bench.gate.open()
-    assert [bench.send(frame) for frame in (follow, small, larger, small)] == [[follow], [small], [zero], [small]]
+    assert [bench.passed(frame) for frame in (follow, small, larger, small)] == [[follow], [small], [zero], [small]]
     wrong_sum = fd_frame(FD_MOTOR, small.data[:-1] + b"\xff")
-    assert bench.send(wrong_sum) == [zero]
+    assert bench.passed(wrong_sum) == [zero]
     assert "node 5" in bench.gate.last_refusal
     others = [Frame(*frame[:4], *flags) for frame in (small, idle) for flags in OTHER_KINDS]
-    assert [bench.send(frame) for frame in others] == [[]] * len(others)
+    assert [bench.passed(frame) for frame in others] == [[]] * len(others)
     assert bench.gate.refused == 4 + len(others)
 
 
 def test_an_outlet_takes_frames_of_one_kind() -> None:
     with pytest.raises(ValueError):
-        TransmitGate(LIMITS).outlet(MockBus().open(), [FD_TABLE, gate_table(OdriveParameters("left", 2))])
+        TransmitGate(LIMITS).outlet(MockBus().open(), [FD_TABLE, odrive().table])
 
 
 def modules_of(*packages: str) -> list[Path]:
@@ -414,7 +304,10 @@ def modules_of(*packages: str) -> list[Path]:
 
 def calls_of(path: Path, name: str) -> list[str]:
     """Return the text before `.name(` of every such call."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    source = path.read_text(encoding="utf-8")
+    if f".{name}(" not in source:
+        return []
+    tree = ast.parse(source)
     calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
     return [ast.unparse(call.value) for call in calls if isinstance(call, ast.Attribute) and call.attr == name]
 
@@ -451,7 +344,10 @@ def test_no_frame_is_repeated_by_the_kernel() -> None:
     for path in modules_of(
         "control", "estimation", "drivers", "firmware_host", "simulation", "experiments", "command_line"
     ):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        source = path.read_text(encoding="utf-8")
+        if not any(word.lower() in source.lower() for word in forbidden):
+            continue
+        tree = ast.parse(source)
         names = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
         names |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
         names |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}

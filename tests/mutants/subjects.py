@@ -21,7 +21,7 @@ SPEED = "the rest then computes the same from nothing"
 SUBJECTS = (
     Subject(
         "drivers.transmit_gate",
-        ("drivers/test_transmit_gate.py", "drivers/moteus/test_gate_table.py", "drivers/mit/test_gate_table.py"),
+        ("drivers/test_transmit_gate.py", "drivers/test_gate_tables.py"),
         EVERY_MUTANT,
         equivalent={
             "Lt to LtE in `torque_nm < 0.0`": "zero has passed before",
@@ -30,13 +30,13 @@ SUBJECTS = (
     ),
     Subject(
         "drivers.odrive.gate_table",
-        ("drivers/test_transmit_gate.py", "drivers/odrive05/test_gate_table.py"),
+        ("drivers/test_transmit_gate.py", "drivers/test_gate_tables.py"),
         EVERY_MUTANT,
     ),
-    Subject("drivers.moteus.gate_table", ("drivers/moteus/test_gate_table.py",)),
-    Subject("drivers.moteus.codec", ("drivers/moteus/test_gate_table.py",), functions=("decode_torque",)),
-    Subject("drivers.mit.gate_table", ("drivers/mit/test_gate_table.py",)),
-    Subject("drivers.mit.codec", ("drivers/mit/test_gate_table.py",), functions=("decode_torque", "_decode")),
+    Subject("drivers.moteus.gate_table", ("drivers/test_gate_tables.py",)),
+    Subject("drivers.moteus.codec", ("drivers/test_gate_tables.py",), functions=("decode_torque",)),
+    Subject("drivers.mit.gate_table", ("drivers/test_gate_tables.py",)),
+    Subject("drivers.mit.codec", ("drivers/test_gate_tables.py",), functions=("decode_torque", "_decode")),
     Subject(
         "drivers.can.reopening_port",
         ("drivers/can/test_reopening_port.py",),

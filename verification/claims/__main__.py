@@ -136,6 +136,7 @@ def measure(claim: Claim, logs: Path | None, root: Path) -> Measured:
         began = time.monotonic()
         output = _run(claim, logs, folder, root)
         seconds = time.monotonic() - began
+        claimed_figures(claim, output)  # what lacks them, such as the JSON of an error, is not kept
         kept.with_suffix(".part").write_text(json.dumps({"seconds": round(seconds, 1), "output": output}))
         kept.with_suffix(".part").rename(kept)
     return Measured(folder=folder, **json.loads(kept.read_text()))
@@ -159,7 +160,7 @@ def _run(claim: Claim, logs: Path | None, folder: Path, root: Path) -> Any:
     try:
         return json.loads(done.stdout)
     except ValueError as error:
-        raise ValueError(f"exit status {done.returncode} and no JSON from: {claim.command}") from error
+        raise ValueError(f"exit status {done.returncode} and no JSON from {claim.command} in {folder}") from error
 
 
 def drifted(claim: Claim, old: Mapping[str, Figure], new: Mapping[str, Figure]) -> list[str]:

@@ -59,15 +59,6 @@ def test_the_bit_rate_of_odrives_as_delivered_cannot_carry_two_drives() -> None:
     assert bus_load(2, 250e3).least > 1.0
 
 
-def test_every_message_that_the_readme_sets_is_counted() -> None:
-    assert sum(each.rate_hz for each in traffic_of([DriveParameters("left", 0)])) == 380 + 2 * 500 + 4 * 10
-
-
-def test_a_frame_without_a_second_rate_takes_as_long_as_its_bits() -> None:
-    least_s, most_s = frame_times_s(FrameRate(8, 1.0), BitRates(1e6))
-    assert (1e6 * least_s, 1e6 * most_s) == pytest.approx((111, 135))
-
-
 def test_a_can_fd_frame_is_fast_only_between_the_two_changes_of_the_rate() -> None:
     """A frame of 32 bytes with a 29-bit identifier, counted field by field from the standard."""
     before = [1, 11, 1, 1, 18, 1, 1, 1, 1]  # start, base id, SRR, IDE, extension, RRS, FDF, reserved, rate switch

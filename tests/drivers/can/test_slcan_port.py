@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 
 import pytest
@@ -14,8 +13,7 @@ from drivers.can.can_port import CanPort, SlcanPort, open_port
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.can.port_health import BusState
-from drivers.can.slcan_serial import SlcanSerial
-from tests.drivers.can.slcan_adapter import SlcanAdapter, decode_line, encode_line
+from tests.drivers.can.slcan_adapter import SlcanAdapter
 from tests.waiting import shortest_wait_s, wait_until
 
 FRAMES = [
@@ -80,38 +78,6 @@ def bench() -> Iterator[Bench]:
     yield made
     made.port.close()
     made.adapter.unplug()
-
-
-@pytest.mark.parametrize(("frame", "line"), list(zip(FRAMES, LINES, strict=True)))
-def test_a_frame_is_a_line(frame: Frame, line: bytes) -> None:
-    assert encode_line(frame) == line
-    assert decode_line(line[:-1]) == frame
-
-
-@pytest.mark.parametrize(
-    "line", [b"", b"t", b"t0098", b"t009800", b"t0099000000000000000000", b"t8000", b"T200000000", b"r0601FF", b"q0090"]
-)
-def test_another_line_is_no_frame(line: bytes) -> None:
-    assert decode_line(line) is None
-
-
-def answer(adapter: SlcanAdapter, file: int, command: bytes) -> bytes:
-    written = adapter.written_bytes
-    os.write(file, command + b"\r")
-    wait_until(lambda: stepped(adapter).written_bytes > written)
-    wait_until(lambda: adapter.unread_bytes == adapter.written_bytes - written)
-    return os.read(file, 100)
-
-
-def test_the_adapter_answers_as_the_protocol_says() -> None:
-    adapter = SlcanAdapter(MockBus().open())
-    file = os.open(adapter.device, os.O_RDWR | os.O_NOCTTY)
-    answers = [answer(adapter, file, command) for command in b"C O S9 S8 t0090 O O S6 t0090 T000000090 V N F".split()]
-    ok, no = b"\r", b"\a"
-    assert answers == [no, no, no, ok, no, ok, no, no, b"z\r", b"Z\r", b"V1013\r", b"NA123\r", b"F00\r"]
-    assert [answer(adapter, file, command) for command in (b"C", b"L", b"t0090", b"nonsense")] == [ok, ok, no, no]
-    os.close(file)
-    adapter.unplug()
 
 
 def test_python_can_opens_the_adapter_at_its_bit_rate(bench: Bench) -> None:
@@ -211,23 +177,3 @@ def test_an_unplugged_adapter_is_reported_and_raises_nothing(bench: Bench) -> No
     assert other.port.failed_sends == 1
     assert "Input/output error" in other.port.last_error and "Input/output error" in other.port.last_send_error
     other.port.close()
-
-
-def test_read_bytes_are_returned_one_by_one(bench: Bench) -> None:
-    master, slave = os.openpty()
-
-    class Port:
-        in_waiting = 3
-
-        def fileno(self) -> int:
-            return slave
-
-        def close(self) -> None:
-            os.close(slave)
-
-    serial = SlcanSerial(Port())
-    os.write(master, b"abc\n")
-    wait_until(lambda: serial.in_waiting == 3)
-    assert [serial.read(1) for _ in range(4)] == [b"a", b"b", b"c", b""]
-    serial.close()
-    os.close(master)

@@ -14,7 +14,7 @@ from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS, TORQUE_CODES
 
 damiao = pytest.importorskip("damiao_motor.core.motor", reason="the package damiao-motor, an oracle, is not installed")
-RANDOM_FRAMES = 100_000
+RANDOM_FRAMES = 5_000
 DAMIAO = {f"DM{name}": name for name in damiao.MOTOR_TYPE_PRESETS}
 
 
@@ -138,14 +138,6 @@ def test_answers_of_a_drive_that_truncates_have_the_right_mean_and_rest_at_zero(
     assert abs(error_nm / len(values)) < 0.02 * model.torque_step_nm
     rest = codec.decode_answer(codec.encode_answer(Answer(1, 0, 0.0, 0.0, 0.0, 30.0, 0), model), model)
     assert abs(rest.velocity_rad_s) < 1e-9 and abs(rest.torque_nm) < 1e-9 and abs(rest.position_rad) < 1e-9
-
-
-def test_an_encoded_answer_is_what_the_library_would_read() -> None:
-    for model in DAMIAO:
-        data = codec.encode_answer(Answer(5, 0xD, 1.5, -0.5, 0.25, 40.0, 50), MODELS[model])
-        theirs = motor(model).decode_sensor_feedback(data, 17)
-        assert theirs["can_id"] == 5 and theirs["status"] == "LOST_COMM"
-        assert 0.0 <= 0.25 - theirs["torq"] <= MODELS[model].torque_step_nm + 1e-9
 
 
 @pytest.mark.parametrize("size", [0, 6, 7, 9])

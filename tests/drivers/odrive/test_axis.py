@@ -7,8 +7,6 @@ from math import isnan, nan
 from random import Random
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from control.rate import PERIOD_S
 from control.records import JOINTS, Joints
@@ -19,7 +17,7 @@ from drivers.drive_types import make_drives
 from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message, arbitration_id
 from drivers.odrive.parameters import OdriveParameters
-from drivers.odrive.settings import REFRESH_S, REPEAT_UNKNOWN_S
+from drivers.odrive.settings import REFRESH_S
 
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
 PRO = (2, 4, 4, 58, 0, 6, 11, 0)
@@ -209,10 +207,10 @@ def test_the_heartbeat_s_period_is_the_configured_one(period_s: float) -> None:
     assert bench.axis.duplicates
 
 
-@pytest.mark.parametrize("stall_s", [0.05, 0.3, 1.0, 3.0, 10.0])
+@pytest.mark.parametrize("stall_s", [0.3, 3.0])
 def test_heartbeats_that_are_read_late_in_a_burst_are_no_duplicate(bench: Bench, stall_s: float) -> None:
-    """Ten stalls follow each other, with a second of ticks between them."""
-    for _ in range(10):
+    """Four stalls follow each other, with a second of ticks between them."""
+    for _ in range(4):
         start_s = bench.now_s
         bench.live(start_s + stall_s, read=False)
         bench.read(start_s + stall_s)
@@ -268,15 +266,6 @@ def test_the_watchdog_is_read_back_by_the_numbers_of_the_drive_s_build(
     assert bench.request_watchdogs(2.0) == []
 
 
-def test_an_unanswered_question_for_a_watchdog_is_repeated_after_a_while(bench: Bench) -> None:
-    bench.report(GET_VERSION, *PRO)
-    bench.read(0.1)
-    asked = []
-    for number in range(10):
-        asked.append(len(bench.request_watchdogs(1.0 + 0.3 * REPEAT_UNKNOWN_S * number)))
-    assert asked == [2, 0, 0, 0, 2, 0, 0, 0, 2, 0]
-
-
 @pytest.mark.parametrize(
     "version",
     [(2, 4, 4, 58, 0, 6, 10, 0), (2, 5, 2, 0, 0, 6, 11, 0), (2, 4, 4, 58, 0, 5, 6, 0), (2, 0, 0, 0, 0, 6, 9, 0)],
@@ -303,27 +292,6 @@ def test_a_setting_that_makes_no_sense_is_malformed_and_stays_unknown(bench: Ben
     bench.read(0.2)
     assert bench.drives.malformed_frames == 1
     assert isnan(bench.axis.settings.watchdog_s)
-
-
-def test_a_restart_forgets_version_and_watchdog(bench: Bench) -> None:
-    bench.live(0.4)
-    bench.report(GET_VERSION, *PRO)
-    bench.report_setting(219, "00")
-    bench.read(0.5)
-    assert bench.axis.settings.watchdog_s == 0.0
-    bench.report(HEARTBEAT, 0x1, 1, 0, 0)
-    bench.read(0.6)
-    assert bench.axis.settings.version is None
-    assert isnan(bench.axis.settings.watchdog_s)
-
-
-@given(st.lists(st.tuples(st.sampled_from([0x000, 0x001, 0x005, 0x009]), st.binary(max_size=8)), max_size=40))
-def test_the_watchdog_is_unknown_or_a_time_after_any_answer(reported: list[tuple[int, bytes]]) -> None:
-    bench = Bench()
-    for number, (identifier, data) in enumerate(reported):
-        bench.far.send(Frame(identifier, data))
-        bench.read(0.1 * number)
-        assert isnan(bench.axis.settings.watchdog_s) or 0.0 <= bench.axis.settings.watchdog_s <= 3600.0
 
 
 @pytest.mark.parametrize("torque_nm", [nan, 1e300, -1e300, float("inf")])

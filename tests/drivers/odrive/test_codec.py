@@ -1,45 +1,65 @@
-"""The bytes of ODrive's messages, against bytes written down by hand and ODrive's published DBC for firmware 0.6."""
+"""The bytes of ODrive's messages, against bytes written down by hand, ODrive's published DBCs, and 0.5's source."""
 
 from pathlib import Path
+from struct import pack, unpack
 from typing import Any
 
 import cantools
 import odrive_can
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.can.frames import MalformedMessageError
-from drivers.odrive import codec as odrive_codec
-from drivers.odrive.codec import ERROR_NAMES, AxisState, Message, arbitration_id, error_text
+from drivers.odrive import codec
+from drivers.odrive.codec import AxisState, Message, arbitration_id
+from drivers.odrive05 import codec as codec05
 
-DBC: Any = cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / "odrive-cansimple-0.6.10.dbc")
-MESSAGES = {name: value for name, value in vars(odrive_codec).items() if isinstance(value, Message)}
-WHOLE = [name for name in MESSAGES if name not in ("RX_SDO", "TX_SDO", "ADDRESS")]  # more bytes may follow in those
-GOLDEN: list[tuple[str, tuple[float, ...], int, str]] = [  # of node 3
-    ("GET_VERSION", (2, 4, 4, 58, 0, 6, 11, 0), 0x060, "02 04 04 3a 00 06 0b 00"),
-    ("HEARTBEAT", (0x01020304, 8, 5, 1), 0x061, "04 03 02 01 08 05 01 00"),
-    ("ESTOP", (), 0x062, ""),
-    ("GET_ERROR", (0x01000000, 0x02000000), 0x063, "00 00 00 01 00 00 00 02"),
-    ("RX_SDO", (0, 0x01F4, 0), 0x064, "00 f4 01 00"),
-    ("TX_SDO", (0, 0x01F4, 0), 0x065, "00 f4 01 00"),
-    ("ADDRESS", (3, 0x33333539, 0x3841), 0x066, "03 39 35 33 33 41 38"),
-    ("SET_AXIS_STATE", (8,), 0x067, "08 00 00 00"),
-    ("GET_ENCODER_ESTIMATES", (1.5, -2.0), 0x069, "00 00 c0 3f 00 00 00 c0"),
-    ("SET_CONTROLLER_MODE", (1, 7), 0x06B, "01 00 00 00 07 00 00 00"),
-    ("SET_INPUT_TORQUE", (0.25,), 0x06E, "00 00 80 3e"),
-    ("SET_LIMITS", (10.0, 12.0), 0x06F, "00 00 20 41 00 00 40 41"),
-    ("GET_IQ", (-0.5, 0.75), 0x074, "00 00 00 bf 00 00 40 3f"),
-    ("GET_TEMPERATURE", (30.0, 45.5), 0x075, "00 00 f0 41 00 00 36 42"),
-    ("REBOOT", (1,), 0x076, "01"),
-    ("GET_BUS_VOLTAGE_CURRENT", (24.0, 1.25), 0x077, "00 00 c0 41 00 00 a0 3f"),
-    ("SET_VEL_GAINS", (0.5, -2.0), 0x07B, "00 00 00 3f 00 00 00 c0"),
-    ("CLEAR_ERRORS", (1,), 0x078, "01"),
+DBCS: dict[str, Any] = {
+    version: cantools.database.load_file(Path(odrive_can.__file__).parent / "dbc" / f"odrive-cansimple-{version}.dbc")
+    for version in ("0.6.10", "0.5.6")
+}
+OLD, NEW = "0.5.6", "0.6.10"
+GOLDEN: list[tuple[Message, str, tuple[float, ...], int, str]] = [  # of node 3
+    (codec.GET_VERSION, NEW, (2, 4, 4, 58, 0, 6, 11, 0), 0x060, "02 04 04 3a 00 06 0b 00"),
+    (codec.HEARTBEAT, NEW, (0x01020304, 8, 5, 1), 0x061, "04 03 02 01 08 05 01 00"),
+    (codec.ESTOP, NEW, (), 0x062, ""),
+    (codec.GET_ERROR, NEW, (0x01000000, 0x02000000), 0x063, "00 00 00 01 00 00 00 02"),
+    (codec.RX_SDO, NEW, (0, 0x01F4, 0), 0x064, "00 f4 01 00"),
+    (codec.TX_SDO, NEW, (0, 0x01F4, 0), 0x065, "00 f4 01 00"),
+    (codec.ADDRESS, NEW, (3, 0x33333539, 0x3841), 0x066, "03 39 35 33 33 41 38"),
+    (codec.SET_AXIS_STATE, NEW, (8,), 0x067, "08 00 00 00"),
+    (codec.GET_ENCODER_ESTIMATES, NEW, (1.5, -2.0), 0x069, "00 00 c0 3f 00 00 00 c0"),
+    (codec.SET_CONTROLLER_MODE, NEW, (1, 7), 0x06B, "01 00 00 00 07 00 00 00"),
+    (codec.SET_INPUT_TORQUE, NEW, (0.25,), 0x06E, "00 00 80 3e"),
+    (codec.SET_LIMITS, NEW, (10.0, 12.0), 0x06F, "00 00 20 41 00 00 40 41"),
+    (codec.GET_IQ, NEW, (-0.5, 0.75), 0x074, "00 00 00 bf 00 00 40 3f"),
+    (codec.GET_TEMPERATURE, NEW, (30.0, 45.5), 0x075, "00 00 f0 41 00 00 36 42"),
+    (codec.REBOOT, NEW, (1,), 0x076, "01"),
+    (codec.GET_BUS_VOLTAGE_CURRENT, NEW, (24.0, 1.25), 0x077, "00 00 c0 41 00 00 a0 3f"),
+    (codec.SET_VEL_GAINS, NEW, (0.5, -2.0), 0x07B, "00 00 00 3f 00 00 00 c0"),
+    (codec.CLEAR_ERRORS, NEW, (1,), 0x078, "01"),
+    (codec05.HEARTBEAT, OLD, (0x01020304, 8, 1, 0, 0x81), 0x061, "04 03 02 01 08 01 00 81"),
+    (codec05.GET_MOTOR_ERROR, OLD, (0x0800000008,), 0x063, "08 00 00 00 08 00 00 00"),
+    (codec05.GET_ENCODER_ERROR, OLD, (0x200,), 0x064, "00 02 00 00 00 00 00 00"),
+    (codec05.GET_ENCODER_COUNT, OLD, (-2, 8190), 0x06A, "fe ff ff ff fe 1f 00 00"),
+    (codec05.CLEAR_ERRORS, OLD, (), 0x078, ""),
+    (codec05.GET_CONTROLLER_ERROR, OLD, (1,), 0x07D, "01 00 00 00 00 00 00 00"),
 ]
+SHARED = [  # of both firmwares
+    *(codec.SET_AXIS_STATE, codec.GET_ENCODER_ESTIMATES, codec.SET_CONTROLLER_MODE, codec.SET_INPUT_TORQUE),
+    *(codec.SET_LIMITS, codec.GET_IQ, codec.GET_BUS_VOLTAGE_CURRENT, codec.SET_VEL_GAINS),
+]
+NAMES = {message: name for module in (codec05, codec) for name, message in vars(module).items()
+         if isinstance(message, Message)}  # fmt: skip
+LONGER = (codec.RX_SDO, codec.TX_SDO, codec.ADDRESS)  # more bytes may follow in those
+WHOLE = [(message, version) for message, version, *_ in GOLDEN if message not in LONGER]
+WHOLE += [(message, OLD) for message in SHARED]
+each_message = pytest.mark.parametrize(("message", "version"), WHOLE, ids=[f"{NAMES[m]} {v}" for m, v in WHOLE])
 
 
-def in_dbc(name: str, node_id: int = 0) -> Any:
-    return DBC.get_message_by_name(f"Axis{node_id}_{name.title()}")
+def in_dbc(message: Message, version: str, node_id: int = 0) -> Any:
+    return DBCS[version].get_message_by_name(f"Axis{node_id}_{NAMES[message].title()}")
 
 
 def any_value(signal: Any) -> st.SearchStrategy[float]:
@@ -48,107 +68,139 @@ def any_value(signal: Any) -> st.SearchStrategy[float]:
     return st.integers(0, 2**signal.length - 1)
 
 
-def test_every_message_has_golden_bytes() -> None:
-    assert [name for name, *_ in GOLDEN] == list(MESSAGES)
+def values_of(message: Message, theirs: dict[str, Any]) -> tuple[Any, ...]:
+    """Return our values of the DBC's, which has single bits of a heartbeat of 0.5, and unsigned counts."""
+    if message is codec05.HEARTBEAT:
+        flags = [theirs[f"{part}_Error_Flag"] for part in ("Motor", "Encoder", "Controller")]
+        done = codec05.TRAJECTORY_DONE * theirs["Trajectory_Done_Flag"]
+        return theirs["Axis_Error"], theirs["Axis_State"], flags[0], flags[1], flags[2] | done
+    if message is codec05.GET_ENCODER_COUNT:
+        return unpack("<ii", pack("<II", theirs["Shadow_Count"], theirs["Count_in_CPR"]))
+    return tuple(theirs.values())
 
 
-@pytest.mark.parametrize(("name", "values", "identifier", "golden"), GOLDEN)
-def test_messages_have_these_bytes(name: str, values: tuple[float, ...], identifier: int, golden: str) -> None:
-    message = MESSAGES[name]
+@pytest.mark.parametrize(("message", "version", "values", "identifier", "golden"), GOLDEN)
+def test_messages_have_these_bytes(
+    message: Message, version: str, values: tuple[float, ...], identifier: int, golden: str
+) -> None:
     assert arbitration_id(3, message) == identifier
     assert message.encode(*values) == bytes.fromhex(golden)
     assert message.decode(bytes.fromhex(golden)) == values
+    assert {*NAMES} == {each for each, *_ in GOLDEN}
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@each_message
+@settings(max_examples=50, deadline=None)
 @given(data=st.data())
-def test_the_dbc_decodes_what_we_encode_and_back(name: str, data: st.DataObject) -> None:
-    theirs = in_dbc(name)
-    values = tuple(data.draw(any_value(signal)) for signal in theirs.signals)
-    ours = MESSAGES[name].encode(*values)
-    padded = ours.ljust(theirs.length, b"\0")  # the DBC pads every short message to 8 bytes; drives take both
-    decoded = theirs.decode(padded, decode_choices=False)
-    assert tuple(decoded[signal.name] for signal in theirs.signals) == values
-    encoded = theirs.encode({signal.name: value for signal, value in zip(theirs.signals, values, strict=True)})
-    assert encoded == padded
-    assert MESSAGES[name].decode(encoded[: len(ours)]) == values
+def test_the_dbc_encodes_and_decodes_as_we_do_for_every_node(
+    message: Message, version: str, data: st.DataObject
+) -> None:
+    theirs = in_dbc(message, version)
+    signals = {signal.name: data.draw(any_value(signal)) for signal in theirs.signals}
+    values, encoded = values_of(message, signals), theirs.encode(signals)
+    ours = message.encode(*values)
+    assert ours.ljust(theirs.length, b"\0") == encoded  # the DBC pads every short command; drives take both
+    assert message.decode(encoded[: len(ours)]) == values
+    assert theirs.decode(encoded, decode_choices=False) == signals
+    for node_id in range(8):
+        assert in_dbc(message, version, node_id).frame_id == arbitration_id(node_id, message)
 
 
 @pytest.mark.parametrize("name", ["RxSdo", "TxSdo"])
 def test_the_dbc_finds_the_number_of_a_parameter_where_we_put_it(name: str) -> None:
-    theirs = DBC.get_message_by_name(f"Axis0_{name}")
-    ours = odrive_codec.RX_SDO.encode(odrive_codec.SDO_READ, 0x1234, 0) + odrive_codec.SDO_FLOAT.pack(0.1)
+    theirs = DBCS[NEW].get_message_by_name(f"Axis0_{name}")
+    ours = codec.RX_SDO.encode(codec.SDO_READ, 0x1234, 0) + codec.SDO_FLOAT.pack(0.1)
     decoded = theirs.decode(ours, decode_choices=False)
     assert (decoded["Endpoint_ID"], decoded["Value"]) == (0x1234, 0x3DCCCCCD)
-    assert theirs.frame_id == (odrive_codec.RX_SDO if name == "RxSdo" else odrive_codec.TX_SDO).command
-    assert odrive_codec.decode_sdo(ours) == (0x1234, bytes.fromhex("cd cc cc 3d"))
+    assert theirs.frame_id == (codec.RX_SDO if name == "RxSdo" else codec.TX_SDO).command
+    assert codec.decode_sdo(ours) == (0x1234, bytes.fromhex("cd cc cc 3d"))
 
 
-@pytest.mark.parametrize("node_id", [0, 3, 0x3F])
-@given(serial=st.integers(0, 2**48 - 1))
-def test_the_dbc_and_we_decode_the_same_serial_number(node_id: int, serial: int) -> None:
-    encoded = in_dbc("ADDRESS").encode({"Node_ID": node_id, "Serial_Number": serial})
-    assert odrive_codec.decode_serial_number(encoded) == f"{serial:012x}"  # with the connection id of 0.6.11
-    assert odrive_codec.decode_serial_number(encoded[:7]) == f"{serial:012x}"
-
-
-@given(data=st.binary(max_size=16))
-def test_only_seven_or_eight_bytes_are_a_serial_number(data: bytes) -> None:
-    if len(data) not in (7, 8):
+@given(serial=st.integers(0, 2**48 - 1), other=st.binary(max_size=16))
+def test_the_dbc_and_we_decode_the_same_serial_number_of_seven_or_eight_bytes(serial: int, other: bytes) -> None:
+    encoded = in_dbc(codec.ADDRESS, NEW).encode({"Node_ID": 3, "Serial_Number": serial})
+    assert codec.decode_serial_number(encoded) == f"{serial:012x}"  # with the connection id of 0.6.11
+    assert codec.decode_serial_number(encoded[:7]) == f"{serial:012x}"
+    if len(other) not in (7, 8):
         with pytest.raises(MalformedMessageError):
-            odrive_codec.decode_serial_number(data)
+            codec.decode_serial_number(other)
 
 
 def test_the_commands_are_the_messages_that_only_a_master_sends() -> None:
-    to_drive = {theirs.frame_id for theirs in DBC.messages if theirs.senders == ["Master"] and theirs.frame_id < 32}
-    assert to_drive - {odrive_codec.RX_SDO.command} == odrive_codec.COMMANDS
-
-
-@pytest.mark.parametrize("name", WHOLE)
-def test_the_dbc_gives_every_node_the_same_ids(name: str) -> None:
-    assert [in_dbc(name, node).frame_id for node in range(8)] == [
-        arbitration_id(node, MESSAGES[name]) for node in range(8)
-    ]
-
-
-def test_the_dbc_knows_the_same_error_flags_and_axis_states() -> None:
-    in_0_6_11_only = {0x20000}  # requested current too high; the DBC is of 0.6.10
-    flags = set(in_dbc("GET_ERROR").get_signal_by_name("Active_Errors").choices)
-    assert set(ERROR_NAMES) - in_0_6_11_only == flags - {0}
-    states = in_dbc("HEARTBEAT").get_signal_by_name("Axis_State").choices
-    assert {state: str(states[state]).removesuffix("_CONTROL") for state in AxisState} == {
-        state: state.name for state in AxisState
+    to_drive = {
+        version: {theirs.frame_id for theirs in dbc.messages if theirs.senders == ["Master"] and theirs.frame_id < 32}
+        for version, dbc in DBCS.items()
     }
+    assert to_drive[NEW] - {codec.RX_SDO.command} == codec.COMMANDS
+    assert to_drive[OLD] | {codec.ESTOP.command} == codec05.COMMANDS  # the DBC lacks it, not the firmware
 
 
-@pytest.mark.parametrize("name", WHOLE)
-@given(data=st.binary(max_size=64))
-def test_any_bytes_of_another_length_are_malformed(name: str, data: bytes) -> None:
-    golden = next(bytes.fromhex(golden) for golden_name, _, _, golden in GOLDEN if golden_name == name)
-    if len(data) == len(golden):
-        assert len(MESSAGES[name].decode(data)) == len(in_dbc(name).signals)
-    else:
-        with pytest.raises(MalformedMessageError, match=f"with {len(data)} bytes"):
-            MESSAGES[name].decode(data)
+@pytest.mark.parametrize(
+    ("message", "version", "signal", "names"),
+    [
+        (codec.GET_ERROR, NEW, "Active_Errors", codec.ERROR_NAMES),
+        (codec05.HEARTBEAT, OLD, "Axis_Error", codec05.AXIS_ERRORS),
+        (codec05.GET_MOTOR_ERROR, OLD, "Motor_Error", codec05.MOTOR_ERRORS),
+        (codec05.GET_ENCODER_ERROR, OLD, "Encoder_Error", codec05.ENCODER_ERRORS),
+        (codec05.GET_CONTROLLER_ERROR, OLD, "Controller_Error", codec05.CONTROLLER_ERRORS),
+    ],
+)
+def test_the_dbc_knows_the_same_error_flags(message: Message, version: str, signal: str, names: dict[int, str]) -> None:
+    only_in_0_6_11 = {0x20000} if version == NEW else set()  # requested current too high; the DBC is of 0.6.10
+    assert set(in_dbc(message, version).get_signal_by_name(signal).choices) - {0} == set(names) - only_in_0_6_11
 
 
-@pytest.mark.parametrize("size", [0, 1, 4, 9])
-def test_an_answer_without_the_value_of_a_parameter_is_malformed(size: int) -> None:
-    with pytest.raises(MalformedMessageError, match=f"with {size} bytes"):
-        odrive_codec.decode_sdo(bytes(size))
+@pytest.mark.parametrize(("message", "version"), [(codec.HEARTBEAT, NEW), (codec05.HEARTBEAT, OLD)])
+def test_the_dbc_knows_the_same_axis_states(message: Message, version: str) -> None:
+    states = in_dbc(message, version).get_signal_by_name("Axis_State").choices
+    assert all(str(states[state]).removesuffix("_CONTROL") == state.name for state in AxisState)
+
+
+@each_message
+def test_bytes_of_another_length_are_malformed(message: Message, version: str) -> None:
+    golden = next(bytes.fromhex(golden) for each, _, _, _, golden in GOLDEN if each is message)
+    for size in {*range(12), 64} - {len(golden)}:
+        with pytest.raises(MalformedMessageError):
+            message.decode(bytes(size))
 
 
 def test_a_parameter_s_value_is_a_flag_or_a_number_and_may_be_padded() -> None:
-    assert [odrive_codec.decode_sdo_flag(bytes([flag, 0, 0, 9])) for flag in (0, 1)] == [False, True]
-    assert odrive_codec.decode_sdo_float(bytes.fromhex("00 00 00 3f")) == 0.5
-    for value in (b"\2", b"\xff"):
+    assert [codec.decode_sdo_flag(bytes([flag, 0, 0, 9])) for flag in (0, 1)] == [False, True]
+    assert codec.decode_sdo_float(bytes.fromhex("00 00 00 3f")) == 0.5
+    for decode, value in (
+        (codec.decode_sdo_flag, b"\2"),
+        (codec.decode_sdo_flag, b"\xff"),
+        (codec.decode_sdo_float, bytes(3)),
+        *((codec.decode_sdo, bytes(size)) for size in (0, 1, 4, 9)),
+    ):
         with pytest.raises(MalformedMessageError):
-            odrive_codec.decode_sdo_flag(value)
-    with pytest.raises(MalformedMessageError):
-        odrive_codec.decode_sdo_float(bytes(3))
+            decode(value)
 
 
-def test_errors_are_named_and_unknown_flags_appear_as_numbers() -> None:
-    assert error_text(0) == ""
-    assert error_text(0x1000000) == "watchdog expired"
-    assert error_text(0x200 | 0x80 | 0x20000000) == "bus under-voltage, unknown flag 0x20000080"
+@pytest.mark.parametrize(
+    ("parts", "flags"),
+    [
+        ((0x800, 0, 0, 0), 0x800),
+        ((0, 1, 0, 0), 0x40),
+        ((0, 0, 1, 0), 0x100),
+        ((0, 0, 0, 1), 0x200),
+        ((0x1, 1, 1, 0x81), 0x341),
+        ((0, 0, 0, 0x80), 0),  # a trajectory is done
+        ((0, 0xFE, 0xFE, 0x7E), 0),  # bits without a meaning
+    ],
+)
+def test_an_error_of_a_part_is_one_of_the_axis_even_where_the_axis_reports_none(
+    parts: tuple[int, int, int, int], flags: int
+) -> None:
+    assert codec05.axis_flags(*parts) == flags
+
+
+def test_errors_are_named_with_their_part_and_unknown_flags_appear_as_numbers() -> None:
+    assert codec.error_text(0) == ""
+    assert codec.error_text(0x200 | 0x80 | 0x20000000) == "bus under-voltage, unknown flag 0x20000080"
+    assert codec05.errors_text(0, 8, 4, 1) == ""  # of before: the axis says that nothing has failed
+    named = codec05.errors_text(0x340, 0x800000008, 0x40, 0x1)
+    assert named == (
+        "motor failed, encoder failed, controller failed; motor: gate driver fault, unbalanced phases;"
+        " encoder: SPI time-out; controller: overspeed"
+    )

@@ -230,7 +230,7 @@ ANY_FLOATS = st.tuples(st.floats(width=32), st.floats(width=32)).map(lambda pair
 ANY_FRAME = st.builds(Frame, ANY_ID, st.binary(max_size=8) | ANY_FLOATS, st.booleans(), st.just(False), st.booleans())
 
 
-def test_two_thousand_random_frames_crash_nothing_and_leave_the_states_finite() -> None:
+def test_a_thousand_random_frames_crash_nothing_and_leave_the_states_finite() -> None:
     bench = Bench()
     bench.report_everything(0.0)
 
@@ -244,7 +244,7 @@ def test_two_thousand_random_frames_crash_nothing_and_leave_the_states_finite() 
         assert all(isfinite(state.angle_rad + state.velocity_rad_s + state.current_a) for state in after)
         assert repr(after[2:]) == repr(states[2:])  # the other bus
 
-    @settings(max_examples=50, deadline=None)
+    @settings(max_examples=25, deadline=None)
     @given(st.lists(ANY_FRAME, min_size=40, max_size=40))
     def examine_all(frames: list[Frame]) -> None:
         for frame in frames:
@@ -394,15 +394,3 @@ def test_a_reset_forgets_everything(bench: Bench) -> None:
     assert bench.drives.malformed_frames == 0
     assert bench.axis(0).settings.version is None
     assert repr(bench.drives.read(2.0)) == repr(Bench().drives.read(2.0))
-
-
-def test_closing_closes_the_ports(bench: Bench) -> None:
-    bench.drives.close()
-    bench.report("left_sweep", GET_IQ, 0.0, 5.0)
-    assert bench.drives.read(1.0)[0].current_stamp_s == NEVER_S
-
-
-def test_reading_transmits_nothing(bench: Bench) -> None:
-    bench.drives.read(0.0)
-    bench.report_everything(1.0)
-    assert bench.silent()

@@ -92,17 +92,3 @@ def test_a_command_meanwhile_lets_it_begin_again(when: str) -> None:
     drive.proof.begin_again()
     assert not drive.proof.silent
     assert drive.run() == pytest.approx(0.1)
-
-
-def test_a_drive_in_closed_loop_or_with_an_error_is_never_left_in_silence() -> None:
-    drive = Drive(0.1)
-    drive.fit = False
-    assert isnan(drive.run()) and drive.cleared == 0
-    assert not drive.proof.silent and not drive.expired
-
-
-def test_a_reset_forgets_the_result() -> None:
-    drive = Drive(0.1)
-    drive.run()
-    drive.proof.reset()
-    assert isnan(drive.proof.watchdog_s) and not drive.proof.silent

@@ -9,8 +9,6 @@ from math import isnan
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivers.pose.pose_port import STALE_S, PoseSourceError
 from drivers.pose.rail_encoder import RETRY_S, RailEncoder, RailEncoderParameters
@@ -124,34 +122,3 @@ def test_a_device_that_does_not_open_is_reported(tmp_path: Path) -> None:
     parameters = RailEncoderParameters(device=str(tmp_path / "nothing"), metres_per_count=METRES)
     with pytest.raises(PoseSourceError, match="^the rail encoder .*/nothing does not open: No such file or directory$"):
         RailEncoder(parameters)
-
-
-class Wire:
-    """A port of pyserial on a file, for speed."""
-
-    def __init__(self, file: int) -> None:
-        self.file, self.in_waiting = file, 1
-
-    def fileno(self) -> int:
-        return self.file
-
-    def close(self) -> None:
-        return
-
-
-def test_any_bytes_are_survived(tmp_path: Path) -> None:
-    path = tmp_path / "bytes"
-    parameters = RailEncoderParameters(device="wire", metres_per_count=METRES, label="x")
-
-    @given(st.lists(st.binary(max_size=40) | st.integers(-(10**20), 10**20).map(lambda n: f"x{n}\n".encode())))
-    def examine(pieces: list[bytes]) -> None:
-        path.write_bytes(b"\n".join(pieces))
-        with path.open("rb") as file:
-            encoder = RailEncoder(parameters, open_device=lambda *_: Wire(file.fileno()))
-            for tick in range(5):
-                assert abs(encoder.read(0.01 * tick).x_m) < 1e11 or not encoder.poses
-            assert encoder.poses + encoder.malformed <= sum(
-                piece.count(b"\n") + piece.count(b"\r") + 1 for piece in pieces
-            )
-
-    examine()

@@ -10,9 +10,9 @@ import pytest
 from experiments.pictures import walk_trace
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides, duration_s, moments_of, with_strides
-from experiments.pictures.walk_trace import DRAWN, WalkTraces, drawn_rows, rows_drawn, rows_of_curve
-from experiments.run_report.headline import headline_of
-from experiments.run_report.run import read_run, read_sources
+from experiments.pictures.walk_trace import DRAWN, WalkTraces, rows_drawn, rows_of_curve
+from experiments.run_report.results import headline_of
+from experiments.run_report.run import read_runs
 from logs.files.log_error import unwatched
 from logs.files.log_reader import read_log
 
@@ -115,17 +115,11 @@ def test_strides_of_a_trace_are_those_of_the_walk(
 
 def test_the_figures_of_a_report_do_not_depend_on_the_trace(two_walks: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def headline() -> object:
-        (source,) = read_sources([two_walks], unwatched)
-        return headline_of(read_run(source, None, unwatched))
+        return headline_of(read_runs([two_walks], None, unwatched)[0])
 
     whole = headline()
     monkeypatch.setattr(walk_trace, "MOST_ROWS", 1000)
     assert headline() == whole
-
-
-def test_a_trace_has_only_rows_of_the_log(rows: walk_trace.Rows, two_walks: Path) -> None:
-    known = {row.tobytes() for row in drawn_rows(read_log(two_walks).ticks)}
-    assert all(row.tobytes() in known for row in rows[:500])
 
 
 def test_a_curve_has_its_extremes_and_its_gaps(rows: walk_trace.Rows, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,12 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from experiments.study.notebook import Entry
 from experiments.study.provenance import PACKAGES
 from experiments.study.workers import LocalWorkers, WorkersError, run_parallel
-from experiments.trackway.depth_rule import constant_depth
-from experiments.trackway.one_mud import MudWalk, run_mud_walk
-from experiments.trackway.walk import Walk
-from simulation.mud.clay import MUDS
+from experiments.trackway.one_mud import walk_in_mud
 from tests.folders import ROOT
 
 pytest.importorskip("distributed", reason="needs the extra cluster")
@@ -23,7 +21,7 @@ from experiments.study import cluster_workers  # noqa: E402 - it imports distrib
 from experiments.study.cluster_workers import ClusterWorkers  # noqa: E402
 from tests.experiments.study.running_cluster import running_cluster  # noqa: E402
 
-WALKS = [partial(run_mud_walk, MudWalk(MUDS["48.5"], constant_depth(0.02), seed, strides=1)) for seed in range(1, 4)]
+WALKS = [partial(walk_in_mud, 2800.0, seed, 0.02, count=1) for seed in range(1, 4)]
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +35,7 @@ def closed_clients() -> None:
 
 
 @pytest.fixture(scope="module")
-def digits() -> list[Walk]:
+def digits() -> list[Entry]:
     return run_parallel(WALKS, ignore, LocalWorkers(1))
 
 
@@ -45,17 +43,17 @@ def ignore(done: int, total: int) -> None:
     pass
 
 
-def test_two_local_workers_find_the_digits_of_one(digits: list[Walk]) -> None:
+def test_two_local_workers_find_the_digits_of_one(digits: list[Entry]) -> None:
     assert run_parallel(WALKS, ignore, LocalWorkers(2)) == digits
 
 
 def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed(
-    tmp_path: Path, digits: list[Walk]
+    tmp_path: Path, digits: list[Entry]
 ) -> None:
     shown: list[tuple[int, int]] = []
     with running_cluster(tmp_path, workers=2) as cluster:
 
-        def kill_one_after_the_first(index: int, walk: Walk) -> None:
+        def kill_one_after_the_first(index: int, walk: Entry) -> None:
             if shown[-1][0] == 0:
                 cluster.workers[0].kill()
 
@@ -64,11 +62,11 @@ def test_a_cluster_finds_the_digits_of_one_worker_although_a_worker_is_killed(
     assert shown == [(done, len(WALKS)) for done in range(len(WALKS) + 1)]
 
 
-def test_a_lost_cluster_is_one_message_after_the_results_that_it_gave(tmp_path: Path, digits: list[Walk]) -> None:
-    kept: list[Walk] = []
+def test_a_lost_cluster_is_one_message_after_the_results_that_it_gave(tmp_path: Path, digits: list[Entry]) -> None:
+    kept: list[Entry] = []
     with running_cluster(tmp_path, workers=1) as cluster:
 
-        def lose(index: int, walk: Walk) -> None:
+        def lose(index: int, walk: Entry) -> None:
             kept.append(walk)
             cluster.end()
 

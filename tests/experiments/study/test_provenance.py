@@ -13,7 +13,7 @@ import pytest
 from experiments.study.provenance import PACKAGES, identity, provenance
 from tests.folders import ROOT
 
-STUDY = "experiments.trackway.simulation"
+STUDY = "experiments.studies.sweep"
 PRINT = "import sys; from experiments.study.provenance import source_digest; print(source_digest(sys.argv[1]))"
 
 
@@ -33,7 +33,7 @@ def digest_of(folder: Path, module: str = STUDY) -> str:
 def test_another_location_has_the_same_digest_and_a_changed_constant_another_one(copy: Path) -> None:
     here = identity(STUDY)["sources"]
     assert digest_of(copy) == here
-    for unused in ("experiments/actuator/plan.py", "command_line/main.py", "experiments/trackway/plots.py"):
+    for unused in ("experiments/actuator/plan.py", "command_line/main.py", "experiments/studies/mud_fit.py"):
         with (copy / unused).open("a") as module:
             module.write("ANOTHER = 1\n")
     (copy / "simulation" / "another.py").write_text("ANOTHER = 1\n")

@@ -9,25 +9,23 @@ from typing import Any
 
 import pytest
 
-from experiments.reports.report_page import to_json
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.robot.prompt import SKIP
 from experiments.study.notebook import Notebook
+from experiments.study.result import to_json
 from experiments.trackway.bench import (
     UNSEEN_S,
-    BenchReport,
     Mud,
-    Plan,
     Progress,
+    Trackway,
     first_walks,
     measure,
     report_of,
     run,
     summary_of,
 )
-from experiments.trackway.plots import plot_trackway
-from experiments.trackway.text import trackway_text
+from experiments.trackway.plots import draw_trackway
 from experiments.trackway.walk import Walk, WalkedStride
 from experiments.trials.mud_trials import Bench, InvalidTrialError, counted_entries
 from experiments.trials.simulated_bed import simulated_bench
@@ -36,8 +34,8 @@ from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.scripted_operator import ScriptedOperator
 
-SHORT = Plan((Mud("48.5", 0.2), Mud("53.1", 0.2)), trials=1, depths_m=(0.03,))
-TINY = Plan((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
+SHORT = Trackway((Mud("48.5", 0.2), Mud("53.1", 0.2)), trials=1, depths_m=(0.03,))
+TINY = Trackway((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
 COPIES, BEYOND_M = 3, 0.5  # fresh trackways in a row, and the length of mud after each
 
 
@@ -50,7 +48,7 @@ def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = A
     return Bench(robot, bed, ScriptedOperator(*answers), Notebook(folder, {}))
 
 
-def walk_all(bench: Bench, plan: Plan) -> BenchReport:
+def walk_all(bench: Bench, plan: Trackway) -> dict[str, Any]:
     run(bench, plan, lambda done, total: None)
     bench.robot.close()
     return report_of(plan, counted_entries(bench.notebook), 0.12)
@@ -65,23 +63,22 @@ def test_every_gait_is_walked_past_the_end_and_reported(tmp_path: Path) -> None:
         "3 cm, trial 1 of 1",
         "adaptive, trial 1 of 1",
     ]
-    assert {tuple(ends) for ends in report.ends.values()} == {("past the end",)}
-    for (strides,) in report.walks.values():
-        assert list(dict.fromkeys(stride.mud for stride in strides)) == ["48.5", "53.1"]
-        assert 0.0 < strides[0].position_cm < 12.0 < strides[-1].position_cm < 40.0
+    assert {tuple(ends) for ends in report["ends"].values()} == {("past the end",)}
+    for (strides,) in report["walks"].values():
+        assert list(dict.fromkeys(stride["mud"] for stride in strides)) == ["48.5", "53.1"]
+        assert 0.0 < strides[0]["position_cm"] < 12.0 < strides[-1]["position_cm"] < 40.0
     json.dumps(to_json(report), allow_nan=False)
-    plot_trackway(report, tmp_path / "trackway.png")
-    assert "Table I" in trackway_text(report)
+    draw_trackway(report)
 
 
 def test_a_walk_that_is_left_out_is_in_no_figure(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, SKIP)
     report = walk_all(bench, TINY)
     assert list(first_walks(TINY, counted_entries(bench.notebook))) == ["adaptive, trial 1"]
-    assert report.walks["3 cm"] == [] and len(report.walks["adaptive"]) == 1
-    assert report.table["3 cm"]["48.5"].mean is None
-    assert "Trials left out: 1." in trackway_text(report)
-    plot_trackway(report, tmp_path / "trackway.png")
+    assert report["walks"]["3 cm"] == [] and len(report["walks"]["adaptive"]) == 1
+    assert report["table"]["3 cm"]["48.5"]["mean"] is None
+    assert report["left_out"] == 1
+    draw_trackway(report)
 
 
 def test_the_robot_does_not_walk_without_a_pose(tmp_path: Path) -> None:
@@ -93,7 +90,7 @@ def test_the_robot_does_not_walk_without_a_pose(tmp_path: Path) -> None:
 def test_strides_without_a_pose_are_reported_and_not_counted(tmp_path: Path) -> None:
     capture = MotionCaptureParameters(rate_hz=120.0, dropouts_per_s=1.0, dropout_s=0.4)
     report = walk_all(make_bench(tmp_path, capture=capture), TINY)
-    assert report.strides_without_position > 0
+    assert report["strides_without_position"] > 0
     json.dumps(to_json(report), allow_nan=False)
 
 

@@ -2,8 +2,6 @@
 
 from typing import get_args
 
-import pytest
-
 from control.parameters.adaptation_parameters import Method
 from experiments.trackway.depth_rule import METHODS, chosen_by, configuration_for, constant_depth
 
@@ -21,8 +19,3 @@ def test_every_method_of_the_adaptation_can_be_chosen() -> None:
         assert configuration.adaptation.method == method
         assert configuration.estimation.method == ("paper" if method == "paper" else "default")
         assert chosen_by(method).name == method
-
-
-def test_an_unknown_method_is_named() -> None:
-    with pytest.raises(ValueError, match="'fog': must be one of default, paper"):
-        chosen_by("fog")

@@ -1,0 +1,143 @@
+"""The pictures of a report: every fit with its residuals, after the law τ = k Φ, and several runs side by side.
+
+Moments in cm⁴ and torques in N·cm make the slope of a line the coefficient in N/cm³.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import nan
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from pandas import DataFrame
+
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_names import mud_key
+from experiments.reports.mud_styles import LABELS, looks_of, mark_of
+from experiments.reports.style import FAINT
+from experiments.reports.value_text import N_CM3
+from experiments.run_report.results import SPEED, Entry
+from experiments.run_report.run import Run
+
+CM4, N_CM = 1e8, 100.0  # in m⁴, and in N·m
+MOST_DRAWN = 10  # strides of each mud, evenly over the run
+MOST_MUDS = 12  # a robot on its own notices hundreds in an hour
+LEGEND_COLUMN_IN = 2.8  # "k_p 1.4 N/cm³, from 3200 s" with its mark
+INSIDE, BEYOND = 2.0, 0.6  # percentiles of the samples, and how far of their range a sample may be beyond them
+WIDTH_IN, HEIGHT_IN = (6.0, 10.0), 7.2  # with one flipper, and with two
+ROOM = 1.12  # above the largest value, for the arrows of bounds
+MARK: dict[str, Any] = {"markersize": 3.0, "alpha": 0.7, "linestyle": ""}
+WIDTH = 0.6  # of the runs of one mud, as a fraction of the distance between two muds
+
+
+def drawn_muds(run: Run) -> list[str]:
+    """Return the muds with the most strides in the order of the run, at most MOST_MUDS."""
+    strides = run.strides[run.strides["mud"] != ""].groupby("mud", sort=False).size()
+    most = set(strides.nlargest(MOST_MUDS).index)
+    return [str(mud) for mud in strides.index if mud in most]
+
+
+def draw_fits(run: Run) -> Figure:
+    """Draw the fits of each coefficient next to their residuals, the left flipper next to the right one."""
+    muds, flippers = drawn_muds(run), run.replay.flippers
+    looks = {mud: MARK | {key: look[key] for key in ("color", "marker")} for mud, look in looks_of(muds).items()}
+    width_in = WIDTH_IN[len(flippers) - 1]
+    figure = Figure(figsize=(width_in, HEIGHT_IN), layout="constrained")
+    axes = figure.subplots(len(COEFFICIENTS), 2 * len(flippers), squeeze=False)
+    fitted = run.estimates[run.estimates["samples"].notna() & run.estimates["mud"].isin(muds)]
+    for row, name in zip(axes, COEFFICIENTS, strict=True):
+        for fit, residuals, flipper in zip(row[::2], row[1::2], flippers, strict=True):
+            own = fitted[(fitted["coefficient"] == name) & (fitted["flipper"] == flipper)]
+            _draw_samples(fit, residuals, own, looks)
+            fit.set_title(f"{LABELS[name]}, {flipper}")
+            residuals.set_title("residuals")
+        _share_scales(row)
+        row[0].set_ylabel("torque (N·cm)")
+    for panel in axes[-1]:
+        panel.set_xlabel("moment (cm⁴)")
+    handles = [axes[0, 0].plot([], [], **looks[mud], label=mud.replace("k_p", "$k_p$"))[0] for mud in muds]
+    columns = min(max(len(muds), 1), int(width_in / LEGEND_COLUMN_IN))
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
+    return figure
+
+
+def _draw_samples(fit: Axes, residuals: Axes, fitted: DataFrame, looks: Mapping[str, dict[str, Any]]) -> None:
+    """Draw all strides of a mud as one artist of each kind: one of its own takes ten kilobytes."""
+    for mud, all_samples in fitted.groupby("mud", sort=False)["samples"]:
+        chosen = np.unique(np.linspace(0, len(all_samples) - 1, MOST_DRAWN).round().astype(int))
+        samples = [all_samples.iloc[number] for number in chosen]
+        parts = zip(*((each.moments_m4, each.torques_nm, each.residuals_nm) for each in samples), strict=True)
+        moments, torques, remains = map(np.concatenate, parts)
+        ends = [(CM4 * max(each.moments_m4), each.slope / N_CM3) for each in samples]
+        lines = [([0.0, end, nan], [0.0, slope * end, nan]) for end, slope in ends]
+        fit.plot(CM4 * moments, N_CM * torques, **looks[str(mud)])
+        fit.plot(*np.hstack(lines), color=looks[str(mud)]["color"], linewidth=0.8)
+        residuals.plot(CM4 * moments, N_CM * remains, **looks[str(mud)])
+    residuals.axhline(0.0, color=FAINT, linewidth=0.8)
+
+
+def _share_scales(row: Sequence[Axes]) -> None:
+    """Give fits, and residuals, of both flippers the same scales."""
+    for panels in (row[::2], row[1::2]):
+        for panel in panels[1:]:
+            panel.sharex(panels[0])
+            panel.sharey(panels[0])
+        panels[0].autoscale()
+        heights = [
+            [np.asarray(line.get_ydata(), dtype=float) for line in panel.lines if line.get_marker() != "None"]
+            for panel in panels
+        ]
+        if any(heights):
+            _cut_outliers(panels, [np.concatenate(own or [np.empty(0)]) for own in heights])
+
+
+def _cut_outliers(panels: Sequence[Axes], heights: Sequence[NDArray[np.float64]]) -> None:
+    """Leave single samples far off out of the picture, and count them in it."""
+    low, high = np.percentile(np.concatenate(heights), [INSIDE, 100.0 - INSIDE])
+    bottom, top = panels[0].get_ylim()
+    room = BEYOND * (high - low)
+    bottom, top = max(bottom, float(low - room)), min(top, float(high + room))
+    if not bottom < top:
+        return
+    panels[0].set_ylim(bottom, top)
+    for panel, own in zip(panels, heights, strict=True):
+        if outside := int(np.sum((own < bottom) | (own > top))):
+            panel.annotate(f"{outside} beyond", (0.98, 0.02), xycoords="axes fraction", ha="right", size=7, color=FAINT)
+
+
+def draw_comparison(runs: Sequence[Run], headlines: Sequence[Entry]) -> Figure:
+    """Draw speed and coefficients of several runs mud by mud; bars are two standard errors, arrows lower bounds."""
+    results = [(run.name, result) for run, headline in zip(runs, headlines, strict=True) for result in headline["muds"]]
+    muds = {mud_key(result["mud"]): result["mud"] for _, result in results}
+    looks = {name: mark_of(look) for name, look in looks_of([run.name for run in runs]).items()}
+    has_speed = any(result["speed_m_s"] is not None for _, result in results)
+    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    axes = figure.subplots(2, 2).flatten() if has_speed else figure.subplots(1, 3)
+    for panel, name in zip(axes, [*[SPEED] * has_speed, *COEFFICIENTS], strict=True):
+        for run_name, result in results:
+            offset = WIDTH * ((list(looks).index(run_name) + 0.5) / len(runs) - 0.5)
+            _mark(panel, list(muds).index(mud_key(result["mud"])) + offset, result, name, looks[run_name])
+        panel.set_ylabel("speed (cm/s)" if name == SPEED else f"{LABELS[name]} (N/cm³)")
+        panel.set_xticks(range(len(muds)), [mud.replace(" N/cm³", "") for mud in muds.values()])
+        panel.set_xlim(-0.5, max(len(muds), 1) - 0.5)
+        panel.set_ylim(min(0.0, panel.get_ylim()[0]), ROOM * panel.get_ylim()[1])
+    handles = [axes[0].plot([], [], **look, linestyle="", label=run)[0] for run, look in looks.items()]
+    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(runs), 3), frameon=False)
+    return figure
+
+
+def _mark(panel: Axes, x: float, result: Entry, name: str, look: dict[str, Any]) -> None:
+    if name == SPEED:
+        value, error, per, is_bound = result["speed_m_s"], result["speed_std_error_m_s"], 0.01, False
+    else:
+        gathered = result["both"][name]
+        value, error, per, is_bound = gathered.value, gathered.std_error, N_CM3, gathered.at_least
+    if value is None:
+        return
+    bar = None if error is None or is_bound else 2.0 * error / per
+    panel.errorbar(x, value / per, bar, **look, linestyle="")
+    if is_bound:
+        arrow = {"arrowstyle": "<-", "color": look["color"]}
+        panel.annotate("", (x, value / per), xytext=(0, 22), textcoords="offset points", arrowprops=arrow)

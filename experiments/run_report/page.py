@@ -1,0 +1,332 @@
+"""The page about one run, and the page that compares several: texts, tables and pictures in the order of questions."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from matplotlib.figure import Figure as Drawing
+from pandas import DataFrame
+
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.stride_choice import Outcome, choose_strides, with_strides
+from experiments.pictures.stride_strip import draw_strip
+from experiments.pictures.walk_plot import draw_walk
+from experiments.reports.coefficient_table import GatheredCoefficient
+from experiments.reports.counted_nouns import counted
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.value_text import N_CM3, value_text
+from experiments.run_report.figures import N_CM, draw_comparison, draw_fits, drawn_muds
+from experiments.run_report.results import (
+    SHOWN,
+    SPEED,
+    Entry,
+    differences,
+    flipper_difference,
+    headline_sentences,
+    is_shown,
+    reaction_of,
+)
+from experiments.run_report.run import MudsFrom, Run
+from experiments.study.result import Figure, Result, Table
+from logs.fault_history import BEGUN, OVER
+from logs.files.log_summary import log_summary
+
+CM = 0.01  # in metres
+UNITS = dict.fromkeys(("first at", "last at", "from"), "s") | dict.fromkeys(("depth", "step"), "cm")
+UNITS |= dict.fromkeys((*COEFFICIENTS, "left", "right", "right - left"), "N/cm³") | {"distance": "m", "speed": "cm/s"}
+NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w])")
+SINCE = "Times count from the beginning of the log."
+UNCERTAINTY = (
+    "Values have their standard errors. Coefficients are means over the strides of a mud; ≥ marks a lower bound. They "
+    "fall with depth, so compare them at like depths. Speeds leave out the last stride of a walk."
+)
+ORIGINS = {
+    MudsFrom.NAMES: "The muds are those that you named.",
+    MudsFrom.FILE: "The mud is the label in the name of the file.",
+    MudsFrom.ROBOT: "The log names no muds: each is one that the robot noticed, described by its k_p.",
+}
+WALK = (
+    "Forces, coefficients and depth of each flipper, position and steps of the body. Bars are two standard errors, "
+    "triangles lower bounds, hollow marks invalid values."
+)
+FITS = (
+    "Every fit and its residuals: the torque that resists the flipper against the moment of the submerged plate. The "
+    "slope of a line is the coefficient of one stride. At most ten strides of each mud are drawn."
+)
+R_SQUARED = (
+    "R² is 1 - Σr²/Στ² of torques τ and residuals r, as usual for a line through the origin. R² about the mean has "
+    "Σ(τ - τ̄)² in its place: below 0 a constant torque would explain the stroke better than the law. Residuals are "
+    "root mean squares. A lower bound has no fit. The table has the median over strides."
+)
+DEPTHS = "Coefficients from other depths differ also in the same mud."
+COMPARED = "Speed and coefficients of each run by mud. Bars are two standard errors; an arrow marks a lower bound."
+
+
+def run_result(run: Run, headline: Entry) -> Result:
+    """Describe one run."""
+    begin_s, texts = run.replay.begin_s, {"Result": _result_text(run, headline)}
+    tables = [_table("Result", [{"mud": each["mud"]} | _mud_cells(each) for each in headline["muds"]])]
+    figures: list[Figure] = []
+    if run.log is None:
+        texts |= {"Findings": "What the reader noticed in the file." if run.replay.findings else "None."}
+        tables.append(_table("Findings", [{"kind": each.kind, "finding": str(each)} for each in run.replay.findings]))
+    else:
+        texts |= {"Faults": f"{SINCE} Faults of one cause are one row." if run.causes else "None."}
+        tables.append(_table("Faults", _cause_rows(run, begin_s)))
+    for number, walk in enumerate(run.walks, 1):
+        texts[f"Walk {number}"] = _walk_text(walk)
+        figures += _walk_figures(run, walk, number)
+    if headline["muds"]:
+        rows = quality_rows(run)
+        has_fits = bool(run.estimates["samples"].notna().any())
+        without = "No estimate of this log has a fit: all are lower bounds, invalid, or of another method."
+        texts["Fits"] = R_SQUARED if has_fits else without
+        tables += [_table("Fits", rows)] * has_fits
+        figures += [Figure("fits", _fits_caption(run, headline), partial(draw_fits, run), "Fits")] * has_fits
+        if len(run.replay.flippers) > 1:
+            texts["Left and right"] = "The difference has the errors of both, since each flipper has motors of its own."
+            tables.append(_table("Left and right", _flipper_rows(headline)))
+    if len(run.strides):
+        texts["Strides"] = f"{SINCE} Brackets mark an invalid value, ≥ a lower bound."
+        tables.append(_table("Strides", stride_rows(run)))
+        tables += [_table("Strides", estimate_rows(run, name), f"{name} by stride") for name in COEFFICIENTS]
+    if run.log:
+        groups = group_events(run.log.events, begin_s)
+        text = f"{SINCE} Events that differ only in numbers are one row, with the range of the numbers."
+        texts |= {"Events": text if groups else "None.", "Log": ""}
+        summary = [{"field": name, "value": value} for name, value in log_summary(run.log).items()]
+        tables += [_table("Events", groups), _table("Log", summary)]
+    return Result(
+        [table for table in tables if len(table.rows)], figures, title=f"Log {run.paths[0].name}", texts=texts
+    )
+
+
+def _table(section: str, rows: Sequence[Mapping[str, Any]], title: str = "") -> Table:
+    return Table(section, title, UNITS, DataFrame(rows, dtype=object), section)
+
+
+def _result_text(run: Run, headline: Entry) -> str:
+    sentences = headline_sentences(run, headline)
+    if run.log and not run.log.complete:
+        sentences.append("The log was not finished: everything up to where it ends was read.")
+    paragraphs = [" ".join(sentences)]
+    if headline["muds"]:
+        uncertain = int((run.strides["mud"] == "").sum())
+        border = f"Near a border or past the last mud, so in no mud: {counted(uncertain, 'stride')}."
+        paragraphs.append(" ".join([UNCERTAINTY, ORIGINS[run.muds_from], *[border] * bool(uncertain)]))
+    return "\n\n".join(paragraphs)
+
+
+def _walk_text(walk: RecordedWalk) -> str:
+    begun = f"It begins {walk.begun_s:.2f} s after the log. Its pictures count from there, as 'mudskipper plot' does."
+    missing = [f"Not in this log: {', '.join(walk.missing)}."] * bool(walk.missing)
+    return "\n\n".join([begun, *missing, *[f"The walk may have {walk.cut}."] * bool(walk.cut)])
+
+
+def _walk_figures(run: Run, walk: RecordedWalk, number: int) -> list[Figure]:
+    def draw_strides() -> Drawing:
+        strides = choose_strides(walk)
+        return draw_strip(with_strides(walk, strides), strides)
+
+    section, caption = f"Walk {number}", f"The clearest stride of each outcome, {walk.flipper} flipper."
+    figures = [Figure(f"walk-{number}", WALK, partial(draw_walk, walk, run.layout), section)]
+    return figures + [Figure(f"strides-{number}", caption, draw_strides, section)] * bool(walk.own_strides)
+
+
+def _fits_caption(run: Run, headline: Entry) -> str:
+    drawn, muds = len(drawn_muds(run)), len(headline["muds"])
+    return FITS + f" Of {muds} muds the {drawn} with the most strides are drawn." * (drawn < muds)
+
+
+# the rows of the tables
+
+
+def coefficient_cell(gathered: GatheredCoefficient) -> str:
+    """Format in N/cm³ with the whole standard error; ≥ marks a lower bound."""
+    if gathered.value is None:
+        return "-"
+    if gathered.at_least:
+        return f"≥ {gathered.value / N_CM3:#.2g}"
+    return value_text(gathered.value, gathered.std_error, per=N_CM3)
+
+
+def counts_cell(outcomes: Mapping[str, int]) -> str:
+    *known, unknown = [outcomes[each] for each in (Outcome.GOOD, Outcome.SLIPPING, Outcome.STUCK, Outcome.UNKNOWN)]
+    if unknown and not any(known):
+        return "-"
+    return " / ".join(map(str, known)) + f" ({unknown} unknown)" * bool(unknown)
+
+
+def _mud_cells(result: Entry) -> dict[str, Any]:
+    depths_cm = [f"{result[name] / CM:z.1f}" for name in ("shallowest_m", "deepest_m")]
+    return {
+        "strides": result["strides"],
+        "good / slipped / stuck": counts_cell(result["outcomes"]),
+        "distance": result["distance_m"],
+        "speed": value_text(result["speed_m_s"], result["speed_std_error_m_s"], per=CM),
+        "depth": " to ".join(dict.fromkeys(depths_cm)),
+        **{name: coefficient_cell(result["both"][name]) for name in COEFFICIENTS},
+    }
+
+
+def _flipper_rows(headline: Entry) -> list[dict[str, Any]]:
+    rows = []
+    for result in headline["muds"]:
+        for name in COEFFICIENTS:
+            left, right = (result["flippers"][flipper][name] for flipper in ("left", "right"))
+            cells = {"left": coefficient_cell(left), "right": coefficient_cell(right)}
+            difference = value_text(*flipper_difference(left, right), per=N_CM3)
+            rows.append({"mud": result["mud"], "coefficient": name, **cells, "right - left": difference})
+    return rows
+
+
+def _cause_rows(run: Run, begin_s: float) -> list[dict[str, Any]]:
+    return [
+        {
+            "first at": cause.first_s - begin_s,
+            "times": cause.times,
+            "cause": cause.message,
+            "parts": cause.subjects,
+            "reaction": reaction_of(cause).name.lower().replace("_", " "),
+            "consequences": cause.consequences,
+            "what to do": cause.what_to_do,
+        }
+        for cause in run.causes
+    ]
+
+
+def group_events(events: Iterable[Mapping[str, Any]], begin_s: float) -> list[dict[str, Any]]:
+    """Group events that differ only in their numbers, without faults, which are grouped by their causes."""
+    groups: dict[str, list[Mapping[str, Any]]] = {}
+    for event in events:
+        if not (BEGUN.fullmatch(event["text"]) or OVER.fullmatch(event["text"])):
+            groups.setdefault(NUMBER.sub("#", event["text"]), []).append(event)
+    return [
+        {
+            "first at": group[0]["stamp_s"] - begin_s,
+            "last at": group[-1]["stamp_s"] - begin_s if len(group) > 1 else "",
+            "times": len(group),
+            "event": _common_text([event["text"] for event in group]),
+        }
+        for group in groups.values()
+    ]
+
+
+def _common_text(texts: Sequence[str]) -> str:
+    """Return the text with the range of each number that differs."""
+    columns = zip(*map(NUMBER.findall, texts), strict=True)
+    ends = ((min(numbers, key=float), max(numbers, key=float)) for numbers in columns)
+    ranges = iter([low if low == high else f"{low} to {high}" for low, high in ends])
+    return NUMBER.sub(lambda _: next(ranges), texts[0])
+
+
+def quality_rows(run: Run) -> list[dict[str, Any]]:
+    """List the fits by mud and coefficient, medians over strides, the flippers side by side."""
+    rows = []
+    for (mud, name), estimates in run.estimates[run.estimates["mud"] != ""].groupby(["mud", "coefficient"], sort=False):
+        row: dict[str, Any] = {"mud": mud, "coefficient": name}
+        for flipper in run.replay.flippers:
+            found = estimates[estimates["flipper"] == flipper]["samples"].dropna()
+            names = ("r_squared", "r_squared_about_mean", "rms_residual_nm")
+            medians = DataFrame([[getattr(each, name) for name in names] for each in found], columns=names).median()
+            r_squared, about_mean, residual_nm = medians.tolist()
+            row |= {f"{flipper}: fits": len(found) or "-", f"{flipper}: R²": r_squared}
+            row |= {f"{flipper}: R² about mean": about_mean, f"{flipper}: residual (N·cm)": N_CM * residual_nm}
+        rows.append(row)
+    return rows
+
+
+def stride_rows(run: Run) -> list[dict[str, Any]]:
+    return [
+        {
+            "walk": stride["walk"],
+            "stride": stride["index"],
+            "mud": stride["mud"] or "at a border",
+            "from": f"{stride['start_s']:.2f}",
+            "depth": f"{stride['depth_m'] / CM:z.1f}",
+            "step": f"{stride['step_m'] / CM:z.1f}".replace("nan", "-"),
+            "outcome": stride["outcome"] + ", two surfaces" * bool(stride["two_surfaces"]),
+        }
+        for stride in run.strides.to_dict("records")
+    ]
+
+
+def estimate_rows(run: Run, name: str) -> list[dict[str, Any]]:
+    """List one coefficient of every stride with R² and residual of its fit, the flippers side by side."""
+    rows: dict[tuple[int, int], dict[str, Any]] = {}
+    for each in run.estimates[run.estimates["coefficient"] == name].to_dict("records"):
+        flipper, samples, estimate = each["flipper"], each["samples"], each["estimate"]
+        text = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
+        text = f"≥ {text}" if estimate["at_least"] else text
+        row = rows.setdefault((each["walk"], each["index"]), {"walk": each["walk"], "stride": each["index"]})
+        row[f"{flipper} (N/cm³)"] = text if estimate["valid"] or text == "-" else f"({text})"
+        row[f"{flipper}: R²"] = f"{samples.r_squared:.3f}" if samples else "-"
+        row[f"{flipper}: residual (N·cm)"] = f"{N_CM * samples.rms_residual_nm:.2f}" if samples else "-"
+    return list(rows.values())
+
+
+# several runs
+
+
+def comparison_result(runs: Sequence[Run], headlines: Sequence[Entry]) -> Result:
+    """Compare several runs: one table, one figure, and the differences to the first run."""
+    first, found = runs[0].name, differences(runs, headlines)
+    shared = " The error that all strides of one robot share is left out: it moves its runs alike."
+    compared = f"Every run compared with {first}. A difference is shown beyond {SHOWN:g} standard errors. {DEPTHS}"
+    compared += shared * (len({run.robot for run in runs}) == 1)
+    texts = {
+        "Result": f"{' '.join(comparison_sentences(runs, headlines))}\n\n{UNCERTAINTY}",
+        "Differences": compared if found else f"No other run has a value in a mud of the same name as one of {first}.",
+    }
+    rows = []
+    for run, headline in zip(runs, headlines, strict=True):
+        faults = {"faults": f"{headline['stops']} stopped it" if headline["stops"] else "-"}
+        muds = [{"mud": each["mud"]} | _mud_cells(each) for each in headline["muds"]]
+        rows += [{"run": run.name} | each | faults for each in muds or [{"mud": "-", "strides": headline["strides"]}]]
+    results = _table("Result", rows)
+    empty = [name for name in results.rows if set(results.rows[name].fillna("-")) == {"-"}]
+    tables = [
+        Table("Result", "", UNITS, results.rows.drop(columns=empty)),
+        _table("Differences", _difference_rows(found)),
+    ]
+    has_muds = any(headline["muds"] for headline in headlines)
+    figures = [Figure("comparison", COMPARED, partial(draw_comparison, runs, headlines))] * has_muds
+    tables = [table for table in tables if len(table.rows)]
+    return Result(tables, figures, title=f"Comparison of {len(runs)} runs", texts=texts)
+
+
+def comparison_sentences(runs: Sequence[Run], headlines: Sequence[Entry]) -> list[str]:
+    """Say how fast each run was, and how many differences are larger than their uncertainty."""
+    named = [(run.name, headline) for run, headline in zip(runs, headlines, strict=True)]
+    known = [f"{name} {each['speed_m_s'] / CM:.1f} cm/s" for name, each in named if each["speed_m_s"] is not None]
+    empty = [name for name, each in named if not each["strides"]]
+    found = differences(runs, headlines)
+    shown = f"{sum(map(bool, map(is_shown, found)))} of {counted(len(found), 'difference')} to {runs[0].name}"
+    return [
+        f"{counted(len(runs), 'run')}, {counted(sum(each['strides'] for each in headlines), 'stride')}.",
+        *[f"Mean speeds: {', '.join(known)}."] * bool(known),
+        *[f"No complete stride in {', '.join(empty)}."] * bool(empty),
+        *[f"{shown} exceed {SHOWN:g} standard errors."] * bool(found),
+    ]
+
+
+def _difference_rows(found: Sequence[Entry]) -> list[dict[str, Any]]:
+    verdicts = {None: "uncertainty not known", True: "differs", False: "no difference shown"}
+    rows = []
+    for each in found:
+        per, unit = (CM, "cm/s") if each["quantity"] == SPEED else (N_CM3, "N/cm³")
+        depth = ", at another depth" * (each["quantity"] != SPEED and not each["like_depths"])
+        rows.append(
+            {
+                "run": each["run"],
+                "mud": each["mud"],
+                "quantity": f"{each['quantity']} ({unit})",
+                "in the first run": value_text(each["first"], per=per),
+                "in this run": value_text(each["other"], per=per),
+                "difference": value_text(each["difference"], each["std_error"], per=per),
+                "of the first": f"{100.0 * each['difference'] / each['first']:+.0f} %" if each["first"] else "-",
+                "verdict": verdicts[is_shown(each)] + depth,
+            }
+        )
+    return rows

@@ -1,0 +1,207 @@
+"""The result of a run: how far, how fast, how many strides were good, what each mud is, what went wrong; and how runs
+differ, mud by mud.
+
+The speed of a mud is the sum of its steps over the sum of their durations, without the last stride of a walk. Its
+standard error is that of a ratio: the scatter of the steps around speed times duration, with Student's factor.
+Coefficients are means over the strides of both flippers (coefficient_table.py). They fall with depth, so the depths
+stand next to them.
+
+Each run is compared with the first one in the muds that both have under the same name. The error that all strides of
+one robot share, such as that of its torque constants, moves its runs alike: where both are of the same robot only the
+errors of the strides count. A difference is shown where it exceeds two of its standard errors.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import fsum, hypot, isfinite, sqrt
+from typing import Any
+
+import numpy as np
+from pandas import DataFrame
+
+from control.faults import FAULT_KINDS, Reaction
+from control.records import UNKNOWN
+from estimation.strokes.origin_fit import student_factor
+from experiments.pictures.recorded_walk import RecordedWalk
+from experiments.pictures.stride_choice import Outcome
+from experiments.reports.coefficient_table import GatheredCoefficient, gather_coefficient
+from experiments.reports.counted_nouns import counted
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_names import mud_key
+from experiments.run_report.run import Run
+from logs.fault_history import LoggedCause
+
+Entry = dict[str, Any]  # of the JSON of a report
+Value = tuple[float | None, float | None]  # with its standard error
+SHOWN = 2.0  # standard errors
+SPEED = "speed"
+DOING = {Outcome.GOOD: "good", Outcome.SLIPPING: "slipped", Outcome.STUCK: "stuck"}
+
+
+def headline_of(run: Run) -> Entry:
+    """Return the result of all walks, and of each mud in the order of the walk without strides of uncertain mud."""
+    reactions = [reaction_of(cause) for cause in run.causes]
+    muds = run.strides[run.strides["mud"] != ""].groupby("mud", sort=False)
+    return {
+        "walks": len(run.walks),
+        **travel_of(run.walks),
+        "strides": len(run.strides),
+        "outcomes": _count_outcomes(run.strides),
+        "muds": [_mud_result(run, str(mud), strides) for mud, strides in muds],
+        "stops": sum(reaction > Reaction.WARN for reaction in reactions),
+        "warnings": sum(reaction is Reaction.WARN for reaction in reactions),
+    }
+
+
+def reaction_of(cause: LoggedCause) -> Reaction:
+    """Return the hardest reaction to a cause and to what followed from it."""
+    return max(FAULT_KINDS[name].reaction for name in (cause.name, *cause.consequences))
+
+
+def travel_of(walks: Sequence[RecordedWalk]) -> Entry:
+    """Return distance, time and mean speed of all walks; between two walks the robot may be moved."""
+    distance_m = duration_s = 0.0
+    for walk in walks:
+        known = np.flatnonzero(np.isfinite(walk.body_x_m))
+        if len(known):
+            distance_m += float(walk.body_x_m[known[-1]] - walk.body_x_m[known[0]])
+            duration_s += float(walk.time_s[known[-1]] - walk.time_s[known[0]])
+    return _speed(distance_m, duration_s) if duration_s > 0.0 else _speed(None)
+
+
+def _speed(distance_m: float | None, duration_s: float | None = None, std_error_m_s: float | None = None) -> Entry:
+    """`duration_s` is None where there is no pose; `std_error_m_s` of a single stride."""
+    return {
+        "distance_m": distance_m,
+        "duration_s": duration_s,
+        "speed_m_s": None if distance_m is None or duration_s is None else distance_m / duration_s,
+        "speed_std_error_m_s": std_error_m_s,
+    }
+
+
+def _count_outcomes(strides: DataFrame) -> dict[str, int]:
+    return {str(outcome): int((strides["outcome"] == outcome).sum()) for outcome in Outcome}
+
+
+def _mud_result(run: Run, mud: str, strides: DataFrame) -> Entry:
+    depths_m = [depth_m for depth_m in strides["depth_m"] if isfinite(depth_m)] or [UNKNOWN]
+    estimates = run.estimates[run.estimates["mud"] == mud]
+    by_flipper = {flipper: estimates[estimates["flipper"] == flipper] for flipper in run.replay.flippers}
+    return {
+        "mud": mud,
+        "strides": len(strides),
+        "outcomes": _count_outcomes(strides),
+        **speed_of(strides),
+        "shallowest_m": min(depths_m),
+        "deepest_m": max(depths_m),
+        "both": _gathered(estimates),
+        "flippers": {flipper: _gathered(own) for flipper, own in by_flipper.items()},
+    }
+
+
+def speed_of(strides: DataFrame) -> Entry:
+    steps_m = [step_m for step_m in strides["step_m"] if isfinite(step_m)]
+    distance_m = fsum(steps_m) if steps_m else None
+    known = strides.dropna(subset=["step_m", "duration_s"])[["step_m", "duration_s"]].to_numpy(float).tolist()
+    if not known:
+        return _speed(distance_m)
+    duration_s = fsum(seconds for _, seconds in known)
+    speed_m_s = fsum(step_m for step_m, _ in known) / duration_s
+    error = None
+    if len(known) > 1:
+        squares = fsum((step_m - speed_m_s * seconds) ** 2 for step_m, seconds in known)
+        freedom = len(known) - 1
+        error = student_factor(freedom) * sqrt(squares / freedom * len(known)) / duration_s
+    return _speed(distance_m, duration_s, error) | {"speed_m_s": speed_m_s}
+
+
+def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
+    by_name = {name: estimates[estimates["coefficient"] == name] for name in COEFFICIENTS}
+    return {name: gather_coefficient(own["estimate"]) for name, own in by_name.items()}
+
+
+def headline_sentences(run: Run, headline: Entry) -> list[str]:
+    """Return the result in sentences; a CSV of the authors knows no faults."""
+    return [_travel_sentence(headline), _strides_sentence(headline), *[_faults_sentence(headline)] * bool(run.log)]
+
+
+def _travel_sentence(headline: Entry) -> str:
+    if not headline["walks"]:
+        return "The robot did not walk."
+    if headline["speed_m_s"] is None:
+        return "The log has no position of the body: distance, speed and slip are not known."
+    walks = f" in {headline['walks']} walks" if headline["walks"] > 1 else ""
+    speed = f"{100.0 * headline['speed_m_s']:.1f} cm/s"
+    return f"The robot walked {headline['distance_m']:.2f} m in {headline['duration_s']:.1f} s{walks}: {speed}."
+
+
+def _strides_sentence(headline: Entry) -> str:
+    if not headline["strides"]:
+        return "No complete stride."
+    known = [(number, doing) for outcome, doing in DOING.items() if (number := headline["outcomes"][outcome])]
+    text = ", ".join(f"{number} {doing}" for number, doing in known)
+    return f"{counted(headline['strides'], 'stride')}{': ' * bool(text)}{text}."
+
+
+def _faults_sentence(headline: Entry) -> str:
+    stops = f"{counted(headline['stops'], 'fault')} stopped it" if headline["stops"] else "No fault stopped it"
+    return f"{stops}; {counted(headline['warnings'], 'warning')}." if headline["warnings"] else f"{stops}."
+
+
+# several runs
+
+
+def differences(runs: Sequence[Run], headlines: Sequence[Entry]) -> list[Entry]:
+    """Compare every run with the first. A quantity is in m/s for the speed, else in N/m³.
+
+    `std_error` is None where a run has a single value without an error.
+    """
+    return [
+        each
+        for run, headline in list(zip(runs, headlines, strict=True))[1:]
+        for before in headlines[0]["muds"]
+        for after in headline["muds"]
+        if mud_key(before["mud"]) == mud_key(after["mud"])
+        for each in _between(runs[0], before, run, after)
+    ]
+
+
+def _between(first: Run, before: Entry, other: Run, after: Entry) -> Iterator[Entry]:
+    for quantity, (a, a_error), (b, b_error) in _quantities(before, after, first.robot == other.robot):
+        if a is not None and b is not None:
+            yield {
+                "run": other.name,
+                "first_run": first.name,
+                "mud": before["mud"],
+                "quantity": quantity,
+                "first": a,
+                "other": b,
+                "difference": b - a,
+                "std_error": None if a_error is None or b_error is None else hypot(a_error, b_error),
+                "like_depths": before["shallowest_m"] <= after["deepest_m"]
+                and after["shallowest_m"] <= before["deepest_m"],
+            }
+
+
+def _quantities(before: Entry, after: Entry, same_robot: bool) -> Iterator[tuple[str, Value, Value]]:
+    a, b = [(each["speed_m_s"], each["speed_std_error_m_s"]) for each in (before, after)]
+    yield SPEED, a, b
+    for name in COEFFICIENTS:
+        both: list[GatheredCoefficient] = [each["both"][name] for each in (before, after)]
+        if not any(each.at_least for each in both):
+            by_trials = same_robot and all(each.trials_error is not None for each in both)
+            a, b = [(each.value, each.trials_error if by_trials else each.std_error) for each in both]
+            yield name, a, b
+
+
+def is_shown(difference: Mapping[str, Any]) -> bool | None:
+    """Return whether the runs differ; None where the logs do not show it."""
+    error = difference["std_error"]
+    return None if error is None else bool(abs(difference["difference"]) > SHOWN * error)
+
+
+def flipper_difference(left: GatheredCoefficient, right: GatheredCoefficient) -> Value:
+    """Return right minus left: two flippers have motors, and so torque constants, of their own."""
+    if left.value is None or right.value is None or left.at_least or right.at_least:
+        return None, None
+    errors = (left.std_error, right.std_error)
+    return right.value - left.value, None if None in errors else hypot(*(error or 0.0 for error in errors))

@@ -1,0 +1,219 @@
+"""Speed against depth in mud from soup to firm clay, and the depth at which each method of adaptation settles.
+
+In each mud the robot walks at constant depths, and then by each method, long enough for it to settle. A method is
+evaluated from its third stride on: by its speed as a fraction of the best constant depth's, and by its failed strides.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
+from statistics import fmean, median
+from typing import Annotated, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+from numpy.typing import NDArray
+from pandas import DataFrame
+
+from control.parameters.adaptation_parameters import Method
+from experiments.reports.text_tables import number
+from experiments.study.option import Option
+from experiments.study.result import Figure, Result, Table
+from experiments.study.trials import Trials
+from experiments.trackway.depth_rule import METHODS, arm_m, walking_world
+from experiments.trackway.one_mud import (
+    CONSTANT_STRIDES,
+    LEARNING,
+    STARTING,
+    best_depth,
+    constant_rows,
+    mean_speeds_cm_s,
+    speed_cm_s,
+    walk_in_mud,
+    walks_in,
+)
+from experiments.trackway.plots import MARKS, TEXT
+from experiments.trackway.table_one import count_failures
+from experiments.trackway.walk import Walk
+from simulation.mud.disturbances import TRACKWAY
+
+SCHEMA = 2
+STRENGTHS_PA = (300.0, 400.0, 500.0, 680.0, 1000.0, 1500.0, 2000.0, 2800.0, 3250.0, 4000.0, 5000.0, 6000.0)
+METHOD_STRIDES = 12
+METHOD_COLOURS = ("white", "tab:red", "tab:cyan", "tab:pink")
+OFFSET = 1.03  # between the methods' dots, as a factor of strength, so that none hides another
+Summary = dict[str, Any]
+
+
+def study(
+    trials: Trials,
+    *,
+    strength: Annotated[
+        tuple[float, ...], Option("undrained strength of a mud", low=50, high=50000, unit="Pa", metavar="PA")
+    ] = STRENGTHS_PA,
+    method: Annotated[tuple[Method, ...], Option("of adaptation (default: all)")] = METHODS,
+    seeds: Annotated[int, Option("walks of each point", low=1, high=1000)] = 2,
+) -> Result:
+    """Speed against depth in muds of any strength."""
+    strengths_pa, methods = sorted(set(strength)), list(dict.fromkeys(method))
+    adaptive = [
+        {"strength_pa": strength_pa, "method": each, "count": METHOD_STRIDES, "seed": seed}
+        for strength_pa in strengths_pa
+        for each in methods
+        for seed in range(1, seeds + 1)
+    ]
+    trials.require_same(**walking_world())
+    walked = trials.run(walk_in_mud, [*adaptive, *constant_rows(strengths_pa, seeds)])  # the longest first
+    muds = [_swept_mud(strength_pa, walks) for strength_pa, walks in walked.groupby("strength_pa")]
+    settings = {
+        "methods": methods,
+        "seeds": seeds,
+        "constant_strides": CONSTANT_STRIDES,
+        "method_strides": METHOD_STRIDES,
+        "disturbances": asdict(TRACKWAY),
+    }
+    title = "Speed at the best constant depth, and where each method settles (after its second stride)"
+    table = Table("sweep", title, {}, DataFrame([_row(mud) for mud in muds]))
+    return Result([table], [Figure("sweep", "", partial(draw, muds))], {"strengths": muds, "settings": settings})
+
+
+def _swept_mud(strength_pa: float, walks: DataFrame) -> Summary:
+    constant = walks[walks["method"].isna()]
+    speeds = mean_speeds_cm_s(constant)
+    best = best_depth(speeds)
+    return {
+        "strength_pa": strength_pa,
+        "constant": [
+            _count(walks_in(own), STARTING) | {"depth_cm": round(100.0 * depth_m, 4), "mean": round(speeds[depth_m], 3)}
+            for depth_m, own in constant.groupby("depth_m")
+        ],
+        "best": best,
+        "methods": {
+            method: _settled(walks_in(own), best["mean"]) for method, own in walks.groupby("method", sort=False)
+        },
+    }
+
+
+def _settled(walks: Sequence[Walk], best_cm_s: float) -> Summary:
+    """Evaluate a method after its second stride. The depth is None where no walk had a third one."""
+    depths = [stride.depth_m for walk in walks for stride in walk.strides[LEARNING:]]
+    mean = fmean(speed_cm_s(walk, LEARNING) for walk in walks)
+    return _count(walks, LEARNING) | {
+        "depth_cm": round(100.0 * median(depths), 3) if depths else None,
+        "depth_range_cm": [round(100.0 * min(depths), 3), round(100.0 * max(depths), 3)] if depths else None,
+        "mean": round(mean, 3),
+        "fraction_of_best": round(mean / best_cm_s, 3) if best_cm_s > 0.0 else None,
+    }
+
+
+def _count(walks: Sequence[Walk], skipped: int) -> Summary:
+    """Return how many strides count, how many of them failed, and the faults that ended walks."""
+    counted = [walk.strides[skipped:] for walk in walks]
+    return {
+        "strides": sum(len(strides) for strides in counted),
+        "failures": count_failures(counted, arm_m()),
+        "faults": sorted({walk.fault for walk in walks if walk.fault}),
+    }
+
+
+def _row(mud: Summary) -> dict[str, str]:
+    cells = {f"{name}: depth, speed (cm/s), % of best, failed": _cell(each) for name, each in mud["methods"].items()}
+    best = mud["best"]
+    return {
+        "strength": f"{mud['strength_pa']:g} Pa",
+        "best depth": f"{best['depth_cm']:g} cm",
+        "speed (cm/s)": f"{best['mean']:.2f}",
+    } | cells
+
+
+def _cell(settled: Summary) -> str:
+    failed, fault = sum(settled["failures"].values()), ", fault" if settled["faults"] else ""
+    fraction = settled["fraction_of_best"]
+    percent = "-" if fraction is None else f"{100.0 * fraction:3.0f} %"
+    return (
+        f"{number(settled['depth_cm'], 2)} cm  {settled['mean']:5.2f}  {percent}  {failed}/{settled['strides']}{fault}"
+    )
+
+
+def draw(muds: Sequence[Summary]) -> Drawing:
+    """Draw speed over strength and depth with each method's choice, and below it each method's fraction of the best."""
+    figure = Drawing(figsize=(9.0, 7.2))
+    over, below = figure.subplots(2, 1, height_ratios=(2.2, 1.0), sharex=True)
+    strengths_kpa = np.array([mud["strength_pa"] / 1000.0 for mud in muds])
+    _draw_map(figure, over, muds, strengths_kpa)
+    best = [mud["best"]["depth_cm"] for mud in muds]
+    over.plot(strengths_kpa, best, color="black", linewidth=1.2, linestyle="--", label="best constant depth")
+    methods = list(muds[0]["methods"])
+    for i, method in enumerate(methods):
+        colour = METHOD_COLOURS[i % len(METHOD_COLOURS)]
+        shifted_kpa = strengths_kpa * OFFSET ** (i - (len(methods) - 1) / 2.0)
+        settled = [mud["methods"][method] for mud in muds]
+        _draw_choice(over, settled, shifted_kpa, method, colour)
+        _draw_fraction(below, settled, shifted_kpa, method, colour, 7 if i == 0 else -12 * i)
+    _name_axes(over, below, strengths_kpa)
+    return figure
+
+
+def _draw_map(figure: Drawing, panel: Axes, muds: Sequence[Summary], strengths_kpa: NDArray[np.float64]) -> None:
+    depths_cm = np.array([each["depth_cm"] for each in muds[0]["constant"]])
+    speeds = np.array([[each["mean"] for each in mud["constant"]] for mud in muds]).T
+    edges = np.exp(_edges(np.log(strengths_kpa))), _edges(depths_cm)
+    mesh = panel.pcolormesh(*edges, speeds, cmap="viridis", vmin=0.0)
+    figure.colorbar(mesh, ax=panel, label="speed (cm/s)", pad=0.01)
+    for name, mark in MARKS.items():
+        failed = [
+            (mud["strength_pa"] / 1000.0, each["depth_cm"])
+            for mud in muds
+            for each in mud["constant"]
+            if each["failures"].get(name, 0) > 0.1 * each["strides"]
+        ]
+        panel.plot([x for x, _ in failed], [y for _, y in failed], mark, color="#ffffff90", markeredgecolor="none",
+                   markersize=5, label=f"{name} in more than a tenth of the strides")  # fmt: skip
+
+
+def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the edges of the cells around the centres."""
+    halves = np.diff(centres) / 2.0 if len(centres) > 1 else np.array([0.1])
+    return np.concatenate(
+        [centres[:1] - halves[0], centres[:-1] + halves[: len(centres) - 1], centres[-1:] + halves[-1]]
+    )
+
+
+def _draw_choice(
+    panel: Axes, settled: Sequence[Summary], strengths_kpa: NDArray[np.float64], method: str, colour: str
+) -> None:
+    """Draw the depths at which the method settled, with their range."""
+    known = [(x, each) for x, each in zip(strengths_kpa, settled, strict=True) if each["depth_cm"] is not None]
+    depths_cm = np.array([each["depth_cm"] for _, each in known])
+    errors_cm = abs(np.array([each["depth_range_cm"] for _, each in known]).reshape(-1, 2).T - depths_cm)
+    panel.errorbar([x for x, _ in known], depths_cm, errors_cm, color=colour, label=f"method {method}",
+                   fmt="o", markeredgecolor="black", markersize=7, capsize=3, linewidth=1.2)  # fmt: skip
+
+
+def _draw_fraction(
+    panel: Axes, settled: Sequence[Summary], strengths_kpa: NDArray[np.float64], method: str, colour: str, points: int
+) -> None:
+    """Draw the fractions of the best speed; failures are written `points` above the dots."""
+    percent = [100.0 * (each["fraction_of_best"] or 0.0) for each in settled]
+    line = TEXT if colour == "white" else colour
+    panel.plot(strengths_kpa, percent, "-o", color=line, markerfacecolor=colour, markersize=6, label=method)
+    for strength, height, each in zip(strengths_kpa, percent, settled, strict=True):
+        if failed := sum(each["failures"].values()):
+            panel.annotate(f"{failed}/{each['strides']}", (strength, height), color=line, fontsize="x-small",
+                           textcoords="offset points", xytext=(0, points), ha="center")  # fmt: skip
+
+
+def _name_axes(over: Axes, below: Axes, strengths_kpa: NDArray[np.float64]) -> None:
+    over.set_ylabel("insertion depth (cm)")
+    over.invert_yaxis()
+    over.set_title("Speed of constant depths, and where the adaptation settles")
+    over.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), ncols=3, facecolor="#8fa3ad")
+    below.axhline(100.0, color="grey", linewidth=0.8, linestyle=":")
+    below.set_ylim(0.0, max(130.0, below.get_ylim()[1]))
+    below.set_ylabel("% of the best constant depth")
+    below.set_xlabel("undrained strength of the mud (kPa); numbers at the dots: failed strides after the second")
+    below.set_xscale("log")
+    below.set_xticks(strengths_kpa, [f"{strength:g}" for strength in strengths_kpa])
+    below.minorticks_off()
+    below.legend(loc="lower left")

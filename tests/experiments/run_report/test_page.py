@@ -1,0 +1,136 @@
+"""Tables and pictures of a report show the fits with their residuals, and repeated events as one row each."""
+
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimation.strokes.fit_samples import FitSamples
+from experiments.run_report.figures import MOST_DRAWN, MOST_MUDS, draw_fits, drawn_muds
+from experiments.run_report.page import estimate_rows, group_events, quality_rows
+from experiments.run_report.run import Run, read_runs
+from logs.fault_history import read_causes
+from logs.files.log_error import unwatched
+from tests.experiments.run_report.synthetic_runs import run_of, stride
+
+K = 1e6
+BY_HAND = FitSamples([1e-7, 2e-7, 3e-7], [0.2, 0.3, 0.7], [0.001] * 3, 2.0 * K)  # residuals 0, -0.1, 0.1 N·m
+
+
+@pytest.fixture(scope="module")
+def run(two_walks: Path) -> Run:
+    return read_runs([two_walks], None, unwatched)[0]
+
+
+def samples_of(run: Run, flipper: str, name: str) -> list[FitSamples]:
+    estimates = run.estimates
+    return list(estimates[(estimates["flipper"] == flipper) & (estimates["coefficient"] == name)]["samples"])
+
+
+def test_the_quality_of_a_fit_by_hand() -> None:
+    row = quality_rows(run_of([stride("a", samples=BY_HAND)]))[0]
+    assert row["left: R²"] == pytest.approx(1.0 - 0.02 / 0.62) and row["left: fits"] == 1
+    assert row["left: R² about mean"] == pytest.approx(1.0 - 0.02 / 0.14)
+    assert row["left: residual (N·cm)"] == pytest.approx(100.0 * (0.02 / 3.0) ** 0.5)
+
+
+def test_the_table_has_medians_over_strides_and_nothing_without_a_fit(run: Run) -> None:
+    rows = {row["coefficient"]: row for row in quality_rows(run)}
+    assert rows["k_p"]["left: fits"] == 3
+    assert rows["k_p"]["left: R²"] == median(samples.r_squared for samples in samples_of(run, "left", "k_p"))
+    assert rows["k_s"]["right: fits"] == "-" and np.isnan(rows["k_s"]["right: R²"])  # a bound in every stride
+
+
+def test_each_stride_has_r_squared_and_residual_next_to_its_estimate(run: Run) -> None:
+    rows = estimate_rows(run, "k_e")
+    assert [(row["walk"], row["stride"]) for row in rows] == [(1, 0), (1, 1), (2, 0)]
+    for row, samples in zip(rows, samples_of(run, "right", "k_e"), strict=True):
+        assert row["right: R²"] == f"{samples.r_squared:.3f}"
+        assert row["right: residual (N·cm)"] == f"{100.0 * samples.rms_residual_nm:.2f}"
+
+
+def test_a_fit_is_drawn_next_to_its_residuals_in_units_of_its_coefficient(run: Run) -> None:
+    """The slope of each line is k in N/cm³, the residuals are those of its samples, and both flippers share scales.
+
+    The strides of a mud are one artist.
+    """
+    axes = draw_fits(run).axes
+    for column, flipper in ((0, "left"), (2, "right")):
+        samples = samples_of(run, flipper, "k_p")[0]
+        marks, line, *_ = axes[column].lines
+        of_first = slice(len(samples.moments_m4))
+        (x0, x1), (y0, y1) = np.asarray(line.get_xdata())[:2], np.asarray(line.get_ydata())[:2]
+        assert (y1 - y0) / (x1 - x0) == pytest.approx(samples.slope / 1e6)
+        residuals = np.asarray(axes[column + 1].lines[0].get_ydata())[of_first]
+        np.testing.assert_allclose(residuals, 100.0 * np.array(samples.residuals_nm))
+        np.testing.assert_allclose(np.asarray(marks.get_xdata())[of_first], 1e8 * np.array(samples.moments_m4))
+    for left, right in ((axes[0], axes[2]), (axes[1], axes[3])):
+        assert left.get_xlim() == right.get_xlim() and left.get_ylim() == right.get_ylim()
+
+
+def test_a_long_walk_draws_few_strides_of_each_mud() -> None:
+    strides = [stride("a", samples=BY_HAND) for _ in range(300)] + [stride("b", samples=BY_HAND) for _ in range(3)]
+    marks = draw_fits(run_of(strides)).axes[0].lines[::2]
+    assert [len(np.asarray(line.get_xdata())) for line in marks[:2]] == [3 * MOST_DRAWN, 3 * 3]
+
+
+def test_a_sample_far_off_is_counted_and_not_drawn() -> None:
+    moments = np.linspace(1e-8, 3e-7, 60)
+    torques = K * moments + 0.002 * np.cos(np.arange(60.0))
+    torques[30] = -9.0
+    samples = FitSamples(moments.tolist(), torques.tolist(), [0.001] * 60, K)
+    fit, residuals, *_ = draw_fits(run_of([stride("a", samples=samples)])).axes
+    for panel in (fit, residuals):
+        assert panel.get_ylim()[0] > -900.0
+        assert [text.get_text() for text in panel.texts] == ["1 beyond"]
+
+
+def test_a_run_with_hundreds_of_muds_draws_those_with_the_most_strides() -> None:
+    muds = [f"mud {number}" for number in range(300)]
+    run = run_of([stride(mud, samples=BY_HAND) for mud in muds + muds[100 : 100 + MOST_MUDS]])
+    assert drawn_muds(run) == muds[100 : 100 + MOST_MUDS]
+    legend, *_ = draw_fits(run).legends
+    assert [text.get_text() for text in legend.get_texts()] == drawn_muds(run)
+
+
+@pytest.mark.parametrize("flippers", [("left", "right"), ("right",)])
+def test_the_legend_fits_into_the_picture_of_one_and_of_two_flippers(flippers: tuple[str, ...]) -> None:
+    muds = [f"k_p 1.7 N/cm³, from {number} s" for number in range(2000, 2000 + MOST_MUDS)]
+    figure = draw_fits(run_of([stride(mud, samples=BY_HAND) for mud in muds], flippers=flippers))
+    figure.draw_without_rendering()
+    outline = figure.legends[0].get_window_extent()
+    assert outline.x0 >= 0.0 and outline.x1 <= figure.bbox.width
+
+
+# events
+
+
+def events(*texts: str) -> list[dict[str, object]]:
+    return [{"stamp_s": float(second), "text": text} for second, text in enumerate(texts)]
+
+
+def test_events_that_differ_in_numbers_are_one_group_with_their_ranges() -> None:
+    texts = ("depth 0.0275 m: fastest", "mode hold to walking", "depth 0.0500 m: fastest", "depth 0.0310 m: fastest")
+    assert [tuple(group.values()) for group in group_events(events(*texts), 0.0)] == [
+        (0.0, 3.0, 3, "depth 0.0275 to 0.0500 m: fastest"),
+        (1.0, "", 1, "mode hold to walking"),
+    ]
+    assert len(group_events(events("robot R1 held", "robot R2 held"), 0.0)) == 2  # names with digits are no numbers
+
+
+def test_two_hundred_overruns_are_one_cause() -> None:
+    texts = [f"fault loop_overrun (warn): The loop missed {1 + i % 3} of its ticks." for i in range(200)]
+    logged = events(*(event for text in texts for event in (text, "over: loop_overrun")))
+    assert group_events(logged, 0.0) == []  # faults have a table of their own
+    (cause,) = read_causes(logged, "")
+    assert (cause.first_s, cause.times) == (0.0, 200)
+
+
+@given(st.lists(st.sampled_from(["a 1", "a 2", "b", "c 1.5 x 2", "c 3 x 4"]), max_size=30))
+def test_every_event_is_in_exactly_one_group(texts: list[str]) -> None:
+    groups = group_events(events(*texts), 0.0)
+    assert sum(group["times"] for group in groups) == len(texts)
+    assert [group["first at"] for group in groups] == sorted(group["first at"] for group in groups)

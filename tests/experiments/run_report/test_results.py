@@ -1,0 +1,208 @@
+"""Results agree with a known truth: the simulated robot's position, strides with known values, known differences."""
+
+from dataclasses import replace
+from math import hypot, sqrt
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Any
+
+import numpy as np
+import pytest
+from pandas import DataFrame
+
+from control.faults import Reaction
+from control.modes import Mode
+from estimation.strokes.origin_fit import student_factor
+from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
+from experiments.pictures.mud_layout import layout_of_lengths
+from experiments.pictures.stride_choice import Outcome
+from experiments.reports.coefficient_table import gather_coefficient
+from experiments.reports.error_table import COEFFICIENTS
+from experiments.run_report.page import coefficient_cell, counts_cell
+from experiments.run_report.results import (
+    SPEED,
+    differences,
+    headline_of,
+    headline_sentences,
+    is_shown,
+    reaction_of,
+    speed_of,
+)
+from experiments.run_report.run import Run, read_runs
+from firmware_host.configuration.configuration import Configuration
+from logs.fault_history import LoggedCause
+from logs.files.log_error import unwatched
+from logs.files.log_reader import read_log
+from tests.experiments.run_report.synthetic_runs import run_of, stride
+from tests.recorded_walks import record_walks
+
+ESTIMATE = {"std_error": 0.04e6, "valid": True, "at_least": False, "reason": ""}
+MUDS = (("48.5", 0.61), ("53.1", 0.61))
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory: pytest.TempPathFactory, configuration: Configuration) -> tuple[Run, float]:
+    """Record seven strides from the first mud into the second; return the run and the body's true travel."""
+    path = tmp_path_factory.mktemp("logs") / "walked.mcap"
+    robot = record_walks(path, configuration, 7)
+    (run,) = read_runs([path], layout_of_lengths(MUDS), unwatched)
+    return run, robot.robot.plant.body_m
+
+
+def test_distance_time_and_strides_are_those_of_the_simulated_robot(walked: tuple[Run, float]) -> None:
+    run, travel_m = walked
+    headline = headline_of(run)
+    assert headline["distance_m"] == pytest.approx(travel_m, abs=0.003)
+    walking_s = np.count_nonzero(read_log(run.paths[0]).ticks["mode"] == Mode.WALKING) / 380.0
+    assert headline["duration_s"] == pytest.approx(walking_s, rel=0.01)
+    assert headline["speed_m_s"] == pytest.approx(travel_m / walking_s, rel=0.02)
+    assert (headline["strides"], headline["walks"], headline["stops"]) == (7, 1, 0)
+
+
+def test_each_stride_is_in_the_mud_in_which_the_plates_go_down(walked: tuple[Run, float]) -> None:
+    """The true borders are the reference; a stride near a border belongs to no mud."""
+    run, _ = walked
+    reach_m = run.walks[0].geometric_step_m / 2.0
+    muds = {"w = 48.5 %": (-1.0, 0.61), "w = 53.1 %": (0.61, 1.22)}
+    named = run.strides[run.strides["mud"] != ""]
+    assert 5 <= len(named) <= 7 and set(named["mud"]) == set(muds)
+    position_m = {row["index"]: row["position_m"] for row in run.walks[0].strides}
+    for mud, index in zip(named["mud"], named["index"], strict=True):
+        begin_m, end_m = muds[mud]
+        assert begin_m < position_m[index] + reach_m < end_m
+    softest = {result["mud"]: result["both"]["k_p"].value for result in headline_of(run)["muds"]}
+    assert softest["w = 53.1 %"] < 0.5 * softest["w = 48.5 %"]
+
+
+def test_a_stride_lasts_from_insertion_to_insertion(walked: tuple[Run, float]) -> None:
+    strides = walked[0].strides
+    assert strides["duration_s"][:-1].tolist() == pytest.approx(np.diff(strides["start_s"]).tolist())
+    assert np.isnan(strides["duration_s"].iloc[-1])
+
+
+def test_the_speed_of_a_mud_and_its_error_by_hand() -> None:
+    """Steps of 10, 12 and 11 cm in 2 s each give 5.5 cm/s; the last stride has no duration."""
+    strides = [stride("a", step_m=step_m, duration_s=2.0) for step_m in (0.10, 0.12, 0.11)]
+    (result,) = headline_of(run_of([*strides, stride("a", step_m=0.10)]))["muds"]
+    assert result["speed_m_s"] == pytest.approx(0.055)
+    assert result["distance_m"] == pytest.approx(0.43)
+    assert result["speed_std_error_m_s"] == pytest.approx(student_factor(2) * 0.01 / sqrt(3.0) / 2.0)
+
+
+def test_the_error_of_a_speed_covers_the_truth() -> None:
+    """Two standard errors contain the truth in about 95 of 100 cases, even with five strides."""
+    random, covered, count = np.random.default_rng(5), 0, 300
+    for _ in range(count):
+        durations_s = random.uniform(1.5, 2.5, 5)
+        steps_m = 0.05 * durations_s + random.normal(0.0, 0.01, 5)
+        result = speed_of(DataFrame({"step_m": steps_m, "duration_s": durations_s}))
+        covered += abs(result["speed_m_s"] - 0.05) < 2.0 * result["speed_std_error_m_s"]
+    assert 0.92 < covered / count < 0.99
+
+
+def test_the_coefficient_of_a_mud_is_the_mean_of_both_flippers_with_its_error_by_hand() -> None:
+    values = (1.0e6, 1.1e6, 0.9e6, 1.04e6)
+    (result,) = headline_of(run_of([stride("a", *values[:2]), stride("a", *values[2:])]))["muds"]
+    k_p = result["both"]["k_p"]
+    assert k_p.value == pytest.approx(fmean(values))
+    assert k_p.trials_error == pytest.approx(student_factor(3) * stdev(values) / 2.0)
+    assert k_p.shared_error == pytest.approx(TORQUE_REPEATABILITY * fmean(values))
+    assert result["flippers"]["right"]["k_p"].value == pytest.approx(fmean([values[1], values[3]]))
+
+
+def test_bounds_and_invalid_estimates_are_no_values() -> None:
+    strides = [stride("a", 0.5e6, 0.5e6, at_least=True), stride("b", 0.2e6, 0.2e6, valid=False)]
+    bounds, nothing = headline_of(run_of(strides))["muds"]
+    assert coefficient_cell(bounds["both"]["k_s"]) == "≥ 0.50" and coefficient_cell(nothing["both"]["k_s"]) == "-"
+
+
+def test_outcomes_are_counted() -> None:
+    outcomes = [Outcome.GOOD, Outcome.GOOD, Outcome.SLIPPING, Outcome.STUCK]
+    run = run_of([stride("a", outcome=outcome) for outcome in outcomes])
+    headline = headline_of(run)
+    assert counts_cell(headline["outcomes"]) == "2 / 1 / 1"
+    assert headline_sentences(run, headline)[1] == "4 strides: 2 good, 1 slipped, 1 stuck."
+
+
+def test_the_hardest_reaction_to_a_cause_counts() -> None:
+    def cause(name: str, *consequences: str) -> LoggedCause:
+        return LoggedCause(0.0, 1, name, (), "", "", consequences)
+
+    assert reaction_of(cause("drive_version")) is Reaction.NONE
+    assert reaction_of(cause("loop_overrun")) is Reaction.WARN
+    assert reaction_of(cause("bus_off", "drive_silent")) > Reaction.WARN
+
+
+def test_a_log_s_estimates_stand_even_if_this_version_would_estimate_otherwise(
+    two_walks: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The report shows the logged values, without R² and residuals, which would belong to another fit."""
+    log = read_log(two_walks)
+    older = log._replace(strides=[row | {"k_p": 1.01 * row["k_p"]} for row in log.strides])
+    monkeypatch.setattr("experiments.run_report.run.scan_log", lambda *_: older)
+    (run,) = read_runs([two_walks], None, unwatched)
+    fitted = run.estimates.groupby("coefficient")["samples"].count()
+    assert (fitted["k_p"], fitted["k_e"]) == (0, len(log.strides))
+    values = [row["k_p"] for row in older.strides]
+    assert headline_of(run)["muds"][0]["both"]["k_p"].value == pytest.approx(fmean(values))
+
+
+# several runs
+
+
+def run_with(values: list[float], name: str = "run", mud: str = "48.5", speed_m_s: float = 0.05) -> Run:
+    """Return a run with a stride for each value; the right flipper reads 1 % more, and the speeds scatter by 4 %."""
+    return run_of(
+        [
+            stride(mud, value, 1.01 * value, speed_m_s * (0.96 if i % 2 else 1.04), 1.0)
+            for i, value in enumerate(values)
+        ],
+        name,
+    )
+
+
+def between(first: Run, other: Run) -> dict[str, dict[str, Any]]:
+    runs = [first, other]
+    return {each["quantity"]: each for each in differences(runs, list(map(headline_of, runs)))}
+
+
+def test_a_known_difference_is_found_with_the_errors_of_both() -> None:
+    first, other = run_with([1.0e6, 1.02e6, 0.98e6, 1.0e6], "a"), run_with([1.3e6, 1.31e6, 1.28e6, 1.3e6], "b")
+    found = between(first, other)["k_p"]
+    assert found["difference"] == pytest.approx(0.2975e6 * 1.005) and is_shown(found)
+    errors = [headline_of(each)["muds"][0]["both"]["k_p"].trials_error for each in (first, other)]
+    assert found["std_error"] == pytest.approx(hypot(*errors))
+    speed = between(first, run_with([1e6] * 4, "c", speed_m_s=0.06))[SPEED]
+    assert speed["difference"] == pytest.approx(0.01) and is_shown(speed)
+
+
+def test_runs_of_two_robots_also_have_the_errors_that_each_shares_among_its_strides() -> None:
+    first, other = run_with([1.0e6, 1.02e6] * 4), run_with([1.05e6, 1.07e6] * 4)
+    same, another = between(first, other)["k_p"], between(first, replace(other, robot="R2"))["k_p"]
+    whole = hypot(*(headline_of(each)["muds"][0]["both"]["k_p"].std_error for each in (first, other)))
+    assert another["std_error"] == pytest.approx(whole) and same["std_error"] < 0.5 * whole
+    assert is_shown(same) and not is_shown(another)
+
+
+def test_equal_runs_differ_once_in_twenty() -> None:
+    """Each run has eight values with 8 % scatter; two standard errors contain 95 % of the differences."""
+    random, run, count, shown = np.random.default_rng(2), run_of([]), 400, 0
+    known = {"mud": "a", "speed_m_s": None, "speed_std_error_m_s": None, "shallowest_m": 0.03, "deepest_m": 0.03}
+    for _ in range(count):
+        scattered = [random.normal(1e6, 0.08e6, 8) for _ in range(2)]
+        gathered = [gather_coefficient(ESTIMATE | {"value": float(k)} for k in values) for values in scattered]
+        headlines = [{"muds": [known | {"both": dict.fromkeys(COEFFICIENTS, each)}]} for each in gathered]
+        shown += bool(is_shown(differences([run, run], headlines)[0]))
+    assert 0.01 < shown / count < 0.07
+
+
+def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() -> None:
+    first = run_with([1.0e6, 1.1e6], mud="w = 48.5 %")
+    assert set(between(first, run_with([1.0e6, 1.1e6], mud="48.50"))) == {SPEED, "k_p", "k_s", "k_e"}
+    assert between(first, run_with([1.0e6, 1.1e6], mud="pond")) == {}
+    assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
+
+
+def test_a_single_stride_has_a_difference_without_an_uncertainty_of_its_speed() -> None:
+    found = between(run_with([1.0e6, 1.1e6]), run_of([stride("48.5", step_m=0.05, duration_s=1.0)]))[SPEED]
+    assert found["std_error"] is None and is_shown(found) is None

@@ -1,0 +1,158 @@
+"""The trackway study: Table I of synthetic walks, and a short trackway in simulation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from experiments.studies.trackway import gaits_of, study
+from experiments.study.result import Result
+from experiments.trackway.one_mud import DEPTHS_M, best_depth, speed_cm_s
+from experiments.trackway.plots import draw_trackway
+from experiments.trackway.table_one import PAPER_TABLE, Speed
+from experiments.trackway.track_walk import end_of, is_over, walk_trackway
+from experiments.trackway.walk import Walk, WalkedStride, walk_of
+from simulation.mud.clay import MUDS
+from simulation.mud.track import paper_track
+from tests.experiments.studies.synthetic_trials import SyntheticTrials
+
+NAMES = list(MUDS)
+WHOLE = Walk([WalkedStride(mud, 1.8, 0.03, 0.12, 2.0, 0.0) for mud in NAMES for _ in range(3)], "")
+
+
+def stride(mud: str, position_m: float = 0.0, step_m: float = 0.12, duration_s: float = 2.0) -> WalkedStride:
+    return WalkedStride(mud, position_m, 0.03, step_m, duration_s, 0.0)
+
+
+def walked(walk: Walk = WHOLE, **row: Any) -> dict[str, Any]:
+    """Return 6 cm/s over the trackway, and in one mud 8 cm/s at the depth of 2.75 cm, else 7 cm/s."""
+    if "compartment_m" in row:
+        return walk.entry
+    step_m = 0.16 if row["depth_m"] == 0.0275 else 0.14
+    return Walk([stride("mud", 0.0, step_m)] * 3, "").entry
+
+
+def reported(walk: Walk = WHOLE) -> Result:
+    trials = SyntheticTrials(lambda **row: walked(walk, **row))
+    return study(trials, trials=2, method=("default", "paper", "default"))
+
+
+def test_the_simulated_trackway_is_the_papers() -> None:
+    segments = paper_track().segments
+    assert [segment.clay for segment in segments] == list(MUDS.values())
+    assert [segment.end_m for segment in segments] == pytest.approx([0.61, 1.22, 1.83])
+    assert gaits_of(("paper",)) == {
+        "3 cm": {"depth_m": 0.03},
+        "5 cm": {"depth_m": 0.05},
+        "adaptive": {"method": "paper"},
+    }
+
+
+# the end of a walk, and the strides that count
+
+
+@pytest.mark.parametrize(("step_m", "over"), [(0.12, False), (0.14, True), (0.13, True)])
+def test_a_walk_is_over_when_the_plates_would_go_down_past_the_end(step_m: float, over: bool) -> None:
+    assert is_over(1.75, [stride("45.3", 1.62, step_m)]) is over
+
+
+def test_a_walk_is_over_after_90_s_in_one_mud_and_not_in_all_muds() -> None:
+    slow = [stride("a", 0.1, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0), stride("b", 0.7, 0.0, 44.0)]
+    assert not is_over(1.83, []) and not is_over(1.83, slow)
+    assert is_over(1.83, [*slow, stride("b", 0.7, 0.0, 2.0)])
+
+
+def test_the_end_of_a_walk_is_described() -> None:
+    assert end_of(Walk([stride("45.3", 1.80)], ""), 1.83) == "past the end"
+    assert end_of(Walk([stride("53.1", 0.80)], ""), 1.83) == "stuck in 53.1"
+    assert end_of(Walk([], "a drive is silent"), 1.83) == "a drive is silent"
+
+
+def test_the_first_stride_of_a_constant_depth_does_not_count() -> None:
+    walk = Walk([stride("firm", 0.0, step_m) for step_m in (0.02, 0.10, 0.14)], "")
+    assert speed_cm_s(walk) == pytest.approx(6.0) and speed_cm_s(walk, skipped=2) == pytest.approx(7.0)
+    assert speed_cm_s(Walk([stride("firm")], "a motor was too hot")) == 0.0
+
+
+def test_depths_go_from_1_5_to_5_cm_and_the_best_is_the_fastest() -> None:
+    assert len(DEPTHS_M) == 15 and (DEPTHS_M[0], DEPTHS_M[1], DEPTHS_M[-1]) == (0.015, 0.0175, 0.05)
+    assert best_depth({0.02: 5.0, 0.0275: 7.12345, 0.05: 6.0}) == {"depth_cm": 2.75, "mean": 7.123}
+
+
+# the report
+
+
+def test_each_gait_has_its_ratio_to_the_best_constant_depth() -> None:
+    report = reported().summary
+    assert report["best_constant_depth"] == dict.fromkeys(NAMES, {"depth_cm": 2.75, "mean": 8.0})
+    assert report["best_constant_mean_over_muds"] == 8.0
+    assert list(report["table"]) == ["3 cm", "5 cm", "adaptive", "adaptive, paper"]
+    assert report["over_best"]["adaptive, paper"] == dict.fromkeys(NAMES, 0.75)
+    assert report["constant_depth_cm_s"]["48.5"]["2"] == 7.0
+
+
+def test_only_fixed_depths_are_compared_with_the_papers_sd() -> None:
+    report = reported().summary
+    assert report["within_one_sd"] == {
+        rule: {mud: abs(6.0 - paper.mean) <= paper.sd for mud, paper in PAPER_TABLE[rule].items()}
+        for rule in ("3 cm", "5 cm")
+    }
+    assert report["paper"]["adaptive"]["53.1"] == Speed(5.1, 0.3)
+
+
+def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
+    result = reported(Walk([stride("48.5")] * 3 + [stride("53.1", 0.7, 0.001)] * 2, ""))
+    report = result.summary
+    assert report["table"]["3 cm"]["45.3"]["mean"] is None
+    assert report["within_one_sd"]["3 cm"]["45.3"] is None
+    assert report["mean_over_muds"]["3 cm"]["mean"] is None
+    assert report["over_best"]["3 cm"]["45.3"] is None
+    assert report["ends"]["3 cm"] == {"stuck in 53.1": 2}
+    assert result.notes and result.notes[0].endswith("8 times.")  # two trials of four gaits had two strides there
+
+
+def test_the_screen_shows_table_one_next_to_the_papers() -> None:
+    speeds, failed, best = reported().text().split("\n\n")
+    lines = [" ".join(line.split()) for line in speeds.splitlines()]
+    assert lines[2] == "3 cm 6.00 ± 0.00 6.00 ± 0.00 6.00 ± 0.00 6.00"
+    assert lines[4] == "paper 7.6 ± 0.5, ours outside 2.1 ± 0.8, ours outside 7.2 ± 0.5, ours outside 5.63"
+    assert "none of 6" in failed and "2 past the end" in failed
+    assert best.splitlines()[2].split()[:3] == ["depth", "2.75", "cm"]
+
+
+def test_the_picture_has_a_line_for_each_gait_and_a_dot_for_each_speed() -> None:
+    panels = draw_trackway(reported().summary).axes
+    assert [panel.get_ylabel() for panel in panels] == ["step length (cm)", "depth (cm)", "speed (cm/s)"] or len(
+        panels
+    ) == 3
+    steps = next(panel for panel in panels if panel.get_ylabel() == "step length (cm)")
+    assert len(steps.lines) >= 4 and steps.get_legend() is not None
+
+
+# in simulation
+
+
+@pytest.fixture(scope="module")
+def short() -> dict[str, Walk]:
+    """Simulate compartments of less than two steps."""
+    return {name: walk_of(walk_trackway(0.2, 1, **gait)) for name, gait in gaits_of(("default",)).items()}
+
+
+def test_a_short_trackway_is_walked_from_mud_to_mud_past_its_end(short: dict[str, Walk]) -> None:
+    for walk in short.values():
+        assert list(dict.fromkeys(each.mud for each in walk.strides)) == NAMES
+        assert end_of(walk, 0.6) == "past the end"
+
+
+def test_fixed_gaits_keep_their_depth_and_the_adaptive_one_does_not(short: dict[str, Walk]) -> None:
+    depths = {name: {each.depth_m for each in walk.strides} for name, walk in short.items()}
+    assert (depths["3 cm"], depths["5 cm"]) == ({0.03}, {0.05})
+    assert len(depths["adaptive"]) > 1
+
+
+def test_three_centimetres_slip_in_the_soft_mud_and_five_get_stuck_in_the_firmest(short: dict[str, Walk]) -> None:
+    failures = {name: {each.failure(0.12) for each in walk.in_mud("53.1")} for name, walk in short.items()}
+    assert "slippage" in failures["3 cm"] and failures["5 cm"] == {""}
+    failures = {name: {each.failure(0.12) for each in walk.in_mud("45.3")} for name, walk in short.items()}
+    assert "extraction" in failures["5 cm"] and "extraction" not in failures["3 cm"]
