@@ -53,7 +53,8 @@ def alarm_text(history: History, now_s: float) -> Text:
         more = f" {counted(len(causes) - 1, 'other cause')}: 'mudskipper status'." if len(causes) > 1 else ""
         advice = [f"-> {cause['what_to_do']}.{more}"]
     else:
-        mode, text, advice = report["mode"], *_quiet(report)
+        mode = report["mode"]
+        text, advice = _quiet(report)
     badge = (f" {mode.upper()} ", BADGES.get(mode, "reverse"))
     return Text.assemble(badge, " ", text, *((f"\n{each}", WARNING) for each in advice))
 
@@ -74,15 +75,16 @@ def walk_text(history: History) -> Text:
     report = history.status
     walks = report["mode"] in ("walking", "stopping")
     reason = report["depth_reason"]
-    why = REASONS.get(reason.removesuffix(SLIPS), reason) + ("; it will slip" if reason.endswith(SLIPS) else "")
+    known = reason.removesuffix(SLIPS)
+    why = REASONS.get(known, known) + ("; it will slip" if reason.endswith(SLIPS) else "")
     depths = f"{cm(report['depth_m'], 2)} cm now, {cm(report['next_depth_m'], 2)} cm next: " if walks else "-"
-    slip = None
-    if history.step_m is not None and report["full_step_m"] > 0.0:
-        slip = max(0.0, 1.0 - history.step_m / report["full_step_m"])
+    slip, step_m = None, history.step_m
+    if step_m is not None and report["full_step_m"] > 0.0:
+        slip = max(0.0, 1.0 - step_m / report["full_step_m"])
     stride = f"stride {report['stride']}, {report['phase']}" if walks else "no stride"
     return Text.assemble(
         ("depth   ", "bold"), depths, (why if walks else "", "dim"),
-        ("\nwalk    ", "bold"), f"{stride}; step {cm(history.step_m, 1)} cm, slip ",
+        ("\nwalk    ", "bold"), f"{stride}; step {cm(step_m, 1)} cm, slip ",
         (f"{number(None if slip is None else 100.0 * slip, 0)} %", WARNING if slip and slip > SLIPPING else ""),
         f", speed {cm(history.speed_m_s, 1)} cm/s, at {number(report['body_x_m'], 2)} m",
     )  # fmt: skip

@@ -84,15 +84,19 @@ def strip_text(history: History, width: int, names: Sequence[str]) -> Text:
     if not pieces:
         return Text("mud     no stride with a position yet" + "\n" * len(names), "dim")
     room = max(width - 8, 1)
-    first, last = max(min(pieces), max(pieces) - room + 1), max(pieces)
-    cells = min(room // (last - first + 1), 6)
-    scale = Text(f"{first * PIECE_M:.2f} m".ljust((last + 1 - first) * cells) + f" {(last + 1) * PIECE_M:.2f} m", "dim")
     x_m = history.status["body_x_m"]
+    last = max(*pieces, min(pieces) if x_m is None else int(x_m // PIECE_M))
+    first = max(min(pieces), last - room + 1)
+    cells = min(room // (last - first + 1), 6)
+    end = f" {(last + 1) * PIECE_M:.2f} m"
+    scale = Text(f"{first * PIECE_M:.2f} m".ljust((last + 1 - first) * cells - len(end)) + end, "dim")
     if x_m is not None and 0 <= (cell := int((x_m / PIECE_M - first) * cells)) < room:
         scale.pad_right(max(0, cell + 1 - len(scale)))
         scale = Text.assemble(scale[:cell], ("▲", "bold"), scale[cell + 1 :])
     rows = [Text.assemble((f"mud {name} ", "bold"), *_blocks(history, name, first, last, cells)) for name in names]
-    return Text("\n").join([*rows, Text.assemble("        ", scale)])
+    lines = Text("\n").join([*rows, Text.assemble("        ", scale)])
+    lines.no_wrap, lines.overflow = True, "crop"
+    return lines
 
 
 def _blocks(history: History, name: str, first: int, last: int, cells: int) -> list[tuple[str, str]]:
@@ -102,7 +106,9 @@ def _blocks(history: History, name: str, first: int, last: int, cells: int) -> l
         for stride in history.strides
         if stride["place_m"] is not None and stride[name]["valid"] and stride[name]["value"]
     }
-    readings = list(accumulate(map(newest.get, range(first, last + 1)), lambda before, new: new or before))
+    readings: list[Report | None] = list(
+        accumulate(map(newest.get, range(first, last + 1)), lambda before, new: new or before)
+    )
     logs = [log(reading["value"]) for reading in readings if reading]
     low, high = min(logs, default=0.0) - 0.35, max(logs, default=0.0) + 0.1  # little mud is not no mud
     blocks = []

@@ -106,7 +106,7 @@ class WatchApp(App[int]):
     ENABLE_COMMAND_PALETTE = False
     CSS = """
     * { background: ansi_default; }
-    #alarm { height: auto; max-height: 4; }
+    #alarm { height: auto; max-height: 3; }
     #help { height: 1fr; }
     #forces, #walk, #strip, #machine, Label { height: auto; }
     #forces Horizontal { height: 1; }
