@@ -6,7 +6,6 @@ import os
 from command_line.experiments.conduct import conduct_bench, refuse
 from drivers.load_cell.line_formats import AUTO, UNITS, LineFormat
 from drivers.load_cell.stage_encoder import StageEncoderSettings
-from experiments.estimation.evaluation import SINGLE_WATERS
 from experiments.loadcell.comparison import load_flipper
 from experiments.loadcell.preparation import CellSettings
 from experiments.loadcell.run import BenchSettings, run_loadcell
@@ -14,6 +13,7 @@ from experiments.loadcell.stage import water_of
 from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import TrialPlan
 from experiments.robot.bench_errors import BenchError
+from experiments.studies.estimation import SINGLE_WATERS
 
 UNNAMED = "mud"
 SIMULATED_STEP_UM = 10.0
