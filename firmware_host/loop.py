@@ -3,8 +3,7 @@
 `Loop.tick` is the whole control path and reads in the order in which it happens. The estimates at a stride's ends are
 computed after the command, a bounded unit a tick (mud_learning.py). The same object runs in the daemon, in simulation
 and in tests, with the drives, the pose source and the recorder that it is given. It owns the mode, the present faults
-and the last command. Its parts are public for the daemon and for fault injection; everything that only reads takes a
-snapshot (loop_snapshot.py).
+and the last command. Its parts are public for the daemon, for fault injection and for the reports to operators.
 """
 
 import time
@@ -12,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 from control.controller import RESTING, Controller, WalkOrder
 from control.depth.gait_choice import quickest
+from control.fault_causes import AgedFault
 from control.fault_latch import FaultLatch
 from control.faults import Fault, Reaction
 from control.gait.recovery import Recovery
@@ -100,6 +100,11 @@ class Loop:
     def fault(self) -> Fault | None:
         """The worst present fault that is more than a warning."""
         return self.faults.worst if self.faults.reaction >= Reaction.HOLD else None
+
+    @property
+    def aged_faults(self) -> list[AgedFault]:
+        """Every present fault with the time since it was first detected."""
+        return [AgedFault(fault, self.faults.age_ticks(fault) * self.period_s) for fault in self.faults.present]
 
     @property
     def stride_depth_m(self) -> float:

@@ -149,8 +149,9 @@ def run_with_progress(unit: str, run: Callable[[Progress], Result]) -> Result:
 def session_in(options: argparse.Namespace, folder: Path, progress: Progress, program: Mapping[str, str]) -> Session:
     prompt = TerminalPrompt(progress.clear)
     if options.simulated:
-        return Session(folder, AutomaticOperator(prompt.report), progress.show, program=program)
-    return Session(folder, prompt, progress.show, getattr(options, "socket", None), program)
+        operator = AutomaticOperator(prompt.report)
+        return Session(folder, operator, progress.show, simulated=True, program=program)
+    return Session(folder, prompt, progress.show, getattr(options, "socket", None), program=program)
 
 
 def _print_finding(report: dict[str, Any], finding: Finding, as_json: bool) -> None:

@@ -13,8 +13,6 @@ from experiments.study.values import (
     group_rule,
     lever_m,
     mud_length,
-    plate_cm,
-    positive,
     weights_g,
     whole,
 )
@@ -40,10 +38,8 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     add_studies(names)
     _add_actuator(names)
-    _add_faults(names)
     _add_flipper(names)
     _add_walk(names)
-    _add_loadcell(names)
     _add_lablogs(names)
 
 
@@ -156,32 +152,6 @@ def _add_walk(names: Commands) -> None:
     option("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
 
 
-def _add_loadcell(names: Commands) -> None:
-    loadcell = add(
-        names, "loadcell", "experiments.loadcell.loadcell", "A mud's coefficients from a load cell on a linear stage."
-    )
-    _add_report(loadcell, "stage and load cell are emulated", "for report, pictures and samples; continues there")
-    _add_amplifier(loadcell)
-    option = loadcell.add_argument
-    option("--mud", action="append", metavar="NAME", help="repeatable; simulated: water content in percent")
-    option("--trials", type=SEEDS, default=5, metavar="N", help="of shear and of insertion (default: 5)")
-    option("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: %(default)s)")
-    option(
-        "--depth-error",
-        type=between(0.0, 20.0, "mm"),
-        default=0.5,
-        metavar="MM",
-        help="one standard error of the set depth (default: %(default)s)",
-    )
-    option(
-        "--plate", type=plate_cm, default=(3.0, 3.5, 0.4), metavar="WxH", help="or WxHxT, in cm (default: 3x3.5x0.4)"
-    )
-    option("--speed", type=STAGE_SPEED_M_S, default=0.1, metavar="M/S", help="of the stage (default: 0.1)")
-    _add_stage_encoder(loadcell)
-    option("--compare", type=Path, metavar="FILE", help="summary.json of the flipper experiment")
-    option("--seed", type=int, default=1, metavar="N", help="of the simulation")
-
-
 def _add_lablogs(names: Commands) -> None:
     lablogs = add(names, "lablogs", "experiments.lablogs.lablogs", "Real logs: do estimates repeat as they claim?")
     lablogs.description = LABLOGS
@@ -199,42 +169,3 @@ def _add_lablogs(names: Commands) -> None:
     add_vertical(lablogs, default="y")
     add_json(lablogs)
     _add_out(lablogs, "for report, figures and numbers")
-
-
-def _add_amplifier(loadcell: argparse.ArgumentParser) -> None:
-    option = loadcell.add_argument
-    option("--port", metavar="PATH", help="of the cell's amplifier; /dev/serial/by-id/... does not change")
-    option("--baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)")
-    option(
-        "--format", default="auto", metavar="NAME", help="of its lines: auto, number, indicator, column2, or a pattern"
-    )
-    option("--unit", default="", metavar="U", help="of its numbers: counts, g, kg, N ... (default: that of the lines)")
-    option("--scale", type=positive, metavar="X", help="newtons per unit, instead of a calibration")
-    option("--calibration", type=Path, metavar="FILE", help="an earlier one, instead of two weights")
-
-
-def _add_stage_encoder(loadcell: argparse.ArgumentParser) -> None:
-    option = loadcell.add_argument
-    option(
-        "--position",
-        nargs="?",
-        const="",
-        metavar="PATH",
-        help="port of an encoder of the stage, which may be pushed by hand then",
-    )
-    option("--position-step", type=between(0.01, 10000.0, "um"), metavar="UM", help="travel per count, of either sign")
-    option("--position-baud", type=whole(300, 4000000), default=115200, metavar="N", help="(default: %(default)s)")
-    option("--position-label", default="", metavar="TEXT", help="at the beginning of each of its lines")
-
-
-def _add_faults(names: Commands) -> None:
-    faults = add(
-        names, "faults", "experiments.faults.run_faults", "Every fault in every phase, with the bounds of its reaction."
-    )
-    _add_report(faults, "the faults happen to a simulated robot", "write JSON and picture there")
-    _add_workers(faults)
-    option = faults.add_argument
-    option("--seeds", type=SEEDS, default=1, metavar="N", help="cells of each pair (default: 1)")
-    option("--fault", action="append", metavar="NAME", help="repeatable (default: all)")
-    option("--phase", action="append", metavar="NAME", help="repeatable (default: all)")
-    option("--drive", default="odrive", metavar="TYPE", help="type of the robot's drives, such as mit:AK80-9")

@@ -3,7 +3,7 @@
 A study is a module of experiments/studies with a function `study`. The type of its first parameter says what it runs:
 `Trials` are rows on the workers and need --simulated, a `Session` is a robot with its operator, or a simulated one.
 A study on rows may have a second function, `robot`, which takes a Session and runs without --simulated. A study of
-files has them as unnamed arguments, and no robot.
+files has them as unnamed arguments, and no robot. A module with HAS_ROBOT = False has an operator and no robot.
 """
 
 import argparse
@@ -38,7 +38,7 @@ def _add_options(name: str, command: argparse.ArgumentParser) -> None:
         add_function_options(command, *functions)
         if not has_files(module.study):
             command.add_argument("--simulated", action="store_true", help="robot and muds are simulated")
-        if any(takes_session(function) for function in functions):
+        if any(takes_session(function) for function in functions) and getattr(module, "HAS_ROBOT", True):
             add_socket(command)
         if not takes_session(module.study):
             workers = command.add_mutually_exclusive_group()

@@ -1,17 +1,14 @@
-"""Coefficients of muds by the load cell, compared with a flipper's and with the truth of simulated muds."""
+"""Coefficients of muds by the load cell, compared with those that a flipper felt."""
 
 import json
 from collections.abc import Mapping
 from math import hypot, isfinite, nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from experiments.loadcell.analysis import COEFFICIENTS, MudCoefficient
-from experiments.reports.mud_names import mud_key, mud_text
-from experiments.reports.text_tables import Rows
-from experiments.reports.value_text import N_CM3, miss_text, value_text
-from experiments.robot.bench_errors import BenchError
-from experiments.trials.load_cell_truth import TrueCoefficients
+from experiments.loadcell.analysis import MudCoefficient
+from experiments.reports.mud_names import mud_key
+from experiments.study.option import OptionError
 
 OTHER_PLATE = (
     "A load cell's plate is upright and goes down straight; a flipper's leans and moves along an arc, and in clay a "
@@ -22,51 +19,41 @@ OTHER_PLATE = (
 )
 
 
-class Compared(NamedTuple):
-    """One coefficient of one mud, by the flipper and by the load cell, in N/m³."""
-
-    mud: str
-    coefficient: str
-    sensed: float
-    sensed_std_error: float
-    truth: float
-    truth_std_error: float
-    at_least: bool = False  # the flipper's value is a lower bound
-
-    @property
-    def ratio(self) -> float:
-        return self.sensed / self.truth
-
-    @property
-    def ratio_std_error(self) -> float:
-        return self.ratio * hypot(self.sensed_std_error / self.sensed, self.truth_std_error / self.truth)
-
-
 def load_flipper(path: Path) -> dict[str, Any]:
-    """Read the summary of a flipper experiment, or the one in a folder. Raises BenchError, OSError."""
+    """Read the summary of a flipper experiment, or the one in a folder. Raises OptionError, OSError."""
     path = path / "summary.json" if path.is_dir() else path
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as problem:
-        raise BenchError(f"{path} is no summary of an experiment: {problem}") from problem
+        raise OptionError(f"{path} is no summary of an experiment: {problem}") from problem
     if not isinstance(summary, dict) or not isinstance(summary.get("muds"), list):
-        raise BenchError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
+        raise OptionError(f"{path} has no muds: give the summary.json of `mudskipper experiment flipper`")
     return summary
 
 
-def compare_muds(flipper: Mapping[str, Any] | None, muds: Mapping[str, Mapping[str, MudCoefficient]]) -> list[Compared]:
-    """Pair the muds of equal name in a flipper's summary and in the load cell's results."""
-    if flipper is None:
-        return []
-    sensed = {mud_key(str(row.get("mud"))): row for row in flipper["muds"] if isinstance(row, dict)}
+def compare_muds(flipper: Mapping[str, Any], muds: Mapping[str, Mapping[str, MudCoefficient]]) -> list[dict[str, Any]]:
+    """Return a row for each coefficient that both measured, in N/m³. `flipper` is a summary, or empty."""
+    sensed = {mud_key(str(row.get("mud"))): row for row in flipper.get("muds", ()) if isinstance(row, dict)}
     rows = []
     for mud, coefficients in muds.items():
         for name, truth in coefficients.items():
             estimate = sensed.get(mud_key(mud), {}).get(name)
             value, error = _value_of(estimate)
             if isfinite(value) and isfinite(truth.value):
-                at_least = bool(estimate and estimate.get("at_least"))
-                rows.append(Compared(mud, name, value, error, truth.value, truth.std_error, at_least))
+                ratio = value / truth.value
+                rows.append(
+                    {
+                        "mud": mud,
+                        "coefficient": name,
+                        "sensed": value,
+                        "sensed_std_error": error,
+                        "truth": truth.value,
+                        "truth_std_error": truth.std_error,
+                        "at_least": bool((estimate or {}).get("at_least")),  # the flipper's value is a lower bound
+                        "ratio": ratio,
+                        "ratio_std_error": ratio * hypot(error / value, truth.std_error / truth.value),
+                    }
+                )
     return rows
 
 
@@ -77,19 +64,3 @@ def _value_of(estimate: Any) -> tuple[float, float]:
         return nan, nan
     error = estimate.get("std_error")
     return float(value), float(error) if isinstance(error, int | float) else 0.0
-
-
-def truth_rows(muds: Mapping[str, Mapping[str, MudCoefficient]], truths: Mapping[str, TrueCoefficients]) -> Rows:
-    """List the true values of simulated muds, and the relative errors of the measured ones."""
-    head = ["mud", *(f"true {name} (N/cm³)" for name in COEFFICIENTS), *(f"{name} error" for name in COEFFICIENTS)]
-    rows = [head]
-    for mud, coefficients in muds.items():
-        truth = truths[mud]._asdict()
-        rows.append(
-            [
-                mud_text(mud),
-                *(value_text(truth[name], per=N_CM3) for name in COEFFICIENTS),
-                *(miss_text(coefficients[name].value, truth[name]) for name in COEFFICIENTS),
-            ]
-        )
-    return rows

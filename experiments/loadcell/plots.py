@@ -1,7 +1,6 @@
 """Pictures of the load cell's trials: force and depth with the fits, and coefficients."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from experiments.loadcell.analysis import COEFFICIENTS, MudCoefficient
 from experiments.loadcell.force_trials import depths_of
 from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, Insertion, Shear, StageSettings
 from experiments.reports.mud_names import mud_text
-from experiments.reports.mud_styles import DOTS_PER_INCH, INK, LABELS, looks_of, mark_of
+from experiments.reports.mud_styles import INK, LABELS, looks_of, mark_of
 from experiments.reports.value_text import N_CM3
 
 COLOURS = ("tab:blue", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
@@ -21,11 +20,11 @@ BEFORE_S, AFTER_S = 0.3, 0.4
 SHOWN_ABOVE_M = 0.01  # the mud
 
 
-def plot_mud(
-    trials: Sequence[AnalysedTrial], coefficients: Mapping[str, MudCoefficient], settings: StageSettings, path: Path
-) -> None:
-    """Plot all trials of one mud from their beginnings, with the model by the mud's coefficients."""
-    figure = Figure(figsize=(12.0, 7.2), layout="constrained")
+def draw_mud(
+    trials: Sequence[AnalysedTrial], coefficients: Mapping[str, MudCoefficient], settings: StageSettings
+) -> Figure:
+    """Draw all trials of one mud from their beginnings, with the model by the mud's coefficients."""
+    figure = Figure(figsize=(12.0, 7.2))
     (vertical, shear), (depth, curve) = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
     strokes = [trial for trial in trials if isinstance(trial.motion, Insertion)]
     for i, trial in enumerate(strokes):
@@ -39,7 +38,7 @@ def plot_mud(
     if drags:
         _plot_shear_model(shear, drags[-1], coefficients["k_s"], settings)
     _name_axes(vertical, shear, depth, curve)
-    figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 def _plot_insertion(
@@ -104,20 +103,19 @@ def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:
         (depth, "depth", "time since the surface (s)", "depth (cm)"),
         (curve, "force over depth", "depth (cm)", "force (N)"),
     ):
-        panel.set(xlabel=x, ylabel=y)
-        panel.set_title(title, fontsize="medium")
+        panel.set(xlabel=x, ylabel=y, title=title)
         if panel is not depth:
             panel.axhline(0.0, color="grey", linewidth=0.6)
     depth.invert_yaxis()
     depth.sharex(vertical)
     for panel in (vertical, shear):
         if panel.get_legend_handles_labels()[0]:
-            panel.legend(fontsize="small", loc="upper right" if panel is vertical else "lower center", ncols=2)
+            panel.legend(loc="upper right" if panel is vertical else "lower center", ncols=2)
 
 
-def plot_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]], path: Path) -> None:
-    """Plot the mean with two standard errors, and every trial."""
-    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
+def draw_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> Figure:
+    """Draw the mean with two standard errors, and every trial."""
+    figure = Figure(figsize=(11.0, 3.6))
     names, looks = list(muds), looks_of(list(muds))
     for panel, name in zip(figure.subplots(1, 3), COEFFICIENTS, strict=True):
         for column, mud in enumerate(names):
@@ -128,4 +126,4 @@ def plot_coefficients(muds: Mapping[str, Mapping[str, MudCoefficient]], path: Pa
             panel.errorbar(column, value, two_errors, ecolor=INK, capsize=3, linestyle="", **mark_of(looks[mud]))
         panel.set_xticks(range(len(names)), [mud_text(name) for name in names])
         panel.set(xlim=(-0.6, len(names) - 0.4), ylim=(0.0, None), xlabel="mud", ylabel=f"{LABELS[name]} (N/cm³)")
-    figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure

@@ -4,12 +4,11 @@ All samples come through serial ports and all times from a clock, so that emulat
 own bytes, only faster than real ones. The notebook's entry of a trial names its files.
 """
 
-import csv
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from drivers.load_cell.stage_encoder import StageEncoder, StagePosition
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.strokes import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, Recorded, StagePositions, noise_of
 from experiments.robot.bench_errors import BenchError
-from experiments.study.notebook import Notebook
+from experiments.study.notebook import Entry, Notebook
 from simulation.test_rig.load_cell_bench import EmulatedBench
 
 POLL_S = 0.005
@@ -142,22 +141,27 @@ class CellRecorder:
         """Record until `stroke_s` after the contact, or until the patience ends without a contact."""
         self.await_port()
         self.drain()
-        before, positions_before = self._count_problems(), _count_position_problems(self.encoder)
-        samples, begin_s = list[Sample](), self.clock.now_s()
-        contact = _Contact(noise_n)
-        end_s = begin_s + patience_s
+        before, positions_before = self._problems(), self._position_problems()
+        samples, contact = list[Sample](), _Contact(noise_n)
+        end_s = self.clock.now_s() + patience_s
         while self.clock.now_s() < end_s and self.port.line.is_there:
             fresh = self.poll()
             samples += fresh
             if contact.handle(fresh):
                 end_s = self.clock.now_s() + stroke_s
         positions, self._positions = self._positions, []
-        of_positions = _difference(_count_position_problems(self.encoder), positions_before) if self.encoder else None
+        of_positions = _difference(self._position_problems(), positions_before) if self.encoder else None
         self.await_port()
-        return StrokeRecording(samples, _difference(self._count_problems(), before), positions, of_positions)
+        return StrokeRecording(samples, _difference(self._problems(), before), positions, of_positions)
 
-    def _count_problems(self) -> LineProblems:
+    def _problems(self) -> LineProblems:
         return LineProblems(self.port.malformed_lines, self.port.line.clock.drop_outs, self.port.line.unpluggings)
+
+    def _position_problems(self) -> LineProblems:
+        encoder = self.encoder
+        if encoder is None:
+            return LineProblems(0, 0, 0)
+        return LineProblems(encoder.counts.malformed, encoder.line.clock.drop_outs, encoder.breaks)
 
 
 def correlation(forces_n: Sequence[float]) -> float:
@@ -167,12 +171,6 @@ def correlation(forces_n: Sequence[float]) -> float:
     order = np.arange(len(forces_n))
     apart_n = np.asarray(forces_n) - np.polyval(np.polyfit(order, forces_n, 1), order)
     return float(apart_n[1:] @ apart_n[:-1] / (apart_n @ apart_n))
-
-
-def _count_position_problems(encoder: StageEncoder | None) -> LineProblems:
-    if encoder is None:
-        return LineProblems(0, 0, 0)
-    return LineProblems(encoder.counts.malformed, encoder.line.clock.drop_outs, encoder.breaks)
 
 
 def _difference(after: LineProblems, before: LineProblems) -> LineProblems:
@@ -192,11 +190,9 @@ class _Contact:
 
     def handle(self, samples: Sequence[Sample]) -> bool:
         """Return whether these samples contain the first contact."""
-        for sample in samples:
-            if not self._touched and self._is_away(sample):
-                self._touched = True
-                return True
-        return False
+        before = self._touched
+        self._touched = before or any(self._is_away(sample) for sample in samples)
+        return self._touched and not before
 
     def _is_away(self, sample: Sample) -> bool:
         if self._first_s is None:
@@ -214,8 +210,8 @@ class _Contact:
 
 
 RAW = "raw"
-FORCE_COLUMNS, POSITION_COLUMNS = ("t_s", "force_n", "overloaded"), ("t_s", "place_m")  # as in earlier files
-FORCE_FORMAT, POSITION_FORMAT = "%.6f,%.6f,%d", "%.6f,%.8f"
+FORCES = {"t_s": "%.6f", "force_n": "%.6f", "overloaded": "%d"}  # columns and formats, as in earlier files
+POSITIONS = {"t_s": "%.6f", "place_m": "%.8f"}
 
 
 def raw_name(key: str, attempt: int, what: str = "") -> str:
@@ -223,39 +219,33 @@ def raw_name(key: str, attempt: int, what: str = "") -> str:
     return f"{RAW}/{plain}_{attempt}{what}.csv"
 
 
-def write_samples(path: Path, samples: Sequence[Sample]) -> None:
-    _write_rows(path, FORCE_COLUMNS, [FORCE_FORMAT % sample for sample in samples])
-
-
-def write_positions(path: Path, positions: Sequence[StagePosition]) -> None:
-    _write_rows(path, POSITION_COLUMNS, [POSITION_FORMAT % position for position in positions])
-
-
-def _write_rows(path: Path, head: Sequence[str], rows: Sequence[str]) -> None:
+def write_rows(path: Path, columns: Mapping[str, str], rows: Sequence[tuple[float, ...]]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\r\n".join([",".join(head), *rows, ""]), encoding="utf-8", newline="")
+    lines = [",".join(columns), *(",".join(columns.values()) % row for row in rows), ""]
+    path.write_text("\r\n".join(lines), encoding="utf-8", newline="")
 
 
-def _read_columns(path: Path, names: Sequence[str]) -> Array:
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = [[float(row[name]) for name in names] for row in csv.DictReader(file)]
-    return np.array(rows).reshape(-1, len(names)).T
+def _read_columns(path: Path) -> Array:
+    head, *lines = path.read_text(encoding="utf-8").splitlines()
+    rows = [[float(value) for value in line.split(",")] for line in lines]
+    return np.array(rows).reshape(-1, len(head.split(","))).T
 
 
-def load_recorded(folder: Path, key: str, entry: dict[str, Any]) -> Recorded:
+def load_recorded(folder: Path, key: str, entry: Entry) -> Recorded:
     """Read one trial. Raises OSError, ValueError for a file of another kind."""
-    times_s, forces_n, overloaded = _read_columns(folder / entry["file"], FORCE_COLUMNS)
-    valid, zero_n = overloaded == 0.0, (entry["zero_before_n"] + entry["zero_after_n"]) / 2.0
-    positions = _load_positions(folder, entry)
-    return Recorded(key, entry["mud"], entry["kind"], times_s[valid], forces_n[valid], zero_n, positions)
-
-
-def _load_positions(folder: Path, entry: dict[str, Any]) -> StagePositions | None:
-    """Return nothing without an encoder, or where its zero changed during the stroke."""
-    position = entry.get("position")
-    if not position or position["breaks"] or not position["places"]:
-        return None
-    return StagePositions(*_read_columns(folder / position["file"], POSITION_COLUMNS))
+    times_s, forces_n, overloaded = _read_columns(folder / entry["file"])
+    valid, position, positions = overloaded == 0.0, entry.get("position"), None
+    if position and position["places"] and not position["breaks"]:  # the encoder's zero did not change in the stroke
+        positions = StagePositions(*_read_columns(folder / position["file"]))
+    return Recorded(
+        key=key,
+        mud=entry["mud"],
+        kind=entry["kind"],
+        times_s=times_s[valid],
+        forces_n=forces_n[valid],
+        zero_n=(entry["zero_before_n"] + entry["zero_after_n"]) / 2.0,
+        positions=positions,
+    )
 
 
 def load_counted(folder: Path, notebook: Notebook) -> list[Recorded]:

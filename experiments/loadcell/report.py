@@ -1,24 +1,38 @@
-"""The load cell's results as sections of a page, and as tables for the screen."""
+"""Evaluates the recorded trials of a load cell: coefficients of each mud with their errors, tables and figures."""
 
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from math import isfinite
-from typing import Any
+from pathlib import Path
+from statistics import fmean
+from typing import Any, NamedTuple
 
 import numpy as np
+from pandas import DataFrame
 
-from experiments.loadcell.analysis import CALLIPERS_M, COEFFICIENTS, MudCoefficient
-from experiments.loadcell.comparison import OTHER_PLATE, Compared
-from experiments.loadcell.evaluation import Results
-from experiments.loadcell.plots import plot_coefficients, plot_mud
+from drivers.load_cell.calibration import LoadCellCalibration
+from experiments.loadcell.analysis import (
+    CALLIPERS_M,
+    COEFFICIENTS,
+    MudCoefficient,
+    analyse,
+    bench_uncertainty,
+    gather_trials,
+    speed_remark,
+)
+from experiments.loadcell.comparison import OTHER_PLATE, compare_muds
+from experiments.loadcell.plots import draw_coefficients, draw_mud
+from experiments.loadcell.recording import load_counted
 from experiments.loadcell.stage_track import common_alignment
 from experiments.loadcell.strokes import RATE_EXPONENT, AnalysedTrial, Insertion, StageSettings
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.mud_names import mud_text
-from experiments.reports.report_page import Figure, Section
-from experiments.reports.text_tables import TitledRows
-from experiments.reports.value_text import N_CM3, repeatability_text, value_text
+from experiments.reports.value_text import N_CM3, miss_text, repeatability_text, value_text
+from experiments.study.notebook import Entry, Notebook
+from experiments.study.result import Figure, Result, Table, to_json
+from experiments.study.session import Show
+from experiments.trials.load_cell_truth import TrueCoefficients
 
 TITLE = "Ground truth of mud from a load cell"
 ACCURACY = "docs/explanation/bench_accuracy.md"
@@ -32,50 +46,180 @@ MEASURED = (
     "An encoder measured the stage's position: depths count from the surface that the force shows, and samples at rest "
     "do not count. The coefficients are those at the set speed."
 )
+FITTED = "measured (solid, one colour a trial) and modelled with the mud's coefficients (red, dashed)."
 HEADING = "Coefficients ± one standard error of the trials ± one of the bench; see the report for their parts"
 COMPARED = "Flipper and load cell; see the report for the effects of plate and path alone"
+TRUTH = "The same plate in even motion, without stage, cell and noise"
+ALIGNMENT_KEYS = ("lag_s", "rate_share", "lag_doubt_s", "rate_doubt")  # as in earlier summaries
+UNITS = dict.fromkeys(COEFFICIENTS, "N/cm³") | {"flipper": "N/cm³", "load cell": "N/cm³", "speed": "m/s"}
+Muds = Mapping[str, Mapping[str, MudCoefficient]]  # by mud and coefficient
 
 
-def errors_text(muds: Mapping[str, Mapping[str, MudCoefficient]], plan: TrialPlan) -> str:
-    """Explain the two errors of each value."""
-    known = [(name, mud[name]) for mud in muds.values() for name in COEFFICIENTS if isfinite(mud[name].value)]
-    largest = dict.fromkeys(COEFFICIENTS, 0.0)
-    for name, each in known:
-        largest[name] = max(largest[name], each.shared_error / each.value)
-    fractions = ", ".join(f"{100.0 * fraction:.1f} % of {name}" for name, fraction in largest.items())
-    return (
-        "The first ± is one standard error of the trials. The second ± is alike in all trials: depth "
-        f"± {1000.0 * plan.depth_error_m:g} mm (--depth-error), callipers ± {1000.0 * CALLIPERS_M:g} mm on width and "
-        f"thickness, and the reading of the calibration, together at most {fractions}. k is the least-squares fit to "
-        f"the mud's own curve and belongs to its depth; {ACCURACY} explains both errors."
+class Results(NamedTuple):
+    trials: list[AnalysedTrial]
+    muds: Muds
+    remarks: list[str]
+
+
+def evaluate_muds(folder: Path, notebook: Notebook, plan: TrialPlan, show: Show) -> Results:
+    """Evaluate the recorded trials of a folder."""
+    trials = analyse(load_counted(folder, notebook), plan.settings, show)
+    muds = {}
+    for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
+        own = [trial for trial in trials if trial.recorded.mud == mud]
+        errors = _bench_errors(own, notebook, plan)
+        muds[mud] = {name: gather_trials(own, name, errors[name]) for name in COEFFICIENTS}
+    return Results(trials, muds, list_remarks(trials, plan.settings))
+
+
+def _bench_errors(trials: Sequence[AnalysedTrial], notebook: Notebook, plan: TrialPlan) -> dict[str, float]:
+    """Return the fraction by which the bench may err alike in all trials of a mud, by coefficient."""
+    calibrations = [notebook.entries[trial.recorded.key]["calibration"] for trial in trials]
+    calibration_error = max(LoadCellCalibration(**calibration).relative_error for calibration in calibrations)
+    depth_errors_m = dict.fromkeys(COEFFICIENTS, plan.depth_error_m)
+    if all(trial.is_measured for trial in trials if trial.coefficients):
+        depth_errors_m |= {"k_p": 0.0, "k_e": 0.0}  # a shear keeps the depth that the operator set
+    return {
+        name: bench_uncertainty(name, plan.settings, depth_errors_m[name], calibration_error) for name in COEFFICIENTS
+    }
+
+
+def list_remarks(trials: Sequence[AnalysedTrial], settings: StageSettings) -> list[str]:
+    remarks = [f"{trial.recorded.key}: {text}" for trial in trials for text in (trial.problem, trial.remark) if text]
+    paced = [(trial.recorded.key, trial.pace) for trial in trials if trial.pace is not None]
+    by_trial = {key: remark for key, pace in paced if (remark := speed_remark(pace, settings))}
+    if len(by_trial) > 3:
+        remarks.append(f"in {len(by_trial)} trials {next(iter(by_trial.values()))}")
+    else:
+        remarks += [f"{key}: {remark}" for key, remark in by_trial.items()]
+    turned = sum(trial.profile is not None and trial.profile.turned for trial in trials)
+    if turned:
+        remarks.append(f"in {turned} trials the cell measured with the opposite sign; their forces are turned")
+    return remarks
+
+
+def make_result(
+    results: Results,
+    notebook: Notebook,
+    plan: TrialPlan,
+    cell: Mapping[str, Any],
+    flipper: Mapping[str, Any],
+    truths: Mapping[str, TrueCoefficients],
+) -> Result:
+    """Return the tables and figures. `truths` are those of simulated muds; `flipper` is a summary, or empty."""
+    muds, compared = results.muds, compare_muds(flipper, results.muds)
+    tables, figures = [_coefficient_table(muds)], [_coefficient_figure(muds)]
+    texts = {"Coefficients": "\n\n".join([METHOD, *position_texts(results.trials), _errors_text(muds, plan)])}
+    if compared:
+        tables.append(_comparison_table(compared))
+        texts[tables[-1].section] = _comparison_text(flipper, plan.settings)
+    if truths:
+        tables.append(_truth_table(muds, truths))
+    for mud, coefficients in muds.items():
+        own, section = [trial for trial in results.trials if trial.recorded.mud == mud], f"Mud {mud_text(mud)}"
+        rows = DataFrame([_trial_row(trial) for trial in own])
+        tables.append(Table(f"trials {mud}", "", UNITS, rows, section, on_page_only=True))
+        caption = f"{section}: {FITTED}"
+        name = re.sub(r"[^\w.]+", "_", f"mud_{mud}")
+        figures.append(Figure(name, caption, partial(draw_mud, own, coefficients, plan.settings), section))
+    return Result(
+        tables=tables,
+        figures=figures,
+        summary=_summary(results, notebook, plan, cell) | {"compared": compared, "truth": truths},
+        title=TITLE,
+        texts=texts,
+        notes=results.remarks,
     )
 
 
-def comparison_text(flipper: Mapping[str, Any], settings: StageSettings) -> str:
-    text = OTHER_PLATE
-    depth_m = (flipper.get("settings") or {}).get("depth_m")
-    if isinstance(depth_m, int | float) and abs(depth_m - settings.depth_m) > 1e-6:
-        text += (
-            f"\n\nThe flipper went {100.0 * depth_m:g} cm deep and the load cell {100.0 * settings.depth_m:g} cm: "
-            "coefficients of one mud differ with the depth, so these cannot be compared."
+def _summary(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mapping[str, Any]) -> dict[str, Any]:
+    paces = [trial.pace for trial in results.trials if trial.pace is not None]
+    return {
+        "settings": to_json(plan.settings) | {"depth_error_m": plan.depth_error_m},
+        "cell": cell,
+        "stage": {
+            name: fmean(getattr(pace, name) for pace in paces) if paces else None
+            for name in ("speed_m_s", "acceleration_m_s2")
+        },
+        "muds": [
+            {"mud": mud} | {name: each._asdict() | {"std_error": each.std_error} for name, each in coefficients.items()}
+            for mud, coefficients in results.muds.items()
+        ],
+        "trials": [_trial_entries(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
+        "left_out": notebook.left_out,
+        "remarks": results.remarks,
+    }
+
+
+def _trial_entries(trial: AnalysedTrial, entry: Entry) -> dict[str, Any]:
+    """Join the notebook's entry of a trial and its results, by the names that programs read."""
+    return {"key": trial.recorded.key, **entry, **trial.coefficients} | {
+        "speed_m_s": trial.speed_m_s,
+        "is_measured": trial.is_measured,
+        "place_error_m": trial.position_error_m if trial.is_measured else None,
+        "alignment": trial.alignment and dict(zip(ALIGNMENT_KEYS, trial.alignment, strict=True)),
+        "problem": trial.problem,
+        "remark": trial.remark,
+    }
+
+
+# tables
+
+
+def _coefficient_table(muds: Muds) -> Table:
+    rows = []
+    for mud, coefficients in muds.items():
+        rows.append({"mud": mud_text(mud)})
+        for name, each in coefficients.items():
+            rows[-1][name] = value_text(each.value, each.trials_error, each.shared_error, per=N_CM3)
+            rows[-1][f"repeatability of {name}"] = repeatability_text(each.repeatability, len(each.trials))
+    return Table("coefficients", HEADING, UNITS, DataFrame(rows), "Coefficients")
+
+
+def _coefficient_figure(muds: Muds) -> Figure:
+    caption = "Mean of the trials with two standard errors; grey: every trial."
+    return Figure("coefficients", caption, partial(draw_coefficients, muds), "Coefficients")
+
+
+def _comparison_table(compared: Sequence[Mapping[str, Any]]) -> Table:
+    rows = []
+    for row in compared:
+        bound = "≥ " if row["at_least"] else ""
+        rows.append(
+            {
+                "mud": mud_text(row["mud"]),
+                "": row["coefficient"],
+                "flipper": bound + value_text(row["sensed"], row["sensed_std_error"], per=N_CM3),
+                "load cell": value_text(row["truth"], row["truth_std_error"], per=N_CM3),
+                "flipper / load cell": bound + value_text(row["ratio"], row["ratio_std_error"]),
+            }
         )
-    return text
+    return Table("compared", COMPARED, UNITS, DataFrame(rows), "Compared with the flipper")
 
 
-def make_sections(results: Results, plan: TrialPlan, flipper: Mapping[str, Any]) -> list[Section]:
-    """`flipper` is the summary of the experiment that is compared, or empty."""
-    rows, draw = coefficient_rows(results.muds), partial(plot_coefficients, results.muds)
-    figures = [Figure("coefficients", "Mean of the trials with two standard errors; grey: every trial.", draw)]
-    text = "\n\n".join([METHOD, *position_texts(results.trials), errors_text(results.muds, plan)])
-    sections = [Section("Coefficients", text, rows=rows, figures=figures)]
-    if results.compared:
-        rows, text = compared_rows(results.compared), comparison_text(flipper, plan.settings)
-        sections.append(Section("Compared with the flipper", text, rows=rows))
-    if results.remarks:
-        sections.append(Section("Remarks", "\n\n".join(results.remarks)))
-    for mud, coefficients in results.muds.items():
-        sections.append(_mud_section(results.trials, mud, coefficients, plan.settings))
-    return sections
+def _truth_table(muds: Muds, truths: Mapping[str, TrueCoefficients]) -> Table:
+    rows = []
+    for mud, coefficients in muds.items():
+        true = truths[mud]._asdict()
+        rows.append({"mud": mud_text(mud)} | {name: value_text(true[name], per=N_CM3) for name in COEFFICIENTS})
+        rows[-1] |= {f"{name} error": miss_text(coefficients[name].value, true[name]) for name in COEFFICIENTS}
+    return Table("truth", TRUTH, UNITS, DataFrame(rows), "The simulated muds themselves")
+
+
+def _trial_row(trial: AnalysedTrial) -> dict[str, Any]:
+    row: dict[str, Any] = {"trial": f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"}
+    for name in COEFFICIENTS:
+        estimate = trial.coefficients.get(name)
+        row[name] = "" if estimate is None else value_text(estimate.value, estimate.std_error, per=N_CM3)
+    row["speed"] = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
+    row["measured (cm)"] = "-"  # the depth of an insertion, or the travel of a shear
+    if trial.positions_m is not None:
+        farthest_m = float(np.nanmax(trial.positions_m))
+        row["measured (cm)"] = value_text(100.0 * farthest_m, 100.0 * trial.position_error_m)
+    return row | {"remark": trial.problem or trial.remark}
+
+
+# texts
 
 
 def position_texts(trials: Sequence[AnalysedTrial]) -> list[str]:
@@ -99,64 +243,26 @@ def position_texts(trials: Sequence[AnalysedTrial]) -> list[str]:
     ]
 
 
-def _mud_section(
-    trials: Sequence[AnalysedTrial], mud: str, coefficients: Mapping[str, MudCoefficient], settings: StageSettings
-) -> Section:
-    own = [trial for trial in trials if trial.recorded.mud == mud]
-    caption = (
-        f"Mud {mud_text(mud)}: measured (solid, one colour a trial) and modelled with the mud's coefficients (red, "
-        "dashed)."
+def _errors_text(muds: Muds, plan: TrialPlan) -> str:
+    """Explain the two errors of each value."""
+    largest = dict.fromkeys(COEFFICIENTS, 0.0)
+    for name, each in ((name, mud[name]) for mud in muds.values() for name in COEFFICIENTS):
+        if isfinite(each.value):
+            largest[name] = max(largest[name], each.shared_error / each.value)
+    fractions = ", ".join(f"{100.0 * fraction:.1f} % of {name}" for name, fraction in largest.items())
+    return (
+        "The first ± is one standard error of the trials. The second ± is alike in all trials: depth "
+        f"± {1000.0 * plan.depth_error_m:g} mm (--depth-error), callipers ± {1000.0 * CALLIPERS_M:g} mm on width and "
+        f"thickness, and the reading of the calibration, together at most {fractions}. k is the least-squares fit to "
+        f"the mud's own curve and belongs to its depth; {ACCURACY} explains both errors."
     )
-    name = re.sub(r"[^\w.]+", "_", f"mud_{mud}")
-    figure = Figure(name, caption, partial(plot_mud, own, coefficients, settings))
-    return Section(f"Mud {mud_text(mud)}", rows=trial_rows(own), figures=[figure])
 
 
-def coefficient_rows(muds: Mapping[str, Mapping[str, MudCoefficient]]) -> list[list[str]]:
-    head = ["mud"]
-    for name in COEFFICIENTS:
-        head += [f"{name} (N/cm³)", "repeatability"]
-    rows = [head]
-    for mud, coefficients in muds.items():
-        rows.append([mud_text(mud)])
-        for each in (coefficients[name] for name in COEFFICIENTS):
-            rows[-1].append(value_text(each.value, each.trials_error, each.shared_error, per=N_CM3))
-            rows[-1].append(repeatability_text(each.repeatability, len(each.trials)))
-    return rows
-
-
-def trial_rows(trials: Sequence[AnalysedTrial]) -> list[list[str]]:
-    head = ["trial", *(f"{name} (N/cm³)" for name in COEFFICIENTS), "speed (m/s)", "measured (cm)", "remark"]
-    rows = []
-    for trial in trials:
-        estimates = [trial.coefficients.get(name) for name in COEFFICIENTS]
-        cells = ["" if each is None else value_text(each.value, each.std_error, per=N_CM3) for each in estimates]
-        speed = "-" if trial.speed_m_s is None or not isfinite(trial.speed_m_s) else f"{trial.speed_m_s:.3f}"
-        label = f"{trial.recorded.kind} {trial.recorded.key.rsplit('/', 1)[-1]}"
-        farthest = "-"  # the depth of an insertion, or the travel of a shear
-        if trial.positions_m is not None:
-            farthest = value_text(100.0 * float(np.nanmax(trial.positions_m)), 100.0 * trial.position_error_m)
-        rows.append([label, *cells, speed, farthest, trial.problem or trial.remark])
-    return [head, *rows]
-
-
-def compared_rows(compared: Sequence[Compared]) -> list[list[str]]:
-    head = ["mud", "", "flipper (N/cm³)", "load cell (N/cm³)", "flipper / load cell"]
-    return [
-        head,
-        *(
-            [
-                mud_text(row.mud),
-                row.coefficient,
-                ("≥ " if row.at_least else "") + value_text(row.sensed, row.sensed_std_error, per=N_CM3),
-                value_text(row.truth, row.truth_std_error, per=N_CM3),
-                ("≥ " if row.at_least else "") + value_text(row.ratio, row.ratio_std_error),
-            ]
-            for row in compared
-        ),
-    ]
-
-
-def make_tables(results: Results) -> list[TitledRows]:
-    tables: list[TitledRows] = [(HEADING, coefficient_rows(results.muds))]
-    return tables + [(COMPARED, compared_rows(results.compared))] * bool(results.compared)
+def _comparison_text(flipper: Mapping[str, Any], settings: StageSettings) -> str:
+    depth_m = (flipper.get("settings") or {}).get("depth_m")
+    if not isinstance(depth_m, int | float) or abs(depth_m - settings.depth_m) <= 1e-6:
+        return OTHER_PLATE
+    return (
+        f"{OTHER_PLATE}\n\nThe flipper went {100.0 * depth_m:g} cm deep and the load cell "
+        f"{100.0 * settings.depth_m:g} cm: coefficients of one mud differ with the depth, so these cannot be compared."
+    )

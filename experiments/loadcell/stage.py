@@ -4,7 +4,7 @@ The experiment asks for each motion and cannot tell which stage it has. Neither 
 that is found from the force.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from random import Random
 from typing import NamedTuple
 
@@ -85,10 +85,9 @@ class SimulatedStage:
 
     patience_s = 5.0
 
-    def __init__(
-        self, settings: StageSettings, bench: EmulatedBench, plates: Mapping[str, CarriedPlate], seed: int
-    ) -> None:
-        self._settings, self._bench, self._plates = settings, bench, plates
+    def __init__(self, settings: StageSettings, bench: EmulatedBench, muds: Sequence[str], seed: int) -> None:
+        self._settings, self._bench = settings, bench
+        self.plates = {mud: simulated_plate(mud, settings) for mud in muds}
         self._random = Random(seed)
 
     def weigh(self, which: int) -> float:
@@ -98,7 +97,7 @@ class SimulatedStage:
 
     def prepare(self, trial: Trial, trials: int) -> str:
         self._bench.stage.hung_weight_n = 0.0
-        self._bench.stage.move_over(self._plates[trial.mud], trial.kind == SHEAR)
+        self._bench.stage.move_over(self.plates[trial.mud], trial.kind == SHEAR)
         self._bench.pass_time(SETTLING_S)
         return GO_ON
 
@@ -138,9 +137,13 @@ def water_of(mud: str) -> float:
     return water_percent
 
 
-def clay_truth(water_percent: float, settings: StageSettings) -> TrueCoefficients:
+def simulated_plate(mud: str, settings: StageSettings) -> CarriedPlate:
+    return clay_plate(water_of(mud), settings.plate)
+
+
+def clay_truth(mud: str, settings: StageSettings) -> TrueCoefficients:
     """Return what the plate feels in even motion, without the stage's ramps and the cell's noise."""
     depth_m = settings.depth_m
     stroke = StrokeTruth(0.0, 0.0, depth_m, settings.speed_m_s, UNKNOWN, depth_m)
-    stride = StrideTruth("", 0, clay_of_water(water_percent), 0.0, stroke, stroke, stroke)
+    stride = StrideTruth("", 0, clay_of_water(water_of(mud)), 0.0, stroke, stroke, stroke)
     return true_coefficients(stride, settings.plate, RELAXATION, PAPER_HOLD_S, upright=True)

@@ -4,32 +4,35 @@ Samples are on the disk before they are evaluated, and the files of a repeated t
 file that counts. The same command continues an interrupted experiment.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from drivers.load_cell.stage_encoder import StageEncoder
 from experiments.loadcell.analysis import analyse_trial, speed_remark
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.force_trials import wide_pace
 from experiments.loadcell.recording import (
     AVERAGED,
+    FORCES,
+    POSITIONS,
     CellRecorder,
     StrokeRecording,
     Tare,
     load_recorded,
     raw_name,
-    write_positions,
-    write_samples,
+    write_rows,
 )
 from experiments.loadcell.stage import Stage, Trial
-from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Shear, StageSettings
+from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Mask, Shear, StageSettings
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.study.notebook import Notebook
-from experiments.trials.session import Show
+from experiments.robot.steps import Step, conduct_steps
+from experiments.study.notebook import Entry, Notebook
+from experiments.study.session import Show
 
 KEEP, WITHOUT = "k", "w"
 OFFERED = {GO_ON: "measure it again", KEEP: "keep it as it is", SKIP: "leave it out"}
@@ -38,6 +41,7 @@ MOST_ATTEMPTS = 3  # after which Enter leaves the trial out
 SLOW, SLOW_BY_HAND = 1.6, 3.0  # recorded time over the expected time of a stroke
 RESERVE_S = 1.5
 LISTENING_S, SILENT_S = 1.0, 1.0
+AT_ITS_LIMIT = "the load cell was at its limit: take a cell of a larger range, a smaller plate, or a lower gain"
 FORCE_ALONE = "the trial is evaluated by its force alone, which assumes a stage of one speed"
 LEAST_DRIFT_N, DRIFT_FRACTION = 0.02, 0.03  # of the largest force, by which the zero may move over a trial
 GARBLED_FRACTION = 0.05
@@ -72,43 +76,32 @@ class TrialBench:
 
 def measure_all(bench: TrialBench, plan: TrialPlan) -> None:
     """Measure every trial that is not in the notebook."""
-    trials, index = plan.list_trials(), 0
-    while index < len(trials):
-        bench.show(index, len(trials))
-        trial = trials[index]
-        if trial.key in bench.notebook.entries:
-            index += 1
-            continue
-        answer = bench.stage.prepare(trial, plan.trials)
-        if answer == REDO and index > 0:
-            index -= 1
-            bench.notebook.forget(trials[index].key)
-        elif answer == SKIP:
-            bench.notebook.write(trial.key, {"skipped": True})
-        elif answer == GO_ON:
-            measure(bench, trial, plan)
-    bench.show(len(trials), len(trials))
+    steps = [
+        Step(trial.key, partial(bench.stage.prepare, trial, plan.trials), partial(measure, bench, trial, plan))
+        for trial in plan.list_trials()
+    ]
+    conduct_steps(steps, bench.notebook, bench.show, {"skipped": True})
 
 
-def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> None:
-    """Measure a prepared trial, again where the operator wants it so."""
+def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> Entry:
+    """Measure a prepared trial, again where the operator wants it so. Return its entry for the notebook."""
     for attempt in count(1):
         entry, problems = record(bench, trial, plan, attempt)
         if not problems:
-            return bench.notebook.write(trial.key, entry)
+            return entry
         for problem in problems:
             bench.operator.report(f"{trial.key}: {problem}")
         offered = OFFERED_OFTEN if attempt >= MOST_ATTEMPTS else OFFERED
         answer = bench.operator.ask(f"{trial.key} may be invalid. What now?", offered, bench.recorder.drain)
         if answer == KEEP:
-            return bench.notebook.write(trial.key, entry | {"kept_in_spite_of": problems})
+            return entry | {"kept_in_spite_of": problems}
         given_up = answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS)
         if given_up or bench.stage.prepare(trial, plan.trials) == SKIP:
-            return bench.notebook.write(trial.key, entry | {"skipped": True, "why": problems})
-    return None
+            break
+    return entry | {"skipped": True, "why": problems}
 
 
-def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tuple[dict[str, Any], list[str]]:
+def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tuple[Entry, list[str]]:
     """Record one stroke; return its entry for the notebook, and its problems."""
     recorder, stage = bench.recorder, bench.stage
     await_encoder(bench)
@@ -120,19 +113,31 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
     stage.start(trial)
     longest_s = stroke_s(trial.kind, plan.settings, bool(recorder.encoder))
     stroke = recorder.record(before.noise_n, stage.patience_s, longest_s)
-    name, position_name = raw_name(trial.key, attempt), raw_name(trial.key, attempt, "_position")
-    write_samples(bench.folder / name, stroke.samples)
+    name = raw_name(trial.key, attempt)
+    write_rows(bench.folder / name, FORCES, stroke.samples)
     stage.lift()
     after = recorder.tare()
-    entry = _make_entry(trial, name, recorder, stroke, before, after)
+    entry: Entry = trial._asdict() | {
+        "file": name,
+        "zero_before_n": before.force_n,
+        "zero_after_n": after.force_n,
+        "noise_n": before.noise_n,
+        "rate_hz": recorder.port.line.clock.rate_hz,
+        "samples": len(stroke.samples),
+        "garbled_lines": stroke.problems.garbled_lines,
+        "drop_outs": stroke.problems.drop_outs,
+        "unpluggings": stroke.problems.breaks,
+        "overloads": stroke.overloads,
+        "calibration": recorder.port.calibration._asdict(),
+    }
     if recorder.encoder is not None and stroke.position_problems is not None:
-        write_positions(bench.folder / position_name, stroke.positions)
         entry["position"] = {
-            "file": position_name,
+            "file": raw_name(trial.key, attempt, "_position"),
             "places": len(stroke.positions),
             "rate_hz": recorder.encoder.line.clock.rate_hz,
             **stroke.position_problems._asdict(),
         }
+        write_rows(bench.folder / entry["position"]["file"], POSITIONS, stroke.positions)
     recorded = load_recorded(bench.folder, trial.key, entry)
     analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
     if analysed.pace and (remark := speed_remark(analysed.pace, plan.settings, SINGLE_SPEED_BOUND)):
@@ -151,7 +156,7 @@ def stroke_s(kind: str, settings: StageSettings, is_measured: bool = False) -> f
 def await_encoder(bench: TrialBench) -> None:
     """Wait for an encoder that is unplugged or silent, or go on without it."""
     recorder, attempts = bench.recorder, 0
-    while recorder.encoder is not None and (problem := _encoder_problem(recorder)):
+    while recorder.encoder is not None and (problem := _encoder_problem(recorder.encoder, recorder.clock.now_s())):
         bench.operator.report(problem)
         answers = {GO_ON: "check again", WITHOUT: "use the force alone"}
         question = "Does the encoder send again?"
@@ -166,36 +171,12 @@ def await_encoder(bench: TrialBench) -> None:
         attempts += 1
 
 
-def _encoder_problem(recorder: CellRecorder) -> str:
-    encoder = recorder.encoder
-    if encoder is None:
-        return ""
+def _encoder_problem(encoder: StageEncoder, now_s: float) -> str:
     if not encoder.line.is_there:
         return f"the stage's encoder is unplugged ({encoder.last_problem}): plug {encoder.settings.path} in again"
-    if encoder.silent_for_s(recorder.clock.now_s()) > SILENT_S:
+    if encoder.silent_for_s(now_s) > SILENT_S:
         return f"no count arrives from the stage's encoder on {encoder.settings.path}: check its power and cable"
     return ""
-
-
-def _make_entry(
-    trial: Trial, name: str, recorder: CellRecorder, stroke: StrokeRecording, before: Tare, after: Tare
-) -> dict[str, Any]:
-    return {
-        "mud": trial.mud,
-        "kind": trial.kind,
-        "number": trial.number,
-        "file": name,
-        "zero_before_n": before.force_n,
-        "zero_after_n": after.force_n,
-        "noise_n": before.noise_n,
-        "rate_hz": recorder.port.line.clock.rate_hz,
-        "samples": len(stroke.samples),
-        "garbled_lines": stroke.problems.garbled_lines,
-        "drop_outs": stroke.problems.drop_outs,
-        "unpluggings": stroke.problems.breaks,
-        "overloads": stroke.overloads,
-        "calibration": recorder.port.calibration._asdict(),
-    }
 
 
 # checks
@@ -203,58 +184,44 @@ def _make_entry(
 
 def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, before: Tare, after: Tare) -> list[str]:
     """Return messages on everything that may make a trial invalid."""
-    problems, recorded = list[str](), analysed.recorded
-    if stroke.problems.breaks:
-        problems.append("the load cell was unplugged during the trial")
-    if stroke.overloads or is_clipped(recorded.forces_n):
-        problems.append(
-            "the load cell was at its limit: take a cell of a larger range, a smaller plate, or a lower gain"
-        )
-    garbled = stroke.problems.garbled_lines
+    recorded, garbled = analysed.recorded, stroke.problems.garbled_lines
     lines = len(stroke.samples) + garbled
-    if garbled > GARBLED_FRACTION * lines:
-        problems.append(f"{garbled} of {lines} lines were garbled: check cable and ground")
-    problems += [each for each in (analysed.problem, analysed.remark) if each]
-    problems += _list_position_problems(analysed, stroke)
-    moved_n = abs(after.force_n - before.force_n)
+    moved_n, missing = abs(after.force_n - before.force_n), _missing_fraction(analysed)
     largest_n = float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
-    if moved_n > max(LEAST_DRIFT_N, DRIFT_FRACTION * largest_n):
-        problems.append(
-            f"the zero moved by {moved_n:.3f} N: wipe the plate, check the mounting, let the amplifier warm up"
+    checks = [
+        (stroke.problems.breaks, "the load cell was unplugged during the trial"),
+        (stroke.overloads or is_clipped(recorded.forces_n), AT_ITS_LIMIT),
+        (garbled > GARBLED_FRACTION * lines, f"{garbled} of {lines} lines were garbled: check cable and ground"),
+        (analysed.problem, analysed.problem),
+        (analysed.remark, analysed.remark),
+        *_position_checks(analysed, stroke),
+        (
+            moved_n > max(LEAST_DRIFT_N, DRIFT_FRACTION * largest_n),
+            f"the zero moved by {moved_n:.3f} N: wipe the plate, check the mounting, let the amplifier warm up",
+        ),
+        (
+            missing > MISSING_FRACTION,
+            f"{100.0 * missing:.0f} % of the samples of its strokes are missing: check cable and connectors",
+        ),
+    ]
+    return [message for is_wrong, message in checks if is_wrong]
+
+
+def _position_checks(analysed: AnalysedTrial, stroke: StrokeRecording) -> Iterator[tuple[bool, str]]:
+    line = stroke.position_problems
+    if line is None:
+        return
+    if line.breaks:
+        yield True, f"the stage's encoder was unplugged or restarted during the trial: {FORCE_ALONE}"
+    elif not stroke.positions:
+        yield True, f"the stage's encoder sent no position: {FORCE_ALONE}"
+    elif analysed.positions_m is not None:
+        unknown = max(np.mean(np.isnan(analysed.positions_m[inside])) for inside, _ in _strokes(analysed))
+        yield (
+            bool(unknown > MISSING_FRACTION),
+            f"the stage's position is unknown for {100.0 * unknown:.0f} % of its strokes ({line.garbled_lines} "
+            f"garbled lines, {line.drop_outs} gaps): check the encoder's cable and connectors",
         )
-    missing = missing_fraction(analysed)
-    if missing > MISSING_FRACTION:
-        problems.append(
-            f"{100.0 * missing:.0f} % of the samples of its strokes are missing: check cable and connectors"
-        )
-    return problems
-
-
-def _list_position_problems(analysed: AnalysedTrial, stroke: StrokeRecording) -> list[str]:
-    of_line = stroke.position_problems
-    if of_line is None:
-        return []
-    if of_line.breaks:
-        return [f"the stage's encoder was unplugged or restarted during the trial: {FORCE_ALONE}"]
-    if not stroke.positions:
-        return [f"the stage's encoder sent no position: {FORCE_ALONE}"]
-    missing = _fraction_without_position(analysed)
-    if missing > MISSING_FRACTION:
-        return [
-            f"the stage's position is unknown for {100.0 * missing:.0f} % of its strokes ({of_line.garbled_lines} "
-            f"garbled lines, {of_line.drop_outs} gaps): check the encoder's cable and connectors"
-        ]
-    return []
-
-
-def _fraction_without_position(analysed: AnalysedTrial) -> float:
-    if analysed.positions_m is None or analysed.profile is None:
-        return 0.0
-    times_s, fractions = analysed.profile.times_s, [0.0]
-    for begin_s, end_s in _strokes(analysed):
-        inside = (times_s >= begin_s) & (times_s < end_s)
-        fractions.append(float(np.mean(np.isnan(analysed.positions_m[inside]))) if np.any(inside) else 0.0)
-    return max(fractions)
 
 
 def is_clipped(forces_n: Array) -> bool:
@@ -265,24 +232,26 @@ def is_clipped(forces_n: Array) -> bool:
     return any(np.all(ends[i : i + FLAT_SAMPLES]) for i in np.flatnonzero(ends))
 
 
-def missing_fraction(analysed: AnalysedTrial) -> float:
+def _missing_fraction(analysed: AnalysedTrial) -> float:
     """Return the fraction of missing samples in the worst stroke."""
-    if analysed.profile is None or analysed.motion is None:
+    if analysed.profile is None:
         return 0.0
-    times_s = analysed.profile.times_s
-    period_s = float(np.median(np.diff(times_s)))
-    fractions = []
-    for begin_s, end_s in _strokes(analysed):
-        inside = np.count_nonzero((times_s >= begin_s) & (times_s < end_s))
-        fractions.append(1.0 - (inside + 1) * period_s / (end_s - begin_s))
-    return max(fractions)
+    period_s = float(np.median(np.diff(analysed.profile.times_s)))
+    return max(
+        (1.0 - (np.count_nonzero(inside) + 1) * period_s / duration_s for inside, duration_s in _strokes(analysed)),
+        default=0.0,
+    )
 
 
-def _strokes(analysed: AnalysedTrial) -> Iterable[tuple[float, float]]:
-    motion, extraction = analysed.motion, analysed.extraction
+def _strokes(analysed: AnalysedTrial) -> Iterator[tuple[Mask, float]]:
+    """Yield which samples belong to each stroke, and its duration."""
+    motion, spans_s = analysed.motion, list[tuple[float, float]]()
     if isinstance(motion, Shear):
-        yield motion.begin_s, motion.steady_to_s
+        spans_s.append((motion.begin_s, motion.steady_to_s))
     if isinstance(motion, Insertion):
-        yield motion.surface_s, motion.stop_s
-    if extraction is not None:
-        yield extraction.lift_s, extraction.out_s
+        spans_s.append((motion.surface_s, motion.stop_s))
+    if analysed.extraction is not None:
+        spans_s.append((analysed.extraction.lift_s, analysed.extraction.out_s))
+    for begin_s, end_s in spans_s:
+        assert analysed.profile is not None
+        yield (analysed.profile.times_s >= begin_s) & (analysed.profile.times_s < end_s), end_s - begin_s

@@ -1,4 +1,4 @@
-"""Finds the studies: every module of experiments/studies that has a function `study`.
+"""Finds the studies: every module of experiments/studies and verification/studies that has a function `study`.
 
 The name of the file is the name of the command, and the first line of the function's docstring its help. Both are read
 from the text, because a study takes long to import.
@@ -9,22 +9,38 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
-FOLDER = Path(__file__).parents[1] / "studies"
-PACKAGE = "experiments.studies"
+ROOT = Path(__file__).parents[2]
+FOLDERS = {  # by package; the second proves the product and is a layer above
+    "experiments.studies": ROOT / "experiments" / "studies",
+    "verification.studies": ROOT / "verification" / "studies",
+}
+
+
+class FoundStudy(NamedTuple):
+    module: str
+    text: str  # the docstring
 
 
 @cache
+def find_studies() -> dict[str, FoundStudy]:
+    """Return every study by the name of its command."""
+    found = {}
+    for package, folder in FOLDERS.items():
+        for path in folder.glob("*.py"):
+            for node in ast.parse(path.read_bytes()).body:
+                if isinstance(node, ast.FunctionDef) and node.name == "study":
+                    name, text = path.stem.replace("_", "-"), ast.get_docstring(node) or ""
+                    found[name] = FoundStudy(f"{package}.{path.stem}", text)
+    return dict(sorted(found.items()))
+
+
 def study_texts() -> dict[str, str]:
     """Return the docstring of every study by the name of its command."""
-    texts = {}
-    for path in sorted(FOLDER.glob("*.py")):
-        for node in ast.parse(path.read_bytes()).body:
-            if isinstance(node, ast.FunctionDef) and node.name == "study":
-                texts[path.stem.replace("_", "-")] = ast.get_docstring(node) or ""
-    return texts
+    return {name: found.text for name, found in find_studies().items()}
 
 
 def load_study(name: str) -> ModuleType:
     """Import the module of a study."""
-    return import_module(f"{PACKAGE}.{name.replace('-', '_')}")
+    return import_module(find_studies()[name].module)

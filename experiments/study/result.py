@@ -25,6 +25,7 @@ class Table:
     units: Mapping[str, str]  # by column
     rows: DataFrame
     section: str = "Result"  # heading of its part of the page
+    on_page_only: bool = False
 
     def cells(self) -> Rows:
         """Return the text of all cells, the head first."""
@@ -61,7 +62,7 @@ class Result:
 
     def text(self) -> str:
         """Return all tables and notes for a screen."""
-        return "\n\n".join([*(table.text() for table in self.tables), *self.notes])
+        return "\n\n".join([*(table.text() for table in self.tables if not table.on_page_only), *self.notes])
 
     def json(self) -> dict[str, Any]:
         """Return the summary as JSON has it."""

@@ -17,6 +17,7 @@ class Session(NamedTuple):
     operator: Operator
     show: Show
     socket: Path | None = None  # of the daemon that controls the robot; None where the robot is simulated
+    simulated: bool = False
     program: Mapping[str, str] = {}  # version and sources, a part of every notebook's plan
 
 

@@ -74,19 +74,6 @@ def group_rule(text: str) -> tuple[str, str]:
     return pattern, name
 
 
-def plate_cm(text: str) -> tuple[float, float, float]:
-    """Parses 3x3.5 or, with its thickness, 3x3.5x0.4."""
-    sides = text.lower().removesuffix("cm").split("x")
-    if len(sides) not in (2, 3):
-        raise argparse.ArgumentTypeError(f"{text}: must be width x height, or width x height x thickness, in cm")
-    width, height, thickness = (_number(side) for side in [*sides, "0.4"][:3])
-    if not (0.2 <= width <= 50.0 and 0.2 <= height <= 50.0 and 0.02 <= thickness <= 10.0):
-        raise argparse.ArgumentTypeError(
-            f"{text}: width and height must be from 0.2 to 50, thickness from 0.02 to 10 cm"
-        )
-    return width, height, thickness
-
-
 def weights_g(text: str) -> tuple[float, ...]:
     try:
         values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))

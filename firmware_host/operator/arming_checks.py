@@ -15,7 +15,6 @@ from control.records import DriveState
 from drivers.drive import DriveHealth
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.loop import Loop
-from firmware_host.loop_snapshot import take_snapshot
 from firmware_host.operator.reports import check_item
 
 HEARING = f"check its power, wiring, node id, type and message periods; {SET_UP}"
@@ -27,19 +26,18 @@ UNWATCHED = ", but never its temperature: the currents alone guard it"
 
 def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
     """All lines, also those that permit arming."""
-    now = take_snapshot(loop)
     lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
-    for health, state in zip(now.drives, now.states, strict=True):
+    for health, state in zip(loop.drives.health, loop.states, strict=True):
         lines |= _drive_lines(health, state)
-    for bus in now.buses:
-        lost = f", {bus.lost_frames} frames lost" if bus.lost_frames else ""
-        lines[f"bus.{bus.name}"] = f"{bus.error_frames} error frames, {bus.failed_sends} failed sends{lost}"
-    lines["loop"] = f"{now.rate_hz:.1f} Hz, {now.missed_ticks} ticks missed since the start"
+    for name, port in loop.drives.ports.items():
+        lost = f", {port.lost_frames} frames lost" if port.lost_frames else ""
+        lines[f"bus.{name}"] = f"{port.error_frames} error frames, {port.failed_sends} failed sends{lost}"
+    lines["loop"] = f"{loop.timing.rate_hz:.1f} Hz, {loop.missed_ticks} ticks missed since the start"
     lines["log"] = str(loop.recorder.path or "off")
-    pose = now.pose
+    pose = loop.pose.report()
     if pose.source:
         lines["pose"] = pose.message
-    faults = [present.fault for present in now.faults]
+    faults = [present.fault for present in loop.aged_faults]
     if pose.trouble:  # the pose source's own text says more
         faults = [fault for fault in faults if fault.kind is not FaultKind.POSE_LOST]
     faults_of: dict[str, list[Fault]] = {}
@@ -47,8 +45,8 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
         faults_of.setdefault(fault.check_line, []).append(fault)
     lines = lines | {identity: "" for identity in faults_of if identity not in lines}
     joints = loop.configuration.rig.joints
-    unheard = {f"drive.{joint}" for joint, state in zip(joints, now.states, strict=True) if not state.heard}
-    cause_lines = _cause_lines(now.faults, loop.configuration)
+    unheard = {f"drive.{joint}" for joint, state in zip(joints, loop.states, strict=True) if not state.heard}
+    cause_lines = _cause_lines(loop.aged_faults, loop.configuration)
     items = []
     for identity, text in lines.items():
         own = faults_of.get(identity, [])

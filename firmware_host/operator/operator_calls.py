@@ -5,17 +5,17 @@ log names the sender of every request that changes something. Methods that set t
 the holder of the lease, if there is one; methods that end a motion are not.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
-from control.fault_causes import AgedFault, group_by_cause
+from control.fault_causes import group_by_cause
 from control.faults import Blocks, Fault
+from control.gait.gait import full_step_m
 from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.loop import Loop
-from firmware_host.loop_snapshot import LoopSnapshot, take_snapshot
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.reports import (
     cause_report,
@@ -76,45 +76,50 @@ class OperatorCalls:
         return {name: validated(name, method) for name, method in methods.items()}
 
     def status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
-        loop, now = self._loop, take_snapshot(self._loop)
+        loop, learning, now_s = self._loop, self._loop.learning, self._clock()
+        lease = loop.lease
         return {
             "schema": "status/2",
             "robot": loop.configuration.robot.name,
             "version": self._version,
             "compiled": self._compiled,
-            "now_s": self._clock(),  # as the log's stamps
-            "mode": now.mode.name.lower(),
-            "moving": now.moving,
-            **self._fault_reports(now),
-            "forced": now.forced,
-            "notice": now.notice,
-            "unlogged_requests": now.unlogged_requests,
-            "lease": now.lease_holder,
-            "lease_left_s": known(now.lease_until_s - self._clock()) if now.lease_holder else None,
-            **_walk_report(now),
-            "pose": now.pose._asdict(),
+            "now_s": now_s,  # as the log's stamps
+            "mode": loop.mode.name.lower(),
+            "moving": loop.controller.moving,
+            **self._fault_reports(),
+            "forced": loop.forced,
+            "notice": loop.events.notice,
+            "unlogged_requests": loop.events.requests.unlogged,
+            "lease": str(lease.holder) if lease.held else None,
+            "lease_left_s": known(lease.until_s - now_s) if lease.held else None,
+            **_walk_report(loop),
+            "pose": loop.pose.report()._asdict(),
             "drives": [
-                {"joint": joint} | _drive_report(now, index, self._clock()) | self._drive_settings[joint]
+                {"joint": joint} | _drive_report(loop, index, now_s) | self._drive_settings[joint]
                 for index, joint in enumerate(self._rig.joints)
             ],
-            "strides_closed": now.strides_closed,
-            "mud": mud_estimate_report(now.mud, self._rig),
-            "loads": {flipper: load_report(load) for flipper, load in now.loads.items()},
+            "strides_closed": learning.strides_closed,
+            "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
+            "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
             "warnings": self._warnings,
-            "bus": _bus_report(now),
-            "log": {"path": str(loop.recorder.path) if loop.recorder.path else None} | _log_report(now),
+            "bus": _bus_report(loop),
+            "log": _log_report(loop),
         }
 
-    def _fault_reports(self, now: LoopSnapshot) -> dict[str, Any]:
-        """The fault to show first, and the gravest ones with their common causes."""
-        shown = now.fault or next(iter(now.blocking), None)
-        gravest = _gravest(now.faults, shown)
-        faults = {present.fault: _fault_report(*present) for present in gravest}
+    def _fault_reports(self) -> dict[str, Any]:
+        """Return the fault to show first, and the gravest ones with their common causes."""
+        present = self._loop.aged_faults
+        shown = self._loop.fault or next(iter(self._loop.faults.blocking()), None)
+        gravest = present
+        if len(present) > FAULTS_PER_ANSWER:
+            ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
+            gravest = ordered[:FAULTS_PER_ANSWER]
+        faults = {each.fault: _fault_report(*each) for each in gravest}
         return {
             "fault": faults[shown] if shown else None,
             "faults": list(faults.values()),
-            "faults_left_out": len(now.faults) - len(faults),
+            "faults_left_out": len(present) - len(faults),
             "causes": [cause_report(cause) for cause in group_by_cause(gravest, self._bus_of)],
         }
 
@@ -214,14 +219,6 @@ def _accepted(refused: str | None) -> str:
     return "accepted"
 
 
-def _gravest(faults: Sequence[AgedFault], shown: Fault | None) -> Sequence[AgedFault]:
-    """Return as many faults as an answer has room for: the one that is shown, then those with the hardest reactions."""
-    if len(faults) <= FAULTS_PER_ANSWER:
-        return faults
-    ordered = sorted(faults, key=lambda present: (present.fault != shown, -present.fault.kind.reaction))
-    return ordered[:FAULTS_PER_ANSWER]
-
-
 def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:
     return {
         "name": fault.name,
@@ -234,13 +231,13 @@ def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:
     }
 
 
-def _drive_report(now: LoopSnapshot, index: int, now_s: float) -> dict[str, Any]:
-    state, health = now.states[index], now.drives[index]
+def _drive_report(loop: Loop, index: int, now_s: float) -> dict[str, Any]:
+    state, health = loop.states[index], loop.drives.health[index]
     return {
         "angle_rad": known(state.angle_rad),
         "velocity_rad_s": known(state.velocity_rad_s),
         "current_a": known(state.current_a),
-        "torque_command_nm": now.sent.torques_nm[index],
+        "torque_command_nm": loop.sent.torques_nm[index],
         "closed_loop": state.closed_loop,
         "errors": health.active_errors,
         "temperature_c": known(state.temperature_c),
@@ -248,41 +245,47 @@ def _drive_report(now: LoopSnapshot, index: int, now_s: float) -> dict[str, Any]
         "firmware": health.firmware or None,
         "hardware": health.hardware or None,
         "watchdog_s": known(health.watchdog_s),
-        "winding_c": round(now.winding_temperatures_c[index], 1),
+        "winding_c": round(loop.fault_monitor.joints[index].winding.temperature_c, 1),  # measured or estimated
         "angle_age_s": known(now_s - state.angle_stamp_s),
         "current_age_s": known(now_s - state.current_stamp_s),
         "heartbeat_age_s": known(now_s - state.heartbeat_stamp_s),
     }
 
 
-def _walk_report(now: LoopSnapshot) -> dict[str, Any]:
+def _walk_report(loop: Loop) -> dict[str, Any]:
+    gait = loop.controller.gait
     return {
-        "phase": now.phase.name.lower(),
-        "stride": now.stride,
-        "depth_m": now.depth_m,
-        "next_depth_m": now.next_depth_m,
-        "depth_reason": now.depth_reason,
-        "full_step_m": now.full_step_m,
-        "body_x_m": known(now.body.x_m),
+        "phase": loop.target.phase.name.lower(),
+        "stride": loop.target.stride,
+        "depth_m": loop.stride_depth_m,
+        "next_depth_m": gait.next_depth_m,
+        "depth_reason": loop.learning.depth_reason,
+        "full_step_m": full_step_m(gait.next_parameters, loop.configuration.geometry),  # if nothing slips
+        "body_x_m": known(loop.body.x_m),
     }
 
 
-def _log_report(now: LoopSnapshot) -> dict[str, Any]:
+def _log_report(loop: Loop) -> dict[str, Any]:
+    log, path = loop.recorder.report(), loop.recorder.path
     return {
-        "dropped": now.log.dropped,
-        "writer_alive": now.log.alive,
-        "problem": now.log.problem,
-        "free_fraction": known(now.log.free_fraction),
-        "slowest_write_s": known(now.log.slowest_write_s),
+        "path": str(path) if path else None,
+        "dropped": log.dropped,
+        "writer_alive": log.alive,
+        "problem": log.problem,
+        "free_fraction": known(log.free_fraction),
+        "slowest_write_s": known(log.slowest_write_s),
     }
 
 
-def _bus_report(now: LoopSnapshot) -> dict[str, Any]:
-    buses = now.buses
-    return now.frames._asdict() | {
-        "state": {bus.name: bus.state.name.lower() for bus in buses},
-        "last_error": {bus.name: bus.last_error for bus in buses if bus.last_error},
-        "error_frames": sum(bus.error_frames for bus in buses),
-        "failed_sends": sum(bus.failed_sends for bus in buses),
-        "lost_frames": sum(bus.lost_frames for bus in buses),
+def _bus_report(loop: Loop) -> dict[str, Any]:
+    drives, ports = loop.drives, loop.drives.ports
+    return {
+        "unknown_frames": drives.unknown_frames,
+        "malformed_frames": drives.malformed_frames,
+        "refused_commands": drives.refused_commands,
+        "state": {name: port.state.name.lower() for name, port in ports.items()},
+        "last_error": {name: port.last_error for name, port in ports.items() if port.last_error},
+        "error_frames": sum(port.error_frames for port in ports.values()),
+        "failed_sends": sum(port.failed_sends for port in ports.values()),
+        "lost_frames": sum(port.lost_frames for port in ports.values()),
     }

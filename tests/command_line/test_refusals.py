@@ -137,7 +137,7 @@ def test_a_wrong_value_of_an_option_is_refused_by_that_value(
     assert said in refusal(capsys, "experiment", *arguments)
 
 
-@pytest.mark.parametrize("experiment", ["actuator", "loadcell", "flipper", "walk", "trackway"])
+@pytest.mark.parametrize("experiment", ["flipper", "walk", "trackway"])
 def test_without_matplotlib_no_experiment_begins(
     experiment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

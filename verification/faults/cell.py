@@ -33,13 +33,13 @@ AFTER_S = 1.0  # in which nothing may come back
 WALKED_ON_S = 0.3  # with a fault that does not stop the robot
 
 
-def run_cell(name: str, phase: str, seed: int, drive: str = DEFAULT) -> Cell:
+def run_cell(mode_name: str, phase: str, seed: int, drive: str = DEFAULT) -> Cell:
     """Run one cell, which depends on nothing but its arguments; `drive` is the type of the robot's drives."""
-    mode, random = mode_of(name, drive), Random(f"{name} {phase} {seed}")
+    mode, random = mode_of(mode_name, drive), Random(f"{mode_name} {phase} {seed}")
     joint = random.choice(mode.joints(phase))
     cell = Cell(
         fault=mode.fault,
-        mode_name=name,
+        mode_name=mode_name,
         phase=phase,
         seed=seed,
         joint=joint,

@@ -15,18 +15,18 @@ GOING_ON = ("arming", "hold", "walking", "stopping")
 
 @dataclass
 class Cell:
-    """The measurements of one cell. The keys of the report in JSON are those of the fields, or their `key`."""
+    """The measurements of one cell. Their names are the keys of the report in JSON."""
 
     fault: str
-    mode_name: str = field(metadata={"key": "way"})
+    mode_name: str
     phase: str
     seed: int
     joint: str
     reaction: str
     bound_ticks: int | None
     reaction_ticks: int | None = None
-    reported_ticks: int | None = field(default=None, metadata={"key": "told_ticks"})
-    reported: list[str] = field(default_factory=list, metadata={"key": "told"})
+    reported_ticks: int | None = None
+    reported: list[str] = field(default_factory=list)
     mode: str = ""  # of the robot at the end
     peak_torque_nm: float = 0.0  # of any motor since the injection
     damping_torque_nm: float = 0.0  # after the start of damping

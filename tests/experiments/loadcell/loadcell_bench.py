@@ -11,13 +11,13 @@ from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
 from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
-from experiments.loadcell.evaluation import Results, evaluate_muds
 from experiments.loadcell.preparation import CellSettings, prepare_cell
 from experiments.loadcell.recording import CellRecorder
-from experiments.loadcell.run import notebook_plan
-from experiments.loadcell.stage import SimulatedStage
-from experiments.loadcell.strokes import StageSettings
-from experiments.loadcell.trials import TrialBench, TrialPlan, measure_all
+from experiments.loadcell.report import Results, evaluate_muds
+from experiments.loadcell.stage import SimulatedStage, Trial
+from experiments.loadcell.strokes import INSERTION, StageSettings
+from experiments.loadcell.trials import TrialBench, TrialPlan, measure, measure_all
+from experiments.studies.loadcell import notebook_plan
 from experiments.study.notebook import Notebook
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
 from simulation.test_rig.load_cell_bench import EmulatedBench
@@ -79,7 +79,8 @@ class Laboratory:
         self.recorder = CellRecorder(self.port, self.bench, operator.report, self.encoder)
         self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
         self.notebook = Notebook(folder, notebook_plan(SETTINGS))
-        stage_of_it = SimulatedStage(SETTINGS, self.bench, muds, seed)
+        stage_of_it = SimulatedStage(SETTINGS, self.bench, (), seed)
+        stage_of_it.plates = dict(muds)
         self.trial_bench = TrialBench(
             self.recorder, stage_of_it, operator, self.notebook, folder, lambda done, total: None
         )
@@ -91,8 +92,16 @@ class Laboratory:
         prepare_cell(self.trial_bench, SETTINGS, cell or CellSettings())
         measure_all(self.trial_bench, self.plan)
 
+    def try_once(self, kind: str = INSERTION) -> list[str]:
+        """Measure one trial and return the reported messages."""
+        trial = Trial("lawful", kind, 1)
+        self.recorder.listen(1.0)
+        self.trial_bench.stage.prepare(trial, 1)
+        self.notebook.write(trial.key, measure(self.trial_bench, trial, self.plan))
+        return self.operator.reported
+
     def evaluate_muds(self) -> Results:
-        return evaluate_muds(self.folder, self.notebook, self.plan, None, lambda done, total: None)
+        return evaluate_muds(self.folder, self.notebook, self.plan, lambda done, total: None)
 
     def close(self) -> None:
         self.port.close()

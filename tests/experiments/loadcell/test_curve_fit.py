@@ -13,13 +13,6 @@ def fading(parameters: Array) -> Array:
     return np.stack([np.ones_like(T), np.exp(-np.exp(parameters[0]) * T)], 1)
 
 
-def test_rate_and_factors_of_a_decay_come_out() -> None:
-    y = 2.0 + 3.0 * np.exp(-1.5 * T)
-    fit = fit_curve(fading, y, [np.array([2.0]), np.array([-2.0])], NOTHING_KNOWN, 0.01)
-    assert np.exp(fit.parameters[0]) == pytest.approx(1.5, rel=1e-3)
-    assert fit.factors == pytest.approx([2.0, 3.0], rel=1e-3)
-
-
 def test_the_standard_error_is_the_scatter_over_many_fits() -> None:
     random = np.random.default_rng(1)
     fits = [

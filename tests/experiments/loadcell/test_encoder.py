@@ -11,12 +11,10 @@ import pytest
 from experiments.loadcell.analysis import bench_uncertainty
 from experiments.loadcell.preparation import CellSettings, examine_encoder
 from experiments.loadcell.recording import RAW, load_counted
-from experiments.loadcell.stage import Trial
-from experiments.loadcell.strokes import INSERTION
-from experiments.loadcell.trials import KEEP, WITHOUT, measure
+from experiments.loadcell.trials import KEEP, WITHOUT
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON
-from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedStageEncoder, StageEncoderParameters
+from simulation.test_rig.emulated_instruments import EmulatedStageEncoder, StageEncoderParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_operator import ScriptedOperator
 
@@ -38,15 +36,6 @@ def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
     return laboratory.bench.encoder
 
 
-def try_once(laboratory: Laboratory) -> list[str]:
-    """Measure one insertion and return the reported messages."""
-    trial = Trial("lawful", INSERTION, 1)
-    laboratory.recorder.listen(1.0)
-    laboratory.trial_bench.stage.prepare(trial, 1)
-    measure(laboratory.trial_bench, trial, laboratory.plan)
-    return laboratory.operator.reported
-
-
 def examine(laboratory: Laboratory) -> None:
     laboratory.recorder.listen(2.0)
     examine_encoder(laboratory.recorder, laboratory.operator, SETTINGS)
@@ -66,20 +55,11 @@ def test_the_known_coefficients_are_found_on_a_manual_stage(make: Make) -> None:
     assert len(list((laboratory.folder / RAW).glob("*_position.csv"))) == 4
 
 
-def test_an_amplifier_that_averages_two_samples_costs_less_than_three_percent(make: Make) -> None:
-    laboratory = make(trials=2, seed=4, amplifier=AmplifierParameters(averaged=2))
-    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
-    reported = laboratory.evaluate_muds().muds["lawful"]
-    assert {name: each.value for name, each in reported.items()} == {
-        name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
-    }
-
-
 def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(4.5, counter_of(laboratory).unplug)
     laboratory.at(6.0, counter_of(laboratory).plug_in)
-    assert any("encoder was unplugged or restarted" in each for each in try_once(laboratory))
+    assert any("encoder was unplugged or restarted" in each for each in laboratory.try_once())
     (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
     assert recorded.positions is None and len(recorded.forces_n) > 400
     assert (laboratory.folder / laboratory.notebook.entries[recorded.key]["position"]["file"]).exists()
@@ -89,7 +69,7 @@ def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make: 
 def test_an_unplugged_encoder_is_asked_for_and_then_left_out(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(GO_ON, WITHOUT, KEEP))
     counter_of(laboratory).unplug()
-    reported = try_once(laboratory)
+    reported = laboratory.try_once()
     assert [("encoder is unplugged" in each, "plug" in each) for each in reported[:2]] == [(True, True)] * 2
     assert reported[2].startswith("going on without the position")
     assert "position" not in laboratory.notebook.entries["lawful/insertion/1"]
@@ -99,7 +79,7 @@ def test_an_encoder_that_is_plugged_in_when_asked_for_continues(make: Make) -> N
     laboratory = make()
     counter_of(laboratory).unplug()
     laboratory.at(1.5, counter_of(laboratory).plug_in)
-    reported = try_once(laboratory)
+    reported = laboratory.try_once()
     assert len(reported) == 1 and "encoder is unplugged" in reported[0]
     (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
     assert recorded.positions is not None
@@ -108,30 +88,31 @@ def test_an_encoder_that_is_plugged_in_when_asked_for_continues(make: Make) -> N
 def test_a_drop_out_in_the_stroke_is_reported(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(3.9, lambda: setattr(counter_of(laboratory), "line_at", lambda at_s: b""))
-    reported = try_once(laboratory)
+    reported = laboratory.try_once()
     assert any("position is unknown" in each or "the position is not used" in each for each in reported)
 
 
 def test_a_few_garbled_lines_do_no_harm(make: Make) -> None:
     laboratory = make(encoder={"garbled_fraction": 0.05})
-    assert try_once(laboratory) == []
+    assert laboratory.try_once() == []
     assert laboratory.notebook.entries["lawful/insertion/1"]["position"]["garbled_lines"] > 5
 
 
-def test_a_wrong_baud_rate_is_reported(make: Make) -> None:
-    with pytest.raises(BenchError, match="own rate with --position-baud.*; or continue without --position"):
-        examine(make(encoder={"baud": 57600}))
-
-
-def test_one_that_sends_nothing_says_what_to_check(make: Make) -> None:
-    with pytest.raises(BenchError, match="nothing arrives.*or continue without --position"):
-        examine(make(encoder={"drop_out_rate_hz": 10.0, "rate_hz": 10.0, "drop_out_s": 10.0}))
-
-
-def test_lines_that_are_no_counts_are_shown(make: Make) -> None:
-    laboratory = make()
-    counter_of(laboratory).line_at = lambda at_s: b"12.5 mm\r\n"
-    with pytest.raises(BenchError, match=r"12.5 mm.*--position-label"):
+@pytest.mark.parametrize(
+    ("encoder", "line", "option"),
+    [
+        ({"baud": 57600}, None, "--position-baud"),
+        ({"drop_out_rate_hz": 10.0, "rate_hz": 10.0, "drop_out_s": 10.0}, None, "nothing arrives"),
+        ({}, b"12.5 mm\r\n", "--position-label"),
+    ],
+)
+def test_lines_that_cannot_be_read_are_refused_with_what_to_do(
+    make: Make, encoder: dict[str, Any], line: bytes | None, option: str
+) -> None:
+    laboratory = make(encoder=encoder)
+    if line is not None:
+        counter_of(laboratory).line_at = lambda at_s: line
+    with pytest.raises(BenchError, match=f"{option}.*or continue without --position"):
         examine(laboratory)
 
 
@@ -139,13 +120,3 @@ def test_an_encoder_too_slow_for_the_stroke_is_reported(make: Make) -> None:
     laboratory = make(encoder={"rate_hz": 20.0})
     examine(laboratory)
     assert "20 lines/s, one per 5.0 mm" in laboratory.operator.reported[0]
-
-
-def test_an_unplugged_cell_does_not_cost_the_positions(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters())
-    laboratory.at(4.5, laboratory.bench.amplifier.unplug)
-    laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
-    assert any("connected again" in each for each in try_once(laboratory))
-    assert laboratory.encoder is not None and laboratory.encoder.breaks == 0
-    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
-    assert recorded.positions is not None

@@ -15,7 +15,6 @@ from experiments.loadcell.analysis import (
     analyse,
     analyse_trial,
     bench_uncertainty,
-    common_pace,
     gather_trials,
     speed_remark,
 )
@@ -33,7 +32,6 @@ from experiments.loadcell.strokes import (
     StageSettings,
     find_contact,
     fit_slope,
-    noises_n,
     without_spikes,
 )
 from simulation.mud.clay import clay_of_water
@@ -55,23 +53,14 @@ def found(trials: list[Recorded]) -> dict[str, float]:
     return {name: gather_trials(reported, name, 0.0).value for name in COEFFICIENTS}
 
 
-@pytest.mark.parametrize(("seed", "acceleration_m_s2"), [(1, 0.6), (2, 2.0), (3, 8.0)])
+@pytest.mark.parametrize(("seed", "acceleration_m_s2"), [(1, 0.6), (3, 8.0)])
 def test_coefficients_of_a_mud_that_obeys_the_laws_come_out_within_three_per_cent(
     seed: int, acceleration_m_s2: float
 ) -> None:
     mud = LawfulMud(**KNOWN)
-    kinds = [(INSERTION, trial) for trial in range(5)] + [(SHEAR, trial) for trial in range(2)]
+    kinds = [(INSERTION, trial) for trial in range(3)] + [(SHEAR, 3)]
     trials = [feel(mud, kind, 100 * seed + i, acceleration_m_s2=acceleration_m_s2) for kind, i in kinds]
     assert found(trials) == {name: pytest.approx(value, rel=BOUND) for name, value in KNOWN.items()}
-
-
-def test_an_abrupt_stage_is_not_taken_for_mud_that_resists_more_at_low_speed() -> None:
-    """Five trials of one mud suffice, although the stage speeds up within a single sample."""
-    mud = LawfulMud(1.3e6, 0.6e6, 1.4e6)
-    trials = [feel(mud, INSERTION, 4000 + i, acceleration_m_s2=8.0, noise_n=0.01) for i in range(5)]
-    reported = analyse(trials, SETTINGS, look)
-    assert gather_trials(reported, "k_p", 0.0).value == pytest.approx(mud.k_p, rel=0.01)
-    assert gather_trials(reported, "k_e", 0.0).value == pytest.approx(mud.k_e, rel=0.01)
 
 
 @pytest.mark.parametrize(("water", "acceleration_m_s2"), [(47.6, 2.0), (51.2, 0.6)])
@@ -103,7 +92,7 @@ def true_slope(curve: LoadCurve, deepest_m: float) -> float:
 @pytest.fixture(scope="module")
 def clay_trials() -> list[AnalysedTrial]:
     """Return trials of one stage that start at random times between two samples."""
-    return analyse([feel(clay_plate(49.5), INSERTION, 40 + i) for i in range(8)], SETTINGS, look)
+    return analyse([feel(clay_plate(49.5), INSERTION, 40 + i) for i in range(6)], SETTINGS, look)
 
 
 @pytest.mark.parametrize("name", ["k_p", "k_e"])
@@ -137,22 +126,6 @@ def test_the_error_of_a_slope_is_the_scatter_of_slopes_and_that_of_weighted_leas
 
 def profile_n(depths_m: Array) -> Array:
     return np.asarray(1.5 + 60.0 * depths_m)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_noises_are_those_of_the_samples_on_any_line(turned: bool) -> None:
-    random = np.random.default_rng(2)
-    depths_m = np.sort(random.uniform(0.0, 0.03, 4000))[:: -1 if turned else 1]
-    reported_n = noises_n(depths_m, profile_n(depths_m) + 0.01 * random.standard_normal(4000))
-    assert float(np.std(reported_n)) == pytest.approx(0.01, rel=0.05)
-    assert np.max(np.abs(noises_n(depths_m, profile_n(depths_m)))) < 1e-9
-
-
-def test_the_error_of_five_trials_has_students_factor() -> None:
-    values = (1e6, 2e6, 3e6, 4e6, 5e6)
-    trials = [AnalysedTrial(nowhere(), coefficients={"k_s": Coefficient(value, 1.0)}) for value in values]
-    reported = gather_trials(trials, "k_s", 0.0)
-    assert reported.trials_error == pytest.approx(student_factor(4) * 5e6 / np.sqrt(10.0) / np.sqrt(5.0))
 
 
 def nowhere() -> Recorded:
@@ -229,12 +202,6 @@ def test_ten_samples_a_second_are_too_few_for_an_insertion() -> None:
     assert "samples" in one(feel(LawfulMud(**KNOWN), INSERTION, 1, rate_hz=10.0)).problem
 
 
-def test_ten_samples_a_second_are_enough_for_a_shear() -> None:
-    reported = one(feel(LawfulMud(**KNOWN), SHEAR, 1, rate_hz=10.0))
-    assert reported.problem == ""
-    assert reported.coefficients["k_s"].value == pytest.approx(KNOWN["k_s"], rel=BOUND)
-
-
 def test_a_drifting_zero_is_no_contact() -> None:
     times_s = np.arange(0.0, 40.0, 0.0125)
     ramp_n = np.where(times_s > 35.0, np.minimum((times_s - 35.0) * 10.0, 2.0), 0.0)
@@ -253,16 +220,6 @@ def test_a_millimetre_of_depth_is_seven_per_cent_of_the_shear_and_three_of_the_o
     uncertainties = {name: bench_uncertainty(name, SETTINGS, 1e-3, 0.0) for name in COEFFICIENTS}
     assert uncertainties == pytest.approx({"k_p": 0.035, "k_s": 0.067, "k_e": 0.035}, abs=0.003)
     assert bench_uncertainty("k_s", SETTINGS, 0.0, 0.05) == pytest.approx(0.05, rel=0.01)
-
-
-def test_a_speed_off_its_setting_is_as_uncertain_as_the_two_are_apart() -> None:
-    """The trials agree on 0.097 m/s and the stage is set to 0.1 m/s: the uncertainty covers both."""
-    agreed, far = (
-        common_pace([Pace(speed * factor, 2.0, 0.005, 0.1) for factor in (0.99, 1.0, 1.01)], SETTINGS)
-        for speed in (0.1, 0.097)
-    )
-    assert agreed[1] < 0.01
-    assert abs(far[0].speed_m_s / 0.097 - 1.0) < 2.0 * far[1] and abs(far[0].speed_m_s / 0.1 - 1.0) < 2.0 * far[1]
 
 
 def test_the_error_of_a_mud_contains_scatter_calibration_and_shared_speed(insertion: Recorded) -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from experiments.loadcell.analysis import COEFFICIENTS, analyse, analyse_trial, gather_trials
 from experiments.loadcell.curve_fit import Array
-from experiments.loadcell.force_trials import depths_of, wide_pace
+from experiments.loadcell.force_trials import wide_pace
 from experiments.loadcell.measured_trials import moving
 from experiments.loadcell.stage_track import WIDE, common_alignment, fit_rate
 from experiments.loadcell.strokes import (
@@ -23,7 +21,6 @@ from experiments.loadcell.strokes import (
 )
 from simulation.mud.clay import RATE_COEFFICIENT
 from simulation.test_rig.load_cell_bench import clay_plate
-from simulation.test_rig.stage_motion import ManualMotionParameters
 from tests.experiments.loadcell.lawful_mud import LawfulMud, feel_by_hand
 from tests.experiments.loadcell.test_force_trials import true_of_clay
 
@@ -69,14 +66,6 @@ def test_the_lag_between_the_devices_is_found_from_the_stroke(insertion: Recorde
         reported = one(insertion._replace(times_s=insertion.times_s - LAG_S + lag_s))
         assert reported.alignment is not None
         assert reported.alignment.lag_s == pytest.approx(lag_s, abs=0.002)
-
-
-def test_the_depth_is_the_encoders_within_a_fraction_of_a_millimetre(insertion: Recorded) -> None:
-    reported = one(insertion)
-    depths_m = depths_of(reported, SETTINGS)
-    assert depths_m is not None
-    assert np.nanmax(depths_m) == pytest.approx(0.03, abs=3e-4)
-    assert 0.0 < reported.position_error_m < 3e-4
 
 
 def test_the_coefficients_do_not_depend_on_the_encoders_direction(insertion: Recorded) -> None:
@@ -151,12 +140,6 @@ def test_an_uncertain_rate_is_shared_by_all_trials(kind: str, name: str, request
     assert gather_trials([reported] * 100, name, 0.0).trials_error > shared
 
 
-def test_an_uncertain_rate_makes_an_insertion_uncertain(insertion: Recorded) -> None:
-    sure, unsure = (one(insertion, Alignment(LAG_S, 0.1, 0.002, uncertainty)) for uncertainty in (0.01, 0.3))
-    for name in ("k_p", "k_e"):
-        assert unsure.coefficients[name].std_error > 1.2 * sure.coefficients[name].std_error
-
-
 def test_a_stage_of_one_speed_says_nothing_of_the_rate() -> None:
     reported = fit_rate(np.full(50, 3.0), np.full(50, 0.01))
     assert (reported.rate_fraction, reported.rate_uncertainty) == pytest.approx(
@@ -179,17 +162,3 @@ def test_after_a_rest_samples_count_again_two_millimetres_on() -> None:
     assert np.flatnonzero(moving(positions_m, speeds_m_s, 0.01, 0.002)).tolist() == [8]
     in_air = np.zeros(10, dtype=bool)
     assert np.flatnonzero(moving(positions_m, speeds_m_s, 0.01, 0.002, in_air)).tolist() == [1, 2, 6, 7, 8]
-
-
-def test_a_slow_encoder_is_less_certain() -> None:
-    hand = ManualMotionParameters(rest_fraction=0.0)
-    quick, slow = (
-        one(feel_by_hand(clay_plate(49.5), INSERTION, 9, hand, position_rate_hz=rate_hz)) for rate_hz in (100.0, 25.0)
-    )
-    assert slow.position_error_m > 1.5 * quick.position_error_m
-
-
-def test_a_measured_trial_has_no_pace_of_the_force(insertion: Recorded) -> None:
-    reported = one(insertion)
-    assert reported.pace is None and reported.speed_m_s is not None and 0.03 < reported.speed_m_s < 0.2
-    assert replace(reported, positions_m=None).pace is not None

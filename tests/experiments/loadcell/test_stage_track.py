@@ -43,11 +43,6 @@ def test_the_position_is_known_over_a_gap_in_which_the_stage_stood_still() -> No
     assert track.mean_positions_m(np.array([0.9]), 0.0125) == pytest.approx([0.7])
 
 
-def test_slow_lines_are_no_gaps() -> None:
-    slow_s = np.arange(0.0, 2.0, 0.1)
-    assert not np.any(np.isnan(even(slow_s).mean_positions_m(np.array([0.5, 1.0]), 0.0125)))
-
-
 def test_a_single_wrong_position_is_removed() -> None:
     positions_m = 0.1 * TIMES_S
     positions_m[70] += 0.004
@@ -58,8 +53,3 @@ def test_a_single_wrong_position_is_removed() -> None:
 def test_positions_are_relative_to_the_first_and_go_forward_whatever_the_sign_of_the_encoder() -> None:
     backward = StageTrack(StagePositions(TIMES_S, 5.0 - 0.1 * TIMES_S))
     assert backward.positions_m(TIMES_S) == pytest.approx(0.1 * TIMES_S)
-
-
-def test_an_abrupt_stop_is_no_leap() -> None:
-    positions_m = np.minimum(0.2 * TIMES_S, 0.1)
-    assert StageTrack(StagePositions(TIMES_S, positions_m)).positions_m(TIMES_S) == pytest.approx(positions_m)

@@ -7,20 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 from statistics import fmean
+from typing import Any
 
 import pytest
 
-from experiments.loadcell.evaluation import list_remarks
 from experiments.loadcell.preparation import CellSettings, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, correlation, load_counted
 from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
-from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial, Insertion, Pace
-from experiments.loadcell.trials import KEEP, list_problems, measure, record
+from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial
+from experiments.loadcell.trials import KEEP, list_problems, record
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
-from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
+from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Make, laboratories
 from tests.scripted_operator import ScriptedOperator
 
 
@@ -42,15 +42,6 @@ class Idle(SimulatedStage):
     def lift(self) -> None: ...
 
 
-def try_once(laboratory: Laboratory, kind: str = INSERTION) -> list[str]:
-    """Measure one trial and return the reported messages."""
-    trial = Trial("lawful", kind, 1)
-    laboratory.recorder.listen(1.0)
-    laboratory.trial_bench.stage.prepare(trial, 1)
-    measure(laboratory.trial_bench, trial, laboratory.plan)
-    return laboratory.operator.reported
-
-
 def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make) -> None:
     laboratory = make(trials=3, seed=4)
     laboratory.measure()
@@ -66,7 +57,7 @@ def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make)
 def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) -> None:
     smeared, sharp = make(amplifier=AmplifierParameters(averaged=4)), make()
     for laboratory in (smeared, sharp):
-        bench = replace(laboratory.trial_bench, stage=Idle(SETTINGS, laboratory.bench, {}, 1))
+        bench = replace(laboratory.trial_bench, stage=Idle(SETTINGS, laboratory.bench, (), 1))
         for number in (1, 2):
             record(bench, Trial("lawful", INSERTION, number), laboratory.plan, 1)
     assert [each for each in smeared.operator.reported if AVERAGED in each] == [f"lawful/insertion/1: {AVERAGED}"]
@@ -97,7 +88,7 @@ def test_a_trial_with_an_unplugged_cell_is_repeated_and_both_files_remain(make: 
     laboratory = make()
     laboratory.at(4.5, laboratory.bench.amplifier.unplug)
     laboratory.at(6.5, laboratory.bench.amplifier.plug_in)
-    reported = try_once(laboratory)
+    reported = laboratory.try_once()
     assert any("plug" in each and "in again" in each for each in reported)
     assert any("connected again" in each for each in reported)
     assert any("unplugged during the trial" in each for each in reported)
@@ -120,29 +111,31 @@ def test_an_invalid_trial_is_reported_and_left_out(
     make: Make, amplifier: AmplifierParameters, stage: StageParameters | None, kind: str, message: str
 ) -> None:
     laboratory = make(amplifier=amplifier, stage=stage, operator=ScriptedOperator(SKIP))
-    assert any(message in each for each in try_once(laboratory, kind))
+    assert any(message in each for each in laboratory.try_once(kind))
     (entry,) = laboratory.notebook.entries.values()
     assert entry["skipped"] and any(message in each for each in entry["why"])
     assert (laboratory.folder / entry["file"]).exists()
     assert load_counted(laboratory.folder, laboratory.notebook) == []
 
 
+def test_enter_repeats_an_invalid_trial_twice_and_then_leaves_it_out(make: Make) -> None:
+    laboratory = make(operator=ScriptedOperator())
+    laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
+    laboratory.try_once()
+    (entry,) = laboratory.notebook.entries.values()
+    assert entry["file"].endswith("_3.csv") and entry["skipped"]
+
+
 def test_a_stage_that_is_not_started_makes_no_contact(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
-    assert any("no contact" in each for each in try_once(laboratory))
+    assert any("no contact" in each for each in laboratory.try_once())
     assert "kept_in_spite_of" in laboratory.notebook.entries["lawful/insertion/1"]
-
-
-def test_enter_repeats_an_invalid_trial_twice_and_then_leaves_it_out(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters(range_n=2.0))
-    try_once(laboratory)
-    assert laboratory.notebook.entries["lawful/insertion/1"]["file"].endswith("_3.csv")
 
 
 def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> None:
     laboratory = make()
-    try_once(laboratory)
+    laboratory.try_once()
     (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
     clipped = recorded._replace(forces_n=recorded.forces_n.clip(-1.0, 1.0))
     tare = laboratory.recorder.tare()
@@ -179,22 +172,22 @@ def test_the_lines_are_examined_first(make: Make) -> None:
         examine_lines(make(amplifier=AmplifierParameters(style="columns")).recorder, "auto")
 
 
-def test_a_wrong_baud_rate_is_reported(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters(baud=57600))
-    with pytest.raises(BenchError, match="own rate with --baud"):
-        laboratory.measure()
-
-
-def test_a_cell_that_sends_nothing_says_what_to_check(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters(drop_out_rate_hz=10.0, rate_hz=10.0, drop_out_s=10.0))
-    with pytest.raises(BenchError, match="nothing arrives"):
-        laboratory.measure()
-
-
-def test_a_cell_that_sends_nonsense_is_shown(make: Make) -> None:
-    laboratory = make()
-    laboratory.bench.amplifier._line = lambda force_n, at_s: b"hello world\r\n"  # type: ignore[method-assign]
-    with pytest.raises(BenchError, match="hello world"):
+@pytest.mark.parametrize(
+    ("amplifier", "line", "message"),
+    [
+        ({"baud": 57600}, None, "own rate with --baud"),
+        ({"drop_out_rate_hz": 10.0, "rate_hz": 10.0, "drop_out_s": 10.0}, None, "nothing arrives"),
+        ({}, b"hello world\r\n", "hello world"),
+        ({"range_n": 1.0}, None, "not calibrated"),  # the heavier weight overloads it
+    ],
+)
+def test_a_cell_that_cannot_be_read_is_refused(
+    make: Make, amplifier: dict[str, Any], line: bytes | None, message: str
+) -> None:
+    laboratory = make(operator=ScriptedOperator("q"), amplifier=AmplifierParameters(**amplifier))
+    if line is not None:
+        laboratory.bench.amplifier._line = lambda force_n, at_s: line  # type: ignore[method-assign]
+    with pytest.raises(BenchError, match=message):
         laboratory.measure()
 
 
@@ -204,34 +197,6 @@ def test_an_amplifier_too_slow_for_the_stroke_is_reported_first(make: Make) -> N
         laboratory.measure(CellSettings(scale_n=1.0))
     assert "RATE pin" in laboratory.operator.reported[1] and "--speed 0.02" in laboratory.operator.reported[1]
     assert not laboratory.notebook.entries
-
-
-def test_weights_that_say_nothing_are_asked_for_again(make: Make) -> None:
-    laboratory = make(operator=ScriptedOperator("q"))
-    laboratory.trial_bench.stage.weigh = lambda which: 2.0  # type: ignore[method-assign]
-    with pytest.raises(BenchError, match="not calibrated"):
-        laboratory.measure()
-    assert "both weights are" in laboratory.operator.reported[1]
-
-
-def test_a_weight_that_overloads_the_cell_is_reported(make: Make) -> None:
-    laboratory = make(operator=ScriptedOperator("q"), amplifier=AmplifierParameters(range_n=1.0))
-    with pytest.raises(BenchError, match="not calibrated"):
-        laboratory.measure()
-    assert "overloaded by this weight" in laboratory.operator.reported[1]
-
-
-def test_a_stage_at_another_speed_is_remarked_for_every_trial(make: Make) -> None:
-    laboratory = make(trials=2)
-    laboratory.measure()
-    pace = Pace(0.05, 2.0, 0.01, 0.1)
-    trials = [
-        replace(trial, motion=trial.motion._replace(pace=pace))
-        for trial in laboratory.evaluate_muds().trials
-        if isinstance(trial.motion, Insertion)
-    ]
-    reported = list_remarks(trials, SETTINGS)
-    assert [remark.split(":")[0] for remark in reported] == ["lawful/insertion/1", "lawful/insertion/2"]
 
 
 def test_a_cell_that_stays_unplugged_ends_the_recording(make: Make) -> None:

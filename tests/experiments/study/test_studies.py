@@ -28,13 +28,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     studies = tmp_path / "experiments" / "studies"
     studies.mkdir(parents=True)
     (studies / "stroke_length.py").write_text(STUDY, encoding="utf-8")
-    monkeypatch.setattr(catalogue, "FOLDER", studies)
+    monkeypatch.setitem(catalogue.FOLDERS, "experiments.studies", studies)
     monkeypatch.setattr(experiments.studies, "__path__", [str(studies)])
     monkeypatch.setattr(provenance, "source_digest", lambda *modules: "0123")  # the file is not in the product
-    catalogue.study_texts.cache_clear()
+    catalogue.find_studies.cache_clear()
     monkeypatch.chdir(tmp_path)
     yield tmp_path
-    catalogue.study_texts.cache_clear()
+    catalogue.find_studies.cache_clear()
     sys.modules.pop("experiments.studies.stroke_length", None)
 
 

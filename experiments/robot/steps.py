@@ -1,0 +1,39 @@
+"""The steps of an experiment with an operator, one after the other.
+
+A step asks the operator to prepare something, measures, and returns an entry of the notebook, which is on the disk
+before the next step begins. A step whose entry is there already is not asked for again, so the same command continues
+an interrupted experiment.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.study.notebook import Entry, Notebook
+from experiments.study.session import Show
+
+
+class Step(NamedTuple):
+    key: str  # of its entry
+    prepare: Callable[[], str]  # returns GO_ON, SKIP to leave it out, REDO for the one before, or else prepares again
+    measure: Callable[[], Entry | None]  # returns nothing to prepare it again
+
+
+def conduct_steps(steps: Sequence[Step], notebook: Notebook, show: Show, skipped: Entry) -> None:
+    """Take every step that is not in the notebook. `skipped` is the entry of one that the operator leaves out."""
+    index = 0
+    while index < len(steps):
+        show(index, len(steps))
+        step = steps[index]
+        if step.key in notebook.entries:
+            index += 1
+            continue
+        answer = step.prepare()
+        if answer == REDO:
+            index = max(index - 1, 0)
+            notebook.forget(steps[index].key)
+        elif answer == SKIP:
+            notebook.write(step.key, skipped)
+        elif answer == GO_ON and (entry := step.measure()) is not None:
+            notebook.write(step.key, entry)
+    show(len(steps), len(steps))

@@ -1,0 +1,112 @@
+"""`mudskipper experiment faults`: which cells it runs, what it refuses, and what it makes of any cells."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pandas import DataFrame
+
+from command_line import exit_codes
+from command_line.main import main
+from drivers.fault_injection.failure_table import PHASES
+from experiments.study.result import Result
+from experiments.study.session import Ending
+from experiments.study.trials import Trials
+from verification.faults.evaluation import Cell
+from verification.studies import healthy_walks
+from verification.studies.faults import FAULTS, study
+
+COMMAND = ["experiment", "faults", "--simulated"]
+
+
+class AnyCells(Trials):
+    """Gives every row the measurements of one cell; those in `late` fail."""
+
+    def __init__(self, late: str = "") -> None:
+        self.rows: list[dict[str, Any]] = []
+        self._late = late
+
+    def run(self, function: Callable[..., Any], rows: Any, **shared: Any) -> DataFrame:
+        self.rows += rows
+        return DataFrame([row | self._measured(row) for row in rows])
+
+    def _measured(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        is_late, is_none = row["phase"] == self._late, row["mode_name"] == "none"
+        cell = asdict(
+            Cell(
+                fault=row["mode_name"],
+                mode_name="",
+                phase="",
+                seed=0,
+                joint="left_sweep",
+                reaction="damping",
+                bound_ticks=None if is_none else 5,
+                reaction_ticks=None if is_none else 9 if is_late else 4,
+                ok=not is_late,
+                why=["the reaction came after 9 ticks"] if is_late else [],
+            )
+        )
+        return {name: value for name, value in cell.items() if name not in row}
+
+
+def run(late: str = "", faults: Sequence[str] = FAULTS, **options: Any) -> tuple[Result, list[dict[str, Any]]]:
+    trials = AnyCells(late)
+    return study(trials, fault=tuple(faults), **options), trials.rows
+
+
+def test_the_default_is_every_fault_in_every_phase() -> None:
+    result, rows = run()
+    assert len(rows) == len({tuple(row.values()) for row in rows}) >= 700
+    assert {row["phase"] for row in rows} == set(PHASES)
+    assert {row["fault"] for row in result.json()["faults"]} >= {"drive_quiet", "flipper_stuck"}
+    assert result.ending is Ending.DONE
+
+
+def test_what_differs_with_a_type_of_drive_is_reported_and_a_failure_that_it_cannot_have_has_no_cell() -> None:
+    result, rows = run(drive="mit:AK80-9")
+    assert "watchdog_off" not in {row["mode_name"] for row in rows}
+    different = result.json()["differences"]
+    assert different["watchdog_off"].startswith("does not exist: ")
+    assert different["voltage_under"].startswith("any reaction, or none: ")
+    assert (
+        run(drive="moteus")[0].json()["differences"]["watchdog_off"].startswith("shown as foreign_commands and also ")
+    )
+
+
+def test_a_failed_cell_is_reported_with_its_reason_and_its_fault_with_the_slowest_cell(tmp_path: Path) -> None:
+    result, _ = run("stance", ("none", "drive_quiet"), seeds=2)
+    assert result.ending is Ending.UNHEALTHY
+    row = next(row for row in result.json()["faults"] if row["mode_name"] == "drive_quiet")
+    assert (row["cells"], row["ok"], row["slowest_ticks"], row["bound_ticks"]) == (18, 16, 9, 5)
+    assert any("drive_quiet in stance, seed 2: the reaction came after 9 ticks" in note for note in result.notes)
+    (figure,) = result.figures
+    figure.draw().savefig(tmp_path / "faults.png")
+    assert (tmp_path / "faults.png").stat().st_size > 1000
+
+
+def test_the_command_runs_the_chosen_cells(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    chosen = ["--fault", "none", "--fault", "drive_quiet", "--phase", "hold", "--workers", "1"]
+    assert main([*COMMAND, *chosen, "--json", "--out", str(tmp_path / "faults")]) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert {(cell["mode_name"], cell["phase"], cell["ok"]) for cell in report["cells"]} >= {
+        ("drive_quiet", "hold", True)
+    }
+    assert all(isinstance(cell["seed"], int) for cell in report["cells"])
+    assert (tmp_path / "faults" / "faults.png").exists() and (tmp_path / "faults" / "report.html").exists()
+
+
+def test_faults_that_cannot_occur_in_a_phase_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([*COMMAND, "--fault", "flipper_stuck", "--phase", "idle"]) == exit_codes.USAGE
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_walk_in_which_nothing_fails_has_no_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(healthy_walks, "WALK_S", 4.0)
+    walked = healthy_walks.walk(3)
+    assert walked["strides"] > 0 and walked["alarms"] == walked["held"] == []
