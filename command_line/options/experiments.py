@@ -8,11 +8,9 @@ from command_line.options.studies import add_studies
 from control.records import JOINTS
 from experiments.study.values import (
     between,
-    depth_cm,
     folder,
     group_rule,
     lever_m,
-    mud_length,
     weights_g,
     whole,
 )
@@ -38,8 +36,6 @@ def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     add_studies(names)
     _add_actuator(names)
-    _add_flipper(names)
-    _add_walk(names)
     _add_lablogs(names)
 
 
@@ -112,44 +108,6 @@ def _add_actuator(names: Commands) -> None:
     option("--apply", action="store_true", help="write the fitted constants to the configuration, after a prompt")
     option("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
     option("--seed", type=int, default=1, metavar="N", help="of the simulated motor")
-
-
-def _add_flipper(names: Commands) -> None:
-    flipper = add(
-        names,
-        "flipper",
-        "experiments.mud_trials.run_flipper",
-        "A single flipper on a fixed base: coefficients of muds.",
-    )
-    _add_bench(flipper)
-    option = flipper.add_argument
-    option("--mud", action="append", metavar="NAME", help="as its water in percent, repeatable")
-    option("--trials", type=TRIALS, default=3, metavar="N", help="of each mud (default: 3)")
-    option("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
-    option("--strides", type=TRIALS, default=1, metavar="N", help="of each trial (default: 1)")
-    option("--flipper", choices=("left", "right"), default="right", help="in the mud (default: right)")
-    option("--motors", type=int, choices=(2, 4), default=4, help="of the simulated robot: 2 for that flipper alone")
-    option("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
-
-
-def _add_walk(names: Commands) -> None:
-    walk = add(
-        names, "walk", "experiments.mud_trials.run_walk", "The walking robot over several muds: their coefficients."
-    )
-    _add_bench(walk)
-    option = walk.add_argument
-    option(
-        "--mud",
-        type=mud_length,
-        action="append",
-        metavar="NAME[=CM]",
-        help="as its water in percent, and its length (default: 61), in the order of the trackway",
-    )
-    option("--trials", type=TRIALS, default=3, metavar="N", help="over the muds (default: 3)")
-    option("--depth", type=depth_cm, default=3.0, metavar="CM", help="(default: 3)")
-    option("--soft", action="append", metavar="NAME", help="mud for additional walks at 3 and at 5 cm, repeatable")
-    option("--flipper", choices=("left", "right"), default="right", help="to evaluate (default: right)")
-    option("--truth", type=Path, metavar="FILE", help="summary.json of a loadcell experiment")
 
 
 def _add_lablogs(names: Commands) -> None:

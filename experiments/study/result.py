@@ -37,6 +37,11 @@ class Table:
         return f"{self.title}\n{aligned(self.cells())}".lstrip("\n")
 
 
+def text_table(name: str, title: str, cells: Sequence[Sequence[str]], section: str = "Result") -> Table:
+    """Return a table of formatted cells, the head first."""
+    return Table(name, title, {}, DataFrame(cells[1:], columns=cells[0]), section)
+
+
 @dataclass(frozen=True)
 class Figure:
     """A picture, which is drawn in the one style of all studies (page.py)."""

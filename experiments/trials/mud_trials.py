@@ -6,7 +6,7 @@ kept or repeated as the operator decides. The notebook also has the trials that 
 does not ask for them again. Torque is off whenever hands may be in the mud.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -17,7 +17,8 @@ from experiments.robot.bench_robot import BenchRobot, ask_to_clear_faults, disar
 from experiments.robot.daemon_robot import DaemonRobot
 from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.study.notebook import Entry, Notebook
-from experiments.trials.session import Session
+from experiments.study.option import OptionError
+from experiments.study.session import Session
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document
 from simulation.mud.clay import clay_of_water
@@ -163,13 +164,14 @@ def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> No
     bench.notebook.write(trial.key, {"skipped": True, "why": list(why)})
 
 
-def why_not_simulated(muds: Iterable[str]) -> str | None:
-    """Return a message where one of these muds cannot be simulated."""
+def require_named(muds: Sequence[str], session: Session, example: str) -> None:
+    """Raises OptionError where no mud is named, and where one of them cannot be simulated in a simulated session."""
+    if not muds:
+        raise OptionError(f"no mud is named: give the muds {example}")
     try:
-        [clay_of_water(float(mud)) for mud in muds]
+        [clay_of_water(float(mud)) for mud in muds if session.simulated]
     except ValueError as problem:
-        return f"--mud: simulated muds are named after their water in percent: {problem}"
-    return None
+        raise OptionError(f"--mud: simulated muds are named after their water in percent: {problem}") from None
 
 
 def open_bench(
