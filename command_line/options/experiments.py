@@ -3,13 +3,12 @@
 import argparse
 from pathlib import Path
 
-from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket, add_vertical
+from command_line.options.shared import DEFAULT_CONFIG, Commands, add, add_json, add_socket
 from command_line.options.studies import add_studies
 from control.records import JOINTS
 from experiments.study.values import (
     between,
     folder,
-    group_rule,
     lever_m,
     weights_g,
     whole,
@@ -20,23 +19,11 @@ STRENGTH_PA = between(50.0, 50000.0, "Pa")
 STAGE_SPEED_M_S = between(0.001, 1.0, "m/s")
 GRAVITY_M_S2 = between(9.7, 9.9, "m/s²")  # anywhere on Earth
 
-LABLOGS = (
-    "Evaluate the estimates from real logs by each method, without a known truth. A group is the logs of one mud, and "
-    "one log is one trial (in .mcap, each walk is). first CV: coefficient of variation (sample standard deviation "
-    "over mean) over trials of the first stroke's value, one flipper on a fixed base. later CV: the same of each "
-    "trial's geometric mean over its later strokes. chi: scatter over claimed error, between trials and between "
-    "strokes; 1 is right. Separation: difference of two groups' first strokes in pooled standard deviations. Left "
-    "against right: median of the difference over its claimed error in walks; 0.67 is right. Logs without mud must "
-    "give no values and no bounds. Sensitivity: the same logs with currents 5 ms late or early, and with 30 percent "
-    "of the rows missing."
-)
-
 
 def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     add_studies(names)
     _add_actuator(names)
-    _add_lablogs(names)
 
 
 def _add_report(experiment: argparse.ArgumentParser, simulated: str, out: str) -> None:
@@ -108,22 +95,3 @@ def _add_actuator(names: Commands) -> None:
     option("--apply", action="store_true", help="write the fitted constants to the configuration, after a prompt")
     option("--config", type=Path, metavar="FILE", help=f"to change (default: {DEFAULT_CONFIG})")
     option("--seed", type=int, default=1, metavar="N", help="of the simulated motor")
-
-
-def _add_lablogs(names: Commands) -> None:
-    lablogs = add(names, "lablogs", "experiments.lablogs.lablogs", "Real logs: do estimates repeat as they claim?")
-    lablogs.description = LABLOGS
-    lablogs.add_argument("folders", type=Path, nargs="+", metavar="DIR", help="with logs: .csv, .csv.gz or .mcap")
-    lablogs.add_argument(
-        "--group",
-        type=group_rule,
-        action="append",
-        metavar="PATTERN=NAME",
-        help="put logs with such a file name into one group, repeatable (default: the label in the name, as 12.5N)",
-    )
-    lablogs.add_argument(
-        "--air", action="append", metavar="PATTERN", help="logs without mud, repeatable (default: detected)"
-    )
-    add_vertical(lablogs, default="y")
-    add_json(lablogs)
-    _add_out(lablogs, "for report, figures and numbers")

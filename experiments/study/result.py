@@ -71,8 +71,9 @@ class Result:
 
     def json(self) -> dict[str, Any]:
         """Return the summary as JSON has it."""
-        tables = {table.name: table.rows.to_dict("records") for table in self.tables}
-        return dict(to_json(tables if self.summary is None else self.summary))
+        if self.summary is not None:
+            return dict(to_json(self.summary))
+        return {table.name: to_json(table.rows.to_dict("records")) for table in self.tables}
 
 
 def _cell(value: Any) -> str:
