@@ -74,7 +74,8 @@ class SetpointMonitor:
         if -self._tolerance_nm < difference_nm < self._tolerance_nm or self._may_follow(setpoint_nm, velocity_rad_s):
             self._differed = False
             if self._score:
-                self._fall()
+                self._score -= 1
+                self.found = self.found and self._score > 0
             return
         again, self._differed = self._differed, True
         if again and self._measured:
@@ -100,10 +101,6 @@ class SetpointMonitor:
     def _may_clamp(self, velocity_rad_s: float, torque_nm: float) -> bool:
         """Return whether a drive that turns this fast forward may reduce this torque, down to braking."""
         return (self._clamp_from_rad_s - velocity_rad_s) * self._clamp_nm_s_rad < torque_nm
-
-    def _fall(self) -> None:
-        self._score -= 1
-        self.found = self.found and self._score > 0
 
     def _rise(self, reports: int) -> None:
         self._score = min(self._score + WEIGHT * reports, 2 * FOUND)

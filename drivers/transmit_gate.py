@@ -157,19 +157,22 @@ class GatedPort:
             NOT_ARMED if idle else self._gate.torque_problem(torque_nm, self._sent_nm[identifier], table.torque_step_nm)
         )
         if problem:
-            what = f"{_text_of(frame)}, {torque_nm:.4g} N·m to node {table.node_id},"
-            unlisted = "" if torque_nm == torque_nm else "it is neither a listed frame nor a torque command, and "
-            replaced = "the frame that keeps it idle" if idle else "zero torque"
-            self._gate.refuse(f"{what} was replaced by {replaced}: {unlisted}{problem}.")
+            is_torque = torque_nm == torque_nm
+            torque = f" ({torque_nm:.4g} N·m)" if is_torque else ""
+            rule = problem if is_torque else "it is neither a listed frame nor a torque command"
+            replacement = "the frame that keeps it idle" if idle else "zero torque"
+            self._gate.refuse(
+                f"{_text_of(frame)}{torque} to node {table.node_id} was replaced by {replacement}: {rule}."
+            )
             torque_nm, frame = 0.0, frame._replace(data=idle or table.zero_torque)
         self._sent_nm[identifier] = torque_nm
         self._port.send(frame)
 
     def _broken_rule(self, frame: Frame) -> str:
         """Say why a frame that commands no torque may not leave."""
-        if frame.is_remote or frame.is_error:
+        if frame.is_remote:
             return "it is none of the requests that the tables of this bus list"
-        if (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:
+        if frame.is_error or (frame.is_extended, frame.is_fd, frame.bit_rate_switch) != self._kind:
             return "the drives of this bus take frames of another kind"
         if frame.arbitration_id not in self._listed:
             return "the tables of this bus do not list its id"

@@ -25,7 +25,7 @@ class Column:
     words: Mapping[int, str]  # of an enumeration, by number; empty for other columns
 
     def coded(self, numbers: NDArray[Any] | None = None) -> tuple[NDArray[np.int32], list[str]]:
-        """Returns the number of each cell's word, and the words. A number that this version does not know is shown.
+        """Return the number of each cell's word, and the words. A number that this version does not know is shown.
 
         `numbers` are those of the whole table in ascending order, if these cells are only some of them.
         """
@@ -35,7 +35,7 @@ class Column:
 
 
 def stack_rows(rows: Sequence[Mapping[str, Any]], kind: RowKind) -> NDArray[np.void]:
-    """Returns decoded rows as a structured array, fields that this version does not know included."""
+    """Return decoded rows as a structured array, fields that this version does not know included."""
     missing = {field.name: field.missing for field in kind.fields}
     names = {name: None for row in rows or [missing] for name in row}
     columns = {name: np.array([row[name] for row in rows or [missing]]) for name in names}
@@ -46,7 +46,7 @@ def stack_rows(rows: Sequence[Mapping[str, Any]], kind: RowKind) -> NDArray[np.v
 
 
 def flat_columns(rows: NDArray[np.void], kind: RowKind) -> list[Column]:
-    """Returns the columns in the order of the fields."""
+    """Return the columns in the order of the fields."""
     known = {field.name: field for field in kind.fields}
     names = rows.dtype.names or ()
     return [column for name in names for column in _columns_of(known.get(name, Field(name, "")), rows[name])]

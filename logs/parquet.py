@@ -26,7 +26,7 @@ ROWS_PER_GROUP = 1 << 14  # of a table: six megabytes of ticks, of which the wri
 
 
 def write_parquet(log: AnyLog, folder: Path, stem: str, watch: Watch = unwatched) -> list[Path]:
-    """Writes STEM-ticks.parquet, STEM-strides.parquet and STEM-events.parquet: all, or none.
+    """Write STEM-ticks.parquet, STEM-strides.parquet and STEM-events.parquet: all, or none.
 
     The metadata, which say whether the log is complete, come before the rows: a log that is cut off meanwhile is
     written again. Raises OSError, and LogError: LogCutError after the rows before the cut.
@@ -42,7 +42,7 @@ def write_parquet(log: AnyLog, folder: Path, stem: str, watch: Watch = unwatched
 
 
 def _write_tables(log: AnyLog, paths: list[Path], metadata: dict[str, str], complete: bool, watch: Watch) -> TickPass:
-    """Returns the pass over the ticks, which knows whether they were cut off meanwhile."""
+    """Return the pass over the ticks, which knows whether they were cut off meanwhile."""
     metadata = metadata | {"complete": str(complete).lower()}
     for path, rows, kind in zip(paths[1:], (log.strides, log.events), (STRIDE, EVENT), strict=True):
         pq.write_table(arrow_table(flat_columns(stack_rows(rows, kind), kind), metadata), path, compression="zstd")
@@ -57,7 +57,7 @@ def _write_tables(log: AnyLog, paths: list[Path], metadata: dict[str, str], comp
 
 
 def _enumerated(log: AnyLog) -> dict[str, NDArray[Any]]:
-    """Returns the numbers that occur in each enumeration of a tick, in ascending order."""
+    """Return the numbers that occur in each enumeration of a tick, in ascending order."""
     found: dict[str, set[int]] = {}
     for ticks in TickPass(log, unwatched, ""):
         for column in flat_columns(ticks, tick_kind(log.rig)):

@@ -70,7 +70,7 @@ def replay_files(
     watch: Watch = unwatched,
     vertical: CaptureAxis | None = None,
 ) -> Replay:
-    """Replays a log of this project, several segments of one run, or the authors' CSV. Raises LogError.
+    """Replay a log of this project, several segments of one run, or the authors' CSV. Raises LogError.
 
     `configuration` and `method` replace those of the log. `vertical` is the axis of a CSV's capture that points up; it
     replaces `pose.vertical` of the configuration.
@@ -93,7 +93,7 @@ def replay_log(
     method: Method | None = None,
     watch: Watch = unwatched,
 ) -> Replay:
-    """Replays with the configuration that the log carries, unless another one is given. Raises LogError."""
+    """Replay with the configuration that the log carries, unless another one is given. Raises LogError."""
     running = RunningReplay(path, log, configuration, method)
     return running.finish(TickPass(log, watch, "ticks replayed").feed(running.add))
 
@@ -147,23 +147,16 @@ class RunningReplay:
 
 
 def _packed(fits: StrideFits) -> StrideFits:
-    """Computes the fits now: a stride's samples are smaller than the ticks that they are computed from."""
-    return StrideFits(*(partial(_same, _packed_samples(samples())) for samples in fits))
-
-
-def _packed_samples(samples: FitSamples | None) -> FitSamples | None:
-    if samples is None:
-        return None
-    moments, torques, weights = (array("d", values) for values in samples[:-1])
-    return FitSamples(moments, torques, weights, samples.slope)
-
-
-def _same(samples: FitSamples | None) -> FitSamples | None:
-    return samples
+    """Compute the fits now: a stride's samples are smaller than the ticks that they are computed from."""
+    packed: list[FitSamples | None] = []
+    for found in (samples() for samples in fits):
+        columns = [array("d", values) for values in found[:-1]] if found else []
+        packed.append(FitSamples(columns[0], columns[1], columns[2], found.slope) if found else None)
+    return StrideFits(*(partial(lambda samples: samples, each) for each in packed))
 
 
 def configuration_of(path: Path, text: str) -> Configuration:
-    """Parses the configuration that a log carries. Raises LogError."""
+    """Parse the configuration that a log carries. Raises LogError."""
     try:
         return parse_configuration(text)
     except ConfigurationError as problem:
@@ -171,7 +164,7 @@ def configuration_of(path: Path, text: str) -> Configuration:
 
 
 def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: Method | None = None) -> Replay:
-    """Replays with `lab_estimator`."""
+    """Replay with `lab_estimator`."""
     estimator = lab_estimator(lab, configuration, method)
     found = [
         (stride, estimator.fits_of(stride.flipper))
@@ -192,7 +185,7 @@ def replay_lab(lab: LabLog, configuration: Configuration | None = None, method: 
 def lab_estimator(
     lab: LabLog, configuration: Configuration | None = None, method: Method | None = None
 ) -> MudEstimator:
-    """Returns an estimator with the paper's torque constant and a weightless arm, unless a configuration is given.
+    """Return an estimator with the paper's torque constant and a weightless arm, unless a configuration is given.
 
     A single flipper was mounted on a fixed bench; two flippers carried a body.
     """
@@ -210,7 +203,7 @@ def lab_estimator(
 
 
 def lab_readings(estimator: MudEstimator, lab: LabLog) -> Iterator[tuple[float, MudReading]]:
-    """Yields the time of each row and the estimator's reading of it."""
+    """Yield the time of each row and the estimator's reading of it."""
     for now_s, phase, angles_rad, currents_a, body_x_m in zip(
         *(column.tolist() for column in (lab.stamp_s, lab.phase, lab.angle_rad, lab.current_a, lab.body_x_m)),
         strict=True,

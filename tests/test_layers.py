@@ -130,6 +130,14 @@ def test_within_every_folder_imports_only_point_down() -> None:
     assert not {folder: found for folder, edges in edges_within_folders().items() if (found := circle(edges))}
 
 
+def test_the_robot_s_folder_holds_only_what_its_two_processes_load() -> None:
+    reached, found = {"firmware_host.daemon", "firmware_host.log.writer"}, set[str]()
+    while reached:
+        found |= reached
+        reached = {each for module in reached for each in imported_modules(module)} - found
+    assert {module for module in sources() if module.startswith("firmware_host.") and "__init__" not in module} <= found
+
+
 def test_no_import_hides_from_the_interpreter() -> None:
     assert not [module for module, source in sources().items() if "TYPE_CHECKING" in source]
 

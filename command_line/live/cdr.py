@@ -24,7 +24,7 @@ class CdrMessage:
         self.text(frame_id)
 
     def count(self, length: int) -> None:
-        """Appends the length of a sequence, whose elements follow."""
+        """Append the length of a sequence, whose elements follow."""
         self._align(4)
         self._body += struct.pack("<I", length)
 
@@ -37,12 +37,12 @@ class CdrMessage:
         self._body.append(value)
 
     def numbers(self, *values: float) -> None:
-        """Appends float64 fields."""
+        """Append float64 fields."""
         self._align(8)
         self._body += struct.pack(f"<{len(values)}d", *values)
 
     def sequence(self, values: Sequence[float]) -> None:
-        """Appends a float64[] of any length."""
+        """Append a float64[] of any length."""
         self.count(len(values))
         if len(values):
             self.numbers(*values)

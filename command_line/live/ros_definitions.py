@@ -29,7 +29,7 @@ DEFINITIONS = {  # type without "msg/" -> fields, in the order of ROS 2
 
 
 def full_definition(message: str) -> str:
-    """Returns the definition of a message such as "sensor_msgs/JointState" and of every type that it uses."""
+    """Return the definition of a message such as "sensor_msgs/JointState" and of every type that it uses."""
     used = [message]
     for name in used:
         types = dict.fromkeys(line.split(" ")[0].removesuffix("[]") for line in DEFINITIONS[name].splitlines())

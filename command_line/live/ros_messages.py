@@ -27,7 +27,7 @@ Row = Any  # one element of the array of ticks, or a mapping with its fields
 
 
 def topics_of(rig: Rig) -> dict[str, str]:
-    """Returns the message of each topic."""
+    """Return the message of each topic."""
     return {
         "/joint_states": "sensor_msgs/JointState",
         "/tf": "tf2_msgs/TFMessage",
@@ -55,7 +55,7 @@ def flipper_pose(geometry: FlipperGeometry, flipper: str, sweep_rad: float, addu
 
 
 def tick_messages(stamp_ns: int, tick: Row, geometry: FlipperGeometry, rig: Rig) -> dict[str, bytes]:
-    """Returns the messages of one tick by topic, all but the diagnostics."""
+    """Return the messages of one tick by topic, all but the diagnostics."""
     angles = tick["angle_rad"]
     poses = {
         flipper: flipper_pose(geometry, flipper, float(angles[2 * number]), float(angles[2 * number + 1]))
@@ -102,7 +102,7 @@ def _add_transform(message: CdrMessage, stamp_ns: int, frames: tuple[str, str], 
 
 
 def diagnostics(stamp_ns: int, tick: Row, strides: Mapping[str, Mapping[str, Any]], event: str, rig: Rig) -> bytes:
-    """Returns the state of the robot, of each joint, and of the mud at each flipper; `strides` are the latest ones."""
+    """Return the state of the robot, of each joint, and of the mud at each flipper; `strides` are the latest ones."""
     mode = _word("mode", tick)
     level = ERROR if tick["mode"] in (Mode.FAULT, Mode.DAMPING) else OK
     message = CdrMessage("", stamp_ns)

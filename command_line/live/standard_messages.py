@@ -40,7 +40,7 @@ class StandardMessages:
         return tick >= self._last_tick + TICKS_A_MESSAGE
 
     def of_tick(self, stamp_ns: int, tick: Row) -> dict[str, bytes]:
-        """Returns the messages of a tick that is due, by topic."""
+        """Return the messages of a tick that is due, by topic."""
         self._last_tick, stamp_s = int(tick["tick"]), float(tick["stamp_s"])
         messages = tick_messages(stamp_ns, tick, self._geometry, self._rig)
         if stamp_s >= self._diagnosed_s + DIAGNOSTICS_S:

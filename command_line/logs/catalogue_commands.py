@@ -21,7 +21,7 @@ LISTING_READS_S = 1.0  # new logs that `log list` reads; it describes the others
 
 
 def catalogued(folder: Path) -> dict[Path, LogEntry]:
-    """Returns the entries of the closed logs; none, with a message, where the catalogue cannot be used."""
+    """Return the entries of the closed logs; none, with a message, where the catalogue cannot be used."""
     try:
         from logs.catalogue.catalogue import Catalogue  # duckdb is an extra
     except ModuleNotFoundError:
@@ -36,7 +36,7 @@ def catalogued(folder: Path) -> dict[Path, LogEntry]:
 
 
 def _update(catalogue: Any, longest_s: float = inf, broken_again: bool = False) -> bool:
-    """Returns whether the catalogue is stored; where it is not, this command can use it all the same."""
+    """Return whether the catalogue is stored; where it is not, this command can use it all the same."""
     try:
         with watched() as watch:
             unread = catalogue.update(watch, longest_s, broken_again)
@@ -58,7 +58,7 @@ def configured_folder(path: Path) -> Path:
 
 
 def chosen_folder(options: Options) -> Path:
-    """Returns the named folder of logs, or the configured one. Raises LogError where there is no such folder."""
+    """Return the named folder of logs, or the configured one. Raises LogError where there is no such folder."""
     folder: Path = options.folder or configured_folder(options.config)
     if not folder.is_dir():
         raise LogError(f"{folder}: there is no such folder")
@@ -95,5 +95,5 @@ def query(options: Options) -> int:
 
 
 def _for_json(value: Any) -> Any:
-    """Returns numbers, texts, lists and structures as they are, and times and other values of SQL as text."""
+    """Return numbers, texts, lists and structures as they are, and times and other values of SQL as text."""
     return value if isinstance(value, str | int | float | list | dict | None) else str(value)

@@ -16,19 +16,19 @@ from logs.lab.summary import lab_summary
 
 
 def chosen_vertical(options: argparse.Namespace) -> CaptureAxis:
-    """Returns the axis of the capture that points up. Raises UsageError for a log that has none."""
+    """Return the axis of the capture that points up. Raises UsageError for a log that has none."""
     if options.vertical and not is_lab_csv(options.files[0]):
         raise UsageError(f"--vertical {options.vertical}: {options.files[0]} is not a CSV log with a motion capture")
     return options.vertical or VERTICAL_AXIS
 
 
 def complain_of(path: Path, findings: Sequence[Finding]) -> None:
-    """Prints each finding on standard error, with the file."""
+    """Print each finding on standard error, with the file."""
     complain(*(f"{path}: {finding}" for finding in findings))
 
 
 def show_lab_log(path: Path, lab: LabLog) -> None:
-    """Prints the summary as lines, and the findings as warnings."""
+    """Print the summary as lines, and the findings as warnings."""
     summary = lab_summary(path, lab)
     print(table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"]))
     complain_of(path, lab.findings)

@@ -10,8 +10,7 @@ from pathlib import Path
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import chosen_vertical, complain_of, show_lab_log
-from command_line.logs.refusals import UsageError, explain_errors
-from command_line.logs.unfinished import complain_of_end
+from command_line.logs.refusals import UsageError, complain_of_end, explain_errors
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
@@ -109,7 +108,7 @@ def film(options: Options) -> int:
 
 
 def _picture_path(log: Path, ending: str) -> Path:
-    """Returns the log's path with another ending, but not in active/, which the log leaves when it is finished."""
+    """Return the log's path with another ending, but not in active/, which the log leaves when it is finished."""
     name = log.name.removesuffix(".gz").removesuffix(".csv").removesuffix(".mcap") + ending
     if log.absolute().parent.name != ACTIVE:
         return log.with_name(name)
@@ -118,7 +117,7 @@ def _picture_path(log: Path, ending: str) -> Path:
 
 
 def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
-    """Reads the walk and prints its limitations. Raises LogError, also for a picture that cannot be written."""
+    """Read the walk and prints its limitations. Raises LogError, also for a picture that cannot be written."""
     with watched() as watch:
         walk = read_walk(options.files[0], options.walk, options.files[1:], watch, chosen_vertical(options))
     if not os.access(path if path.exists() else path.parent, os.W_OK):
@@ -135,7 +134,7 @@ def _walk_for_picture(options: Options, path: Path) -> RecordedWalk:
 
 
 def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[Stride]:
-    """Returns the requested strides, or all for a film, or the clearest of each kind. Raises LogError, UsageError."""
+    """Return the requested strides, or all for a film, or the clearest of each kind. Raises LogError, UsageError."""
     by_number = {stride["index"]: stride for stride in walk.own_strides}
     if not by_number:
         raise LogError(f"{options.files[0]}: no complete stride in this log")

@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 from command_line import exit_codes
-from command_line.logs.refusals import UsageError, explain_errors
-from command_line.logs.unfinished import complain_of_end
+from command_line.logs.refusals import UsageError, complain_of_end, explain_errors
 from command_line.screen import watched
 from logs.files.log_error import LogError
 from logs.files.scanned_log import ScannedLog, scan_logs
@@ -55,7 +54,7 @@ def _write_csv(log: ScannedLog, options: Options) -> list[Path]:
 
 
 def _not_written(path: Path, problem: OSError) -> LogError:
-    """Returns the message for a file or folder that stays as it was; pyarrow's own text names no file."""
+    """Return the message for a file or folder that stays as it was; pyarrow's own text names no file."""
     reason = os.strerror(problem.errno) if problem.errno else str(problem)
     return LogError(f"{path}: nothing was written: {reason}")
 

@@ -64,7 +64,7 @@ def list_logs(options: Options) -> int:
 
 
 def describe(path: Path, entry: LogEntry | None) -> dict[str, Any]:
-    """Describes a log by its entry in the catalogue, or else by the summary at the file's end."""
+    """Describe a log by its entry in the catalogue, or else by the summary at the file's end."""
     known = _described(entry) if entry else _summarised(path)
     return {"name": path.name, "place": path.parent.name, "preserved": path.parent.name == PRESERVED} | known
 
@@ -149,7 +149,7 @@ def recover(options: Options) -> int:
 
 
 def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[str]]:
-    """Recovers the logs and returns messages about the others. Skips files of living writers that were not named."""
+    """Recover the logs and returns messages about the others. Skips files of living writers that were not named."""
     from logs.recovery import recover_log  # slow to import, and a listing does without it
 
     recovered, problems = [], []
@@ -170,7 +170,7 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[
 
 
 def preserve_log(options: Options) -> int:
-    """Preserves each log that can be moved, and reports the others."""
+    """Preserve each log that can be moved, and reports the others."""
     status = exit_codes.OK
     for path in options.files:
         try:

@@ -1,12 +1,14 @@
-"""Turns the errors of the commands on logs into messages and exit statuses."""
+"""Turns the errors of the commands on logs into messages and exit statuses, and says where a log ends early."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
+from pathlib import Path
 
 from command_line import exit_codes
 from command_line.screen import complain
 from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.log.log_file import is_being_written
 from logs.files.log_error import LogError
 
 Command = Callable[[argparse.Namespace], int]
@@ -17,7 +19,7 @@ class UsageError(Exception):
 
 
 def explain_errors(command: Command) -> Command:
-    """Makes a command print the message of an error and return its exit status."""
+    """Make a command print the message of an error and return its exit status."""
 
     @wraps(command)
     def run(options: argparse.Namespace) -> int:
@@ -31,3 +33,11 @@ def explain_errors(command: Command) -> Command:
             return exit_codes.USAGE if isinstance(problem, UsageError) else exit_codes.UNHEALTHY
 
     return run
+
+
+def complain_of_end(files: Sequence[Path], complete: bool) -> None:
+    """Say that the daemon still writes a log, or that its writer was cut off."""
+    if not complete:
+        is_written = any(map(is_being_written, files))
+        what, until = ("is still being written", "now") if is_written else ("was cut off", "there")
+        complain(f"the log {what}: everything up to {until} was read")

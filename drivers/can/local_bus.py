@@ -72,7 +72,8 @@ class LocalLink:
             except BlockingIOError:
                 self.lost_frames += 1
             except OSError:
-                self._read_last(peer)
+                while self._read(peer):  # the frames that the node sent before it left
+                    pass
             else:
                 if written != len(data):  # never observed; all following bytes would be misread
                     self._drop(peer)
@@ -163,11 +164,6 @@ class LocalLink:
             return False
         self._split(peer, peer.rest + chunk)
         return True
-
-    def _read_last(self, peer: Peer) -> None:
-        """Read the frames that a node sent before it left."""
-        while self._read(peer):
-            pass
 
     def _split(self, peer: Peer, stream: bytes) -> None:
         """Queue the complete frames of a peer's stream, and store the incomplete last one."""

@@ -108,6 +108,7 @@ class FailingPort:
 
     def _arrived(self, frames: Sequence[Frame]) -> list[Frame]:
         failures, failure = self._failures, self._failures.of(self._bus)
+        random = failures.random
         arrived = [frame._replace(stamp_s=failures.now_s) for frame in self._incoming.pop_arrived(self._due_s)]
         for frame in frames:
             changed = self._after_failures(frame)
@@ -116,7 +117,10 @@ class FailingPort:
             if not self._delays(changed, self._senders_of(changed)[0], self._incoming):
                 arrived.append(changed)
         if failure and failure.kind is FailureKind.GARBAGE:
-            arrived += _random_frames(failures.random)
+            arrived += [
+                Frame(random.randint(0, STANDARD_MASK), random.randbytes(random.randint(0, DATA_MAX_BYTES)))
+                for _ in range(random.randint(0, MOST_RANDOM_FRAMES))
+            ]
         if failure and failure.kind in STATES:
             self._forged_error_frames += 1
         return arrived
@@ -184,16 +188,11 @@ class FailingPort:
         if failure.kind is FailureKind.GARBAGE and (not of_bus or self._failures.loses()):
             return corrupted(frame.data, self._failures.random)
         if failure.kind is FailureKind.STUCK and not of_bus:
-            return self._first_since(failure, frame)
+            key = failure.component, frame.arbitration_id
+            if self._frozen.get(key, (None,))[0] is not failure:
+                self._frozen[key] = failure, frame.data
+            return self._frozen[key][1]
         return frame.data
-
-    def _first_since(self, failure: Failure, frame: Frame) -> bytes:
-        key = failure.component, frame.arbitration_id
-        since, data = self._frozen.get(key, (None, b""))
-        if since is not failure:
-            data = frame.data
-            self._frozen[key] = failure, data
-        return data
 
     def _with_error(self, frame: Frame, failure: Failure, drive: DriveParameters) -> bytes:
         """Add an error to a heartbeat or an error report; return one that is malformed already as it is."""
@@ -224,15 +223,14 @@ class FailingPort:
             if failure is None:
                 continue
             if component == self._bus and failure.kind in REFUSING:
-                return self._refuse(f"{REFUSING[failure.kind]} (on purpose)")
+                self._refused_sends += 1
+                self.last_send_error = f"{REFUSING[failure.kind]} (on purpose)"
+                self._count()
+                return
             if failure.kind is FailureKind.OFF or failure.kind is FailureKind.INTERMITTENT and self._failures.loses():
-                return None
-        return None if self._delays(frame, components, self._outgoing) else self._pass(frame)
-
-    def _refuse(self, why: str) -> None:
-        self._refused_sends += 1
-        self.last_send_error = why
-        self._count()
+                return
+        if not self._delays(frame, components, self._outgoing):
+            self._pass(frame)
 
     def _deliver(self) -> None:
         for frame in self._outgoing.pop_arrived(self._due_s):
@@ -267,10 +265,3 @@ def corrupted(data: bytes, random: Random) -> bytes:
         return random.randbytes(len(data))
     number = random.choice(NO_NUMBERS) if kind == 2 else random.uniform(-FAR_TURNS, FAR_TURNS)
     return (2 * ONE_FLOAT.pack(number))[: len(data)]
-
-
-def _random_frames(random: Random) -> list[Frame]:
-    return [
-        Frame(random.randint(0, STANDARD_MASK), random.randbytes(random.randint(0, DATA_MAX_BYTES)))
-        for _ in range(random.randint(0, MOST_RANDOM_FRAMES))
-    ]

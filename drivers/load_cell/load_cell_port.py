@@ -4,6 +4,7 @@ The amplifier sends lines of text at its own rate. Reading never waits. A malfor
 display, and an unplugged adapter is opened again as soon as it is back (serial_line.py).
 """
 
+from math import nan
 from typing import NamedTuple
 
 from drivers.load_cell.calibration import LoadCellCalibration
@@ -39,18 +40,15 @@ class LoadCellPort:
         for stamp_s, line in self.line.read_stamped(now_s):
             reading = self.line_format.decode(line)
             self.lines += 1
-            if reading is not None:
-                samples.append(self._sample(stamp_s, reading))
-            else:
+            if reading is None:
                 self.malformed_lines += 1
                 self.last_malformed = printable(line[:60]) or repr(line[:30])[2:-1]
+            elif reading.overloaded:
+                self.overloads += 1
+                samples.append(Sample(stamp_s, nan, overloaded=True))
+            else:
+                samples.append(Sample(stamp_s, self.calibration.force_n(self._in_unit(reading))))
         return samples
-
-    def _sample(self, stamp_s: float, reading: Reading) -> Sample:
-        if reading.overloaded:
-            self.overloads += 1
-            return Sample(stamp_s, float("nan"), True)
-        return Sample(stamp_s, self.calibration.force_n(self._in_unit(reading)))
 
     def _in_unit(self, reading: Reading) -> float:
         """Convert a reading whose line names another unit than the calibration."""

@@ -7,6 +7,7 @@ ODrive's CANSimple documentation, and examples/can_restore_config.py of odrivero
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from struct import Struct, error
 from typing import Any, NamedTuple
 
@@ -154,7 +155,7 @@ class OdriveSetup(DriveSetup):
         question = codec.RX_SDO.encode(codec.SDO_READ, number.endpoint, 0)
         answer = self._port.ask(
             Frame(arbitration_id(self._parameters.node_id, codec.RX_SDO), question),
-            lambda frame: self._is_from(frame, codec.TX_SDO) and _endpoint(frame.data) == number.endpoint,
+            lambda frame: self._is_from(frame, codec.TX_SDO) and _answers(frame.data, number.endpoint),
             key,
         )
         try:
@@ -206,8 +207,7 @@ class OdriveSetup(DriveSetup):
         return frame.is_plain and frame.arbitration_id == arbitration_id(self._parameters.node_id, message)
 
 
-def _endpoint(data: bytes) -> int:
-    try:
-        return codec.decode_sdo(data)[0]
-    except MalformedMessageError:
-        return -1
+def _answers(data: bytes, endpoint: int) -> bool:
+    with suppress(MalformedMessageError):
+        return codec.decode_sdo(data)[0] == endpoint
+    return False

@@ -49,13 +49,11 @@ class WatchdogProof:
         if not fit or read_s - read_before_s > LATE_S:
             self.begin_again()
         elif self.silent:
-            self._conclude(expired, read_s - self._silent_since_s)
+            silence_s = read_s - self._silent_since_s
+            if expired or silence_s > self._longest_s:
+                self.begin_again()
+                self.watchdog_s = min(self._timeout_s, silence_s) if expired else 0.0
         else:
             self._sound, self._expired = (0, self._expired + 1) if expired else (self._sound + 1, 0)
             self.silent = self._sound >= IN_A_ROW
             self._silent_since_s = read_before_s  # every tick sends after it has read
-
-    def _conclude(self, expired: bool, silence_s: float) -> None:
-        if expired or silence_s > self._longest_s:
-            self.begin_again()
-            self.watchdog_s = min(self._timeout_s, silence_s) if expired else 0.0

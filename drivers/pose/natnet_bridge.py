@@ -23,6 +23,7 @@ from drivers.pose.natnet_sockets import Direction, NatNetParameters
 from drivers.pose.pose_port import MOST_MESSAGES_PER_READ, NO_SOURCE, POSE, PoseReport, PoseSourceError
 
 LONGEST_START_S = 20.0  # of the program, on a busy computer
+LONGEST_END_S = 2.0
 REPORT_S = 0.25
 LONGEST_MESSAGE = 4096
 ENDED, RESTART = "the program that receives NatNet has ended.", "restart the daemon"
@@ -44,8 +45,9 @@ class NatNetBridge:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
             far.close()
         self._link.settimeout(LONGEST_START_S)
-        self._report = NO_SOURCE
-        self._on_message(self._link.recv(LONGEST_MESSAGE))
+        self._report = NO_SOURCE._replace(trouble="the program that receives NatNet did not start")
+        with suppress(TimeoutError):
+            self._on_message(self._link.recv(LONGEST_MESSAGE))
         if not self._report.source:
             self.close()
             raise PoseSourceError(self._report.trouble)
@@ -74,8 +76,12 @@ class NatNetBridge:
         return self._report
 
     def close(self) -> None:
+        """End the program, which notices that this side closes."""
         self._link.close()
-        self._program.wait(LONGEST_START_S)
+        try:
+            self._program.wait(LONGEST_END_S)
+        except subprocess.TimeoutExpired:
+            self._program.kill()
 
 
 def serve(client: NatNetClient, link: socket.socket) -> None:

@@ -276,16 +276,11 @@ def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
         offset += INTEGER.size
         size, offset = _read_count(packet, offset) if has_sizes else (0, offset)
         if kind == RIGID_BODY:
-            yield _name(packet, offset)
+            end = packet.index(0, offset)
+            yield packet[offset:end].decode(errors="replace"), INTEGER.unpack_from(packet, end + 1)[0]
         elif not has_sizes and kind != MARKER_SET:
             return
         offset = offset + size if has_sizes else _end_of(packet, offset, kind, version)
-
-
-def _name(packet: bytes, offset: int) -> tuple[str, int]:
-    end = packet.index(0, offset)
-    (identity,) = INTEGER.unpack_from(packet, end + 1)
-    return packet[offset:end].decode(errors="replace"), identity
 
 
 def _end_of(packet: bytes, offset: int, kind: int, version: NatNetVersion) -> int:

@@ -83,7 +83,10 @@ class SerialLine:
         try:
             *lines, self._incomplete = LINE_ENDS.split(self._incomplete + self._fetch())
         except OSError as problem:
-            self._lose(problem, now_s)
+            self.unpluggings += 1
+            self.problem = SerialLineError(problem.strerror or str(problem))
+            self.close()
+            self._retry_at_s = now_s + self._retry_s
             return []
         heard = [line for line in (lines if self._from_its_start else lines[1:]) if line.strip()]
         self._from_its_start = self._from_its_start or bool(lines)
@@ -99,22 +102,12 @@ class SerialLine:
         if not events:
             return b""
         if self._device.in_waiting:  # an empty read does not mean that the device is gone
-            return self._read_file()
+            with suppress(BlockingIOError):  # another program has read it
+                return os.read(self._file, MOST_BYTES_PER_READ)
+            return b""
         if events[0][1] & GONE or not self._device.in_waiting:  # a device that is gone is readable and has no bytes
             raise OSError(errno.EIO, os.strerror(errno.EIO))
         return b""
-
-    def _read_file(self) -> bytes:
-        try:
-            return os.read(self._file, MOST_BYTES_PER_READ)
-        except BlockingIOError:  # another program has read it
-            return b""
-
-    def _lose(self, problem: OSError, now_s: float) -> None:
-        self.unpluggings += 1
-        self.problem = SerialLineError(problem.strerror or str(problem))
-        self.close()
-        self._retry_at_s = now_s + self._retry_s
 
     def reopen(self, now_s: float) -> bool:
         """Try to open a lost device again, every `retry_s`; return whether it did."""

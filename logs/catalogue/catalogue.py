@@ -56,7 +56,7 @@ class Answer(NamedTuple):
 
 
 def catalogue_path(folder: Path) -> Path:
-    """Returns the file in the user's own folder, or in the user's cache: root writes into no folder of the daemon."""
+    """Return the file in the user's own folder, or in the user's cache: root writes into no folder of the daemon."""
     if folder.stat().st_uid == os.geteuid() and os.access(folder, os.W_OK):
         return folder / NAME
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -64,7 +64,7 @@ def catalogue_path(folder: Path) -> Path:
 
 
 def closed_logs(folder: Path) -> list[Path]:
-    """Returns all logs below the folder whose writer is done, oldest first."""
+    """Return all logs below the folder whose writer is done, oldest first."""
     return sorted(
         (path for path in folder.rglob(f"*{ENDING}") if path.parent.name != ACTIVE), key=lambda path: path.name
     )
@@ -114,7 +114,7 @@ class Catalogue:
         return [entry_of_row(row) for row in self._connection.execute("SELECT * FROM logs ORDER BY file").fetchall()]
 
     def update(self, watch: Watch, longest_s: float = inf, broken_again: bool = False) -> int:
-        """Reads new and changed logs for at most `longest_s`, and stores the table where it changed.
+        """Read new and changed logs for at most `longest_s`, and stores the table where it changed.
 
         `broken_again` also reads the logs again that could not be read: rights or this program may have changed.
         Returns the number of logs that are still to be read. Raises OSError where the table cannot be stored. An
@@ -161,7 +161,7 @@ class Catalogue:
             raise OSError(os.strerror(int(found[1])) if found else _first_line(problem)) from None
 
     def query(self, text: str) -> Answer:
-        """Answers one SELECT on the tables `logs` and `trials`. It can change nothing. Raises CatalogueError."""
+        """Answer one SELECT on the tables `logs` and `trials`. It can change nothing. Raises CatalogueError."""
         try:
             if TRIALS_TABLE in text.casefold():
                 self._load_trials()
@@ -176,7 +176,7 @@ class Catalogue:
             raise CatalogueError(f"the query is not understood: {_first_line(problem)}") from None
 
     def _load_trials(self) -> None:
-        """Makes the table of the results of all campaigns below the folder; without a campaign it is empty.
+        """Make the table of the results of all campaigns below the folder; without a campaign it is empty.
 
         Raises CatalogueError for a file that is damaged.
         """

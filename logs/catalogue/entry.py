@@ -73,7 +73,7 @@ def stamp_of_entry(entry: LogEntry) -> FileStamp:
 
 
 def entry_of_row(row: tuple[Any, ...]) -> LogEntry:
-    """Returns the entry of a row of the table."""
+    """Return the entry of a row of the table."""
     values = dict(zip(COLUMNS, row, strict=True))
     values["muds"] = tuple(MudEntry(**mud) for mud in values["muds"])
     values["faults"] = tuple(values["faults"])

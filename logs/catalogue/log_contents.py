@@ -44,7 +44,7 @@ def read_entry(path: Path, file: str, stamp: FileStamp) -> LogEntry:
 
 
 def entry_of_log(entry: LogEntry, log: Log) -> LogEntry:
-    """Returns the entry with what the log contains."""
+    """Return the entry with what the log contains."""
     summary = log_summary(log)
     walks = _walks(log.ticks)
     distance_m, speed_m_s = _travel(walks)
@@ -73,14 +73,14 @@ def _utc(text: str) -> datetime | None:
 
 
 def _walks(ticks: Ticks) -> list[Ticks]:
-    """Returns the ticks of each walk, from its beginning until the robot no longer walks."""
+    """Return the ticks of each walk, from its beginning until the robot no longer walks."""
     walking = ticks["mode"] == Mode.WALKING
     edges = np.flatnonzero(np.diff(np.concatenate([[False], walking, [False]]).astype(np.int8)))
     return [ticks[begin:end] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _travel(walks: Sequence[Ticks]) -> tuple[float | None, float | None]:
-    """Returns distance and mean speed of these walks; None without a pose. Between two walks the robot may be moved."""
+    """Return distance and mean speed of these walks; None without a pose. Between two walks the robot may be moved."""
     known = [walk[np.isfinite(walk["body_x_m"])] for walk in walks]
     spans = [walk[[0, -1]] for walk in known if len(walk)]
     distance_m = fsum(float(np.diff(span["body_x_m"])[0]) for span in spans)
@@ -105,6 +105,6 @@ def _mud(strides: Rows, walks: Sequence[Ticks]) -> MudEntry:
 
 
 def _median(strides: Rows, name: str) -> float | None:
-    """Returns the median of the valid values that are no bounds."""
+    """Return the median of the valid values that are no bounds."""
     usable = [stride[name] for stride in strides if stride[f"{name}_valid"] and not stride[f"{name}_at_least"]]
     return median(finite) if (finite := [float(value) for value in usable if isfinite(value)]) else None

@@ -39,7 +39,7 @@ Record = Row | Schema | Channel
 
 
 def open_chunk(chunk: Chunk) -> bytes:
-    """Returns the chunk's records. Raises ValueError or RuntimeError where the chunk is damaged."""
+    """Return the chunk's records. Raises ValueError or RuntimeError where the chunk is damaged."""
     size = chunk.uncompressed_size
     if size > LARGEST_RATIO * (len(chunk.data) + 1):
         raise ValueError(f"a chunk of {len(chunk.data)} bytes cannot hold {size}")
@@ -57,7 +57,7 @@ def open_chunk(chunk: Chunk) -> bytes:
 
 
 def split_records(contents: bytes) -> Iterator[Record]:
-    """Yields the records of an opened chunk. Raises ValueError, struct.error or McapError where they are malformed."""
+    """Yield the records of an opened chunk. Raises ValueError, struct.error or McapError where they are malformed."""
     end = 0
     while end < len(contents):
         record, end = record_at(contents, end)
@@ -66,7 +66,7 @@ def split_records(contents: bytes) -> Iterator[Record]:
 
 
 def record_at(contents: bytes, start: int) -> tuple[Record | None, int]:
-    """Returns the record that starts there, None for one of another kind, and where it ends. Raises as above."""
+    """Return the record that starts there, None for one of another kind, and where it ends. Raises as above."""
     opcode, length = RECORD_HEAD.unpack_from(contents, start)
     start, end = start + RECORD_HEAD.size, start + RECORD_HEAD.size + length
     if end > len(contents):
@@ -84,7 +84,7 @@ def record_at(contents: bytes, start: int) -> tuple[Record | None, int]:
 
 
 def run_of_rows(contents: bytes, start: int, channel_id: int, size: int) -> NDArray[np.void]:
-    """Returns the rows of `size` bytes of one channel that follow one another from `start` on; none where another does.
+    """Return the rows of `size` bytes of one channel that follow one another from `start` on; none where another does.
 
     The next record starts `size + ROW_AT` bytes later for each of them.
     """

@@ -60,7 +60,7 @@ class FilePass:
         return self.kinds.get(TICK_KIND, TICK)
 
     def ticks(self, watch: Watch = unwatched) -> Iterator[StoredTicks]:
-        """Yields the ticks in the order of the file. Raises LogError for a damaged or unreadable file."""
+        """Yield the ticks in the order of the file. Raises LogError for a damaged or unreadable file."""
         try:
             with present_path(self.path).open("rb") as file:
                 stream = _Beginning(file, self.size)
@@ -178,7 +178,7 @@ class FilePass:
             raise LogError(f"{self.path}: {self._misfit}")
 
     def decoded(self, number: int) -> list[dict[str, Any]]:
-        """Returns the strides or the events. Raises LogError."""
+        """Return the strides or the events. Raises LogError."""
         own = ROW_KINDS[number]
         kind = self.kinds.get(number, own)
         missing = {field.name: field.missing for field in own.fields}
@@ -228,7 +228,7 @@ def _is_cut(error: Exception, at_the_end: bool) -> bool:
 
 
 def described_kind(number: int, schema: Schema | None, metadata: Mapping[str, str]) -> RowKind:
-    """Returns the row kind of one of our topics as a file describes it. Raises LayoutError."""
+    """Return the row kind of one of our topics as a file describes it. Raises LayoutError."""
     if schema is None:
         raise LayoutError(f"{ROW_KINDS[number].topic} is not described")
     definition = schema.data.decode(errors="replace")
@@ -237,7 +237,7 @@ def described_kind(number: int, schema: Schema | None, metadata: Mapping[str, st
 
 
 def _flippers_of_comments(definition: str) -> str:
-    """Returns the flippers whose joints the comments of a log of version 0.2 name, before they were metadata."""
+    """Return the flippers whose joints the comments of a log of version 0.2 name, before they were metadata."""
     return " ".join(flipper for flipper in FLIPPERS if f"{flipper} sweep" in definition)
 
 

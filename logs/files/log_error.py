@@ -18,4 +18,4 @@ class LogCutError(LogError):
 
 
 def unwatched(what: str, done: int, total: int) -> None:
-    """Reports no progress."""
+    """Report no progress."""

@@ -6,7 +6,7 @@ The commands on logs read them in blocks instead (scanned_log.py), and work on a
 from collections.abc import Callable, Iterator, Sequence
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,32 +15,6 @@ from logs.files.file_pass import Spans
 from logs.files.log_error import LogCutError, LogError, Watch, unwatched
 from logs.files.scanned_log import ScannedLog, scan_logs
 from logs.files.tick_array import Ticks, whole_rows
-
-
-class AnyLog(Protocol):
-    """What the readers of logs need: a ScannedLog or a Log."""
-
-    @property
-    def metadata(self) -> dict[str, str]: ...
-    @property
-    def configuration_text(self) -> str: ...
-    @property
-    def strides(self) -> list[dict[str, Any]]: ...
-    @property
-    def events(self) -> list[dict[str, Any]]: ...
-    @property
-    def complete(self) -> bool: ...
-    @property
-    def unknown_fields(self) -> tuple[str, ...]: ...
-    @property
-    def missing_fields(self) -> tuple[str, ...]: ...
-    @property
-    def rig(self) -> Rig: ...
-    @property
-    def rows(self) -> int: ...
-    @property
-    def ends(self) -> Ticks: ...
-    def blocks(self, watch: Watch = ..., spans: Spans = ...) -> Iterator[Ticks]: ...
 
 
 class Log(NamedTuple):
@@ -69,6 +43,9 @@ class Log(NamedTuple):
         yield self.ticks
 
 
+AnyLog: TypeAlias = Log | ScannedLog
+
+
 class TickPass:
     """One pass over the ticks of a log, which reports its progress: `what` names the work, as "ticks replayed" does."""
 
@@ -77,7 +54,7 @@ class TickPass:
         self._cut: LogCutError | None = None
 
     def __iter__(self) -> Iterator[Ticks]:
-        """Yields blocks of ticks, up to a cut. Raises LogError."""
+        """Yield blocks of ticks, up to a cut. Raises LogError."""
         done = 0
         try:
             for ticks in self._log.blocks():
@@ -98,7 +75,7 @@ class TickPass:
             raise self._cut
 
     def feed(self, *consumers: Callable[[Ticks], None]) -> bool:
-        """Feeds every consumer; returns whether the log is complete. Raises LogError."""
+        """Feed every consumer; returns whether the log is complete. Raises LogError."""
         for ticks in self:
             for consume in consumers:
                 consume(ticks)
@@ -106,49 +83,36 @@ class TickPass:
 
 
 def read_log(path: Path, watch: Watch = unwatched, from_s: float = -inf, fields: Sequence[str] = ()) -> Log:
-    """Reads one file; of the rows before `from_s` it reads only the first chunk. Raises LogError."""
+    """Read one file; of the rows before `from_s` it reads only the first chunk. Raises LogError."""
     return read_logs([path], watch, from_s, fields)
 
 
 def read_logs(paths: Sequence[Path], watch: Watch = unwatched, from_s: float = -inf, fields: Sequence[str] = ()) -> Log:
-    """Reads one log, or joins several segments of one run: all fields of a tick, or some. Raises LogError."""
+    """Read one log, or joins several segments of one run: all fields of a tick, or some. Raises LogError."""
     scanned = scan_logs(paths, watch, from_s)
-    array = _TickArray(paths[0], scanned, fields)
-    complete = TickPass(scanned, watch, "ticks read").feed(array.add)
+    types, names = scanned.tick_type, scanned.tick_type.names or ()
+    for name in fields:
+        if name not in names:
+            raise LogError(f"{paths[0]}: a tick has no field {name}; its fields are {', '.join(names)}")
+    if fields:
+        types = np.dtype([(name, types[name]) for name in fields])
+    ticks, read = np.empty(scanned.rows, types), 0
+    passed = TickPass(scanned, watch, "ticks read")
+    for block in passed:
+        part = ticks[read : read + len(block)]
+        read += len(block)
+        if not fields:
+            whole_rows(part)[:] = whole_rows(block)
+        for name in fields:
+            part[name] = block[name]
     return Log(
         metadata=scanned.metadata,
         configuration_text=scanned.configuration_text,
-        ticks=array.filled,
+        ticks=ticks[:read],
         strides=scanned.strides,
         events=scanned.events,
-        complete=complete,
+        complete=passed.complete,
         unknown_fields=scanned.unknown_fields,
         missing_fields=scanned.missing_fields,
         rig=scanned.rig,
     )
-
-
-class _TickArray:
-    """Owns an array with room for all ticks, or for some of their fields."""
-
-    def __init__(self, path: Path, log: ScannedLog, fields: Sequence[str]) -> None:
-        """Raises LogError for a field that the log does not have."""
-        names = log.tick_type.names or ()
-        for name in fields:
-            if name not in names:
-                raise LogError(f"{path}: a tick has no field {name}; its fields are {', '.join(names)}")
-        self._fields = fields
-        types = np.dtype([(name, log.tick_type[name]) for name in fields]) if fields else log.tick_type
-        self._array, self._rows = np.empty(log.rows, types), 0
-
-    def add(self, ticks: Ticks) -> None:
-        part = self._array[self._rows : self._rows + len(ticks)]
-        self._rows += len(ticks)
-        if not self._fields:
-            whole_rows(part)[:] = whole_rows(ticks)
-        for name in self._fields:
-            part[name] = ticks[name]
-
-    @property
-    def filled(self) -> Ticks:
-        return self._array[: self._rows]

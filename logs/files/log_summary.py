@@ -34,7 +34,7 @@ def log_summary(log: AnyLog) -> dict[str, Any]:
 
 
 def _ticks_run(ends: Ticks) -> int:
-    """Returns the number of ticks from the first row to the last one, without those that were missed."""
+    """Return the number of ticks from the first row to the last one, without those that were missed."""
     if not len(ends):
         return 0
     first, last = ends[0], ends[-1]
@@ -42,19 +42,19 @@ def _ticks_run(ends: Ticks) -> int:
 
 
 def segment_of(log: AnyLog) -> int:
-    """Returns the number of the first segment in the run; 0 where none is given."""
+    """Return the number of the first segment in the run; 0 where none is given."""
     number = log.metadata.get("segment", "")
     return int(number) if number.isdecimal() else 0
 
 
 def begin_s(log: AnyLog) -> float:
-    """Returns the time of the first row by the log's own clock; 0 where there is none."""
+    """Return the time of the first row by the log's own clock; 0 where there is none."""
     stamps_s = [*log.ends["stamp_s"][:1], *(row["stamp_s"] for row in (*log.strides[:1], *log.events[:1]))]
     return float(min(stamps_s, default=0.0))
 
 
 def _start_time(log: AnyLog) -> str:
-    """Returns the universal time of the first row, to the second; empty where it is not known."""
+    """Return the universal time of the first row, to the second; empty where it is not known."""
     if not (log.rows or log.strides or log.events) or "wall_minus_monotonic_ns" not in log.metadata:
         return ""
     try:

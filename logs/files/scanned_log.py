@@ -65,7 +65,7 @@ class ScannedLog(NamedTuple):
         return np.empty(0, self.tick_type) if self.tally.ends is None else self.tally.ends
 
     def blocks(self, watch: Watch = unwatched, spans: Spans = ()) -> Iterator[Ticks]:
-        """Yields the ticks in the order of their numbers. With spans, most ticks outside of them are left out.
+        """Yield the ticks in the order of their numbers. With spans, most ticks outside of them are left out.
 
         Raises LogCutError after the last tick of a file that was cut off since the scan, and LogError.
         """
@@ -75,7 +75,7 @@ class ScannedLog(NamedTuple):
             raise cut
 
     def _in_files(self, watch: Watch, spans: Spans, cuts: list[LogCutError]) -> Iterator[Ticks]:
-        """Ends at the first cut: without it, the segments after it would seem to follow the rows before."""
+        """End at the first cut: without it, the segments after it would seem to follow the rows before."""
         try:
             for file in self.files:
                 yield from file.ticks(watch, spans)
@@ -84,7 +84,7 @@ class ScannedLog(NamedTuple):
 
 
 def scan_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> ScannedLog:
-    """Scans one file; of the rows before `from_s` it reads only the first chunk. Raises LogError."""
+    """Scan one file; of the rows before `from_s` it reads only the first chunk. Raises LogError."""
     spans = EVERYTHING if from_s == -inf else ((from_s, inf),)
     found, tally = FilePass(path, spans=spans), TickTally()
     for ticks in _divided_ticks(found, watch):
@@ -108,12 +108,12 @@ def scan_log(path: Path, watch: Watch = unwatched, from_s: float = -inf) -> Scan
 
 
 def scan_logs(paths: Sequence[Path], watch: Watch = unwatched, from_s: float = -inf) -> ScannedLog:
-    """Scans one log, or several segments of one run. Raises LogError, also where a segment between is missing."""
+    """Scan one log, or several segments of one run. Raises LogError, also where a segment between is missing."""
     return join_logs(paths, [scan_log(path, watch, from_s) for path in paths])
 
 
 def join_logs(paths: Sequence[Path], logs: Sequence[ScannedLog]) -> ScannedLog:
-    """Joins the logs of several segments of one run; a single log stays as it is. Raises LogError."""
+    """Join the logs of several segments of one run; a single log stays as it is. Raises LogError."""
     if len(logs) == 1:
         return logs[0]
     if len({log.metadata.get("run_id") for log in logs}) > 1 or "run_id" not in logs[0].metadata:

@@ -26,7 +26,7 @@ def tick_type(kind: RowKind = TICK) -> np.dtype[np.void]:
 
 
 def divide_ticks(kind: RowKind, stored: NDArray[np.void]) -> Ticks:
-    """Returns whole rows with their fields.
+    """Return whole rows with their fields.
 
     Rows of this version keep their bytes. Those of another version are copied: into all fields of this version, then
     those that this version does not know.
@@ -47,24 +47,24 @@ def _with_own_fields(ticks: Ticks, own: RowKind) -> Ticks:
 
 
 def whole_rows(ticks: Ticks) -> NDArray[np.void]:
-    """Returns the rows without a division into fields, so that joining and sorting keep the bytes between fields."""
+    """Return the rows without a division into fields, so that joining and sorting keep the bytes between fields."""
     return ticks if ticks.dtype.names is None else ticks.view(np.dtype((np.void, ticks.dtype.itemsize)))
 
 
 def sort_ticks(ticks: Ticks) -> Ticks:
-    """Sorts by the tick's number; ticks of one number keep their order."""
+    """Sort by the tick's number; ticks of one number keep their order."""
     if np.all(ticks["tick"][1:] >= ticks["tick"][:-1]):
         return ticks
     return whole_rows(ticks)[np.argsort(ticks["tick"], kind="stable")].view(ticks.dtype)
 
 
 def join_ticks(pieces: list[Ticks]) -> Ticks:
-    """Returns the rows of at least one piece as one array."""
+    """Return the rows of at least one piece as one array."""
     return np.concatenate([whole_rows(piece) for piece in pieces]).view(pieces[0].dtype)
 
 
 def in_groups(pieces: Iterable[Ticks], rows: int) -> Iterator[Ticks]:
-    """Joins pieces until they have so many rows together, or no more follow."""
+    """Join pieces until they have so many rows together, or no more follow."""
     gathered: list[Ticks] = []
     for piece in pieces:
         gathered.append(piece)
@@ -76,7 +76,7 @@ def in_groups(pieces: Iterable[Ticks], rows: int) -> Iterator[Ticks]:
 
 
 def in_order(blocks: Iterable[Ticks], farthest: int) -> Iterator[Ticks]:
-    """Sorts blocks in which no tick follows one whose number is larger by more than `farthest`."""
+    """Sort blocks in which no tick follows one whose number is larger by more than `farthest`."""
     held: Ticks | None = None
     for block in blocks:
         held = sort_ticks(block if held is None or not len(held) else join_ticks([held, block]))
@@ -105,7 +105,7 @@ class TickTally:
         self._extend(ticks[[int(np.argmin(numbers)), last]])
 
     def add_after(self, later: "TickTally") -> None:
-        """Adds the ticks of the next segment."""
+        """Add the ticks of the next segment."""
         if later.ends is None:
             return
         self.rows += later.rows

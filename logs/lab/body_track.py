@@ -41,7 +41,7 @@ class BodyTrack(NamedTuple):
 def read_body_track(
     rows: LogRows, table: CsvTable, vertical: CaptureAxis = VERTICAL_AXIS
 ) -> tuple[BodyTrack, list[Finding]]:
-    """Returns the track and what is to be reported about it. A file with x alone has the advance alone."""
+    """Return the track and what is to be reported about it. A file with x alone has the advance alone."""
     unknown, nothing = np.full(len(rows.time_s), UNKNOWN), np.zeros(len(rows.time_s))
     columns = [name for name in BODY_COLUMNS if name in table.column]
     if not columns:
@@ -53,14 +53,15 @@ def read_body_track(
     forward = _find_forward(rows, position_m, up)
     advance_m = unknown if forward is None else position_m @ forward
     height_m = position_m[:, up] if BODY_COLUMNS[up] in columns else unknown
-    track = BodyTrack(advance_m, height_m, _find_pitch(table, lost, forward, up))
+    pitch_rad = unknown if forward is None else np.arcsin(_rise(table, lost, forward, up))
+    tilt_rad = np.arccos(_rise(table, lost, np.eye(len(AXES))[up], up))  # of the body's vertical, to any side
     findings = [*_report_lost(rows, columns[0], lost), *_report_height(rows, height_m, BODY_COLUMNS[up])]
     findings += _report_direction(rows, position_m, up, columns[0])
-    return track, [*findings, *_report_tilt(rows, _find_tilt(table, lost, up), track.pitch_rad)]
+    return BodyTrack(advance_m, height_m, pitch_rad), [*findings, *_report_tilt(rows, tilt_rad, pitch_rad)]
 
 
 def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
-    """Returns the rows with an invalid pose: frozen until it leaps to the true one, or three zeros."""
+    """Return the rows with an invalid pose: frozen until it leaps to the true one, or three zeros."""
     zero = np.all(position_m == 0.0, axis=1) & (position_m.shape[1] == len(BODY_COLUMNS))
     known_m = np.where(zero[:, None], np.nan, position_m)
     first = np.flatnonzero(np.any(np.diff(known_m, axis=0, prepend=UNKNOWN) != 0.0, axis=1))
@@ -72,27 +73,15 @@ def _is_lost(position_m: Floats, stamp_s: Floats) -> Truths:
 
 
 def _find_forward(rows: LogRows, position_m: Floats, up: int) -> Floats | None:
-    """Returns the horizontal direction in which the stances moved the body; None if they did not."""
+    """Return the horizontal direction in which the stances moved the body; None if they did not."""
     stance_m = rows.change(position_m, Phase.STANCE)
     stance_m[up] = 0.0
     distance_m = float(np.linalg.norm(stance_m))
     return stance_m / distance_m if distance_m > 0.0 else None
 
 
-def _find_pitch(table: CsvTable, lost: Truths, forward: Floats | None, up: int) -> Floats:
-    """Returns by how much the body's forward direction rose since the first known pose."""
-    if forward is None:
-        return np.full(len(lost), UNKNOWN)
-    return np.arcsin(_rise(table, lost, forward, up))
-
-
-def _find_tilt(table: CsvTable, lost: Truths, up: int) -> Floats:
-    """Returns by how much the body's vertical leaned over, to any side, since the first known pose."""
-    return np.arccos(_rise(table, lost, np.eye(len(AXES))[up], up))
-
-
 def _rise(table: CsvTable, lost: Truths, direction: Floats, up: int) -> Floats:
-    """Returns the vertical part of the body's axis that had a direction in the first known pose."""
+    """Return the vertical part of the body's axis that had a direction in the first known pose."""
     rise = np.full(len(lost), UNKNOWN)
     if not set(ORIENTATION_COLUMNS) <= table.column.keys():
         return rise
@@ -106,7 +95,7 @@ def _rise(table: CsvTable, lost: Truths, direction: Floats, up: int) -> Floats:
 
 
 def _rotation_matrices(quaternion: Floats) -> Floats:
-    """Returns the matrices (n, 3, 3) that turn the body's axes into the capture's, of unit quaternions x, y, z, w."""
+    """Return the matrices (n, 3, 3) that turn the body's axes into the capture's, of unit quaternions x, y, z, w."""
     vector, scalar = quaternion[:, :3], quaternion[:, 3, None, None]
     x, y, z = vector.T
     zero = np.zeros_like(x)
@@ -116,7 +105,7 @@ def _rotation_matrices(quaternion: Floats) -> Floats:
 
 
 def _report_lost(rows: LogRows, column: str, lost: Truths) -> list[Finding]:
-    """Reports that motion capture lost the body, unless it never saw it."""
+    """Report that motion capture lost the body, unless it never saw it."""
     periods = runs(lost)
     if not periods or np.all(lost):
         return []
@@ -137,7 +126,7 @@ def _report_height(rows: LogRows, height_m: Floats, column: str) -> list[Finding
 
 
 def _report_direction(rows: LogRows, position_m: Floats, up: int, column: str) -> list[Finding]:
-    """Reports stances that moved the body to different sides: then the direction of the advance is not certain."""
+    """Report stances that moved the body to different sides: then the direction of the advance is not certain."""
     strokes = [np.delete(position_m[each], up, axis=1) for each in rows.strokes(Phase.STANCE)]
     known = [stroke[np.isfinite(stroke[:, 0])] for stroke in strokes]
     steps_m = np.array([stroke[-1] - stroke[0] for stroke in known if len(stroke)])
@@ -164,7 +153,7 @@ def _report_tilt(rows: LogRows, tilt_rad: Floats, pitch_rad: Floats) -> list[Fin
 
 
 def largest_change(values: Floats, phase: NDArray[np.int64]) -> tuple[float, int]:
-    """Returns the largest change since the first insertion with a known value, and its row; 0 where none is known."""
+    """Return the largest change since the first insertion with a known value, and its row; 0 where none is known."""
     later = np.isfinite(values) & (np.cumsum(phase == Phase.INSERTION) > 0)
     if not np.any(later):
         return 0.0, 0

@@ -11,7 +11,7 @@ import re
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ class CsvTable(NamedTuple):
 
 
 def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
-    """Reads the time, the state and those of the wanted columns that the file has. Raises LogError."""
+    """Read the time, the state and those of the wanted columns that the file has. Raises LogError."""
     lines = _split_lines(path, _unpack(path))
     head = _find_names(path, lines)
     names = [name.strip() for name in lines[head].split(",")]
@@ -66,7 +66,7 @@ def read_table(path: Path, wanted: Sequence[str]) -> CsvTable:
 
 
 def _unpack(path: Path) -> bytes:
-    """Returns the contents, decompressed if they are compressed; the name does not matter."""
+    """Return the contents, decompressed if they are compressed; the name does not matter."""
     pieces: list[bytes] = []
     try:
         with path.open("rb") as file:
@@ -83,7 +83,7 @@ def _unpack(path: Path) -> bytes:
 
 
 def _split_lines(path: Path, contents: bytes) -> list[str]:
-    """Returns the lines without their ends, which are those of any system."""
+    """Return the lines without their ends, which are those of any system."""
     try:
         text = contents.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -93,7 +93,7 @@ def _split_lines(path: Path, contents: bytes) -> list[str]:
 
 
 def _find_names(path: Path, lines: list[str]) -> int:
-    """Returns the index of the line with the column names: the first one that names time and state."""
+    """Return the index of the line with the column names: the first one that names time and state."""
     for index, line in enumerate(lines[: LONGEST_HEAD + 1]):
         if {TIME, STATE} <= {name.strip() for name in line.split(",")}:
             return index
@@ -101,7 +101,7 @@ def _find_names(path: Path, lines: list[str]) -> int:
 
 
 def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], list[Finding]]:
-    """Returns the settings that are numbers, the names without one, and what is reported about them."""
+    """Return the settings that are numbers, the names without one, and what is reported about them."""
     names, values = _split_settings([line for line in head if line.strip()])
     if len(names) != len(values):
         count = f"{len(names)} names and {len(values)} values"
@@ -119,7 +119,7 @@ def parse_settings(head: list[str]) -> tuple[dict[str, float], tuple[str, ...], 
 
 
 def _split_settings(head: list[str]) -> tuple[Cells, Cells]:
-    """Returns the names and the values of the settings as they stand in the head; both empty without a head."""
+    """Return the names and the values of the settings as they stand in the head; both empty without a head."""
     if len(head) == 1 and head[0].startswith(GAIT_HEADER):
         head = list(head[0].removeprefix(GAIT_HEADER).partition("|")[::2])
     if len(head) != 2:
@@ -137,7 +137,7 @@ def _is_number(text: str) -> bool:
 
 
 def _is_torn(row: str, width: int, places: list[int]) -> bool:
-    """Returns whether a row breaks off: it has too few cells, or one that is not a number."""
+    """Return whether a row breaks off: it has too few cells, or one that is not a number."""
     cells = row.split(",")
     return len(cells) != width or not all(_is_number(cells[place]) or not cells[place].strip() for place in places)
 
@@ -149,30 +149,22 @@ def _parse_rows(path: Path, numbered: list[tuple[int, str]], width: int, places:
             raise ValueError
         return np.loadtxt(rows, delimiter=",", comments=None, ndmin=2, usecols=places)
     except ValueError:
-        return np.array([_parse_row(path, number, row.split(","), width, places) for number, row in numbered])
+        return np.array([_parse_row(path, line, row.split(","), width, places) for line, row in numbered])
 
 
 def _parse_row(path: Path, line: int, cells: Cells, width: int, places: list[int]) -> list[float]:
-    """Parses a row that may have empty cells. Raises LogError where it is malformed."""
+    """Parse a row that may have empty cells, which are NaN. Raises LogError where it is malformed."""
     if len(cells) != width:
         raise LogError(f"{path}: line {line} has {len(cells)} fields, the columns are {width}")
-    return [_parse_cell(path, line, cells[place]) for place in places]
-
-
-def _parse_cell(path: Path, line: int, cell: str) -> float:
-    if _is_number(cell):
-        return float(cell)
-    if cell.strip():
-        _refuse_cell(path, line, cell)
-    return math.nan
-
-
-def _refuse_cell(path: Path, line: int, cell: str) -> NoReturn:
-    raise LogError(f"{path}: line {line}: '{cell}' is not a number")
+    wanted = [cells[place] for place in places]
+    for cell in wanted:
+        if cell.strip() and not _is_number(cell):
+            raise LogError(f"{path}: line {line}: '{cell}' is not a number")
+    return [float(cell) if cell.strip() else math.nan for cell in wanted]
 
 
 def _drop_rows(path: Path, table: CsvTable) -> CsvTable:
-    """Drops the rows without a time or a state, and reports the cells that are empty in the others."""
+    """Drop the rows without a time or a state, and reports the cells that are empty in the others."""
     findings = list(table.findings)
     known = np.isfinite(table.column[TIME]) & np.isfinite(table.column[STATE])
     if np.count_nonzero(known) < MOST_DROPPED * len(known):

@@ -38,5 +38,5 @@ class Finding(NamedTuple):
 
 
 def of_whole_log(kind: FindingKind, text: str) -> Finding:
-    """Returns a finding that belongs to no row and no column."""
+    """Return a finding that belongs to no row and no column."""
     return Finding(kind, column="", time_s=math.nan, line=0, text=text)

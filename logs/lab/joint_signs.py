@@ -48,7 +48,7 @@ class Evidence(NamedTuple):
 
 
 def orient(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
-    """Inverts angles and currents where needed, in place; invalidates strides whose current has the wrong sign."""
+    """Invert angles and currents where needed, in place; invalidates strides whose current has the wrong sign."""
     for joint, pushing in enumerate(PUSHING):
         if rows.change(angle_rad[:, joint], pushing) > 0.0:
             angle_rad[:, joint] *= -1.0
@@ -66,13 +66,13 @@ def orient(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]
 
 
 def _work(rows: LogRows, angles: Floats, currents: Floats, wanted: Phase) -> float:
-    """Returns the motor's work in a phase in A·rad."""
+    """Return the motor's work in a phase in A·rad."""
     steps = np.diff(angles) * (currents[1:] + currents[:-1]) / 2.0
     return float(np.nansum(steps[steps_inside(rows.phase, wanted)]))
 
 
 def find_evidence(rows: LogRows, angle_rad: Floats, current_a: Floats) -> Evidence:
-    """Measures the sweeps' torques; the flippers are in the same mud."""
+    """Measure the sweeps' torques; the flippers are in the same mud."""
     sweeps = [(angle_rad[:, joint], current_a[:, joint]) for joint in range(0, len(PUSHING), 2)]
     stances = [_middle_torques(rows, *sweep, Phase.STANCE) for sweep in sweeps]
     swings = [_middle_torques(rows, *sweep, Phase.SWING) for sweep in sweeps]
@@ -82,7 +82,7 @@ def find_evidence(rows: LogRows, angle_rad: Floats, current_a: Floats) -> Eviden
 
 
 def _middle_torques(rows: LogRows, angles: Floats, currents: Floats, wanted: Phase) -> list[tuple[slice, float]]:
-    """Returns each stroke with its median torque in the middle half of its travel, by the paper's torque constant."""
+    """Return each stroke with its median torque in the middle half of its travel, by the paper's torque constant."""
     torques = []
     for stroke in rows.strokes(wanted):
         known = np.isfinite(angles[stroke]) & np.isfinite(currents[stroke])
@@ -95,7 +95,7 @@ def _middle_torques(rows: LogRows, angles: Floats, currents: Floats, wanted: Pha
 
 
 def _sign_in_mud(rows: LogRows, joint: int, angles: Floats, currents: Floats) -> float:
-    """Returns the strokes' vote on the sign of a current: one each, less where the torque may be friction."""
+    """Return the strokes' vote on the sign of a current: one each, less where the torque may be friction."""
     votes = [
         float(np.clip(direction * torque_nm, -FRICTION_LIMIT_NM, FRICTION_LIMIT_NM))
         for phase, direction in MOTIONS[joint]
@@ -105,7 +105,7 @@ def _sign_in_mud(rows: LogRows, joint: int, angles: Floats, currents: Floats) ->
 
 
 def _sign_in_air(rows: LogRows, joint: int, angles: Floats, currents: Floats) -> float:
-    """Returns a number of the sign that makes a current physical in air; 0 where the log does not show it."""
+    """Return a number of the sign that makes a current physical in air; 0 where the log does not show it."""
     if PUSHING[joint] is Phase.INSERTION:
         return _hold_nm(rows, currents)
     medians = [
@@ -118,7 +118,7 @@ def _sign_in_air(rows: LogRows, joint: int, angles: Floats, currents: Floats) ->
 
 
 def _hold_nm(rows: LogRows, currents: Floats) -> float:
-    """Returns the median torque of the adduction in swing; 0 where its sign is not clear."""
+    """Return the median torque of the adduction in swing; 0 where its sign is not clear."""
     held = currents[rows.phase == Phase.SWING]
     held = held[np.isfinite(held)]
     median_a = float(np.median(held)) if len(held) else 0.0
@@ -135,7 +135,7 @@ def _report_air(evidence: Evidence) -> Finding:
 
 
 def _check_holds(rows: LogRows, current_a: Floats) -> list[Finding]:
-    """Reports an adduction whose work on the mud and whose hold in swing contradict each other."""
+    """Report an adduction whose work on the mud and whose hold in swing contradict each other."""
     findings = []
     for joint in range(1, len(PUSHING), 2):
         hold_nm = _hold_nm(rows, current_a[:, joint])
@@ -149,7 +149,7 @@ def _check_holds(rows: LogRows, current_a: Floats) -> list[Finding]:
 
 
 def _check_swings(rows: LogRows, angle_rad: Floats, current_a: Floats, allowed_nm: float) -> list[Finding]:
-    """Reports a sweep whose sign by its stances makes the motor brake in the swings."""
+    """Report a sweep whose sign by its stances makes the motor brake in the swings."""
     findings = []
     for joint in range(0, len(PUSHING), 2):
         angles, currents = angle_rad[:, joint], current_a[:, joint]
@@ -166,7 +166,7 @@ def _check_swings(rows: LogRows, angle_rad: Floats, current_a: Floats, allowed_n
 
 
 def _drop_contradictions(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
-    """Invalidates the current in strides in which the mud would push the flipper."""
+    """Invalidate the current in strides in which the mud would push the flipper."""
     found = list(_contradictions(rows, angle_rad, current_a))
     for joint, stroke, _, _ in found:
         current_a[_stride_of(rows, stroke), joint] = np.nan
@@ -178,7 +178,7 @@ def _drop_contradictions(rows: LogRows, angle_rad: Floats, current_a: Floats) ->
 
 
 def _contradictions(rows: LogRows, angle_rad: Floats, current_a: Floats) -> Iterator[tuple[int, slice, Phase, float]]:
-    """Yields joint, stroke, phase and torque where a torque beyond friction and weight opposes the motion."""
+    """Yield joint, stroke, phase and torque where a torque beyond friction and weight opposes the motion."""
     for joint, motions in enumerate(MOTIONS):
         angles, currents = angle_rad[:, joint], current_a[:, joint]
         weight_nm = abs(_hold_nm(rows, currents)) if PUSHING[joint] is Phase.INSERTION else 0.0
@@ -192,7 +192,7 @@ def _contradictions(rows: LogRows, angle_rad: Floats, current_a: Floats) -> Iter
 
 
 def _stride_of(rows: LogRows, stroke: slice) -> slice:
-    """Returns the rows from the insertion of a stroke's stride to the next insertion."""
+    """Return the rows from the insertion of a stroke's stride to the next insertion."""
     starts = [each.start for each in rows.strokes(Phase.INSERTION)]
     first = max((start for start in starts if start <= stroke.start), default=0)
     return slice(first, min((start for start in starts if start > stroke.start), default=len(rows.phase)))

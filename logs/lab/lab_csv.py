@@ -58,22 +58,28 @@ class LabLog(NamedTuple):
 
 
 def is_lab_csv(path: Path) -> bool:
-    """Returns whether a file's name is that of a CSV, compressed or not."""
+    """Return whether a file's name is that of a CSV, compressed or not."""
     return path.name.endswith((".csv", ".csv.gz"))
 
 
 def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
-    """Reads a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
+    """Read a CSV file, plain or gzip; `vertical` is the axis of the capture that points up. Raises LogError."""
     table = drop_backward_rows(path, read_table(path, READ_COLUMNS))
     _refuse_missing(path, table)
     phase, found = _read_phases(path, table)
     rows = LogRows(path, table.column[TIME], table.line, phase)
     angle_rad, current_a = math.tau * _stack(table, POSITION_COLUMNS), _stack(table, CURRENT_COLUMNS)
-    flippers = _find_flippers(angle_rad)
-    _blank_absent(angle_rad, current_a, flippers)
-    commanded_m = _commanded_depth(table)
+    joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
+    moved = {name: bool(joint_moved[2 * number : 2 * number + 2].any()) for number, name in enumerate(FLIPPERS)}
+    absent = np.repeat([not moved[name] for name in FLIPPERS], 2)
+    angle_rad[:, absent] = current_a[:, absent] = UNKNOWN  # the authors log zeros for absent motors
+    commanded_m = table.column.get(DEPTH_COLUMN, np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)))
     current_limit_a = _find_limit_a(current_a)
-    found += _check_joints(rows, angle_rad, current_a, commanded_m, table.gait.get("extraction_height", UNKNOWN))
+    found += check_ranges(rows, angle_rad, current_a)
+    check_swapped_joints(rows, angle_rad)
+    found += drop_stuck_signals(rows, angle_rad, current_a)
+    found += orient(rows, angle_rad, current_a)
+    found += check_zero(rows, angle_rad, commanded_m, table.gait.get("extraction_height", UNKNOWN))
     track, found_in_track = read_body_track(rows, table, vertical)
     return LabLog(
         stamp_s=rows.time_s,
@@ -82,7 +88,7 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
         current_a=current_a,
         body_x_m=track.advance_m,
         gait=table.gait,
-        flippers=flippers,
+        flippers=tuple(name for name in FLIPPERS if moved[name]),
         current_limit_a=current_limit_a,
         commanded_depth_m=commanded_m,
         body_height_m=track.height_m,
@@ -92,19 +98,8 @@ def read_lab_csv(path: Path, vertical: CaptureAxis = VERTICAL_AXIS) -> LabLog:
     )
 
 
-def _check_joints(
-    rows: LogRows, angle_rad: Floats, current_a: Floats, commanded_m: Floats, extraction_m: float
-) -> list[Finding]:
-    """Orients the joints' signals and invalidates wrong samples, in place. Raises LogError where all are wrong."""
-    found = check_ranges(rows, angle_rad, current_a)
-    check_swapped_joints(rows, angle_rad)
-    found += drop_stuck_signals(rows, angle_rad, current_a)
-    found += orient(rows, angle_rad, current_a)
-    return [*found, *check_zero(rows, angle_rad, commanded_m, extraction_m)]
-
-
 def _refuse_missing(path: Path, table: CsvTable) -> None:
-    """Refuses a file without the positions and currents of at least one flipper. Raises LogError."""
+    """Refuse a file without the positions and currents of at least one flipper. Raises LogError."""
     needed = [(*POSITION_COLUMNS[i : i + 2], *CURRENT_COLUMNS[i : i + 2]) for i in range(0, len(POSITION_COLUMNS), 2)]
     if not any(set(names) <= table.column.keys() for names in needed):
         missing = ", ".join(name for names in needed for name in names if name not in table.column)
@@ -112,18 +107,13 @@ def _refuse_missing(path: Path, table: CsvTable) -> None:
 
 
 def _stack(table: CsvTable, names: tuple[str, ...]) -> Floats:
-    """Returns the columns side by side, NaN for those that the file does not have."""
+    """Return the columns side by side, NaN for those that the file does not have."""
     absent = np.full(len(table.line), np.nan)
     return np.column_stack([table.column.get(name, absent) for name in names])
 
 
-def _commanded_depth(table: CsvTable) -> Floats:
-    depth_m = table.column.get(DEPTH_COLUMN)
-    return np.full(len(table.line), table.gait.get("insertion_angle", UNKNOWN)) if depth_m is None else depth_m
-
-
 def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
-    """Returns the phase of each row; a state that is not known is a pause. Raises LogError where most are unknown."""
+    """Return the phase of each row; a state that is not known is a pause. Raises LogError where most are unknown."""
     state = table.column[STATE]
     known = np.isin(state, list(PHASE_OF_STATE))
     phase_from_lowest = np.array([PHASE_OF_STATE[number] for number in sorted(PHASE_OF_STATE)], dtype=np.int64)
@@ -141,22 +131,8 @@ def _read_phases(path: Path, table: CsvTable) -> tuple[Integers, list[Finding]]:
     return phase, [found]
 
 
-def _find_flippers(angle_rad: Floats) -> tuple[str, ...]:
-    """Returns the flippers that moved."""
-    joint_moved = np.any(np.abs(np.diff(angle_rad, axis=0)) > 0.0, axis=0)
-    return tuple(name for number, name in enumerate(FLIPPERS) if joint_moved[2 * number : 2 * number + 2].any())
-
-
-def _blank_absent(angle_rad: Floats, current_a: Floats, flippers: tuple[str, ...]) -> None:
-    """Replaces the zeros that the authors logged for absent motors."""
-    for number, name in enumerate(FLIPPERS):
-        if name not in flippers:
-            angle_rad[:, 2 * number : 2 * number + 2] = UNKNOWN
-            current_a[:, 2 * number : 2 * number + 2] = UNKNOWN
-
-
 def _find_limit_a(current_a: Floats) -> float:
-    """Returns the largest current if one joint shows it in many rows: then the drive clipped it."""
+    """Return the largest current if one joint shows it in many rows: then the drive clipped it."""
     size_a = np.nan_to_num(np.abs(current_a))
     peak_a = float(size_a.max(initial=0.0))
     at_peak = size_a >= AT_PEAK * peak_a

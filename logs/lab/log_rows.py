@@ -33,26 +33,26 @@ class LogRows(NamedTuple):
         return Finding(kind, column=column, time_s=float(self.time_s[row]), line=int(self.line[row]), text=text)
 
     def refusal(self, kind: FindingKind, column: str, row: int, text: str) -> LogError:
-        """Returns the error of a log in which every number is wrong."""
+        """Return the error of a log in which every number is wrong."""
         return LogError(f"{self.path}: {self.finding(kind, column, row, text)}")
 
     def change(self, values: Floats, wanted: Phase) -> Floats:
-        """Returns the sum of a signal's steps in a phase, column by column; steps from or to NaN do not count."""
+        """Return the sum of a signal's steps in a phase, column by column; steps from or to NaN do not count."""
         total: Floats = np.nansum(np.diff(values, axis=0)[steps_inside(self.phase, wanted)], axis=0)
         return total
 
     def strokes(self, wanted: Phase) -> list[slice]:
-        """Returns the rows of each uninterrupted run of a phase."""
+        """Return the rows of each uninterrupted run of a phase."""
         return runs(self.phase == wanted)
 
 
 def runs(inside: Truths) -> list[slice]:
-    """Returns the rows of each uninterrupted run of true values."""
+    """Return the rows of each uninterrupted run of true values."""
     borders = np.flatnonzero(np.diff(inside.astype(np.int8), prepend=0, append=0))
     return [slice(int(first), int(end)) for first, end in zip(borders[::2], borders[1::2], strict=True)]
 
 
 def steps_inside(phase: Integers, wanted: Phase) -> Truths:
-    """Returns which steps from one row to the next begin and end in a phase."""
+    """Return which steps from one row to the next begin and end in a phase."""
     inside: Truths = (phase[1:] == wanted) & (phase[:-1] == wanted)
     return inside

@@ -18,7 +18,7 @@ LONGEST_STEP_S = 0.5  # median time between rows; a stride takes about 1 s
 
 
 def drop_backward_rows(path: Path, table: CsvTable) -> CsvTable:
-    """Keeps the longest series of rows whose times do not fall. Raises LogError where the times are of no use."""
+    """Keep the longest series of rows whose times do not fall. Raises LogError where the times are of no use."""
     time_s = table.column[TIME]
     kept = longest_ascent(time_s)
     findings = list(table.findings)
@@ -31,12 +31,14 @@ def drop_backward_rows(path: Path, table: CsvTable) -> CsvTable:
             raise LogError(f"{path}: {found}")
         findings.append(found)
     column = {name: values[kept] for name, values in table.column.items()}
-    _refuse_slow(path, column[TIME])
+    step_s = float(np.median(np.diff(column[TIME]))) if len(kept) > 1 else 0.0
+    if step_s > LONGEST_STEP_S:
+        raise LogError(f"{path}: column {TIME}: rows are {step_s:g} s apart; times are in seconds")
     return table._replace(column=column, line=table.line[kept], findings=tuple(findings))
 
 
 def longest_ascent(values: Floats) -> Integers:
-    """Returns the indices of the longest series of values that does not fall (patience sorting)."""
+    """Return the indices of the longest series of values that does not fall (patience sorting)."""
     if np.all(np.diff(values) >= 0.0):
         return np.arange(len(values))
     ends: list[float] = []  # the smallest value that ends an ascent of each length
@@ -51,9 +53,3 @@ def longest_ascent(values: Floats) -> Integers:
     while before[kept[-1]] >= 0:
         kept.append(int(before[kept[-1]]))
     return np.array(kept[::-1])
-
-
-def _refuse_slow(path: Path, time_s: Floats) -> None:
-    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
-    if step_s > LONGEST_STEP_S:
-        raise LogError(f"{path}: column {TIME}: rows are {step_s:g} s apart; times are in seconds")

@@ -29,7 +29,7 @@ AT_PEAK = 0.9995  # of the largest current: there the drive clips it, and it doe
 
 
 def check_ranges(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
-    """Invalidates samples beyond the mechanism and refuses a log that is mostly beyond it. Raises LogError."""
+    """Invalidate samples beyond the mechanism and refuses a log that is mostly beyond it. Raises LogError."""
     findings = []
     for joint, column in enumerate(POSITION_COLUMNS):
         size_deg = np.degrees(np.abs(angle_rad[:, joint]))
@@ -60,7 +60,7 @@ def _check_range(rows: LogRows, column: str, value: Floats, beyond: Truths, reas
 
 
 def check_swapped_joints(rows: LogRows, angle_rad: Floats) -> None:
-    """Refuses a flipper that sweeps in insertion and adducts in stance. Raises LogError."""
+    """Refuse a flipper that sweeps in insertion and adducts in stance. Raises LogError."""
     for number in range(len(FLIPPERS)):
         sweep, adduction = 2 * number, 2 * number + 1
         stance = np.abs(rows.change(angle_rad, Phase.STANCE))[[sweep, adduction]]
@@ -73,7 +73,7 @@ def check_swapped_joints(rows: LogRows, angle_rad: Floats) -> None:
 
 
 def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> list[Finding]:
-    """Invalidates signals that are bit-identical for a while in which their joint is not."""
+    """Invalidate signals that are bit-identical for a while in which their joint is not."""
     peak_a = float(np.nanmax(np.abs(current_a), initial=0.0))
     stuck = []
     for joint, (position, current) in enumerate(zip(POSITION_COLUMNS, CURRENT_COLUMNS, strict=True)):
@@ -84,40 +84,37 @@ def drop_stuck_signals(rows: LogRows, angle_rad: Floats, current_a: Floats) -> l
         stuck += [(position, angles, held) for held in held_angles]
         stale = [held for held in _stale(rows, angles, currents) if not clipped[held.start]]
         stuck += [(position, angles, held) for held in stale] + [(current, currents, held) for held in stale]
-    findings = [_report_stuck(rows, column, held) for column, _, held in stuck]
-    for _, values, held in stuck:
+    findings = []
+    for column, values, held in stuck:
+        text = f"has the same value for {_duration_s(rows, held):.2f} s, so it is left out there"
+        findings.append(rows.finding(FindingKind.STUCK_SIGNAL, column, held.start, text))
         values[held] = np.nan
     return findings
 
 
 def _stuck(rows: LogRows, values: Floats, other: Floats) -> list[slice]:
-    """Returns the rows in which a signal has one value and the other signal of its joint has many."""
+    """Return the rows in which a signal has one value and the other signal of its joint has many."""
     held = [each for each in _held(values) if _duration_s(rows, each) > STUCK_S and np.any(rows.in_gait[each])]
     return [each for each in held if len(np.unique(other[each])) > STUCK_VALUES]
 
 
 def _must_move(rows: LogRows, joint: int, angles: Floats, held: slice) -> bool:
-    """Returns whether a joint moved while its position hung: it leaps then, or strokes passed. Joints also rest."""
+    """Return whether a joint moved while its position hung: it leaps then, or strokes passed. Joints also rest."""
     before, after = angles[max(held.start - 1, 0)], angles[min(held.stop, len(angles) - 1)]
     leap_rad = max(abs(after - angles[held.start]), abs(before - angles[held.start]))
     return bool(leap_rad > LEAP_RAD or set(MOVING[joint]) <= set(rows.phase[held].tolist()))
 
 
 def _stale(rows: LogRows, angles: Floats, currents: Floats) -> list[slice]:
-    """Returns the rows of a stride in which both signals of a joint hang."""
+    """Return the rows of a stride in which both signals of a joint hang."""
     held = [each for each in _held(angles + 1j * currents) if _duration_s(rows, each) > STALE_S]
     return [each for each in held if np.all(rows.in_gait[each])]
 
 
 def _held(values: NDArray[np.float64] | NDArray[np.complex128]) -> list[slice]:
-    """Returns the rows of each value that is repeated."""
+    """Return the rows of each value that is repeated."""
     return [slice(each.start, each.stop + 1) for each in runs(np.diff(values) == 0.0)]
 
 
 def _duration_s(rows: LogRows, held: slice) -> float:
     return float(rows.time_s[held.stop - 1] - rows.time_s[held.start])
-
-
-def _report_stuck(rows: LogRows, column: str, held: slice) -> Finding:
-    text = f"has the same value for {_duration_s(rows, held):.2f} s, so it is left out there"
-    return rows.finding(FindingKind.STUCK_SIGNAL, column, held.start, text)

@@ -16,7 +16,7 @@ from logs.lab.log_rows import runs
 
 
 def lab_summary(path: Path, lab: LabLog) -> dict[str, Any]:
-    """Returns what `mudskipper log info` prints. A stride is counted when its extraction begins."""
+    """Return what `mudskipper log info` prints. A stride is counted when its extraction begins."""
     rows = len(lab.stamp_s)
     duration_s = float(lab.stamp_s[-1] - lab.stamp_s[0])
     signals = np.column_stack([lab.angle_rad, lab.current_a])
@@ -39,12 +39,12 @@ def lab_summary(path: Path, lab: LabLog) -> dict[str, Any]:
 
 
 def _change(values: NDArray[np.float64], lab: LabLog) -> float | None:
-    """Returns the largest change after the first insertion, with its sign; None where the pose is not known."""
+    """Return the largest change after the first insertion, with its sign; None where the pose is not known."""
     return largest_change(values, lab.phase)[0] if np.any(np.isfinite(values)) else None
 
 
 def finding_reports(path: Path, findings: Sequence[Finding]) -> list[dict[str, Any]]:
-    """Returns findings as JSON objects; null where a finding has no column, time or line."""
+    """Return findings as JSON objects; null where a finding has no column, time or line."""
     return [
         {
             "file": str(path),

@@ -36,7 +36,7 @@ class Excursion(NamedTuple):
 
 
 def check_zero(rows: LogRows, angle_rad: Floats, commanded_m: Floats, extraction_m: float) -> list[Finding]:
-    """Refuses an adduction whose zero is wrong, invalidates one that may be, and reports an unexpected depth.
+    """Refuse an adduction whose zero is wrong, invalidates one that may be, and reports an unexpected depth.
 
     `extraction_m` is the set height of the extraction, NaN where unknown. Raises LogError.
     """
@@ -55,7 +55,7 @@ def check_zero(rows: LogRows, angle_rad: Floats, commanded_m: Floats, extraction
 
 
 def _measure(rows: LogRows, sweep_rad: Floats, adduction_rad: Floats, commanded_m: Floats) -> Excursion | None:
-    """Returns the excursion of a flipper that swung and pushed; None for one that did not."""
+    """Return the excursion of a flipper that swung and pushed; None for one that did not."""
     depth_m = edge_depth_m(sweep_rad, adduction_rad)
     pushing = np.isin(rows.phase, (Phase.INSERTION, Phase.STANCE)) & np.isfinite(depth_m)
     swings = [
@@ -72,7 +72,7 @@ def _measure(rows: LogRows, sweep_rad: Floats, adduction_rad: Floats, commanded_
 
 
 def edge_depth_m(sweep_rad: Floats, adduction_rad: Floats) -> Floats:
-    """Returns the depth of the lower edge below the nominal surface, as FlipperGeometry.depth_m does for one sample."""
+    """Return the depth of the lower edge below the nominal surface, as FlipperGeometry.depth_m does for one sample."""
     tilted_drop_m = GEOMETRY.drop_m * np.cos(adduction_rad)
     lowered_m: Floats = GEOMETRY.flipper_length_m * np.cos(sweep_rad) * np.sin(adduction_rad)
     return tilted_drop_m - lowered_m - GEOMETRY.axis_height_m

@@ -21,7 +21,7 @@ from command_line import exit_codes
 from command_line.main import main
 from experiments.pictures.mud_layout import describe_mud, layout_of_track, mud_regions
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
-from experiments.pictures.stride_choice import Outcome, duration_s, rows_of
+from experiments.pictures.stride_choice import Outcome, duration_s
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
 from experiments.pictures.walk_plot import MOST_DASHES, draw_walk, plot_walk
 from experiments.reports.style import OUTCOME_COLOURS
@@ -103,13 +103,6 @@ def test_the_authors_form_is_drawn_too(log: Path, tmp_path: Path, capsys: pytest
     assert capsys.readouterr().err == ""
 
 
-def test_a_cut_log_is_drawn_as_far_as_it_goes(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log.write_bytes(log.read_bytes()[: int(0.6 * log.stat().st_size)])
-    assert main(["plot", str(log)]) == exit_codes.OK
-    assert "cut off" in capsys.readouterr().err
-    png_size(log.with_name("two.png"))
-
-
 # drawn values
 
 
@@ -178,13 +171,6 @@ def test_failed_strides_are_marked(two_walks: Path, tmp_path: Path) -> None:
     for outcome, stride in ((Outcome.SLIPPING, slipping), (Outcome.STUCK, stuck)):
         assert to_hex(bars[outcome].get_facecolor()[0]) == OUTCOME_COLOURS[outcome]
         assert bars[outcome].get_paths()[0].get_extents().x0 == pytest.approx(stride["t_start_s"])
-
-
-def test_without_a_known_sweep_no_geometric_step_is_drawn(two_walks: Path, tmp_path: Path) -> None:
-    walk = read_walk(two_walks, 1)
-    strides = [stride | {"released": True} for stride in walk.strides]
-    figure = draw_walk(walk._replace(strides=strides, sweep_rad=float("nan")))
-    assert panel(figure, "step").get_legend_handles_labels()[1] == ["unknown"]
 
 
 def test_without_a_pose_there_are_no_panels_of_position(two_walks: Path, tmp_path: Path) -> None:
@@ -262,16 +248,6 @@ def test_muds_of_a_known_track_are_shaded_from_arrival_to_arrival(two_walks: Pat
     assert regions[-1][1] == walk.time_s[-1]
 
 
-def test_frames_are_a_twentieth_of_a_second_apart(two_walks: Path) -> None:
-    walk = read_walk(two_walks, 1)
-    frames = film_frames(walk, walk.own_strides)
-    for stride in walk.own_strides:
-        rows = [row for shown, row in frames if shown is stride]
-        assert rows[0] == rows_of(walk, stride).start
-        assert set(rows) <= set(rows_of(walk, stride))
-        np.testing.assert_allclose(np.diff(walk.time_s[rows]), 1.0 / FRAMES_PER_S, atol=0.003)  # one tick
-
-
 # refused options
 
 
@@ -305,12 +281,6 @@ def test_without_strides_there_is_nothing_to_film(
     assert "no complete stride" in failure(capsys, "film", str(log), "--walk", "1")
 
 
-def test_without_strides_a_plot_shows_the_rest(log: Path, no_strides: None, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plot", str(log), "--walk", "1"]) == exit_codes.OK
-    assert "no complete stride" in capsys.readouterr().err
-    png_size(log.with_name("two.png"))
-
-
 def test_a_film_without_end_is_refused(
     log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -332,12 +302,3 @@ def test_without_matplotlib_a_sentence_says_what_to_install(log: Path) -> None:
     )
     assert ended.stdout == f"{exit_codes.UNHEALTHY}\n" * len(commands)
     assert ended.stderr.count("extra 'plots'") == len(commands) and "Traceback" not in ended.stderr
-
-
-def test_another_missing_module_is_not_reported_as_missing_matplotlib(
-    log: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delitem(sys.modules, "experiments.pictures.walk_plot", raising=False)
-    monkeypatch.setitem(sys.modules, "experiments.pictures.mud_layout", None)
-    with pytest.raises(ModuleNotFoundError):
-        main(["plot", str(log)])

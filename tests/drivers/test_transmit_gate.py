@@ -57,6 +57,7 @@ def armed() -> Bench:
         (Frame(0x04F), "Frame 0x04f", "payload"),
         (Frame(0x047, CLOSED_LOOP), "Frame 0x047 08 00 00 00", "armed"),
         (Frame(0x18FEF100, b"\2", is_extended=True), "Frame 0x18fef100 extended 02", "kind"),
+        (Frame(0x047, IDLE, is_error=True), "Frame 0x047 error 01 00 00 00", "kind"),
         (Frame(0x004, is_error=True, is_remote=True), "Frame 0x004 error remote", "requests"),
         (Frame(0x005, b"\3", is_fd=True, bit_rate_switch=True), "Frame 0x005 FD bit-rate-switch 03", "kind"),
     ],

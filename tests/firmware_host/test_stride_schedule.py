@@ -35,7 +35,7 @@ def walked(units_per_tick: int) -> Lockstep:
     return robot
 
 
-@pytest.mark.parametrize("units_per_tick", [NONE, 3, ALL])
+@pytest.mark.parametrize("units_per_tick", [NONE, ALL])
 def test_estimates_and_depths_do_not_depend_on_the_units_per_tick(units_per_tick: int) -> None:
     one, other = walked(1).loop.learning, walked(units_per_tick).loop.learning
     assert len(one.strides) == 2 * STRIDES

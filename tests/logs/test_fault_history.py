@@ -40,12 +40,6 @@ def test_every_fault_of_every_part_is_read_back(kind: FaultKind) -> None:
         assert (cause.name, cause.subjects, cause.consequences) == (kind, (subject,), ())
 
 
-def test_two_hundred_overruns_are_one_entry() -> None:
-    texts = ["fault loop_overrun (warn): The loop missed 1 of its ticks.", "over: loop_overrun"] * 200
-    (cause,) = read_causes(events(*texts), TEXT)
-    assert (cause.name, cause.times, cause.first_s) == ("loop_overrun", 200, 10.0)
-
-
 def test_faults_that_were_never_present_together_do_not_follow_from_each_other() -> None:
     bus, silent = "fault bus_off (damping): The left bus is off.", "fault drive_silent (damping): The left_sweep drive."
     apart = read_causes(events(bus, "over: bus_off left", silent), TEXT)

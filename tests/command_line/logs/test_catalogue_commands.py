@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import duckdb
 import pytest
@@ -29,32 +27,11 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_index_counts_the_logs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["log", "index", str(folder), "--json"]) == exit_codes.OK
-    report = json.loads(capsys.readouterr().out)
-    assert (report["logs"], report["broken"]) == (2, 1)
-    assert Path(report["catalogue"]).is_file()
-
-
 def test_the_list_knows_strides_and_reasons(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["log", "list", str(folder), "--json"]) == exit_codes.OK
     logs = {log["name"]: log for log in json.loads(capsys.readouterr().out)["logs"]}
     assert logs["walk.mcap"]["strides"] == 6 and logs["walk.mcap"]["started"] == "2026-11-22T14:50:21+00:00"
     assert logs["text.mcap"]["state"] == "broken" and logs["text.mcap"]["reason"]
-
-
-def test_a_listing_opens_no_log_that_the_catalogue_knows(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert main(["log", "index", str(folder)]) == exit_codes.OK
-    opened: list[Path] = []
-    plain = io.open
-
-    def noted(path: Any, *arguments: Any, **named: Any) -> Any:
-        opened.extend([Path(path)] if str(path).endswith(".mcap") else [])
-        return plain(path, *arguments, **named)
-
-    monkeypatch.setattr(io, "open", noted)  # Path.open and Path.read_bytes call it
-    assert main(["log", "list", str(folder)]) == exit_codes.OK
-    assert opened == []
 
 
 def test_a_query_is_answered_as_text_and_as_json(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -63,10 +40,6 @@ def test_a_query_is_answered_as_text_and_as_json(folder: Path, capsys: pytest.Ca
     assert "done/walk.mcap" in capsys.readouterr().out
     assert main(["log", "query", query, str(folder), "--json"]) == exit_codes.OK
     assert json.loads(capsys.readouterr().out)["rows"][0]["strides"] == 6
-
-
-def test_a_wrong_query_is_one_message(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "not understood" in failure(capsys, "log", "query", "selekt", str(folder))
 
 
 def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -107,12 +107,6 @@ def test_lablogs_takes_the_vertical_axis_of_its_logs(z_up: Path) -> None:
     assert any("sinks by 61 mm" in finding for finding in trial[0].findings)
 
 
-def test_log_info_prints_how_far_the_body_sinks(z_up: Path, hung: Path) -> None:
-    info = json.loads(run("log", "info", str(z_up), "--vertical", "z", "--json").stdout)
-    assert info["sinking_m"] == pytest.approx(0.061, rel=0.01) and info["pitch_rad"] is None
-    assert json.loads(run("log", "info", str(hung), "--json").stdout)["sinking_m"] is None
-
-
 def test_a_replay_takes_the_vertical_axis_of_its_configuration(z_up: Path, example_text: str) -> None:
     """The argument `vertical` overrides the configuration."""
     configuration = parse_configuration(example_text + '\n[pose]\nvertical = "z"\n')

@@ -32,12 +32,6 @@ def test_parquet_goes_into_the_named_folder(tmp_path: Path) -> None:
     assert names == {f"walk_0_1-{part}.parquet" for part in ("ticks", "strides", "events")}
 
 
-def test_a_full_disk_is_one_message_and_leaves_no_half_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with files_of_at_most(100_000):
-        assert "nothing was written" in failure(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path))
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_csv_on_a_full_disk_leaves_the_file_before(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "walk.csv"
     path.write_text("before", encoding="utf-8")
@@ -51,11 +45,6 @@ def test_parquet_into_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     (tmp_path / "file").touch()
     message = refusal(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
     assert "name a folder" in message
-
-
-@pytest.mark.parametrize("forms", [(), ("--csv", "--parquet")])
-def test_one_form_is_named(forms: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    refusal(capsys, "log", "export", LOG, *forms)
 
 
 def test_without_the_extra_a_message_says_what_to_install(tmp_path: Path) -> None:
@@ -107,25 +96,3 @@ def test_a_log_that_is_cut_off_during_an_export_is_one_message_after_the_rows_be
     assert rows_of(form, out) == read_log(log).rows > 1000
     if form == "--parquet":
         assert pq.read_schema(out / "walk-ticks.parquet").metadata[b"complete"] == b"false"
-
-
-def test_a_log_that_is_cut_off_during_a_replay_is_replayed_up_to_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    log = tmp_path / "walk.mcap"
-    contents = Path(LOG).read_bytes()
-    log.write_bytes(contents[: len(contents) // 2])
-    assert main(["replay", str(log)]) == exit_codes.OK
-    expected = capsys.readouterr()
-
-    def scan_before_cut(paths: list[Path], *arguments: Any) -> ScannedLog:
-        scanned = scan_logs(paths, *arguments)
-        os.truncate(log, len(contents) // 2)
-        return scanned
-
-    log.write_bytes(contents)
-    monkeypatch.setattr("logs.replay.scan_logs", scan_before_cut)
-    assert main(["replay", str(log)]) == exit_codes.OK
-    cut = capsys.readouterr()
-    assert cut.out.split("\n")[2].split()[:8] == expected.out.split("\n")[2].split()[:8]
-    assert cut.err == expected.err and "the log was cut off" in cut.err

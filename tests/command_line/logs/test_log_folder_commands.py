@@ -5,13 +5,11 @@ from __future__ import annotations
 import errno
 import json
 import os
-import sys
 from pathlib import Path
 
 import pytest
 
 from command_line import exit_codes, main
-from command_line.logs import log_folder_commands as log_care
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
 from logs.files.log_reader import read_log
@@ -106,15 +104,6 @@ def test_several_logs_are_preserved_even_if_one_fails(folder: Path, capsys: pyte
     assert capsys.readouterr().out == f"{folder / DONE / '1.mcap'}\n" and (folder / DONE / "1.mcap").exists()
 
 
-def test_recovery_that_takes_its_time_says_how_far_it_is(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    monkeypatch.setattr(log_care, "QUIET_S", 1e-9)
-    assert main.main(["log", "recover", str(folder)]) == exit_codes.OK
-    assert "of 1 logs" in capsys.readouterr().err
-
-
 def test_recovery_of_a_folder_reports_the_result_of_each_log(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["log", "recover", str(folder), "--json"]) == exit_codes.OK
     (log,) = json.loads(capsys.readouterr().out)["recovered"]
@@ -122,17 +111,6 @@ def test_recovery_of_a_folder_reports_the_result_of_each_log(folder: Path, capsy
     assert read_log(folder / DONE / "2.mcap").complete
     assert main.main(["log", "list", str(folder), "--json"]) == exit_codes.OK
     assert [log["recovered"] for log in json.loads(capsys.readouterr().out)["logs"]] == [False, True]
-
-
-def test_a_log_that_cannot_be_recovered_is_reported(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "x.mcap").write_text("no log")
-    living = make_log(folder, "3.mcap")
-    for path, word in ((folder / "x.mcap", "nothing of a log"), (living.path, "is being written")):
-        assert main.main(["log", "recover", str(path)]) == exit_codes.UNHEALTHY
-        assert word in capsys.readouterr().err
-    assert main.main(["log", "recover", str(folder / "none.mcap")]) == exit_codes.UNHEALTHY
-    assert "No such file" in capsys.readouterr().err
-    living.finish()
 
 
 def test_a_user_who_may_not_read_or_move_a_log_gets_advice(
@@ -152,11 +130,6 @@ def test_a_user_who_may_not_read_or_move_a_log_gets_advice(
     assert capsys.readouterr().err.endswith(
         "1.mcap: only the daemon's own user and root may move logs: do this as root\n"
     )
-
-
-def test_a_missing_folder_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main.main(["log", "list", str(tmp_path / "none")]) == exit_codes.UNHEALTHY
-    assert "there is no such folder" in capsys.readouterr().err
 
 
 def test_the_configured_folder_is_the_default(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -83,17 +83,6 @@ def after(log: Log, uptime_s: float) -> Log:
     return log._replace(metadata=metadata, ticks=ticks, strides=strides, events=events)
 
 
-def test_every_line_on_the_terminal_fits_80_columns(
-    two_walks: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(two_walks.parent)
-    shown(monkeypatch, "two.mcap")
-    printed = capsys.readouterr()
-    assert printed.out == "two-report/report.html\n"
-    assert "3 strides: 3 good" in printed.err.replace("\n", " ")
-    assert max(map(len, printed.err.splitlines())) <= 80
-
-
 def test_muds_have_the_names_they_are_given(two_walks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The operator names a mud by name and length or by a world file; a mud without a name is described by its k_p."""
     out = ("--out", str(tmp_path))
@@ -167,16 +156,6 @@ def test_runs_are_compared_on_one_page_with_one_table_and_one_figure(
     names = {path.name for path in out.iterdir()}
     pictures = {f"comparison{ending}" for ending in (".png", ".svg", ".pdf")}
     assert names == {"report.html", "summary.json", "two.mcap", "another.mcap", *pictures}
-
-
-def test_a_run_without_strides_is_a_row_of_the_comparison(
-    two_walks: Path, configuration: Configuration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rest = tmp_path / "rest.mcap"
-    record_rest(rest, configuration)
-    texts, tables = shown(monkeypatch, str(two_walks), str(rest), "--out", str(tmp_path / "out"))
-    assert [row[0] for row in tables["Result"][1:]] == ["two", "rest"]
-    assert "No complete stride in rest." in texts["Result"]
 
 
 # bad input gives one sentence each

@@ -82,10 +82,6 @@ def test_a_stride_fails_below_half_of_the_geometric_step_or_where_the_flipper_st
     assert outcome_of(walk.strides[0], walk.geometric_step_m) is outcome
 
 
-def test_an_unknown_sweep_leaves_the_outcome_unknown() -> None:
-    assert outcome_of(stride_row(0, 0.1), nan) is Outcome.UNKNOWN
-
-
 def test_the_clearest_stride_of_each_outcome_is_chosen() -> None:
     steps = [(0.11, True), (0.05, True), (0.02, False), (0.01, True), (-0.03, False), (0.13, True)]
     walk = walk_of([stride_row(index, *step) for index, step in enumerate(steps)])
@@ -100,19 +96,9 @@ def test_a_stride_that_begins_stuck_is_chosen_only_where_there_is_no_other() -> 
     assert [stride["index"] for stride in choose_strides(walk)] == [1]
 
 
-def test_what_there_is_not_is_not_shown() -> None:
-    walk = walk_of([stride_row(0, 0.11), stride_row(1, 0.10)])
-    assert [stride["index"] for stride in choose_strides(walk)] == [0]
-    assert choose_strides(walk_of([])) == []
-
-
 def test_the_other_flippers_strides_are_not_chosen() -> None:
     walk = walk_of([stride_row(0, 0.11), stride_row(0, 0.01, flipper=0)])
     assert choose_strides(walk) == walk.strides[:1]
-
-
-def test_on_a_bench_any_stride_will_do() -> None:
-    assert len(choose_strides(walk_of([stride_row(0, nan), stride_row(1, nan)]))) == 1
 
 
 def test_a_stride_lasts_until_the_next_insertion() -> None:

@@ -10,7 +10,7 @@ import pytest
 from experiments.pictures import walk_trace
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides, duration_s, moments_of, with_strides
-from experiments.pictures.walk_trace import DRAWN, WalkTraces, drawn_rows, rows_drawn, rows_of_curve
+from experiments.pictures.walk_trace import DRAWN, WalkTraces, rows_drawn, rows_of_curve
 from experiments.run_report.results import headline_of
 from experiments.run_report.run import read_runs
 from logs.files.log_error import unwatched
@@ -120,11 +120,6 @@ def test_the_figures_of_a_report_do_not_depend_on_the_trace(two_walks: Path, mon
     whole = headline()
     monkeypatch.setattr(walk_trace, "MOST_ROWS", 1000)
     assert headline() == whole
-
-
-def test_a_trace_has_only_rows_of_the_log(rows: walk_trace.Rows, two_walks: Path) -> None:
-    known = {row.tobytes() for row in drawn_rows(read_log(two_walks).ticks)}
-    assert all(row.tobytes() in known for row in rows[:500])
 
 
 def test_a_curve_has_its_extremes_and_its_gaps(rows: walk_trace.Rows, monkeypatch: pytest.MonkeyPatch) -> None:

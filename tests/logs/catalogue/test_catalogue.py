@@ -13,7 +13,7 @@ from firmware_host.log.log_file import LogFile
 from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED, preserve
 from logs.catalogue import catalogue as catalogue_module
 from logs.catalogue.catalogue import VERSION, VERSION_KEY, Catalogue, CatalogueError, catalogue_path
-from logs.catalogue.entry import COLUMNS, LogEntry
+from logs.catalogue.entry import LogEntry
 from logs.files.log_error import unwatched
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.folders import ROOT
@@ -160,14 +160,6 @@ def test_root_writes_into_no_folder_of_another_user(
     updated(folder)
     assert not (folder / "catalogue.parquet").exists()
     assert len(list((tmp_path / "cache" / "mudskipper").iterdir())) == 1
-
-
-def test_queries_see_every_column(folder: Path) -> None:
-    catalogue = Catalogue(folder)
-    catalogue.update(unwatched)
-    assert catalogue.query("SELECT * FROM logs").names == list(COLUMNS) == list(LogEntry._fields)
-    strides = catalogue.query("SELECT m.strides FROM logs, unnest(muds) AS t(m) WHERE NOT list_contains(faults, 'x')")
-    assert strides.rows == [(6,)]
 
 
 @pytest.mark.parametrize(

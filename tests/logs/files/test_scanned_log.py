@@ -15,8 +15,8 @@ import pytest
 from firmware_host.log.log_file import LogFile
 from firmware_host.log.rows import TICK, TICK_KIND
 from logs.files import scanned_log, tick_array
-from logs.files.log_error import LogCutError, LogError, unwatched
-from logs.files.log_reader import TickPass, read_log, read_logs
+from logs.files.log_error import LogCutError, unwatched
+from logs.files.log_reader import TickPass, read_logs
 from logs.files.log_summary import log_summary
 from logs.files.scanned_log import scan_log, scan_logs
 from logs.files.tick_array import in_order
@@ -105,15 +105,6 @@ def test_the_memory_of_a_pass_does_not_depend_on_the_length_of_the_log(tmp_path:
 
     assert (read(short), read(long)) == (2000, 20_000)
     assert peak_bytes(lambda: read(long)) < 1.5 * peak_bytes(lambda: read(short))
-
-
-def test_some_fields_of_the_ticks_take_no_more_room_than_they_have(tmp_path: Path) -> None:
-    path = write_ticks(tmp_path / "run.mcap", list(range(TICKS)))
-    ticks = read_log(path, fields=("mode", "stamp_s")).ticks
-    assert ticks.dtype.names == ("mode", "stamp_s") and ticks.nbytes == TICKS * (1 + 8)
-    assert ticks["stamp_s"].tolist() == read_log(path).ticks["stamp_s"].tolist()
-    with pytest.raises(LogError, match=r"run\.mcap: a tick has no field angle; its fields are stamp_s, "):
-        read_log(path, fields=("angle",))
 
 
 def test_a_file_that_is_cut_between_two_passes_is_read_up_to_the_cut(tmp_path: Path) -> None:

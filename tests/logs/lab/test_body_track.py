@@ -70,10 +70,6 @@ def test_much_sinking_and_pitch_are_reported_with_their_size(tmp_path: Path) -> 
     assert pitch.column == "OptitrackOrientation_x" and "tilts by 17°" in pitch.text and "+17°" in pitch.text
 
 
-def test_a_level_walk_reports_nothing(tmp_path: Path) -> None:
-    assert read(tmp_path, 0.002, 0.01, 35.0).findings == ()
-
-
 def test_stances_that_move_the_body_to_all_sides_are_reported(tmp_path: Path) -> None:
     columns = lab_columns(strides=4)
     add_pose(columns, 0.0, 0.0, 0.0)
