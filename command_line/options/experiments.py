@@ -37,23 +37,6 @@ LABLOGS = (
 def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     add_studies(names)
-    estimation = add(
-        names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
-    )
-    _add_report(estimation, "the load cell is virtual", "write JSON and picture there")
-    _add_workers(estimation)
-    estimation.add_argument(
-        "--setup",
-        choices=("single", "walking", "measuring", "all"),
-        default="all",
-        help="one flipper on a fixed base, the gait `walking`, the gait `measuring`, or all (default: %(default)s)",
-    )
-    estimation.add_argument("--seeds", type=SEEDS, default=10, metavar="N", help="trials of each mud (default: 10)")
-    muds = estimation.add_mutually_exclusive_group()
-    muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
-    muds.add_argument("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="instead, repeatable")
-    estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
-    _add_campaign(names)
     _add_actuator(names)
     _add_flipper(names)
     _add_walk(names)
@@ -82,16 +65,6 @@ def _add_workers(experiment: argparse.ArgumentParser) -> None:
     workers.add_argument(
         "--cluster", metavar="ADDRESS", help="of a Dask scheduler, whose workers run the trials instead"
     )
-
-
-def _add_campaign(names: Commands) -> None:
-    text = "Many simulated walks: a grid, or a random sample, of worlds, robots and configurations."
-    campaign = add(names, "campaign", "experiments.campaign.campaign", text)
-    campaign.set_defaults(simulated=True)
-    campaign.add_argument("file", type=Path, metavar="FILE", help="in TOML, such as examples/campaigns/strength.toml")
-    add_json(campaign)
-    _add_out(campaign, "for results; continues there (default: a new mudskipper-NAME of the file)")
-    _add_workers(campaign)
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:

@@ -37,16 +37,16 @@ SHORT_RECOVERY = RecoveryParameters(attempts=1, grace_s=0.05, pause_s=0.05, atte
 def bench_for(phase: str, random: Random, hopeless: bool = False, drive: str = DEFAULT) -> FaultBench:
     """Make a robot at power-on. In recovery its flippers are stuck; if `hopeless`, the robot soon gives up."""
     clay = HOLDING_CLAY if phase == "recovery" else random.choice(list(MUDS.values()))
-    configuration = _configuration(hopeless, drive)
+    configuration = real_configuration(drive)
+    if hopeless:
+        configuration = replace(configuration, recovery=SHORT_RECOVERY)
     return FaultBench(configuration, Track([(LENGTH_M, clay)]), random.getrandbits(31))
 
 
-def _configuration(hopeless: bool, drive_type: str) -> Configuration:
-    """Use the bounds of a real robot; simulations in real time have wider ones, for the pauses of a busy computer."""
+def real_configuration(drive_type: str = DEFAULT) -> Configuration:
+    """Return one with the bounds of a real robot; those of simulations are wider, for the pauses of a busy computer."""
     usual = configuration_of(WALKING, drive_type)
-    drives = {joint: _as_real(drive) for joint, drive in usual.drive.items()}
-    configuration = replace(usual, faults=FaultBounds(), drive=drives)
-    return replace(configuration, recovery=SHORT_RECOVERY) if hopeless else configuration
+    return replace(usual, faults=FaultBounds(), drive={joint: _as_real(drive) for joint, drive in usual.drive.items()})
 
 
 def _as_real(drive: DriveParameters) -> DriveParameters:

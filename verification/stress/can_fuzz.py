@@ -12,8 +12,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from random import Random
 from struct import pack
-from time import perf_counter
-from typing import Any
 
 from control.modes import Mode
 from drivers.can.frames import DATA_MAX_BYTES, Frame
@@ -26,10 +24,10 @@ from firmware_host.ticker import Tick
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from verification.benchmark import evaluated, run_benchmark, show_progress
+from verification.benchmark import Report, evaluated, run_benchmark
 from verification.example_robot import load_example, require_drive
+from verification.stress.fuzz_loop import fuzz
 from verification.stress.harmless_frames import is_harmless
-from verification.stress.resources import resident_kib
 
 TRACK = Track([(1.0, MUDS["48.5"])])
 FD_BYTES = 64  # of the longest CAN FD frame
@@ -38,7 +36,6 @@ FRAMES_PER_TICK = 40  # three times what four drives send
 BABBLE_FRAMES = 400
 BABBLE_FRACTION = 0.001
 BAR_KIB = 1024.0
-WARM_UP_FRACTION = 0.1  # of the frames, before the first reading of memory
 NUMBERS = [float("nan"), float("inf"), float("-inf"), 0.0, -0.0, 1e38, -3.4e38, 1e-45, 0.5]
 STAMPS_S = [0.0, 1e9, -1.0, float("nan")]
 
@@ -51,7 +48,7 @@ class ObservedRobot:
         self.nodes = [_open_third_node(walk, bus) for bus in walk.loop.configuration.bus]
 
     def step(self, with_drives: bool = True) -> tuple[list[Frame], list[Frame]]:
-        """Steps as the lockstep does; returns the frames of the drives and those of the loop."""
+        """Step as the lockstep does; return the frames of the drives and those of the loop."""
         walk = self.walk
         walk.tick_number += 1
         if with_drives:
@@ -65,7 +62,7 @@ class ObservedRobot:
 
 
 def true_frames(configuration: Configuration) -> list[list[Frame]]:
-    """Returns the frames of simulated drives from start to idle, each payload once, by id and length."""
+    """Return the frames of simulated drives from start to idle, each payload once, by id and length."""
     robot = ObservedRobot(Lockstep(configuration, TRACK))
     groups: dict[tuple[int, int], dict[bytes, Frame]] = {}
     for _ in range(RECORDED_TICKS):
@@ -75,7 +72,7 @@ def true_frames(configuration: Configuration) -> list[list[Frame]]:
 
 
 def announces(frame: Frame, drive: DriveParameters) -> bool:
-    """Returns whether the loop may take a frame for this drive's heartbeat, or its answer."""
+    """Return whether the loop may take a frame for this drive's heartbeat, or its answer."""
     content = type_of(drive).read_frame(frame)
     identifier = frame.arbitration_id | FD * frame.is_fd
     return identifier in type_of(drive).identifiers(drive) and (content is None or "heartbeat" in content.signals)
@@ -84,7 +81,7 @@ def announces(frame: Frame, drive: DriveParameters) -> bool:
 def malformed_frames(
     true: Sequence[Sequence[Frame]], random: Random, silent: DriveParameters | None
 ) -> Iterator[Frame]:
-    """Yields malformed frames without end, none that announces the silent drive; a seed always gives the same."""
+    """Yield malformed frames without end, none that announces the silent drive; a seed always gives the same."""
     while True:
         frame = random.choice(CHANGES)(random.choice(random.choice(true)), random)
         if silent is None or not announces(frame, silent):
@@ -148,60 +145,44 @@ class Fuzzing:
         if mode is Mode.IDLE:
             self.robot.walk.run_until(lambda: self.loop.mode is Mode.IDLE, 2.0)
         self.robot.receive()
-        self.exceptions, self.forbidden = list[str](), list[str]()
-        self.sent = self.ticks_in_another_mode = 0
+        self.sent = 0
 
-    def step(self) -> None:
+    def step(self, number: int) -> tuple[str, list[str]]:
+        """Run one tick with malformed frames; return the mode, and every frame that could move a drive."""
         nodes = self.robot.nodes
         for index in range(FRAMES_PER_TICK):
             nodes[index % len(nodes)].send(next(self.source))
-        try:
-            _, sent = self.robot.step(with_drives=self.mode is Mode.IDLE)
-        except Exception as problem:  # noqa: BLE001  that none comes is what is measured
-            self.exceptions.append(repr(problem))
-            sent = self.robot.receive()
-        self.ticks_in_another_mode += self.loop.mode is not self.mode
+        _, sent = self.robot.step(with_drives=self.mode is Mode.IDLE)
         self.sent += len(sent)
         forbidden = [frame for frame in sent if not is_harmless(frame, self.drive_type)]
-        self.forbidden += [f"0x{each.arbitration_id:03x} {each.data.hex(' ')}" for each in forbidden]
+        problems = [f"sent 0x{each.arbitration_id:03x} {each.data.hex(' ')}" for each in forbidden]
+        if self.loop.mode is not self.mode:
+            problems.append(f"left {self.mode.name.lower()}")
+        return self.loop.mode.name.lower(), problems
 
 
-def fuzz(mode: Mode, frames: int, seed: int, drive: str = DEFAULT) -> dict[str, Any]:
-    fuzzing, ticks, started_s = Fuzzing(mode, seed, drive), frames // FRAMES_PER_TICK, perf_counter()
-    readings_kib = []
-    for number in range(ticks):
-        fuzzing.step()
-        if number >= WARM_UP_FRACTION * ticks and number % max(1, ticks // 10) == 0:
-            readings_kib.append(resident_kib())
-        show_progress(number, ticks, mode.name.lower())
-    return {
+def fuzz_in_mode(mode: Mode, frames: int, seed: int, drive: str = DEFAULT) -> Report:
+    fuzzing, ticks = Fuzzing(mode, seed, drive), frames // FRAMES_PER_TICK
+    found = fuzz(ticks, mode.name.lower(), fuzzing.step)
+    return found.report() | {
         "frames": ticks * FRAMES_PER_TICK,
-        "exceptions": len(fuzzing.exceptions),
-        "first_exceptions": fuzzing.exceptions[:3],
-        "forbidden": fuzzing.forbidden[:10],
         "frames_sent": fuzzing.sent,
         "refused_by_the_gate": fuzzing.loop.drives.refused_commands,
-        "ticks_in_another_mode": fuzzing.ticks_in_another_mode,
-        "growth_kib": round(readings_kib[-1] - readings_kib[0], 1),
-        "seconds": round(perf_counter() - started_s, 1),
     }
 
 
 def _open_third_node(walk: Lockstep, bus: str) -> MockPort:
-    """Opens a third node on a bus of the loop."""
+    """Open a third node on a bus of the loop."""
     port = walk.loop.drives.ports[bus]
     assert isinstance(port, MockPort)
     return port.open_peer()
 
 
-def measure(folder: Path, *, frames: int = 1_000_000, seed: int = 1, drive: str = DEFAULT) -> dict[str, Any]:
+def measure(folder: Path, *, frames: int = 1_000_000, seed: int = 1, drive: str = DEFAULT) -> Report:
     require_drive(drive)
     freeze_garbage()
-    parts = {mode.name.lower(): fuzz(mode, frames // 2, seed, drive) for mode in (Mode.BOOT, Mode.IDLE)}
-    reached = all(
-        not (part["exceptions"] or part["forbidden"] or part["ticks_in_another_mode"]) and part["growth_kib"] < BAR_KIB
-        for part in parts.values()
-    )
+    parts = {mode.name.lower(): fuzz_in_mode(mode, frames // 2, seed, drive) for mode in (Mode.BOOT, Mode.IDLE)}
+    reached = not any(part["bugs"] or part["growth_kib"] >= BAR_KIB for part in parts.values())
     bar = f"no exception, no torque, no closed loop, memory within {BAR_KIB:g} KiB"
     return evaluated({"drive": drive, "parts": parts}, bar, reached)
 

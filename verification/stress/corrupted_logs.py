@@ -7,9 +7,6 @@ the largest log; the slowest log shows whether anything hangs.
 """
 
 import sys
-import time
-import traceback
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -22,7 +19,8 @@ from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_log
 from logs.files.log_summary import log_summary
 from logs.recovery import recover_log
-from verification.benchmark import evaluated, run_benchmark, show_progress
+from verification.benchmark import Report, evaluated, run_benchmark
+from verification.stress.fuzz_loop import fuzz
 from verification.stress.resources import peak_kib
 
 BAR_S = 2.0  # for one log
@@ -40,7 +38,7 @@ class SoundLog(NamedTuple):
 
 
 def make_sound_log(path: Path, chance: Random, finished: bool) -> SoundLog:
-    """Writes eight chunks of ticks, each with an event."""
+    """Write eight chunks of ticks, each with an event."""
     log = LogFile(path, OPENING)
     rows: list[bytes] = []
     safe = []
@@ -59,7 +57,7 @@ def make_sound_log(path: Path, chance: Random, finished: bool) -> SoundLog:
 
 
 def _tick_row(number: int, chance: Random) -> bytes:
-    """Makes a row with random values and its own number, by which the reader sorts."""
+    """Make a row with random values and its own number, by which the reader sorts."""
     kinds = [field.kind for field in TICK.fields for _ in range(field.length or 1)]
     whole = {"uint32": number, "int32": number}
     values = [chance.random() if kind == "float64" else whole.get(kind, number % 7) for kind in kinds[1:]]
@@ -85,12 +83,12 @@ def _insert(contents: bytearray, at: int, data: bytes | bytearray) -> None:
 
 
 def _replace(contents: bytearray, at: int, data: bytes) -> None:
-    """Replaces no more than there is."""
+    """Replace no more than there is."""
     contents[at : at + len(data)] = data[: len(contents) - at]
 
 
 def corrupt(log: SoundLog, chance: Random) -> tuple[bytes, int, str]:
-    """Returns (the corrupted bytes, the index of the first changed one, the names of the changes)."""
+    """Return (the corrupted bytes, the index of the first changed one, the names of the changes)."""
     contents, first, names = bytearray(log.contents), len(log.contents), []
     for _ in range(chance.choice((1, 1, 2, 3))):
         if contents:
@@ -102,7 +100,7 @@ def corrupt(log: SoundLog, chance: Random) -> tuple[bytes, int, str]:
 
 
 def try_log(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[str, str]:
-    """Returns (the outcome, what is wrong with it or an empty text)."""
+    """Return (the outcome, what is wrong with it or an empty text)."""
     path.write_bytes(contents)
     try:
         log_summary(read_log(path))
@@ -119,7 +117,7 @@ def try_log(path: Path, sound: SoundLog, contents: bytes, first: int) -> tuple[s
 
 
 def _wrong_with(log: Log, sound: SoundLog, first: int) -> str:
-    """Returns what is wrong with a recovered log, or an empty text."""
+    """Return what is wrong with a recovered log, or an empty text."""
     stored, size = log.ticks.tobytes(), TICK.layout.size
     ticks = [stored[index : index + size] for index in range(0, len(stored), size)]
     if not log.complete:
@@ -135,31 +133,25 @@ def _ticks_before(sound: SoundLog, first: int) -> int:
     return max((ticks for end, ticks in sound.safe if end <= first), default=0)
 
 
-def measure(folder: Path, *, logs: int = 10_000, seed: int = 1) -> dict[str, Any]:
+def measure(folder: Path, *, logs: int = 10_000, seed: int = 1) -> Report:
     (folder / "active").mkdir()
     chance = Random(seed)
     sound = [make_sound_log(folder / "sound.mcap", chance, finished) for finished in (True, False)]
-    outcomes: Counter[str] = Counter()
-    wrong: list[dict[str, Any]] = []
-    slowest_s, before_kib = 0.0, peak_kib()
-    for number in range(logs):
-        show_progress(number, logs, "logs")
+    before_kib = peak_kib()
+
+    def try_next(number: int) -> tuple[str, list[str]]:
         contents, first, how = corrupt(sound[number % 2], chance)
-        started_s = time.perf_counter()
         try:
-            outcome, complaint = try_log(folder / "active" / f"{number}.mcap", sound[number % 2], contents, first)
-        except Exception:  # noqa: BLE001 - which must not happen is what is looked for
-            outcome, complaint = "crashed", traceback.format_exc(limit=-3)
-        slowest_s = max(slowest_s, time.perf_counter() - started_s)
-        outcomes[outcome] += 1
-        if complaint:
-            wrong.append({"number": number, "how": how, "first": first, "complaint": complaint})
-        for path in folder.glob("*/*"):
-            path.unlink()
+            outcome, problem = try_log(folder / "active" / f"{number}.mcap", sound[number % 2], contents, first)
+        finally:
+            for path in folder.glob("*/*"):
+                path.unlink()
+        return outcome, [f"{how} from byte {first} on: {problem}"] if problem else []
+
+    found = fuzz(logs, "logs", try_next)
     memory = 1024.0 * (peak_kib() - before_kib) / max(len(log.contents) for log in sound)
-    report = {"logs": logs, "seed": seed, "outcomes": dict(outcomes), "wrong": wrong}
-    report |= {"slowest_s": round(slowest_s, 3), "peak_in_log_sizes": round(memory, 1)}
-    reached = not wrong and slowest_s < BAR_S and memory < BAR_MEMORY
+    report = found.report() | {"logs": logs, "seed": seed, "peak_in_log_sizes": round(memory, 1)}
+    reached = not found.bugs and found.slowest_s < BAR_S and memory < BAR_MEMORY
     return evaluated(report, "no crash, no hang, bounded memory, no row lost", reached)
 
 

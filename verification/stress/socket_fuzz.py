@@ -2,10 +2,10 @@
 
 Each stream has a Unix connection of its own, of an operator, a reader, an unauthorised user or root, fifteen at a time;
 some arrive in pieces, some hang up at once. A stream starts with valid requests, which must be answered, and continues
-with bytes from verification.stress.malformed_streams. A reference client next to them asks repeatedly and must be
-answered within one more tick than there are clients. An exception ends the run. Times are the thread's own, so other
-programs do not count. Memory is that of the whole process with garbage collection off, as in the daemon, read ten
-times; the growth is that of the second half, because the walking robot fills its bounded lists in the first.
+with bytes from verification.stress.fuzz_loop import fuzz
+from verification.stress.malformed_streams. A reference client next to them asks repeatedly and must be
+answered within one more tick than there are clients. Memory is that of the whole process with garbage collection off,
+as in the daemon.
 """
 
 import sys
@@ -27,10 +27,10 @@ from firmware_host.sockets.status_socket import MOST_CLIENTS, Methods, StatusSoc
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from verification.benchmark import evaluated, run_benchmark, show_progress
+from verification.benchmark import Report, evaluated, run_benchmark
 from verification.example_robot import load_example
+from verification.stress.fuzz_loop import fuzz
 from verification.stress.malformed_streams import Stream, next_stream
-from verification.stress.resources import resident_kib
 from verification.stress.stream_client import StreamClient
 
 BAR_KIB = 1024.0
@@ -63,7 +63,7 @@ class Bench:
         self.socket.report_bug = self.bugs.append
         self.now_s = 1000.0
         self.kinds: Counter[str] = Counter()
-        self.valid = self.unanswered = self.answers = self.ticks = 0
+        self.valid = self.answers = self.ticks = 0
         self.most_calls_a_tick = self.longest_wait_ticks = self._calls = 0
         self.durations = Histogram()
         self.reference = StreamClient(self.socket.path, [])
@@ -88,7 +88,9 @@ class Bench:
         self.most_calls_a_tick = max(self.most_calls_a_tick, self._calls)
         self.ticks += 1
 
-    def run_batch(self, count: int) -> None:
+    def run_batch(self, count: int) -> list[str]:
+        """Send streams at once and return what is wrong with the answers."""
+        known = len(self.bugs)
         self.robot.step()  # so that it executes the requests
         self._next_peers += [PEERS[number % len(PEERS)] for number in range(count)]
         streams = [next_stream(self.chance) for _ in range(count)]
@@ -109,9 +111,10 @@ class Bench:
             self._count(client, stream)
         while self.socket.counters["clients"] > 1:
             self.tick()
+        return self.bugs[known:]
 
     def _ask_reference(self, others: list[StreamClient]) -> None:
-        """Asks as the reference client while the others send."""
+        """Ask as the reference client while the others send."""
         number = self.ticks
         self.reference.pieces.append(msgpack.packb([0, number, "status", {}]))
         for waited in range(LONGEST_BATCH_TICKS):
@@ -129,7 +132,9 @@ class Bench:
         self.answers += len(client.answers)
         if not client.hurried:
             self.valid += stream.valid
-            self.unanswered += len(_unanswered(client, stream))
+            self.bugs += [
+                f"request {each} of a {stream.kind} stream is not answered" for each in _unanswered(client, stream)
+            ]
         client.close()
 
     def close(self) -> None:
@@ -142,50 +147,35 @@ def _unanswered(client: StreamClient, stream: Stream) -> set[int]:
 
 
 def _is_done(client: StreamClient, stream: Stream) -> bool:
-    """Returns whether all is sent and answered, or the connection closed."""
+    """Return whether all is sent and answered, or the connection closed."""
     return client.closed or not (client.pieces or _unanswered(client, stream))
 
 
-def fuzz(bench: Bench, streams: int) -> list[float]:
-    """Sends all streams; returns ten readings of the process's memory, in KiB."""
-    sent, readings = 0, list[float]()
-    while sent < streams:
-        count = min(AT_ONCE, streams - sent)
-        bench.run_batch(count)
-        sent += count
-        if sent >= streams * (len(readings) + 1) / 10:
-            readings.append(resident_kib())
-        show_progress(sent, streams, "streams")
-    return readings
-
-
-def measure(folder: Path, *, streams: int = 200_000, seed: int = 1) -> dict[str, Any]:
+def measure(folder: Path, *, streams: int = 200_000, seed: int = 1) -> Report:
     bench = Bench(folder, seed)
     freeze_garbage()
-    start_s = time.monotonic()
+
+    def try_batch(number: int) -> tuple[str, list[str]]:
+        return "answered", bench.run_batch(min(AT_ONCE, streams - number * AT_ONCE))
+
     try:
-        readings_kib = fuzz(bench, streams)
+        found = fuzz(-(-streams // AT_ONCE), "streams", try_batch)
     finally:
         bench.close()
-    report = {
+    report = found.report() | {
         "streams": streams,
         "seed": seed,
-        "seconds": round(time.monotonic() - start_s, 1),
         "kinds": dict(bench.kinds),
         "ticks": bench.ticks,
         "answers": bench.answers,
         "valid_requests": bench.valid,
-        "unanswered": bench.unanswered,
-        "bugs": bench.bugs[:10],
         "counters": bench.socket.counters,
         "most_calls_a_tick": bench.most_calls_a_tick,
         "longest_wait_ticks": bench.longest_wait_ticks,
         "serve_us": bench.durations.summary(),
-        "readings_kib": readings_kib,
-        "growth_kib": (growth_kib := readings_kib[-1] - readings_kib[len(readings_kib) // 2]),
     }
-    sound = bench.unanswered == 0 and not bench.bugs and bench.most_calls_a_tick <= 1
-    reached = sound and bench.longest_wait_ticks <= LONGEST_WAIT_TICKS and growth_kib < BAR_KIB
+    sound = not found.bugs and bench.most_calls_a_tick <= 1
+    reached = sound and bench.longest_wait_ticks <= LONGEST_WAIT_TICKS and found.growth_kib < BAR_KIB
     bar = f"every valid request answered, one a tick, no bug, memory growth below {BAR_KIB:.0f} KiB"
     return evaluated(report, bar, reached)
 

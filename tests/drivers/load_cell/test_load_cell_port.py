@@ -65,20 +65,6 @@ def test_malformed_lines_are_counted_and_the_last_one_is_stored(tmp_path: Path) 
     cable.close()
 
 
-def test_an_amplifier_that_is_unplugged_is_opened_again_when_it_is_back(cable: Cable) -> None:
-    cable.run(1.0)
-    cable.amplifier.unplug()
-    assert cable.run(1.0) == []
-    assert not cable.port.line.is_there
-    assert "no serial port" in str(cable.port.line.problem)
-    cable.amplifier.plug_in()
-    samples = cable.run(2.0)
-    assert cable.port.line.is_there
-    assert cable.port.line.unpluggings == 1
-    assert len(samples) > 80
-    assert samples[0].stamp_s > 2.0
-
-
 def test_a_drop_out_is_a_gap_in_the_stamps(tmp_path: Path) -> None:
     cable = Cable(tmp_path, drop_out_rate_hz=1.0, drop_out_s=0.3)
     stamps_s = [sample.stamp_s for sample in cable.run(10.0)]
@@ -109,11 +95,3 @@ def test_the_unit_of_a_line_is_converted(tmp_path: Path) -> None:
     cable.port.calibration = LoadCellCalibration("N", 1.0)
     assert cable.run(1.0)[-1].force_n == pytest.approx(FORCE_N, abs=1e-3)
     cable.close()
-
-
-def test_noise_without_an_end_does_not_grow(cable: Cable) -> None:
-    for _ in range(100):
-        cable.amplifier.waiting = b"\xff" * 60
-        cable.amplifier.deliver()
-        cable.port.read(1.0)
-    assert cable.port.malformed_lines > 20

@@ -202,9 +202,3 @@ def test_every_changed_byte_besides_the_torque_is_no_torque_command(position: in
     data[position] ^= 0x01
     begin = data.index(bytes.fromhex("0d22")) + 2 if position not in (7, 8) else 9
     assert isnan(codec.decode_torque(bytes(data))) is not (begin <= position < begin + 4)
-
-
-def test_a_fault_has_its_name_and_an_active_limit_none() -> None:
-    assert codec.error_text(0) == ""
-    assert codec.error_text(34) == "over-voltage" and codec.error_text(codec.TIMEOUT_FLAG) == "watchdog expired"
-    assert codec.error_text(77) == "fault 77"

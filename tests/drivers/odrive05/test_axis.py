@@ -357,11 +357,3 @@ def test_nothing_is_asked_of_a_drive_that_was_never_heard(bench: Bench) -> None:
         bench.read()
         bench.drives.poll()
     assert bench.far.receive() == []
-
-
-def test_a_reset_forgets_everything(bench: Bench) -> None:
-    before = bench.health
-    bench.run()
-    bench.drives.reset()
-    assert str(bench.health) == str(before)
-    assert isnan(bench.state.angle_rad) and not bench.state.heard

@@ -18,6 +18,7 @@ from experiments.study.result import Result
 from experiments.study.session import Ending
 from experiments.study.trials import Trials
 from verification.faults.evaluation import Cell
+from verification.studies import healthy_walks
 from verification.studies.faults import FAULTS, study
 
 COMMAND = ["experiment", "faults", "--simulated"]
@@ -103,3 +104,9 @@ def test_faults_that_cannot_occur_in_a_phase_are_refused(tmp_path: Path, monkeyp
     monkeypatch.chdir(tmp_path)
     assert main([*COMMAND, "--fault", "flipper_stuck", "--phase", "idle"]) == exit_codes.USAGE
     assert not any(tmp_path.iterdir())
+
+
+def test_a_walk_in_which_nothing_fails_has_no_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(healthy_walks, "WALK_S", 4.0)
+    walked = healthy_walks.walk(3)
+    assert walked["strides"] > 0 and walked["alarms"] == walked["held"] == []

@@ -6,24 +6,25 @@ joints and walks on, in lockstep. A flipper that the mud holds is no false alarm
 a free body that sinks until the mud blocks the swing of its flippers.
 """
 
-import os
-import sys
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 from random import Random
-from typing import Any, NamedTuple
+from typing import Annotated, Any
+
+from pandas import DataFrame
 
 from control.controller import WalkOrder
 from control.faults import Reaction
 from control.modes import Mode, Request
+from experiments.study.option import Option
+from experiments.study.result import Result, Table
+from experiments.study.session import Ending
+from experiments.study.trials import Trials
 from simulation.harness.lockstep import Lockstep, drives_of, plant_of
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE, drive_changes
 from simulation.mud.track import Track
 from simulation.mud.unevenness import RandomStrength
-from verification.benchmark import evaluated, run_benchmark, show_progress
-from verification.example_robot import load_example
+from verification.faults.phases import real_configuration
 
 WALK_S = 60.0
 STRENGTHS_PA = (400.0, 4000.0)  # softer mud supports no robot, firmer mud holds a flipper that is deep in it
@@ -32,20 +33,35 @@ MOVE_RAD = 0.2
 BY_THE_MUD, BY_SINKING = ("flipper_stuck", "joint_not_following"), "following_error"
 
 
-class Walk(NamedTuple):
-    """The result of one walk."""
+def study(
+    trials: Trials,
+    *,
+    walks: Annotated[int, Option("of a minute each; 600 are ten hours", low=1, high=100_000)] = 60,
+    first: Annotated[int, Option("seed of the first walk", low=0, high=1_000_000)] = 0,
+) -> Result:
+    """Hours of walking without a failure, in which no fault may stop the robot."""
+    walked = trials.run(walk, [{"seed": seed} for seed in range(first, first + walks)])
+    alarms = {int(row.seed): row.alarms for row in walked.itertuples() if row.alarms}
+    faults = Counter(text.split(": ")[1] for texts in (*walked["alarms"], *walked["held"]) for text in texts)
+    summary = {
+        "hours": round(float(walked["duration_s"].sum()) / 3600.0, 3),
+        "strides": int(walked["strides"].sum()),
+        "distance_m": round(float(walked["distance_m"].sum()), 1),
+        "faults": dict(faults),
+        "walks_held_by_the_mud": sum(bool(held) for held in walked["held"]),
+        "false_alarms": alarms,
+    }
+    row = {name: summary[name] for name in ("hours", "strides", "distance_m", "walks_held_by_the_mud")}
+    table = Table(
+        "walks", "Walks in which nothing fails", {}, DataFrame([row | {"walks_with_false_alarms": len(alarms)}])
+    )
+    notes = [f"seed {seed}: {', '.join(texts)}" for seed, texts in alarms.items()]
+    return Result([table], summary=summary, notes=notes, ending=Ending.UNHEALTHY if alarms else Ending.DONE)
 
-    seed: int
-    duration_s: float
-    strides: int
-    distance_m: float
-    alarms: list[str]  # faults with a reaction, and when
-    held: list[str]  # faults of flippers that the mud holds
 
-
-def walk(seed: int) -> Walk:
-    """Walks for a minute over a random track."""
-    chance, configuration = Random(f"healthy {seed}"), load_example()
+def walk(seed: int) -> dict[str, Any]:
+    """Walk for a minute over a random track; return distances, and the faults that stopped the robot."""
+    chance, configuration = Random(f"healthy {seed}"), real_configuration()
     strength = RandomStrength(chance.choice((0.0, 0.1, 0.25)), chance.uniform(0.05, 0.5), seed)
     track = Track([(100.0, Clay("drawn", chance.uniform(*STRENGTHS_PA)))], random_strength=strength)
     disturbances = chance.choice((NONE, LAB))
@@ -62,13 +78,19 @@ def walk(seed: int) -> Walk:
         faults += [(robot.now_s, fault) for fault in robot.loop.faults.begun if fault.kind.reaction > Reaction.WARN]
         strides = max(strides, robot.loop.controller.target.stride + 1)
     of_mud = (*BY_THE_MUD, BY_SINKING) if is_free else BY_THE_MUD
-    named = [(f"{now_s:.2f} s: {fault.name}", fault.kind.value in of_mud) for now_s, fault in faults]
+    named = [(f"{now_s:.2f} s: {fault.name}", fault.name in of_mud) for now_s, fault in faults]
     held, alarms = [text for text, by_mud in named if by_mud], [text for text, by_mud in named if not by_mud]
-    return Walk(seed, robot.now_s, strides, robot.robot.plant.body_m, [] if held else alarms, held)
+    return {
+        "duration_s": robot.now_s,
+        "strides": strides,
+        "distance_m": robot.robot.plant.body_m,
+        "alarms": [] if held else alarms,
+        "held": held,
+    }
 
 
 def _operate(robot: Lockstep, chance: Random, order: WalkOrder) -> None:
-    """Walks most of the time, and now and then stops and moves a joint."""
+    """Walk most of the time, and now and then stop and move a joint."""
     loop = robot.loop
     if loop.mode is Mode.HOLD and not loop.controller.moving and chance.random() < 0.01:
         if chance.random() < 0.3:
@@ -80,28 +102,3 @@ def _operate(robot: Lockstep, chance: Random, order: WalkOrder) -> None:
             loop.request(Request.WALK, robot.now_s, order)
     elif loop.mode is Mode.WALKING and chance.random() < 0.0003:
         loop.request(Request.STOP, robot.now_s)
-
-
-def measure(folder: Path, *, walks: int = 600, first: int = 0, workers: int = os.cpu_count() or 1) -> dict[str, Any]:
-    """`walks` of one minute each: 600 are ten hours."""
-    kinds: Counter[str] = Counter()
-    results: list[Walk] = []
-    with ProcessPoolExecutor(workers) as pool:
-        for result in pool.map(walk, range(first, first + walks)):
-            results.append(result)
-            kinds.update(text.split(": ")[1].split()[0] for text in [*result.alarms, *result.held])
-            show_progress(len(results), walks, f"{len(results)} of {walks} walks, {dict(kinds)}")
-    alarms = {result.seed: result.alarms for result in results if result.alarms}
-    report = {
-        "hours": round(sum(result.duration_s for result in results) / 3600.0, 3),
-        "strides": sum(result.strides for result in results),
-        "distance_m": round(sum(result.distance_m for result in results), 1),
-        "faults": dict(kinds),
-        "walks_held_by_the_mud": sum(bool(result.held) for result in results),
-        "false_alarms": alarms,
-    }
-    return evaluated(report, "no false alarm", not alarms)
-
-
-if __name__ == "__main__":
-    sys.exit(run_benchmark(measure))
