@@ -98,11 +98,11 @@ class FaultMonitor:
 
     @property
     def winding_temperatures_c(self) -> Joints[float]:
-        """The temperature of each motor, measured or estimated."""
+        """Return the temperature of each motor, measured or estimated."""
         return Joints(*(joint.winding.temperature_c for joint in self.joints))
 
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
-        """The states with the estimated winding temperatures, if one is warm enough to matter for the limits."""
+        """Return the states with the estimated winding temperatures, if one is warm enough to matter for the limits."""
         warm_c = self._warm_c
         for joint, state in zip(self.joints, states, strict=True):
             if state.temperature_c > warm_c or not joint.winding.temperature_c <= warm_c:

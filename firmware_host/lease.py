@@ -28,17 +28,17 @@ class Lease:
 
     @property
     def holder(self) -> Hashable | None:
-        """The holder, also after it has lost the lease."""
+        """Return the holder, also after it has lost the lease."""
         return self._holder
 
     @property
     def until_s(self) -> float:
-        """The time until which it is held unless it is renewed; infinite if no program has taken it."""
+        """Return the time until which it is held unless it is renewed; infinite if no program has taken it."""
         return self._until_s
 
     @property
     def held(self) -> bool:
-        """Whether the lease is held, as of the last `update`."""
+        """Return whether the lease is held, as of the last `update`."""
         return self._holder is not None and not self._lost
 
     def update(self, now_s: float) -> None:

@@ -98,17 +98,17 @@ class Loop:
 
     @property
     def fault(self) -> Fault | None:
-        """The worst present fault that is more than a warning."""
+        """Return the worst present fault that is more than a warning."""
         return self.faults.worst if self.faults.reaction >= Reaction.HOLD else None
 
     @property
     def aged_faults(self) -> list[AgedFault]:
-        """Every present fault with the time since it was first detected."""
+        """Return every present fault with the time since it was first detected."""
         return [AgedFault(fault, self.faults.age_ticks(fault) * self.period_s) for fault in self.faults.present]
 
     @property
     def stride_depth_m(self) -> float:
-        """The commanded depth of this stride."""
+        """Return the commanded depth of this stride."""
         return self.controller.gait.commanded_depth_m
 
     def _end_lost_lease(self, now_s: float) -> str:
@@ -161,7 +161,7 @@ class Loop:
         )
 
     def _all_in_closed_loop(self) -> bool:
-        """Whether all drives report closed loop, in heartbeats that are newer than the request to arm."""
+        """Return whether all drives report closed loop, in heartbeats that are newer than the request to arm."""
         asked_s = self._mode_since_s
         return all(state.closed_loop and state.heartbeat_stamp_s > asked_s for state in self.states)
 

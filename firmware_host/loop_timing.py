@@ -26,7 +26,7 @@ class Histogram:
             self.max_us = duration_us
 
     def percentile_us(self, fraction: float) -> float:
-        """The duration that this fraction of all durations did not exceed, rounded up to a microsecond."""
+        """Return the duration that this fraction of all durations did not exceed, rounded up to a microsecond."""
         if self.count == 0:
             return 0.0
         wanted, counted, block = fraction * self.count, 0, 0
@@ -76,7 +76,7 @@ class LoopTiming:
 
     @property
     def rate_hz(self) -> float:
-        """Ticks that ran per second; missed ticks lower it."""
+        """Return the ticks that ran per second; missed ticks lower it."""
         elapsed_s = self._last_s - self._first_s
         return (self.ticks - 1) / elapsed_s if elapsed_s > 0.0 else 0.0
 

@@ -162,7 +162,7 @@ class MudLearning:
         return [_choice_text(choice), *late]
 
     def _is_firm(self, controller: Controller) -> bool:
-        """Whether an insertion of an adaptive walk has met solid mud."""
+        """Return whether an insertion of an adaptive walk has met solid mud."""
         if not controller.order.adaptive or controller.target.phase is not Phase.INSERTION:
             self._firm_ticks = 0
             return False

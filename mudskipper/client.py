@@ -48,34 +48,34 @@ class Client:
         self._client.close()
 
     def status(self) -> Report:
-        """Returns mode, faults, joints, mud and log of the robot (docs/reference/socket.md)."""
+        """Return mode, faults, joints, mud and log of the robot (docs/reference/socket.md)."""
         return dict(self._client.call("status"))
 
     def check(self) -> list[Report]:
-        """Returns every condition of arming with `ok`, `text` and `fix`."""
+        """Return every condition of arming with `ok`, `text` and `fix`."""
         return list(self._client.call("check"))
 
     def strides(self, since: int = 0) -> list[Report]:
-        """Returns the first 20 strides from that number on; ask again from the next number."""
+        """Return the first 20 strides from that number on; ask again from the next number."""
         return list(self._client.call("strides", since=since))
 
     def map(self) -> list[Report]:
-        """Returns the mud along the track since the walk began."""
+        """Return the mud along the track since the walk began."""
         pieces: list[Report] = []
         while page := self._client.call("map", after_m=pieces[-1]["place_m"] if pieces else None):
             pieces += page
         return pieces
 
     def arm(self, force: bool = False) -> None:
-        """Energises the joints; `force` overrules the faults that are not mandatory."""
+        """Energise the joints; `force` overrules the faults that are not mandatory."""
         self._move("arm", force=force)
 
     def walk(self, strides: int = 0, depth_m: float | None = None) -> None:
-        """Walks so many strides (0: without end), at a fixed depth or at depths that adapt to the mud."""
+        """Walk so many strides (0: without end), at a fixed depth or at depths that adapt to the mud."""
         self._move("walk", strides=strides, **({} if depth_m is None else {"depth_m": depth_m}))
 
     def move(self, **angles_rad: float) -> None:
-        """Moves joints slowly while the robot holds: `move(left_sweep_rad=0.1, right_sweep_rad=0.1)`."""
+        """Move joints slowly while the robot holds: `move(left_sweep_rad=0.1, right_sweep_rad=0.1)`."""
         self._move("move", **angles_rad)
 
     def _move(self, method: str, **params: Any) -> None:
@@ -83,28 +83,28 @@ class Client:
         self._leased = bool(self._lease)
 
     def stop(self) -> None:
-        """Ends the walk with raised flippers; no lease is needed."""
+        """End the walk with raised flippers; no lease is needed."""
         self._client.call("stop")
 
     def disarm(self) -> None:
-        """Switches the torque off; no lease is needed."""
+        """Switch the torque off; no lease is needed."""
         self._client.call("disarm")
 
     def clear(self) -> None:
-        """Clears faults whose cause has ended."""
+        """Clear faults whose cause has ended."""
         self._client.call("clear")
 
     def renew(self) -> None:
-        """Renews the lease."""
+        """Renew the lease."""
         self._client.call("lease", for_s=self._lease["lease_s"])
 
     def release(self) -> None:
-        """Ends the lease."""
+        """End the lease."""
         self._client.call("release")
         self._leased = False
 
     def wait_for(self, mode: str, timeout_s: float = 30.0) -> Report:
-        """Returns the status once the robot is in a mode such as "hold". Raises TimeoutError; renews the lease."""
+        """Return the status once the robot is in a mode such as "hold". Raises TimeoutError; renews the lease."""
         deadline_s = time.monotonic() + timeout_s
         while (report := self.status())["mode"] != mode:
             if time.monotonic() > deadline_s:

@@ -33,12 +33,12 @@ class OpenedLog:
 
     @property
     def configuration(self) -> Configuration:
-        """The configuration with which the daemon ran. Raises LogError where this version does not accept it."""
+        """Return the configuration with which the daemon ran. Raises LogError where this version does not accept it."""
         return configuration_of(self.paths[0], self.configuration_text)
 
 
 def open_log(path: Paths, fields: Sequence[str] = ()) -> OpenedLog:
-    """Reads an MCAP log, or several segments of one run. Raises LogError.
+    """Read an MCAP log, or several segments of one run. Raises LogError.
 
     `ticks` has all fields of a tick, or only `fields`: an hour of all takes 500 MB, of each number 11 MB.
     """
@@ -58,7 +58,7 @@ def replay(
     configuration: Configuration | None = None,
     vertical: CaptureAxis | None = None,
 ) -> Replay:
-    """Estimates the mud from a log again: an MCAP log, its segments, or the authors' CSV. Raises LogError.
+    """Estimate the mud from a log again: an MCAP log, its segments, or the authors' CSV. Raises LogError.
 
     `method` and `configuration` replace those of the log. `vertical` is the axis of a CSV's capture that points up:
     "x", "y" or "z" (default: `pose.vertical` of the configuration, "y" without one).

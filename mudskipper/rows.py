@@ -30,7 +30,7 @@ class Rows(np.ndarray[Any, np.dtype[np.void]]):
         return found.view(np.ndarray) if isinstance(found, Rows) and found.dtype.names is None else found
 
     def to_pandas(self) -> Any:
-        """Returns a DataFrame with one column per joint or flipper, enumerations as categories.
+        """Return a DataFrame with one column per joint or flipper, enumerations as categories.
 
         `frame.attrs["units"]` has the unit of each column. Needs pandas: install mudskipper with its extra `data`.
         """

@@ -33,7 +33,7 @@ class LiveRows:
     """Owns the connection to the rows' socket. Raises NoDaemonError or NotPermittedError."""
 
     def __init__(self, path: Path, opening_s: float = OPENING_S) -> None:
-        """Waits `opening_s` for the daemon's description of its rows; with 0 s, `read` takes it, and then `is_open`."""
+        """Wait `opening_s` for the daemon's description of its rows; with 0 s, `read` takes it, and then `is_open`."""
         self.lost = 0  # rows, because this program did not read in time
         self.kinds: list[RowKind] = []
         self.metadata: dict[str, Any] = {}

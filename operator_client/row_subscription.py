@@ -26,7 +26,7 @@ class RowSubscription:
         return self._rows is not None and self._rows.is_open
 
     def read(self, timeout_s: float, now_s: float) -> list[LiveRow]:
-        """Returns the rows that have come; none after the time, or without a daemon. Raises NotPermittedError."""
+        """Return the rows that have come; none after the time, or without a daemon. Raises NotPermittedError."""
         if self._rows is None and now_s < self._tried_s + RETRY_S:
             time.sleep(timeout_s)
             return []

@@ -58,7 +58,7 @@ class StatusClient:
 
     @property
     def daemon_pid(self) -> int:
-        """The process that created the socket, as the kernel reports it."""
+        """Return the process that created the socket, as the kernel reports it."""
         size = CREDENTIALS.size
         return int(CREDENTIALS.unpack(self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, size))[0])
 

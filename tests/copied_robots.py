@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copyreg
 from copy import deepcopy
+from struct import Struct
 from typing import TypeVar
 
 from drivers.odrive import codec
@@ -11,6 +13,7 @@ from simulation.harness.lockstep import Lockstep
 MESSAGES = [each for each in vars(codec).values() if isinstance(each, codec.Message)]  # keys of tables, by identity
 
 Robot = TypeVar("Robot", bound=Lockstep)
+copyreg.pickle(Struct, lambda layout: (Struct, (layout.format,)))  # the layouts of rows, which refuse to be copied
 
 
 def copy_of(robot: Robot) -> Robot:
@@ -19,5 +22,5 @@ def copy_of(robot: Robot) -> Robot:
     Work that is not finished cannot be copied; finishing it in this tick changes no digit of its result.
     """
     robot.loop.learning.estimator.work.finish()
-    shared = [robot.loop.configuration, *MESSAGES]
+    shared = [robot.loop.configuration, robot.loop._tick_kind, *MESSAGES]
     return deepcopy(robot, {id(each): each for each in shared})

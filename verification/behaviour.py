@@ -86,7 +86,7 @@ class RowList(NullRecorder):
 
 
 def record_lockstep(folder: Path) -> None:
-    """Operates one robot by SCHEDULE and writes its rows and every answer."""
+    """Operate one robot by SCHEDULE and writes its rows and every answer."""
     rows = RowList()
     robot = Lockstep(load_example(), paper_track(), seed=3, recorder=rows)
     methods = OperatorCalls(robot.loop, [], lambda: robot.now_s).methods
@@ -107,7 +107,7 @@ def record_lockstep(folder: Path) -> None:
 
 
 def commands_of(data: Path, results: Path) -> Iterator[tuple[str, list[str]]]:
-    """Yields the name and the arguments of every recorded command."""
+    """Yield the name and the arguments of every recorded command."""
     for path in sorted(data.glob("flipper_in_mud/*.csv.gz")):
         for method in ("default", "paper"):
             yield f"replay_{path.name.split('.csv')[0]}_{method}", ["replay", str(path), "--json", "--method", method]
@@ -144,7 +144,7 @@ def _write(path: Path, content: Any) -> None:
 
 
 def differences(old: Any, new: Any, names: Mapping[str, str], ignored: frozenset[str], path: str = "") -> Iterator[str]:
-    """Yields every value that is missing, added or changed, by its path. `names`: new names by the old ones."""
+    """Yield every value that is missing, added or changed, by its path. `names`: new names by the old ones."""
     if isinstance(old, dict) and isinstance(new, dict):
         old = {name if name in new else names.get(name, name): value for name, value in old.items()}
         for name in sorted((old.keys() | new.keys()) - ignored):
@@ -162,7 +162,7 @@ def differences(old: Any, new: Any, names: Mapping[str, str], ignored: frozenset
 
 
 def compare(old: Path, new: Path, names: dict[str, str], ignored: frozenset[str]) -> int:
-    """Prints the differences of each file; returns 0 where nothing differs."""
+    """Print the differences of each file; return 0 where nothing differs."""
     failed = 0
     for path in sorted(old.glob("*.json")):
         if not (new / path.name).exists():

@@ -13,7 +13,7 @@ EXAMPLE = Path(__file__).parent.parent / "systemd" / "mudskipper.toml"
 
 
 def require_drive(drive: str) -> None:
-    """Ends the benchmark where no such drive exists."""
+    """End the benchmark where no such drive exists."""
     if drive not in DRIVES:
         raise SystemExit(f"--drive {drive}: must be one of {', '.join(DRIVES)}")
 

@@ -25,14 +25,14 @@ LONGEST_WAIT_S = 60.0
 
 
 def kill_session(process: subprocess.Popen[bytes]) -> None:
-    """Kills a process of LocalRobot with its children."""
+    """Kill a process of LocalRobot with its children."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
 def wait_for(condition: Callable[[], bool]) -> bool:
-    """Waits for a condition, in which a daemon may not answer yet; returns whether it came about."""
+    """Wait for a condition, in which a daemon may not answer yet; return whether it came about."""
     deadline_s = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < deadline_s:
         with suppress(NoDaemonError, OSError):
@@ -70,7 +70,7 @@ class LocalRobot:
         return self._processes[-1]
 
     def call(self, method: str, **params: Any) -> Any:
-        """Calls the daemon on a connection of its own."""
+        """Call the daemon on a connection of its own."""
         client = StatusClient(self.socket)
         try:
             return client.call(method, **params)
@@ -78,7 +78,7 @@ class LocalRobot:
             client.close()
 
     def require_walk(self, rate_hz: float = RATE_HZ) -> None:
-        """Arms and walks into the first stance. Ends the benchmark with a sentence where the robot does not."""
+        """Arm and walk into the first stance. Ends the benchmark with a sentence where the robot does not."""
         if not self.walk_until("stance"):
             fault = self.call("status")["fault"] or {"name": "", "message": "no walk begins"}
             is_slow = fault["name"].startswith("loop_")
@@ -86,7 +86,7 @@ class LocalRobot:
             raise SystemExit(f"{why} {rate_hz:g} Hz: {fault['message']}")
 
     def walk_until(self, phase: str) -> bool:
-        """Arms and walks; returns whether this phase, or `hold` before the walk, was reached without a fault."""
+        """Arm and walk; return whether this phase, or `hold` before the walk, was reached without a fault."""
         if not self._reaches("idle"):
             return False
         with suppress(CallRefusedError):

@@ -6,7 +6,6 @@ from pathlib import Path
 from command_line.options.shared import Commands, add, add_json, add_socket, add_vertical
 from command_line.options.studies import add_studies
 from experiments.study.values import (
-    between,
     depth_cm,
     folder,
     group_rule,
@@ -14,10 +13,7 @@ from experiments.study.values import (
     whole,
 )
 
-SEEDS, TRIALS, WORKERS = whole(1, 1000), whole(1, 100), whole(1, 1000)
-STRENGTH_PA = between(50.0, 50000.0, "Pa")
-STAGE_SPEED_M_S = between(0.001, 1.0, "m/s")
-GRAVITY_M_S2 = between(9.7, 9.9, "m/s²")  # anywhere on Earth
+TRIALS = whole(1, 100)
 
 LABLOGS = (
     "Evaluate the estimates from real logs by each method, without a known truth. A group is the logs of one mud, and "
@@ -34,23 +30,6 @@ LABLOGS = (
 def add_experiment(experiment: argparse.ArgumentParser) -> None:
     names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     add_studies(names)
-    estimation = add(
-        names, "estimation", "experiments.estimation.estimation", "Estimated coefficients against a load cell."
-    )
-    _add_report(estimation, "the load cell is virtual", "write JSON and picture there")
-    _add_workers(estimation)
-    estimation.add_argument(
-        "--setup",
-        choices=("single", "walking", "measuring", "all"),
-        default="all",
-        help="one flipper on a fixed base, the gait `walking`, the gait `measuring`, or all (default: %(default)s)",
-    )
-    estimation.add_argument("--seeds", type=SEEDS, default=10, metavar="N", help="trials of each mud (default: 10)")
-    muds = estimation.add_mutually_exclusive_group()
-    muds.add_argument("--mud", action="append", type=float, metavar="W", help="water content in percent, repeatable")
-    muds.add_argument("--strength", action="append", type=STRENGTH_PA, metavar="PA", help="instead, repeatable")
-    estimation.add_argument("--layers", metavar="A,B", help="disturbances, separated by commas, or none (default: all)")
-    _add_campaign(names)
     _add_flipper(names)
     _add_walk(names)
     _add_lablogs(names)
@@ -68,26 +47,6 @@ def _add_out(experiment: argparse.ArgumentParser, text: str) -> None:
     experiment.add_argument(
         "--restart", action="store_true", help="begin again in that folder; its earlier results are kept as DIR-old"
     )
-
-
-def _add_workers(experiment: argparse.ArgumentParser) -> None:
-    workers = experiment.add_mutually_exclusive_group()
-    workers.add_argument(
-        "--workers", type=WORKERS, metavar="N", help="processes here (default: one for each processor)"
-    )
-    workers.add_argument(
-        "--cluster", metavar="ADDRESS", help="of a Dask scheduler, whose workers run the trials instead"
-    )
-
-
-def _add_campaign(names: Commands) -> None:
-    text = "Many simulated walks: a grid, or a random sample, of worlds, robots and configurations."
-    campaign = add(names, "campaign", "experiments.campaign.campaign", text)
-    campaign.set_defaults(simulated=True)
-    campaign.add_argument("file", type=Path, metavar="FILE", help="in TOML, such as examples/campaigns/strength.toml")
-    add_json(campaign)
-    _add_out(campaign, "for results; continues there (default: a new mudskipper-NAME of the file)")
-    _add_workers(campaign)
 
 
 def _add_bench(experiment: argparse.ArgumentParser) -> None:

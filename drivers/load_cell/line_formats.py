@@ -104,7 +104,7 @@ def find_format(lines: Sequence[bytes]) -> LineFormat | None:
 
     Columns are never chosen, because only the operator knows which one is the load.
     """
-    best, most = None, len(lines) / 2.0
+    best, most = None, len(lines) // 2
     for name in (INDICATOR, NUMBER):
         line_format = LineFormat(name)
         readable = sum(line_format.decode(line) is not None for line in lines)

@@ -37,84 +37,7 @@ class CampaignText:
     configuration: dict[str, Any] = field(default_factory=dict)
 
 
-class Trial(NamedTuple):
-    point: int  # from 1
-    seed: int
-    values: Values
-    tables: Tables
-
-    @property
-    def key(self) -> str:
-        """Its key in the notebook."""
-        return f"point {self.point}, seed {self.seed}"
-
-
-class Campaign(NamedTuple):
-    name: str
-    identity: dict[str, Any]  # what must be the same when it continues
-    points: list[Values]
-    tables: list[Tables]  # of each point
-    seeds: int
-
-    @property
-    def trials(self) -> list[Trial]:
-        return [
-            Trial(point, seed, values, tables)
-            for point, (values, tables) in enumerate(zip(self.points, self.tables, strict=True), 1)
-            for seed in range(1, self.seeds + 1)
-        ]
-
-
-_READER = RecordReader(CampaignText)
-
-
-def load_campaign(path: Path) -> Campaign:
-    """Raises ConfigurationError."""
-    document = parse_document(read_text(path), path)
-    text = CampaignText(**_READER.read(document))
-    _require_one_kind(document, path)
-    is_random = "random" in document
-    points = list(_points(text, is_random))
-    base = {section: getattr(text, section) for section in SECTIONS}
-    base["world"] = one_mud(text.world)
-    plates = _Plates(path.parent)
-    for end in range_ends(text.random) if is_random else ():
-        _check(points[0] | end, base, plates)
-    tables = [_check(values, base, plates, number) for number, values in enumerate(points, 1)]
-    return Campaign(path.stem, document | {"plates": plates.corners}, points, tables, text.seeds)
-
-
-def _require_one_kind(document: Tables, path: Path) -> None:
-    """Raises ConfigurationError."""
-    if ("grid" in document) == ("random" in document):
-        raise ConfigurationError([f"{path}: must have either [grid] or [random]"])
-    for key in ("points", "seed"):
-        if "grid" in document and key in document:
-            raise ConfigurationError([f"{key} = {document[key]}: must be left out with [grid], which draws nothing"])
-
-
-def _points(text: CampaignText, is_random: bool) -> Iterator[Values]:
-    """Raises ConfigurationError where there are too many."""
-    drawn = random_points(text.random, text.points, text.seed) if is_random else grid_points(text.grid)
-    most = MOST_TRIALS // text.seeds
-    yield from islice(drawn, most)
-    if next(drawn, None) is not None:
-        raise ConfigurationError([f"seeds = {text.seeds}: must give at most {MOST_TRIALS} trials with all points"])
-
-
-def _check(values: Values, base: Tables, plates: "_Plates", number: int = 0) -> Tables:
-    """Return the tables of a walk. Raises ConfigurationError, which names the point of several."""
-    try:
-        tables = plates.in_configuration(with_values(base, values))
-        plan_walk(tables)
-    except ConfigurationError as problem:
-        point = ", ".join(f"{key} = {shown(value)}" for key, value in list(values.items())[:SHOWN_KEYS])
-        where = f"; at point {number}: {point}" if number else ""
-        raise ConfigurationError([f"{each}{where}" for each in problem.problems[:1]]) from None
-    return tables
-
-
-class _Plates:
+class Plates:
     """Owns the corners that were read; a worker on another computer has no such file."""
 
     def __init__(self, folder: Path) -> None:
@@ -137,3 +60,61 @@ class _Plates:
         except ValueError as problem:
             raise ConfigurationError([f"robot.plate = {name!r}: {problem}"]) from None
         return self.corners[name]
+
+
+class Campaign(NamedTuple):
+    name: str
+    identity: dict[str, Any]  # what must be the same when it continues
+    points: list[Values]
+    seeds: int
+    base: Tables  # of a walk, without the values of a point
+    plates: Plates
+
+
+_READER = RecordReader(CampaignText)
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Raises ConfigurationError."""
+    document = parse_document(read_text(path), path)
+    text = CampaignText(**_READER.read(document))
+    _require_one_kind(document, path)
+    is_random = "random" in document
+    points = list(_points(text, is_random))
+    base = {section: getattr(text, section) for section in SECTIONS}
+    base["world"] = one_mud(text.world)
+    plates = Plates(path.parent)
+    for end in range_ends(text.random) if is_random else ():
+        _check(points[0] | end, base, plates)
+    for number, values in enumerate(points, 1):
+        _check(values, base, plates, number)
+    identity = document | {"plates": plates.corners}
+    return Campaign(path.stem, identity, points, text.seeds, base, plates)
+
+
+def _require_one_kind(document: Tables, path: Path) -> None:
+    """Raises ConfigurationError."""
+    if ("grid" in document) == ("random" in document):
+        raise ConfigurationError([f"{path}: must have either [grid] or [random]"])
+    for key in ("points", "seed"):
+        if "grid" in document and key in document:
+            raise ConfigurationError([f"{key} = {document[key]}: must be left out with [grid], which draws nothing"])
+
+
+def _points(text: CampaignText, is_random: bool) -> Iterator[Values]:
+    """Raises ConfigurationError where there are too many."""
+    drawn = random_points(text.random, text.points, text.seed) if is_random else grid_points(text.grid)
+    most = MOST_TRIALS // text.seeds
+    yield from islice(drawn, most)
+    if next(drawn, None) is not None:
+        raise ConfigurationError([f"seeds = {text.seeds}: must give at most {MOST_TRIALS} trials with all points"])
+
+
+def _check(values: Values, base: Tables, plates: Plates, number: int = 0) -> None:
+    """Raises ConfigurationError, which names the point of several."""
+    try:
+        plan_walk(plates.in_configuration(with_values(base, values)))
+    except ConfigurationError as problem:
+        point = ", ".join(f"{key} = {shown(value)}" for key, value in list(values.items())[:SHOWN_KEYS])
+        where = f"; at point {number}: {point}" if number else ""
+        raise ConfigurationError([f"{each}{where}" for each in problem.problems[:1]]) from None

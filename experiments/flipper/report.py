@@ -13,7 +13,7 @@ from control.records import Phase
 from experiments.flipper.measurement import Plan
 from experiments.flipper.modelled_force import drawn_coefficients, misfit_n, modelled_forces
 from experiments.reports.coefficient_table import ComparedStride, MudSummary, error_table, gather_coefficients
-from experiments.reports.error_table import COEFFICIENTS, ErrorRow
+from experiments.reports.error_table import COEFFICIENTS, Row
 from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import configured_method
 from experiments.trials.stride_profile import profile_from_row
@@ -33,7 +33,7 @@ class FlipperMud(MudSummary):
 class FlipperReport:
     experiment: str = "flipper"
     muds: Sequence[FlipperMud]
-    errors: Sequence[ErrorRow]
+    errors: Sequence[Row]
     falls_with_water: Mapping[str, bool | None]  # by coefficient
     largest_forces_n: Mapping[str, ForceByStroke]  # by mud
     misfit_n: Mapping[str, ForceByStroke]  # by mud

@@ -13,7 +13,7 @@ from experiments.flipper.report import STROKES, FlipperReport, muds_of, report_o
 from experiments.flipper.simulation import flipper_bench
 from experiments.loadcell.comparison import OTHER_PLATE
 from experiments.reports.coefficient_table import MudSummary, error_text_rows, mud_rows
-from experiments.reports.error_table import ErrorRow
+from experiments.reports.error_table import Row
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
 from experiments.reports.report_page import Figure, Section
@@ -101,7 +101,7 @@ def remarks_sections(remarks: Sequence[str], left_out: Mapping[str, Entry]) -> l
     return [Section("Remarks", text)] * bool(text)
 
 
-def coefficient_tables(muds: Sequence[MudSummary], errors: Sequence[ErrorRow]) -> list[TitledRows]:
+def coefficient_tables(muds: Sequence[MudSummary], errors: Sequence[Row]) -> list[TitledRows]:
     """Return the tables that every report of coefficients has on the screen."""
     tables: list[TitledRows] = [(HEADING, mud_rows(muds))]
     return tables + [(ERRORS, error_text_rows(errors))] * bool(errors)

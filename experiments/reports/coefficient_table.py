@@ -13,10 +13,12 @@ from math import hypot, isfinite, sqrt
 from statistics import fmean, median, stdev
 from typing import Any, NamedTuple
 
+from pandas import DataFrame
+
 from control.records import UNKNOWN, Estimate
 from estimation.strokes.origin_fit import student_factor
 from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
-from experiments.reports.error_table import COEFFICIENTS, ErrorRow, Evaluation, error_rows
+from experiments.reports.error_table import COEFFICIENTS, Row, error_rows, evaluation_of
 from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
 
@@ -105,15 +107,15 @@ def _errors(values: Sequence[EstimateReport], spread: float | None) -> tuple[flo
     return hypot(trials_error, shared_error), trials_error, shared_error
 
 
-def error_table(rows: Iterable[ComparedStride], setup: str) -> list[ErrorRow]:
+def error_table(rows: Iterable[ComparedStride], setup: str) -> list[Row]:
     """Evaluate every coefficient that has a true value."""
     evaluations = [
-        Evaluation(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
+        evaluation_of(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
         for row in rows
         for name in COEFFICIENTS
         if (truth := row.truth.get(name)) is not None and row.stride[name] is not None
     ]
-    return error_rows(evaluations)
+    return error_rows(DataFrame(evaluations))
 
 
 def estimate_of(report: EstimateReport) -> Estimate:
@@ -151,25 +153,31 @@ def _mud_cells(mud: MudSummary) -> list[str]:
     return cells
 
 
-def error_text_rows(errors: Sequence[ErrorRow]) -> list[list[str]]:
+def error_text_rows(errors: Sequence[Row]) -> list[list[str]]:
     """List the median error of each coefficient by mud and method, mud by mud."""
     head = ["mud", "method", *(f"{name} error" for name in COEFFICIENTS), "strides"]
-    muds = list(dict.fromkeys(row.mud for row in errors))
-    keys = sorted(dict.fromkeys((row.mud, row.method) for row in errors), key=lambda key: muds.index(key[0]))
+    muds = list(dict.fromkeys(row["mud"] for row in errors))
+    keys = sorted(dict.fromkeys((row["mud"], row["method"]) for row in errors), key=lambda key: muds.index(key[0]))
     rows = [head]
     for key in keys:
-        own = {row.coefficient: row for row in errors if (row.mud, row.method) == key}
+        own = {row["coefficient"]: row for row in errors if (row["mud"], row["method"]) == key}
         cells = [_error_text(own[name]) if name in own else "-" for name in COEFFICIENTS]
-        rows.append([mud_text(key[0]), key[1], *cells, str(max(row.all_strides for row in own.values()))])
+        rows.append(
+            [
+                mud_text(key[0]),
+                key[1],
+                *cells,
+                str(max(row["strides"] + row["bounds"] + row["not_valid"] for row in own.values())),
+            ]
+        )
     return rows
 
 
-def _error_text(row: ErrorRow) -> str:
-    parts = []
-    if row.median is not None and row.bias is not None:
-        parts.append(f"{fraction_text(row.median)} ({100.0 * row.bias:+z.0f} %)")
-    if row.bounds and row.bound_over_truth is not None:
-        parts.append(f"≥ {100.0 * row.bound_over_truth:.0f} % of it ({row.bounds})")
-    if row.not_valid:
-        parts.append(f"nothing ({row.not_valid})")
+def _error_text(row: Row) -> str:
+    median, bias, bounds, lost = (row[name] for name in ("median", "bias", "bounds", "not_valid"))
+    parts = [] if median is None else [f"{fraction_text(median)} ({100.0 * bias:+z.0f} %)"]
+    if bounds:
+        parts.append(f"≥ {100.0 * row['bound_over_truth']:.0f} % of it ({bounds})")
+    if lost:
+        parts.append(f"nothing ({lost})")
     return ", ".join(parts) or "-"

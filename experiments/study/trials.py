@@ -25,7 +25,7 @@ class Trials:
     def __init__(self, folder: Path, plan: Mapping[str, Any], show: Show, workers: Workers | None = None) -> None:
         """`plan` has what must be the same when the study continues."""
         self.folder = folder  # exists
-        self.measured: list[DataFrame] = []  # of each call of `run`
+        self.measured: list[DataFrame] = []  # of each call of `run`, also of one that was interrupted
         self._plan, self._show, self._workers = dict(plan), show, workers
         self._notebook: Notebook | None = None
         self._ended = 0  # rows of earlier calls
@@ -49,12 +49,15 @@ class Trials:
         left = {key: row for key, row in zip(keys, ordered, strict=True) if key not in notebook.entries}
         names = list(left)
         before = self._ended + len({*keys}) - len(left)
-        run_parallel(
-            [partial(function, **row, **shared) for row in left.values()],
-            lambda done, total: self._show(before + done, before + total),
-            self._workers,
-            keep=lambda index, entry: notebook.write(names[index], entry),
-        )
+        try:
+            run_parallel(
+                [partial(function, **row, **shared) for row in left.values()],
+                lambda done, total: self._show(before + done, before + total),
+                self._workers,
+                keep=lambda index, entry: notebook.write(names[index], entry),
+            )
+        finally:
+            ended = [(key, row) for key, row in zip(keys, ordered, strict=True) if key in notebook.entries]
+            self.measured.append(DataFrame([row | notebook.entries[key] for key, row in ended]))
         self._ended += len({*keys})
-        self.measured.append(DataFrame([row | notebook.entries[key] for key, row in zip(keys, ordered, strict=True)]))
         return self.measured[-1]

@@ -23,7 +23,7 @@ from experiments.reports.coefficient_table import (
     gather_coefficient,
     gather_coefficients,
 )
-from experiments.reports.error_table import COEFFICIENTS, ErrorRow
+from experiments.reports.error_table import COEFFICIENTS, Row
 from experiments.reports.mud_names import mud_text
 from experiments.study.notebook import Entry
 from experiments.trackway.bench import reach_of
@@ -65,7 +65,7 @@ class WalkReport:
     experiment: str = "walk"
     muds: Sequence[MudSummary]
     soft: Sequence[SoftMud]
-    errors: Sequence[ErrorRow]
+    errors: Sequence[Row]
     findings: Sequence[PaperFinding] = field(metadata={"key": "beside_paper"})
     without_pose: int  # walks
     at_a_border: int  # strides that belong to no mud

@@ -20,7 +20,7 @@ class SystemdNotifier:
             self._socket.setblocking(False)
 
     def send(self, *lines: str) -> None:
-        """Sends without waiting: a lost notice does no harm, since the watchdog's next one follows."""
+        """Send without waiting: a lost notice does no harm, since the watchdog's next one follows."""
         if self._socket is not None:
             with suppress(OSError):  # systemd is gone or its queue is full, which must not stop the loop
                 self._socket.sendto("\n".join(lines).encode(), self._address)

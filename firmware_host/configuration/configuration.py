@@ -140,7 +140,7 @@ class Configuration:
 
     @property
     def flipper_drives(self) -> tuple[FlipperDrive, ...]:
-        """The estimator's description of each flipper's motors."""
+        """Return the estimator's description of each flipper's motors."""
         rig = self.rig
         return tuple(self._flipper_drive(*rig.joints[rig.joints_of(flipper)]) for flipper in rig.flippers)
 
@@ -148,12 +148,12 @@ class Configuration:
         drives = (self.drive[sweep], self.drive[adduction])
         limits_a = [min(d.current_limit_a, self.limits.torque_nm / d.torque_constant_nm_a) for d in drives]
         return FlipperDrive(
-            self.arm,
-            drives[0].torque_constant_nm_a,
-            drives[1].torque_constant_nm_a,
-            self.friction.get(sweep, NO_FRICTION),
-            self.friction.get(adduction, NO_FRICTION),
-            min(limits_a),
+            mass=self.arm,
+            sweep_constant_nm_a=drives[0].torque_constant_nm_a,
+            adduction_constant_nm_a=drives[1].torque_constant_nm_a,
+            sweep_friction=self.friction.get(sweep, NO_FRICTION),
+            adduction_friction=self.friction.get(adduction, NO_FRICTION),
+            current_limit_a=min(limits_a),
         )
 
     @property

@@ -41,7 +41,7 @@ ORDERED = (  # pairs of keys, the first of which must be at most the second
 
 
 def contradictions(configuration: Configuration) -> Iterator[str]:
-    """Yields a message with key, value and bound for each contradiction."""
+    """Yield a message with key, value and bound for each contradiction."""
     yield from _text_problems(configuration)
     yield from rig_problems(configuration)
     yield from _pose_problems(configuration.pose)
@@ -91,7 +91,7 @@ def _text_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _lead_problems(configuration: Configuration) -> Iterator[str]:
-    """Checks that the lead of a recovery's targets gives the full torque in its last attempt."""
+    """Check that the lead of a recovery's targets gives the full torque in its last attempt."""
     gains, lead_deg, torque_nm = configuration.gains, configuration.recovery.lead_deg, configuration.limits.torque_nm
     needed_nm_rad = torque_nm / radians(lead_deg)
     for key in ("sweep_stiffness_nm_rad", "adduction_stiffness_nm_rad"):
@@ -103,7 +103,7 @@ def _lead_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _gain_problems(configuration: Configuration) -> Iterator[str]:
-    """Checks that the PD of each joint is stable with its inertia and the delay of the loop."""
+    """Check that the PD of each joint is stable with its inertia and the delay of the loop."""
     gains, arm = configuration.gains, configuration.arm
     for kind in ("sweep", "adduction"):
         stiffness_nm_rad, damping_nm_s_rad, inertia_kg_m2 = (
@@ -141,7 +141,7 @@ def _winding_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _plate_problems(geometry: FlipperGeometry) -> Iterator[str]:
-    """Checks that the plate is a polygon, and that it lies beyond the sweep axis."""
+    """Check that the plate is a polygon, and that it lies beyond the sweep axis."""
     problems = list(outline_problems(geometry.plate_corners_m)) if geometry.plate_corners_m else []
     yield from (f"geometry.plate_corners_m: {problem}" for problem in problems)
     if problems:
@@ -155,7 +155,7 @@ def _plate_problems(geometry: FlipperGeometry) -> Iterator[str]:
 
 
 def _motor_force_problems(configuration: Configuration) -> Iterator[str]:
-    """Checks that the torque limit permits the force that the depth choice allows for an extraction."""
+    """Check that the torque limit permits the force that the depth choice allows for an extraction."""
     length_m, force_n = configuration.geometry.flipper_length_m, configuration.adaptation.motor_force_n
     largest_n = configuration.limits.torque_nm / length_m
     if force_n > largest_n * (1.0 + ROUNDING):
@@ -211,7 +211,7 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _sweep_problems(configuration: Configuration) -> Iterator[str]:
-    """Checks the sweeps among which the method "gait" chooses; a wide one reaches less deep."""
+    """Check the sweeps among which the method "gait" chooses; a wide one reaches less deep."""
     geometry, limits, adaptation = configuration.geometry, configuration.limits, configuration.adaptation
     widest_deg = adaptation.gait.max_sweep_deg
     widest = f"adaptation.gait.max_sweep_deg = {widest_deg}"
@@ -237,7 +237,7 @@ def _sweep_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def _pose_problems(pose: PoseParameters) -> Iterator[str]:
-    """Yields a message with key, value and bound for each problem."""
+    """Yield a message with key, value and bound for each problem."""
     if pose.chosen == "socket" and not pose.socket:
         yield "pose.socket = '': must name a socket where pose.source = 'socket'"
     if pose.chosen in ("natnet", "rail_encoder") and pose.socket:

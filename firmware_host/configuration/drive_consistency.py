@@ -10,7 +10,7 @@ from firmware_host.configuration.configuration import Configuration
 
 
 def rig_problems(configuration: Configuration) -> Iterator[str]:
-    """Checks that every joint of the rig has a drive, and nothing is configured for a joint that it lacks."""
+    """Check that every joint of the rig has a drive, and nothing is configured for a joint that it lacks."""
     flippers, joints = list(configuration.rig.flippers), configuration.rig.joints
     if not flippers or flippers != [flipper for flipper in FLIPPERS if flipper in flippers]:
         yield f"rig.flippers = {flippers}: must be {[FLIPPERS[0]]}, {[FLIPPERS[1]]} or {list(FLIPPERS)}"
@@ -58,7 +58,7 @@ def drive_problems(configuration: Configuration) -> Iterator[str]:
 
 
 def bus_problems(configuration: Configuration) -> Iterator[str]:
-    """Checks that each bus carries the frames of its drives, and that these do not disturb each other."""
+    """Check that each bus carries the frames of its drives, and that these do not disturb each other."""
     for name, bus in configuration.bus.items():
         drives = {f"drive.{joint}": each for joint, each in configuration.drive.items() if each.bus == name}
         kinds = {key: type_of(drive).kind for key, drive in drives.items()}

@@ -42,17 +42,17 @@ _READER = RecordReader(Configuration, without=NO_KEYS, hints={"drive": dict[str,
 
 
 def load_configuration(path: Path) -> Configuration:
-    """Reads a file. Raises ConfigurationError, also for a file that cannot be read."""
+    """Read a file. Raises ConfigurationError, also for a file that cannot be read."""
     return parse_configuration(read_text(path), path)
 
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:
-    """Reads a text; messages name its file. Raises ConfigurationError with all problems."""
+    """Read a text; messages name its file. Raises ConfigurationError with all problems."""
     return read_configuration(parse_document(text, file), text)
 
 
 def read_configuration(document: dict[str, Any], text: str = "") -> Configuration:
-    """Reads the tables of a file, and changes them. Raises ConfigurationError with all problems."""
+    """Read the tables of a file, and change them. Raises ConfigurationError with all problems."""
     warnings = rename_former_keys(document, FORMER_KEYS)
     _apply_protocol(document)
     _require_known_types(document)
@@ -67,7 +67,7 @@ def read_configuration(document: dict[str, Any], text: str = "") -> Configuratio
 
 
 def _require_known_types(document: dict[str, Any]) -> None:
-    """Raises ConfigurationError where the type of a drive is unknown."""
+    """Raise ConfigurationError if the type of a drive is unknown."""
     drives = document.get("drive")
     tables = drives if isinstance(drives, dict) else {}
     types = {joint: table.get("type", DEFAULT) for joint, table in tables.items() if isinstance(table, dict)}
@@ -82,7 +82,7 @@ def _require_known_types(document: dict[str, Any]) -> None:
 
 
 def _require_one_shape(document: dict[str, Any]) -> None:
-    """Raises ConfigurationError where a plate has both corners and the sides of a rectangle."""
+    """Raise ConfigurationError if a plate has both corners and the sides of a rectangle."""
     geometry = document.get("geometry")
     if not isinstance(geometry, dict) or not geometry.get("plate_corners_m"):
         return
@@ -93,7 +93,7 @@ def _require_one_shape(document: dict[str, Any]) -> None:
 
 
 def _apply_protocol(document: dict[str, Any]) -> None:
-    """Replaces `gait.protocol` by the values of that preset; the other keys of [gait] overrule them."""
+    """Replace `gait.protocol` by the values of that preset; the other keys of [gait] overrule them."""
     gait = document.get("gait")
     if not isinstance(gait, dict) or "protocol" not in gait:
         return

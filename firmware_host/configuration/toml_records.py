@@ -39,7 +39,7 @@ class ChangesOf:
 
 
 def read_text(path: Path) -> str:
-    """Raises ConfigurationError."""
+    """Return the text of a file; raises ConfigurationError."""
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST_FILE_BYTES + 1)
@@ -54,7 +54,7 @@ def read_text(path: Path) -> str:
 
 
 def parse_document(text: str, file: Path | None = None) -> dict[str, Any]:
-    """Raises ConfigurationError, which names the file of the text."""
+    """Return the tables of a text; raises ConfigurationError, which names the file."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
@@ -69,7 +69,7 @@ def parse_document(text: str, file: Path | None = None) -> dict[str, Any]:
 
 
 def rename_former_keys(document: dict[str, Any], former: Mapping[str, str]) -> list[str]:
-    """Renames keys such as `log.min_free_share` in place; returns a warning for each.
+    """Rename keys such as `log.min_free_share` in place; returns a warning for each.
 
     Raises ConfigurationError where a file gives both names.
     """
@@ -105,7 +105,7 @@ class RecordReader:
         return []
 
     def read(self, document: Mapping[str, Any]) -> dict[str, Any]:
-        """The record's fields. Raises ConfigurationError."""
+        """Return the record's fields. Raises ConfigurationError."""
         try:
             return dict(self._model.model_validate(document))
         except ValidationError as problem:
@@ -113,7 +113,7 @@ class RecordReader:
 
 
 def _model_of(record: type, without: Collection[str] = (), others: dict[str, Any] | None = None) -> type[BaseModel]:
-    """Makes a pydantic model with a record's fields, defaults and bounds; `others` replace some of its annotations."""
+    """Make a pydantic model with a record's fields, defaults and bounds; `others` replace some of its annotations."""
     hints = get_type_hints(record, include_extras=True) | (others or {})
     definitions: dict[str, Any] = {}
     for item in fields(record):
@@ -128,7 +128,7 @@ def _model_of(record: type, without: Collection[str] = (), others: dict[str, Any
 
 
 def _checked_hint(hint: Any) -> Any:
-    """Returns the type that pydantic checks for a field; a checked table becomes a record again."""
+    """Return the type that pydantic checks for a field; a checked table becomes a record again."""
     if get_origin(hint) is Annotated:
         kind, *extras = get_args(hint)
         choice = next((extra for extra in extras if isinstance(extra, OneOf)), None)
@@ -152,7 +152,7 @@ def _checked_hint(hint: Any) -> Any:
 
 
 def _checked_tuple(items: tuple[Any, ...]) -> Any:
-    """Returns the type of an array in the file that becomes a tuple of any length, or of as many items as named."""
+    """Return the type of an array in the file that becomes a tuple of any length, or of as many items as named."""
     inner, length = _checked_hint(items[0]), None if items[-1] is ... else len(items)
     checked = Annotated[list[inner], Field(min_length=length or 0, max_length=length), AfterValidator(tuple)]  # type: ignore[valid-type]
     return checked if is_dataclass(items[0]) else Annotated[checked, BeforeValidator(_require_array)]
@@ -181,12 +181,12 @@ class OneOf:
 
 
 def _tag(name: object) -> str:
-    """Returns the tag of a record among several; `_key` leaves it out of the path of a key."""
+    """Return the tag of a record among several; `_key` leaves it out of the path of a key."""
     return f"<{name}>"
 
 
 def _given_fields(checked: BaseModel) -> dict[str, Any]:
-    """Returns only the fields that the file sets; the part that makes the record has the others."""
+    """Return only the fields that the file sets; the part that makes the record has the others."""
     return {name: value for name, value in checked if name in checked.model_fields_set}
 
 
@@ -200,7 +200,7 @@ def _key(location: tuple[str | int, ...]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Returns the text of any value of the file."""
+    """Return the text of any value of the file."""
     try:
         return repr(value)
     except (ValueError, RecursionError):  # a whole number of thousands of digits, tables within tables

@@ -86,7 +86,7 @@ class FailureCalls:
             self._report(self._clock(), end_text(each))
 
     def failures(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
-        """The active failures, and all possible ones."""
+        """Return the active failures, and all possible ones."""
         families = self._failures.families
         table = [
             {"component": name, "family": families[name], "kind": kind, "does": does}
@@ -95,7 +95,7 @@ class FailureCalls:
         return {"allowed": True, "failing": self.failing(), "table": table}
 
     def failing(self) -> list[dict[str, Any]]:
-        """The active failures."""
+        """Return the active failures."""
         return [
             {
                 "component": component,

@@ -95,7 +95,7 @@ class LogFile:
 
     @property
     def length(self) -> int:
-        """Bytes, including those that are not on the disk yet."""
+        """Return the number of bytes, including those that are not on the disk yet."""
         return self._buffer.length + self._chunk_bytes
 
     def write(self, rows: Rows) -> None:
@@ -123,7 +123,7 @@ class LogFile:
         return self._latest_ns
 
     def flush(self) -> None:
-        """Ends the chunk, so that a crash of this process no longer costs its rows."""
+        """End the chunk, so that a crash of this process no longer costs its rows."""
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._chunk_bytes = 0
         self._write_out()
@@ -151,7 +151,7 @@ class LogFile:
         self.slowest_s = max(self.slowest_s, self._synchronised_s - started_s)
 
     def _require_path(self) -> None:
-        """Raises FileNotFoundError for a removed file: writing into it would not fail."""
+        """Raise FileNotFoundError for a removed file: writing into it would not fail."""
         if _is_at(self.path, self._file.fileno()):
             return
         if os.fstat(self._file.fileno()).st_nlink == 0:
@@ -159,7 +159,7 @@ class LogFile:
         raise FileNotFoundError(errno.ENOENT, "it was removed or moved away")
 
     def finish(self) -> Path:
-        """Writes the index and synchronises everything, the file's name included; moves a file in active/ to done/."""
+        """Write the index and synchronises everything, the file's name included; moves a file in active/ to done/."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._write_out()
         self._synchronise()
@@ -173,7 +173,7 @@ class LogFile:
         return path
 
     def abandon(self) -> None:
-        """Cuts the file back to the last flush and closes it; removes a file without rows. Never raises OSError."""
+        """Cut the file back to the last flush and closes it; removes a file without rows. Never raises OSError."""
         with suppress(OSError):
             os.ftruncate(self._file.fileno(), self._safe_bytes)
         if self.safe_rows == 0:
@@ -185,14 +185,14 @@ class LogFile:
 
 
 def lock_file(descriptor: int, path: Path) -> None:
-    """Raises OSError where another process holds the lock, or has moved the file away meanwhile."""
+    """Raise OSError if another process holds the lock, or has moved the file away meanwhile."""
     flock(descriptor, LOCK_EX | LOCK_NB)
     if not _is_at(path, descriptor):
         raise FileNotFoundError(errno.ENOENT, "was moved away", str(path))
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether a living process holds the lock of this log; False where this user cannot open it."""
+    """Return whether a living process holds the lock of this log; False where this user cannot open it."""
     try:
         with path.open("rb") as file:
             flock(file.fileno(), LOCK_SH | LOCK_NB)

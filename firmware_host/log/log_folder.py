@@ -29,7 +29,7 @@ class FreeSpace(NamedTuple):
 
 
 def size_text(size: float) -> str:
-    """Formats a number of bytes."""
+    """Format a number of bytes."""
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
 
 
@@ -39,7 +39,7 @@ class DeletedLog(NamedTuple):
 
 
 def new_run_id(robot: str) -> str:
-    """Returns an id that sorts by time and is a valid file name for any name of the robot."""
+    """Return an id that sorts by time and is a valid file name for any name of the robot."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
     return f"{stamp}-{re.sub(r'[^A-Za-z0-9_.]+', '_', robot)[:60]}"
 
@@ -55,26 +55,26 @@ def segment_path(first: Path, segment: int) -> Path:
 
 
 def finished_path(path: Path) -> Path:
-    """Returns the path of the finished log; a log outside of active/ does not move."""
+    """Return the path of the finished log; a log outside of active/ does not move."""
     moves = path.parent.name == ACTIVE and path.suffix == ENDING
     return path.parent.parent / DONE / path.name if moves else path
 
 
 def present_path(path: Path) -> Path:
-    """Returns where a log is now that was in active/ before."""
+    """Return where a log is now that was in active/ before."""
     folder = path.parent.parent
     paths = (path, folder / DONE / path.name, folder / PRESERVED / path.name)
     return next((possible for possible in paths if possible.exists()), path)
 
 
 def log_files(folder: Path, *subfolders: str) -> list[Path]:
-    """Returns the logs in these subfolders, the oldest first; a missing subfolder is empty."""
+    """Return the logs in these subfolders, the oldest first; a missing subfolder is empty."""
     found = [path for subfolder in subfolders for path in (folder / subfolder).glob(f"*{ENDING}")]
     return sorted(found, key=lambda path: path.name)
 
 
 def run_files(path: Path) -> list[Path]:
-    """Returns all segments of the run that a log belongs to, wherever they are now, in their order."""
+    """Return all segments of the run that a log belongs to, wherever they are now, in their order."""
     folder = path.parent.parent if path.parent.name in (ACTIVE, DONE, PRESERVED) else path.parent
     run = re.sub(r"-\d{4,}$", "", path.stem)
     segments = re.compile(re.escape(run) + r"-(\d{4,})")
@@ -84,14 +84,14 @@ def run_files(path: Path) -> list[Path]:
 
 
 def unfinished_files(folder: Path) -> list[Path]:
-    """Returns the files that recovery has to examine, including those of living writers."""
+    """Return the files that recovery has to examine, including those of living writers."""
     found = [path for ending in (ENDING, BROKEN, PART) for path in (folder / ACTIVE).glob(f"*{ending}")]
     found += [path for ending in (BROKEN, PART) for path in folder.glob(f"*{ENDING}{ending}")]
     return sorted([*found, *(path for path in folder.glob(f"*{ENDING}") if not _has_an_end(path))])
 
 
 def _has_an_end(path: Path) -> bool:
-    """True also for a file that was removed or cannot be opened: there is nothing to recover."""
+    """Return true also for a file that was removed or cannot be opened: there is nothing to recover."""
     try:
         with path.open("rb") as file:
             file.seek(-min(len(LAST_BYTES), path.stat().st_size), os.SEEK_END)
@@ -101,14 +101,14 @@ def _has_an_end(path: Path) -> bool:
 
 
 def stored_files(folder: Path) -> list[Path]:
-    """Returns all files that count towards the quota: everything in active/ does, a preserved log does not."""
+    """Return all files that count towards the quota: everything in active/ does, a preserved log does not."""
     active = {path for path in (folder / ACTIVE).glob("*") if path.is_file()}
     found = active.union(unfinished_files(folder), log_files(folder, TOP, DONE))
     return sorted(found, key=lambda path: path.name)
 
 
 def free_space(folder: Path) -> FreeSpace:
-    """Returns the disk's free space for users without special rights. Raises OSError."""
+    """Return the disk's free space for users without special rights. Raises OSError."""
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     disk = os.statvfs(folder)
@@ -116,7 +116,7 @@ def free_space(folder: Path) -> FreeSpace:
 
 
 def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[DeletedLog]:
-    """Deletes the oldest finished logs one by one until quota and free space are respected. Raises OSError."""
+    """Delete the oldest finished logs one by one until quota and free space are respected. Raises OSError."""
     used = sum(_size(path) for path in stored_files(folder))
     for oldest in deletable_logs(folder)[:most]:
         too_much = 0 < quota_bytes < used
@@ -128,7 +128,7 @@ def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, mo
 
 
 def deletable_logs(folder: Path) -> list[Path]:
-    """Returns the finished logs, the oldest first, without the newest: it shows what happened last."""
+    """Return the finished logs, the oldest first, without the newest: it shows what happened last."""
     unfinished = unfinished_files(folder)
     return [path for path in log_files(folder, TOP, DONE) if path not in unfinished][:-1]
 
@@ -140,14 +140,14 @@ def delete_log(path: Path) -> DeletedLog:
 
 
 def _size(path: Path) -> int:
-    """Returns zero for a file that was removed meanwhile."""
+    """Return zero for a file that was removed meanwhile."""
     with suppress(OSError):
         return path.stat().st_size
     return 0
 
 
 def preserve(path: Path, undo: bool = False) -> Path:
-    """Moves a log to kept/, or back to done/. Raises OSError, and ValueError for a log that is elsewhere."""
+    """Move a log to kept/, or back to done/. Raises OSError, and ValueError for a log that is elsewhere."""
     source, target = (PRESERVED, DONE) if undo else (DONE, PRESERVED)
     path = path.absolute()
     if path.parent.name == target:
@@ -165,7 +165,7 @@ def preserve(path: Path, undo: bool = False) -> Path:
 
 
 def move_file(path: Path, target: Path) -> None:
-    """Renames a file and synchronises both folders."""
+    """Rename a file and synchronises both folders."""
     make_folder(target.parent)
     path.rename(target)
     for folder in {target.parent, path.parent}:
@@ -173,7 +173,7 @@ def move_file(path: Path, target: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Makes a folder and its missing parents, each with the owner of the folder that it is in. Raises OSError."""
+    """Make a folder and its missing parents, each with the owner of the folder that it is in. Raises OSError."""
     if not folder.exists():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
@@ -185,7 +185,7 @@ def make_folder(folder: Path) -> None:
 
 
 def copy_owner(descriptor: int, folder: Path) -> None:
-    """Gives an open file the owner of its folder: what a command makes as root must not lock the daemon out.
+    """Give an open file the owner of its folder: what a command makes as root must not lock the daemon out.
 
     The file is open and not named by its path, which the folder's owner may have replaced by a link meanwhile.
     """
@@ -204,7 +204,7 @@ def synchronise_folder(folder: Path) -> None:
 
 
 def why_not_read(path: Path, problem: OSError) -> str:
-    """Says why a file cannot be read and, where permission is missing, what to do."""
+    """Say why a file cannot be read and, where permission is missing, what to do."""
     if not isinstance(problem, PermissionError):
         return f"{path}: {problem.strerror or problem}"
     visible = next((parent for parent in (path, *path.absolute().parents) if os.path.exists(parent)), path)

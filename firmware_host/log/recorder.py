@@ -141,7 +141,7 @@ class Recorder:
             self.writer_alive = False
 
     def put(self, number: int, row: bytes) -> bool:
-        """Sends one row without waiting; returns False where it was lost."""
+        """Send one row without waiting; returns False where it was lost."""
         if len(row) > LARGEST_ROW:
             row = _shorten(row)
         record = pack_record(number, row)
@@ -166,13 +166,13 @@ class Recorder:
         return True
 
     def _loss_report(self) -> bytes:
-        """Is sent together with the next row: alone it would fit into gaps that are too small for a row."""
+        """Return the report of a loss, which is sent with the next row: alone it would fit where a row does not."""
         text = f"rows missing here: {self._unreported}, the log's writer did not keep up"
         row = EVENT.encode(self._loss_stamp_s, text)
         return pack_record(EVENT_KIND, row)
 
     def report(self) -> LogReport:
-        """Returns the newest report; cheap enough for every tick, since it seldom reads the pipe."""
+        """Return the newest report; cheap enough for every tick, since it seldom reads the pipe."""
         self._calls -= 1
         if self._calls < 0:
             self._calls = REPORT_CALLS
@@ -199,7 +199,7 @@ class Recorder:
         )
 
     def _accept(self, line: bytes) -> bool:
-        """Returns whether the line is a report: output of any other kind must not end the loop."""
+        """Return whether the line is a report: output of any other kind must not end the loop."""
         try:
             path, *values = json.loads(line)
             path = Path(path)
@@ -214,7 +214,7 @@ class Recorder:
         return True
 
     def close(self, timeout_s: float) -> bool:
-        """Ends the log; returns whether it is whole on the disk. A writer that needs longer finishes alone."""
+        """End the log; returns whether it is whole on the disk. A writer that needs longer finishes alone."""
         assert self._writer.stdin is not None and self._writer.stdout is not None
         deadline_s = time.monotonic() + timeout_s
         if self._unreported and self.writer_alive:
@@ -236,7 +236,7 @@ class Recorder:
 
 
 def _start_writer(path: Path) -> subprocess.Popen[bytes]:
-    """Ctrl-C, the service's stop and its watchdog reach the writer too, so it starts with their signals blocked."""
+    """Start the writer with blocked signals: Ctrl-C, the service's stop and its watchdog reach it too."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGABRT})
     try:
         command = [sys.executable, "-P", "-m", "firmware_host.log.writer", str(path)]
@@ -246,7 +246,7 @@ def _start_writer(path: Path) -> subprocess.Popen[bytes]:
 
 
 def _shorten(row: bytes) -> bytes:
-    """Cuts the text of an event, the only row that can be this long."""
+    """Cut the text of an event, the only row that can be this long."""
     event = EVENT.decode(row)
     text = event["text"].encode()[:LONGEST_TEXT].decode(errors="ignore")
     return EVENT.encode(event["stamp_s"], text)

@@ -36,7 +36,7 @@ class RestThinning:
         self._resting = False
 
     def thin(self, rows: Iterable[tuple[int, bytes]]) -> Thinned:
-        """Returns the rows to write, in the order in which they came."""
+        """Return the rows to write, in the order in which they came."""
         if self._every == 1:
             return Thinned(list(rows), "")
         written: list[tuple[int, bytes]] = []
@@ -65,7 +65,7 @@ class RestThinning:
         return f"at rest: of the ticks, one in {self._every} is written from here on" if begins else ""
 
     def release(self) -> list[tuple[int, bytes]]:
-        """Returns everything that is held back, to be written after all."""
+        """Return everything that is held back, to be written after all."""
         held = list(self._held)
         self._held.clear()
         return held

@@ -11,7 +11,7 @@ def pack_record(kind: int, content: bytes) -> bytes:
 
 
 def split_records(data: bytes) -> tuple[list[Record], bytes]:
-    """Returns the whole records and the bytes after them."""
+    """Return the whole records and the bytes after them."""
     records: list[Record] = []
     start = 0
     while start + HEADER.size <= len(data):

@@ -35,7 +35,7 @@ def _enumeration(name: str, values: type[IntEnum]) -> Field:
 
 @cache
 def tick_kind(rig: Rig) -> RowKind:
-    """The ticks of a rig: arrays have one value for each of its joints or flippers, whose names are in the meanings."""
+    """Return the row of a tick, whose arrays have one value for each joint or flipper of the rig."""
     joint_order = ", ".join(joint.replace("_", " ") for joint in rig.joints)
     flipper_order = f"of the mud on the joint; {', '.join(rig.flippers)}"
     return RowKind(

@@ -40,18 +40,18 @@ class Field:
 
     @property
     def length(self) -> int:
-        """Values in an array, 0 for a plain field."""
+        """Return the number of values in an array, 0 for a plain field."""
         return self.array or len(self.each)
 
     @property
     def missing(self) -> Any:
-        """The value in a log that lacks this field."""
+        """Return the value in a log that lacks this field."""
         value: Any = nan if self.kind.startswith("float") else MISSING.get(self.kind, 0)
         return (value,) * self.length if self.length else value
 
     @property
     def line(self) -> str:
-        """The field in a ros2msg definition, its meaning as a comment."""
+        """Return the field in a ros2msg definition, its meaning as a comment."""
         array = f"[{self.length}]" if self.length else ""
         return f"{self.kind}{array} {self.name}  # {self.meaning}".rstrip(" #")
 
@@ -81,7 +81,7 @@ class RowKind:
         self._stamp_offset = stamps[0] if stamps else None
 
     def _align(self) -> tuple[list[str], list[int]]:
-        """Formats of `struct` with padding, and each field's position in the row."""
+        """Format of `struct` with padding, and each field's position in the row."""
         formats, offsets, end = [], [], 0
         for field in self.numbers:
             size = struct.calcsize(f"<{FORMAT_OF[field.kind]}")
@@ -92,21 +92,21 @@ class RowKind:
         return formats, offsets
 
     def offset_of(self, name: str) -> int:
-        """Position of a field's first byte in a row."""
+        """Return the position of a field's first byte in a row."""
         return dict(zip((field.name for field in self.numbers), self.offsets, strict=True))[name]
 
     def fits(self, row: bytes) -> bool:
-        """Whether a row has the length of this layout; a text may be of any length."""
+        """Return whether a row has the length of this layout; a text may be of any length."""
         return len(row) >= self.layout.size if self.has_text else len(row) == self.layout.size
 
     def stamp_s(self, row: bytes) -> float:
-        """The monotonic time of a row; NaN where it has none."""
+        """Return the monotonic time of a row; NaN where it has none."""
         if self._stamp_offset is None or len(row) < self._stamp_offset + 8:
             return nan
         return float(struct.unpack_from("<d", row, self._stamp_offset)[0])
 
     def encode(self, *values: Any) -> bytes:
-        """Packs values in the order of the fields, arrays spread out, a text last."""
+        """Pack values in the order of the fields, arrays spread out, a text last."""
         if not self.has_text:
             return self.layout.pack(CDR_HEADER, *values)
         text: bytes = values[-1].encode() + b"\x00"
@@ -115,7 +115,7 @@ class RowKind:
         return fixed + padding + struct.pack("<I", len(text)) + text
 
     def encode_named(self, **values: Any) -> bytes:
-        """Packs the given fields; the others have the value of a missing one."""
+        """Pack the given fields; the others have the value of a missing one."""
         flat: list[Any] = []
         for field in self.fields:
             value = values.get(field.name, field.missing)
@@ -123,7 +123,7 @@ class RowKind:
         return self.encode(*flat)
 
     def decode(self, row: bytes) -> dict[str, Any]:
-        """Returns the values by field name, arrays as tuples. Raises struct.error where the row is too short."""
+        """Return the values by field name, arrays as tuples. Raises struct.error where the row is too short."""
         flat = self.layout.unpack_from(row)[1:]
         values: dict[str, Any] = {}
         start = 0
@@ -138,7 +138,7 @@ class RowKind:
 
 
 def read_definition(own: RowKind, definition: str) -> RowKind:
-    """The row kind of a file, its fields under the names of this version. Raises LayoutError."""
+    """Return the row kind of a file, its fields under the names of this version. Raises LayoutError."""
     present = {field.name: field for field in own.fields}
     renamed = {former: field.name for field in own.fields for former in field.formerly}
     fields = list(_parse_fields(definition))

@@ -111,7 +111,7 @@ class LogSegments:
         self._start_recovery()
 
     def _report_gap(self, file: LogFile) -> None:
-        """Writes events about the rows that are missing before this file and the logs that were deleted for it."""
+        """Write events about the rows that are missing before this file and the logs that were deleted for it."""
         texts = list(self._deleted)
         if self._missing:
             texts.append(f"rows missing here: {self._missing}, the log could not be written: {self._reason}")
@@ -139,7 +139,7 @@ class LogSegments:
         }
 
     def _give_up(self, error: OSError, unwritten: int = 0) -> None:
-        """Gives up this file, not the log."""
+        """Give up this file, not the log."""
         if self._file is not None:
             self._drop(self._file.rows - self._file.safe_rows + unwritten)
             self._segment -= self._file.safe_rows == 0  # such a file is removed
@@ -158,7 +158,7 @@ class LogSegments:
         self.slowest_s, file.slowest_s = max(self.slowest_s, file.slowest_s), 0.0
 
     def _rotate(self, rows: Rows) -> None:
-        """Begins a new file before these rows where the present one is too long or too large."""
+        """Begin a new file before these rows where the present one is too long or too large."""
         if self._file is None or not rows:
             return
         if self._first_stamp_s is None:
@@ -182,7 +182,7 @@ class LogSegments:
             self._give_up(error)
 
     def close(self) -> bool:
-        """Returns whether every row is on the disk, or reported there as missing."""
+        """Return whether every row is on the disk, or reported there as missing."""
         if self._file is None:
             self._open()
         self._write(self._thinning.release())
@@ -190,7 +190,7 @@ class LogSegments:
         return not self.problem
 
     def _make_room(self) -> None:
-        """Deletes the oldest log at once where the disk was full, logs may be deleted, and deleting helped before."""
+        """Delete the oldest log at once where the disk was full, logs may be deleted, and deleting helped before."""
         may_delete = self._parameters.quota_bytes > 0 or self._parameters.min_free_fraction > 0.0
         if self._full and self._folder is not None and may_delete and self._deleting_helps:
             for oldest in deletable_logs(self._folder)[:1]:
@@ -209,7 +209,7 @@ class LogSegments:
                 self._write([self._event(_message(deleted))])
 
     def _start_recovery(self) -> None:
-        """Recovers the files of other runs, or of this run before its disk failed, in a process of its own."""
+        """Recover the files of other runs, or of this run before its disk failed, in a process of its own."""
         if self._folder is None or (self._recovery is not None and self._recovery.poll() is None):
             return
         found = set(unfinished_files(self._folder)) - {self.path}

@@ -67,7 +67,7 @@ class Reporter:
 
 
 def write_log(pipe: int, reports: int, path: Path) -> bool:
-    """Writes everything that comes through the pipe; without an opening, no file is made."""
+    """Write everything that comes through the pipe; without an opening, no file is made."""
     batches = _read_batches(pipe)
     rows = next((batch for batch in batches if batch), [])
     if not rows or not rows[0][1]:
@@ -90,7 +90,7 @@ def write_log(pipe: int, reports: int, path: Path) -> bool:
 
 
 def _open_stream(opening: dict[str, Any]) -> RowStream | None:
-    """Returns the stream for subscribers; None where the loop asks for none."""
+    """Return the stream for subscribers; None where the loop asks for none."""
     wanted = opening.get("stream")
     if wanted is None:
         return None
@@ -107,12 +107,12 @@ def _open_stream(opening: dict[str, Any]) -> RowStream | None:
 
 
 def _valid(rows: Rows) -> Rows:
-    """Returns the rows that have a known kind and a stamp, as every row of the recorder has."""
+    """Return the rows that have a known kind and a stamp, as every row of the recorder has."""
     return [row for row in rows if row[0] < len(ROW_KINDS) and len(row[1]) >= STAMP.size]
 
 
 def _read_batches(pipe: int) -> Iterator[Rows]:
-    """Yields whole rows as they come, or none after a while without any, until the input ends."""
+    """Yield whole rows as they come, or none after a while without any, until the input ends."""
     poll = select.poll()
     poll.register(pipe, select.POLLIN | select.POLLHUP)
     unread = b""
@@ -129,7 +129,7 @@ def _read_batches(pipe: int) -> Iterator[Rows]:
 
 
 def _yield_to_the_loop() -> None:
-    """Ignores the loop's signals, gives up its real-time priority and takes the CPU last."""
+    """Ignore the loop's signals, gives up its real-time priority and takes the CPU last."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     with suppress(PermissionError):  # a hardened service may refuse both; the log is written all the same

@@ -25,7 +25,7 @@ UNWATCHED = ", but never its temperature: the currents alone guard it"
 
 
 def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
-    """All lines, also those that permit arming."""
+    """Return all lines, also those that permit arming."""
     lines = {"configuration": f"accepted for {loop.configuration.robot.name}"}
     for health, state in zip(loop.drives.health, loop.states, strict=True):
         lines |= _drive_lines(health, state)
@@ -85,7 +85,7 @@ def _line(identity: str, text: str, faults: Sequence[Fault], unheard: bool) -> d
 
 
 def _drive_lines(health: DriveHealth, state: DriveState) -> dict[str, str]:
-    """The lines of a drive, its joint and its watchdog."""
+    """Return the lines of a drive, its joint and its watchdog."""
     joint = health.joint
     stamps_s = (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s)
     missing = [signal for signal, stamp_s in zip(SIGNALS, stamps_s, strict=True) if not isfinite(stamp_s)]

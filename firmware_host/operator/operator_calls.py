@@ -124,7 +124,7 @@ class OperatorCalls:
         }
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
-        """The first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""
+        """Return the first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""
         wanted = [closed for closed in self._loop.learning.strides if closed.number >= params["since"]]
         return [
             stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
@@ -132,7 +132,7 @@ class OperatorCalls:
         ]
 
     def map(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
-        """The first PIECES_PER_ANSWER pieces of the mud's map beyond `after_m`."""
+        """Return the first PIECES_PER_ANSWER pieces of the mud's map beyond `after_m`."""
         after_m = -inf if params["after_m"] is None else params["after_m"]
         return map_report(self._loop.learning.estimator.map.rows(after_m, PIECES_PER_ANSWER))
 
@@ -213,7 +213,7 @@ class OperatorCalls:
 
 
 def _accepted(refused: str | None) -> str:
-    """Raises RefusedError with the reason, if there is one."""
+    """Raise RefusedError with the reason, if there is one."""
     if refused:
         raise RefusedError(refused)
     return "accepted"

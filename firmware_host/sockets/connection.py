@@ -52,7 +52,7 @@ class Client:
         return self.budget >= 1.0
 
     def receive(self) -> None:
-        """Raises OSError, or MalformedError for a request that is too long."""
+        """Raise OSError, or MalformedError for a request that is too long."""
         data = self.connection.recv(READ_BYTES)
         self.ended = not data
         self._received += len(data)
@@ -77,7 +77,7 @@ class Client:
         return message
 
     def is_overdue(self, now_s: float) -> bool:
-        """Whether the rest of a request has been missing for too long."""
+        """Return whether the rest of a request has been missing for too long."""
         return now_s - self._begun_s > LONGEST_SENDING_S
 
     def send(self, message: list[Any]) -> None:

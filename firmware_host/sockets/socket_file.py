@@ -118,7 +118,7 @@ def _remove_stale(path: Path, kind: int) -> None:
 
 
 def _answers(path: Path, kind: int) -> bool:
-    """Whether a daemon listens; one that accepts no connection in time hangs, but is not dead."""
+    """Return whether a daemon listens; one that accepts no connection in time hangs, but is not dead."""
     with socket.socket(socket.AF_UNIX, kind) as probe:
         probe.settimeout(PROBE_S)
         try:

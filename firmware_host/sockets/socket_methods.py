@@ -60,7 +60,7 @@ class Parameter(NamedTuple):
 
     @property
     def bounds(self) -> str:
-        """The permitted values, for messages and documentation."""
+        """Return the permitted values, for messages and documentation."""
         if self.range is None:
             return self.bounds_note
         return f"from {self.range.minimum:.15g} to {self.range.maximum:.15g} {self.unit}".rstrip()

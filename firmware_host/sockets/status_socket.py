@@ -73,14 +73,14 @@ class StatusSocket:
 
     @property
     def warnings(self) -> list[str]:
-        """Why operators share the socket of all users, if they do."""
+        """Return why operators share the socket of all users, if they do."""
         group = self._rights.operators.name
         problem = f"the group {group} cannot be given a socket of its own, so other accounts may delay its commands"
         return [] if self._for_operators.file.has_group else [f"{problem}: {REMEDY.format(group=group)}"]
 
     @property
     def counters(self) -> dict[str, int]:
-        """Counts since the start, and the number of present clients."""
+        """Return the counts since the start, and the number of present clients."""
         return {
             "clients": len(self._listeners),
             "accepted_clients": self._accepted,

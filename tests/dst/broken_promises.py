@@ -154,7 +154,7 @@ BREAKS: dict[str, Break] = {  # by the promise that must notice
 
 
 def seeds_until_noticed(promise: str) -> int | None:
-    """Returns how many random seeds show a break, or None where none of MOST_SEEDS does."""
+    """Return how many random seeds show a break, or None where none of MOST_SEEDS does."""
     for seed in range(MOST_SEEDS):
         scenario = draw_scenario(seed)
         sound_walk(scenario.surroundings).robot_at(scenario.start)  # whole until the schedule begins

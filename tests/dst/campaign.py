@@ -53,7 +53,7 @@ class Campaign:
 
 
 def run_block(first: int, last: int) -> list[Outcome]:
-    """Runs consecutive seeds, most of which share their surroundings."""
+    """Run consecutive seeds, most of which share their surroundings."""
     return [run_seed(seed) for seed in range(first, last)]
 
 
@@ -65,7 +65,7 @@ def run_seed(seed: int) -> Outcome:
 
 
 def blocks(first: int, last: int) -> Iterator[tuple[int, int]]:
-    """Yields spans of seeds with common surroundings."""
+    """Yield spans of seeds with common surroundings."""
     while first < last:
         end = min(last, (first // SHARED + 1) * SHARED)
         yield first, end
@@ -73,12 +73,12 @@ def blocks(first: int, last: int) -> Iterator[tuple[int, int]]:
 
 
 def shrunk(seed: int, promise: str) -> Scenario:
-    """Returns a short scenario that breaks the same promise."""
+    """Return a short scenario that breaks the same promise."""
     return shrink(draw_scenario(seed), lambda scenario: run_scenario(scenario).promise == promise)
 
 
 def run_campaign(first: int, last: int, workers: int, until_s: float, progress: Path | None) -> Campaign:
-    """Runs the seeds in processes of their own until all are done, the time is over, or Ctrl-C."""
+    """Run the seeds in processes of their own until all are done, the time is over, or Ctrl-C."""
     campaign, begun_s = Campaign(first, last), time.monotonic()
     done = _read_progress(progress)
     waiting = iter([block for block in blocks(first, last) if block not in done])
@@ -149,7 +149,7 @@ def _show(campaign: Campaign, elapsed_s: float) -> None:
 
 
 def span_of(text: str) -> tuple[int, int]:
-    """Reads a count or a span FIRST:LAST, the last one not included. Raises ValueError."""
+    """Read a count or a span FIRST:LAST, the last one not included. Raises ValueError."""
     first, colon, last = text.partition(":")
     return (int(first), int(last)) if colon else (0, int(first))
 
@@ -178,7 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def report_of(campaign: Campaign, duration_s: float) -> dict[str, Any]:
-    """Returns the result for programs; `covered` counts the seeds in which each kind of event, mode and fault was."""
+    """Return the result for programs; `covered` counts the seeds in which each kind of event, mode and fault was."""
     broken = [{"seed": each.seed, "promise": each.promise, "problem": each.problem} for each in campaign.broken]
     return {**vars(campaign), "covered": dict(campaign.covered), "broken": broken, "duration_s": duration_s}
 

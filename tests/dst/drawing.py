@@ -69,7 +69,7 @@ def _draw_drives(random: Random) -> Iterator[tuple[str, float]]:
 
 
 def _draw_configuration(random: Random, stuck: bool) -> Iterator[tuple[str, Any]]:
-    """Draws changes that keep a sound robot healthy: quick paths, other gains, limits and recoveries."""
+    """Draw changes that keep a sound robot healthy: quick paths, other gains, limits and recoveries."""
     yield "motion.path_speed_rad_s", round(random.uniform(1.5, 3.0), 1)
     yield "motion.fade_in_s", random.choice((0.1, 0.3, 0.5))
     yield "gait.swing_duration_s", random.choice((0.4, 0.6, 0.8))
@@ -113,14 +113,14 @@ def _draw_failure(random: Random, at_s: float) -> Failure:
 
 
 def _flapping(random: Random, event: Failure) -> Iterator[Failure]:
-    """Repeats a failure with short gaps, some of them shorter than its detection takes."""
+    """Repeat a failure with short gaps, some of them shorter than its detection takes."""
     for_s, gap_s = round(random.uniform(0.01, 0.06), 3), random.uniform(0.005, 0.08)
     for number in range(random.randint(2, 5)):
         yield event._replace(at_s=round(event.at_s + number * (for_s + gap_s), 3), for_s=for_s)
 
 
 def _draw_calls(random: Random, start: str, moments_s: list[float]) -> Iterator[Event]:
-    """Draws the operators' calls, at or shortly after the times at which something begins or ends."""
+    """Draw the operators' calls, at or shortly after the times at which something begins or ends."""
 
     def moment_s() -> float:
         return round(random.choice(moments_s) + random.choice((0.0, 0.003, 0.02, 0.1)) * random.random(), 3)
@@ -141,7 +141,7 @@ def _draw_calls(random: Random, start: str, moments_s: list[float]) -> Iterator[
 
 
 def _attend(random: Random) -> Iterator[Event]:
-    """Draws a program that renews its lease for a while, then stops in order, disconnects, or falls silent."""
+    """Draw a program that renews its lease for a while, then stops in order, disconnects, or falls silent."""
     renewals, for_s = random.randint(1, 4), random.choice((0.1, 0.2, 1.0))
     for number in range(renewals):
         yield Call(round(0.08 * number, 3), "pilot", "lease", {"for_s": for_s})

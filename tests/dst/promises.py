@@ -80,7 +80,7 @@ class LimitedMotors(Promise):
         robot.lockstep.robot.observers.append(self._measure)
 
     def _measure(self, dt_s: float, torques_nm: Torques) -> None:
-        """Checks the motors whose torque changed or is large."""
+        """Check the motors whose torque changed or is large."""
         robot = self.robot.lockstep.robot
         self._torques_nm = self._torques_nm or torques_nm
         for index, torque_nm in enumerate(torques_nm):
@@ -92,7 +92,7 @@ class LimitedMotors(Promise):
         self._torques_nm = torques_nm
 
     def _check(self, index: int, torque_nm: float, speed_rad_s: float, now_s: float) -> None:
-        """Checks what a motor was commanded: its true torque over the gain of a harmed motor."""
+        """Check what a motor was commanded: its true torque over the gain of a harmed motor."""
         gain = self.reach.gains[index]
         commanded_nm, rounding_nm = torque_nm / gain, ROUNDING_NM + self.reach.cogging_nm / abs(gain)
         if now_s - self._fast_s[index] > CLAMP_S and not self.reach.is_foreign(index):
@@ -218,7 +218,7 @@ class EnergyRise:
         self._lowest_j = [joint.work_j for joint in self._work.joints]
 
     def largest_j(self) -> tuple[float, str]:
-        """Returns the largest rise up to now by our torque, and its joint."""
+        """Return the largest rise up to now by our torque, and its joint."""
         rises_j = []
         for index, joint in enumerate(self._work.joints):
             foreign = self._reach.is_foreign(index)

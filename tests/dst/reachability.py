@@ -69,7 +69,7 @@ class Reachability:
         return self._robot.lockstep.robot.now_s - since_s < within_s
 
     def longest_s(self, index: int, ticks: int) -> float:
-        """Returns how long a motor may keep its torque after the loop has taken it away."""
+        """Return how long a motor may keep its torque after the loop has taken it away."""
         if self._recently(self._disturbed_s[index], WATCHDOG_S + AFTERMATH_S) or self._recently(
             self._late_s, WATCHDOG_S + AFTERMATH_S
         ):
@@ -79,19 +79,19 @@ class Reachability:
         return ticks * self._period_s
 
     def longest_idling_s(self, index: int) -> float:
-        """Returns how long a drive may stay in closed loop after the loop has commanded it idle."""
+        """Return how long a drive may stay in closed loop after the loop has commanded it idle."""
         if self._recently(self._disturbed_s[index], HEARTBEATS_S + REPEAT_S):
             return float("inf")
         return HEARTBEATS_S + REPEAT_S
 
     def bunched_s(self, index: int) -> float:
-        """Returns by how much the times between commands may shrink before they take effect."""
+        """Return by how much the times between commands may shrink before they take effect."""
         late = self._recently(self._disturbed_s[index], AFTERMATH_S)
         hastened = self._recently(self._hastened_s[index], AFTERMATH_S)
         return self._period_s + (MOST_DELAY_S if late else 0.0) + (LONGEST_LAG_S if hastened else 0.0)
 
     def is_foreign(self, index: int) -> bool:
-        """Returns whether another program commands the drive's torque."""
+        """Return whether another program commands the drive's torque."""
         return self._recently(self._foreign_s[index], AFTERMATH_S)
 
     def is_energised_by_others(self, index: int) -> bool:
@@ -99,7 +99,7 @@ class Reachability:
 
 
 def _gain(parameters: SimulatedDriveParameters) -> float:
-    """Returns the motor's true torque for a commanded one."""
+    """Return the motor's true torque for a commanded one."""
     return (1.0 + parameters.torque_constant_error) * cos(radians(parameters.commutation_error_deg))
 
 

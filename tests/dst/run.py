@@ -93,13 +93,13 @@ class Run:
         self._robot.call("guest", "disarm")
 
     def _check_end(self) -> None:
-        """Checks that a daemon that has ended leaves its drives idle."""
+        """Check that a daemon that has ended leaves its drives idle."""
         self._run(DISARMED_TICKS)
         if any(drive.energised for drive in self._robot.lockstep.robot.drives):
             self._break("Shutdown", "a drive is in closed loop after the end of the daemon")
 
     def _come_to_rest(self) -> None:
-        """Lets the joints come to rest, moves them back by hand where they are out of range, and clears the faults."""
+        """Let the joints come to rest, moves them back by hand where they are out of range, and clears the faults."""
         self._run(RESTING_TICKS)
         self._wait_until(self._is_still, LONGEST_COASTING_S)
         if self._is_out_of_range():
@@ -122,7 +122,7 @@ class Run:
         return not all(span.min_rad <= angle <= span.max_rad for span, angle in zip(ranges, angles_rad, strict=True))
 
     def _is_ready(self) -> bool:
-        """Returns whether the robot may be armed, or waits for its windings to cool."""
+        """Return whether the robot may be armed, or waits for its windings to cool."""
         return self._cools() or self._loop.mode is Mode.IDLE and not self._loop.faults.blocking()
 
     def _cools(self) -> bool:
@@ -176,7 +176,7 @@ class Run:
                 self._break(type(promise).__name__, text)
 
     def _cover(self, event: Event) -> None:
-        """Counts the kind of an event."""
+        """Count the kind of an event."""
         match event:
             case Call(client=client, method=method):
                 self.outcome.covered[f"call {method}"] += 1
@@ -201,7 +201,7 @@ class Run:
 
 
 def run_scenario(scenario: Scenario, promises: Sequence[type[Promise]] = PROMISES) -> Outcome:
-    """Runs a scenario from a copy of a sound robot; the same scenario gives the same outcome."""
+    """Run a scenario from a copy of a sound robot; the same scenario gives the same outcome."""
     lockstep = sound_walk(scenario.surroundings).robot_at(scenario.start)
     lockstep.failures.random.seed(scenario.seed)
     with TemporaryDirectory(prefix="dst-", dir="/dev/shm") as name:

@@ -17,7 +17,7 @@ Breaks = Callable[[Scenario], bool]
 
 
 def shrink(scenario: Scenario, breaks: Breaks, most_runs: int = 150) -> Scenario:
-    """Returns the smallest scenario found that `breaks` accepts. The given one must be accepted."""
+    """Return the smallest scenario found that `breaks` accepts. The given one must be accepted."""
     runs = 0
     progress = True
     while progress:
@@ -33,7 +33,7 @@ def shrink(scenario: Scenario, breaks: Breaks, most_runs: int = 150) -> Scenario
 
 
 def _smaller(scenario: Scenario) -> Iterator[Scenario]:
-    """Yields simpler scenarios, those that would save most first."""
+    """Yield simpler scenarios, those that would save most first."""
     for events in _with_fewer(scenario.events):
         yield scenario._replace(events=events)
     for shorter in _with_shorter(scenario.events):

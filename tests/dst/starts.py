@@ -79,7 +79,7 @@ def _example() -> str:
 
 
 def configuration_of(surroundings: Surroundings) -> Configuration:
-    """Returns the configuration; raises ConfigurationError where the changed keys contradict each other."""
+    """Return the configuration; raises ConfigurationError where the changed keys contradict each other."""
     document = tomllib.loads(_example())
     for key, value in (("failures.allowed", True), *surroundings.configuration):
         section, _, name = key.rpartition(".")
@@ -88,7 +88,7 @@ def configuration_of(surroundings: Surroundings) -> Configuration:
 
 
 def _toml(document: Mapping[str, Any], above: str = "") -> str:
-    """Writes tables, arrays of tables and plain values, the JSON of which is TOML too."""
+    """Write tables, arrays of tables and plain values, the JSON of which is TOML too."""
     lines = []
     for key, value in document.items():
         if isinstance(value, dict):
@@ -103,7 +103,7 @@ def _toml(document: Mapping[str, Any], above: str = "") -> str:
 
 
 def robot_of(surroundings: Surroundings) -> RecordedRobot:
-    """Makes a robot at power-on."""
+    """Make a robot at power-on."""
     stones = [] if surroundings.stone_m is None else [_stone(surroundings.stone_m)]
     clay = Clay(f"{surroundings.strength_pa:g} Pa", surroundings.strength_pa)
     world = World(
@@ -128,7 +128,7 @@ class SoundWalk:
         self._passed = {STARTS[0]: copy_of(self._robot)}
 
     def robot_at(self, start: str) -> RecordedRobot:
-        """Returns a copy at this start. Raises RuntimeError where a sound robot does not get there."""
+        """Return a copy at this start. Raises RuntimeError where a sound robot does not get there."""
         for each in STARTS[len(self._passed) : STARTS.index(start) + 1]:
             self._go_to(each)
             self._passed[each] = copy_of(self._robot)
@@ -155,5 +155,5 @@ class SoundWalk:
 
 @lru_cache(maxsize=2)
 def sound_walk(surroundings: Surroundings) -> SoundWalk:
-    """Returns the walk that consecutive scenarios share."""
+    """Return the walk that consecutive scenarios share."""
     return SoundWalk(surroundings)

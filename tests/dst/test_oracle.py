@@ -32,7 +32,7 @@ SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events 
 
 @pytest.fixture(scope="module", autouse=True)
 def sound_robots() -> None:
-    """Passes the starts of the schedules while the robot is whole."""
+    """Pass the starts of the schedules while the robot is whole."""
     for start, _, _ in SCHEDULES.values():
         sound_walk(QUICK).robot_at(start)
 

@@ -58,8 +58,7 @@ def walking(armed: Lockstep) -> Lockstep:
     return robot
 
 
-@pytest.mark.parametrize("every", [1, 2, 10])
-@pytest.mark.parametrize("torque_nm", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize(("torque_nm", "every"), [(0.0, 1), (1.0, 10)])
 def test_torque_of_another_program_on_the_bus_idles_the_drives_in_two_ticks(
     armed: Lockstep, torque_nm: float, every: int
 ) -> None:
@@ -73,7 +72,7 @@ def test_torque_of_another_program_on_the_bus_idles_the_drives_in_two_ticks(
     assert robot.loop.request(Request.ARM, robot.now_s)
 
 
-@pytest.mark.parametrize(("every", "longest_ticks"), [(1, 10), (2, 16), (10, 90)])
+@pytest.mark.parametrize(("every", "longest_ticks"), [(1, 10), (10, 90)])
 def test_torque_of_a_program_that_is_not_heard_idles_the_drives(
     walking: Lockstep, every: int, longest_ticks: int
 ) -> None:
@@ -89,13 +88,6 @@ def test_commands_that_come_late_or_by_halves_idle_the_drives(walking: Lockstep,
     robot.fail("left_adduction.command", kind, 2.0)
     assert robot.run_until(lambda: robot.loop.mode not in ENERGISED, 1.0)
     assert "setpoint_mismatch" in present(robot)
-
-
-def test_a_long_walk_has_no_mismatch(walking: Lockstep) -> None:
-    robot = copy_of(walking)
-    robot.run_for(8.0)
-    assert robot.loop.mode is Mode.WALKING
-    assert robot.loop.faults.present == []
 
 
 COMMANDS: list[tuple[Message, bytes, bool]] = [

@@ -64,7 +64,7 @@ def free_port() -> int:
 
 
 def cpu_s(process: subprocess.Popen[bytes]) -> float:
-    """Returns the processor time that a process has used."""
+    """Return the processor time that a process has used."""
     fields = Path(f"/proc/{process.pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / CLOCK_TICKS
 

@@ -33,7 +33,7 @@ ATTEMPTS = 5  # at a walk, which may fail on a busy machine
 
 
 def observe(folder: Path, from_s: float) -> npt.NDArray[Any]:
-    """Waits for WINDOW_STEPS of the robot's own time, and returns what its motors did in them."""
+    """Wait for WINDOW_STEPS of the robot's own time, and return what its motors did in them."""
     deadline_s = time.monotonic() + LONGEST_WAIT_S
     while len(rows := read_record(folder, from_s)) < WINDOW_STEPS and time.monotonic() < deadline_s:
         time.sleep(0.05)
@@ -43,7 +43,7 @@ def observe(folder: Path, from_s: float) -> npt.NDArray[Any]:
 
 
 def kill_once(folder: Path, number: signal.Signals, phase: str, drive: str) -> dict[str, Any] | None:
-    """Returns None where the robot did not reach that phase."""
+    """Return None where the robot did not reach that phase."""
     robot = LocalRobot(folder, drive=drive, robot="verification.stress.recorded_robot")
     daemon = robot.start_daemon()
     try:
@@ -67,7 +67,7 @@ def kill_once(folder: Path, number: signal.Signals, phase: str, drive: str) -> d
 
 
 def end_s(marked: npt.NDArray[np.bool_]) -> float:
-    """Returns the time to the end of the last marked step."""
+    """Return the time to the end of the last marked step."""
     steps = marked.nonzero()[0]
     return round(STEP_S * float(steps[-1] + 1), 4) if len(steps) else 0.0
 

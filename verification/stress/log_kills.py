@@ -34,7 +34,7 @@ SUMMED = ("missing_inside", "doubled", "recovered", "segments", "ticks")
 
 
 def wait_for_log(robot: LocalRobot, known: set[str]) -> None:
-    """Waits until the daemon answers and a file of its run exists."""
+    """Wait until the daemon answers and a file of its run exists."""
 
     def is_recording() -> bool:
         robot.call("hello")
@@ -45,7 +45,7 @@ def wait_for_log(robot: LocalRobot, known: set[str]) -> None:
 
 
 def kill(victim: str, daemon: subprocess.Popen[bytes]) -> float:
-    """Kills the victim and returns the time on the monotonic clock."""
+    """Kill the victim and return the time on the monotonic clock."""
     writers = children_of(daemon.pid)
     killed_s = time.monotonic()
     if victim in ("writer", "both"):
@@ -72,7 +72,7 @@ def _has_ended(process: int) -> bool:
 
 
 def examine(paths: Sequence[Path], seen_s: float, killed_s: float) -> dict[str, Any]:
-    """Returns the content of one run's logs, and their problems. A log without a tick lost all since it was seen."""
+    """Return the content of one run's logs, and their problems. A log without a tick lost all since it was seen."""
     logs = [read_log(path) for path in paths]
     problems = [f"{path.name} is incomplete" for path, log in zip(paths, logs, strict=True) if not log.complete]
     problems += [complaint for path, log in zip(paths, logs, strict=True) if (complaint := _by_others(path, log))]
@@ -92,7 +92,7 @@ def examine(paths: Sequence[Path], seen_s: float, killed_s: float) -> dict[str, 
 
 
 def _by_others(path: Path, log: Log) -> str:
-    """Returns how two independent readers differ from ours, or an empty text."""
+    """Return how two independent readers differ from ours, or an empty text."""
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
     from rosbags.highlevel import AnyReader

@@ -61,12 +61,12 @@ class Parameter(NamedTuple):
 
 
 def key_of(path: KeyPath) -> str:
-    """Returns the name of a value in a refusal."""
+    """Return the name of a value in a refusal."""
     return "".join(f" {part + 1}" if isinstance(part, int) else f".{part}" for part in path)[1:]
 
 
 def parameters_of(value: Any, path: KeyPath = (), hint: Any = None) -> Iterator[Parameter]:
-    """Yields all parameters of a record, of those in it, and of those in its tables and arrays."""
+    """Yield all parameters of a record, of those in it, and of those in its tables and arrays."""
     if is_dataclass(value):
         hints = get_type_hints(type(value), include_extras=True)
         for item in fields(value):
@@ -82,7 +82,7 @@ def parameters_of(value: Any, path: KeyPath = (), hint: Any = None) -> Iterator[
 
 
 def parameters_in(text: str) -> list[Parameter]:
-    """Returns the parameters of a valid file, those that it omits included."""
+    """Return the parameters of a valid file, those that it omits included."""
     if text == WORLD:
         found = [*parameters_of(WorldText(**RecordReader(WorldText).read(tomllib.loads(text))))]
         found += [*parameters_of(PlantParameters(), ("robot",)), *parameters_of(DriveParameters(0), ("drives",))]
@@ -107,7 +107,7 @@ class Draft:
         self.wrong_key = self.bound = ""
 
     def _set(self, path: KeyPath, value: Any) -> str:
-        """Changes one value and returns the whole file."""
+        """Change one value and return the whole file."""
         table: Any = self._document
         for part in path[:-1]:
             table = table.setdefault(part, {}) if isinstance(table, dict) else table[part]
@@ -115,17 +115,17 @@ class Draft:
         return "".join(f"{json.dumps(key)} = {toml_of(value)}\n" for key, value in self._document.items())
 
     def _choose(self, wanted: Callable[[Parameter], bool] = lambda parameter: True) -> Parameter:
-        """Chooses the parameter that the refusal must name."""
+        """Choose the parameter that the refusal must name."""
         parameter = self._chance.choice([each for each in self._parameters if wanted(each)])
         self.wrong_key = key_of(parameter.path)
         return parameter
 
     def near(self) -> str:
-        """Changes a few values to nearby ones, so each is valid by itself."""
+        """Change a few values to nearby ones, so each is valid by itself."""
         return self._change_some(8, self._near_value)
 
     def within(self) -> str:
-        """Changes a few values to any within their bounds, so each is valid by itself."""
+        """Change a few values to any within their bounds, so each is valid by itself."""
         return self._change_some(3, self._value_within)
 
     def _change_some(self, most: int, value_of: Callable[[Parameter], Any]) -> str:
@@ -183,12 +183,12 @@ class Draft:
         return self._set(path, self._chance.choice((1, "", [], {"a": {}})))
 
     def hostile_text(self) -> str:
-        """Sets a hostile text. Some of these are valid: a bus may have any name."""
+        """Set a hostile text. Some of these are valid: a bus may have any name."""
         texts = [parameter for parameter in self._parameters if parameter.kind is str] or self._parameters
         return self._set(self._chance.choice(texts).path, self._chance.choice(HOSTILE))
 
     def missing(self) -> str:
-        """Removes lines: keys, heads of sections, or parts of both."""
+        """Remove lines: keys, heads of sections, or parts of both."""
         lines = self._lines()
         first = self._chance.randrange(len(lines))
         return "".join([*lines[:first], *lines[first + self._chance.randint(1, 5) :]])
@@ -239,7 +239,7 @@ def next_file(chance: Random) -> CandidateFile:
 
 
 def toml_of(value: Any) -> str:
-    """Writes a value as TOML, with inline tables only."""
+    """Write a value as TOML, with inline tables only."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{toml_of(str(key))} = {toml_of(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):

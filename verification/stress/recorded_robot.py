@@ -35,7 +35,7 @@ class MotorRecord:
         self._velocities_rad_s = self._measured_rad_s()
 
     def add_step(self, step_s: float, torques: Torques) -> None:
-        """Records a step by the velocities before it, to which the drives have reacted."""
+        """Record a step by the velocities before it, to which the drives have reacted."""
         follows = [drive.energised for drive in self._robot.drives]
         drives = [
             torque_nm != 0.0 and (following or not torque_nm * velocity_rad_s < 0.0)
@@ -50,7 +50,7 @@ class MotorRecord:
 
 
 def read_record(folder: Path, from_s: float) -> npt.NDArray[Any]:
-    """Returns the rows since a time on the monotonic clock."""
+    """Return the rows since a time on the monotonic clock."""
     rows = np.fromfile(folder / RECORD, COLUMNS)
     return rows[rows["stamp_s"] > from_s]
 

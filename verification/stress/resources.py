@@ -12,7 +12,7 @@ def resident_kib(process: int | str = "self") -> float:
 
 
 def peak_kib() -> float:
-    """Returns the largest resident memory that this process ever had."""
+    """Return the largest resident memory that this process ever had."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 

@@ -84,7 +84,7 @@ class RandomOperator:
         return Call("fail", {"component": component, "kind": kind, "for_s": for_s})
 
     def next_call(self, mode: str, blocked: bool) -> Call:
-        """Returns the next call that makes sense in this mode, or a question."""
+        """Return the next call that makes sense in this mode, or a question."""
         draw = self.chance.random()
         if mode in ("fault", "damping") or (mode == "idle" and blocked):
             return Call("clear", {})
@@ -104,7 +104,7 @@ class RandomOperator:
 
 
 class PatientRecorder(Recorder):
-    """Waits for room, since a loop without a clock is faster than any writer."""
+    """Wait for room, since a loop without a clock is faster than any writer."""
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         if not self._room.poll(ROOM_MS):
@@ -116,7 +116,7 @@ class PatientRecorder(Recorder):
         self._room.register(self._pipe, select.POLLOUT)
 
     def report(self) -> LogReport:
-        """Omits the age of the writer's reports, which has another clock."""
+        """Omit the age of the writer's reports, which has another clock."""
         return super().report()._replace(slowest_write_s=0.0)
 
 
@@ -155,7 +155,7 @@ class SoakedLoop:
         return track
 
     def run_for(self, seconds: float) -> None:
-        """Runs with operator, visitors and failures, and then until no client is connected."""
+        """Run with operator, visitors and failures, and then until no client is connected."""
         for _ in range(round(seconds * RATE_HZ)):
             self._step()
             self._invite()
@@ -180,7 +180,7 @@ class SoakedLoop:
         return gone
 
     def _invite(self) -> None:
-        """Lets the operator and failures come at their times, and resets joints that a fault moved out of range."""
+        """Let the operator and failures come at their times, and resets joints that a fault moved out of range."""
         loop = self.robot.loop
         if self.ticks % BY_HAND_TICKS == 0 and any(fault.name == "joint_position" for fault in loop.faults.present):
             for arm in self.robot.robot.plant.arms:
@@ -250,7 +250,7 @@ def soak(folder: Path, seed: int, seconds: float) -> dict[str, Any]:
 
 
 def count_garbage() -> dict[str, Any]:
-    """Counts the reference cycles since collections ended, which only a collection frees."""
+    """Count the reference cycles since collections ended, which only a collection frees."""
     gc.set_debug(gc.DEBUG_SAVEALL)
     gc.collect()
     kinds = Counter(type(each).__name__ for each in gc.garbage)
@@ -260,7 +260,7 @@ def count_garbage() -> dict[str, Any]:
 
 
 def rows_of(logs: Path) -> dict[str, Any]:
-    """Counts the rows in the files that the quota preserved: ticks are numbered, and count the missed ones."""
+    """Count the rows in the files that the quota preserved: ticks are numbered, and count the missed ones."""
     read = [read_log(path) for path in log_files(logs, ACTIVE, DONE)]
     ticks = np.concatenate([log.ticks[["tick", "missed_ticks"]] for log in read])
     numbers = ticks["tick"].astype(np.int64) - ticks["missed_ticks"].astype(np.int64)

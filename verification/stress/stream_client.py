@@ -22,7 +22,7 @@ class StreamClient:
         self._connection.setblocking(False)
 
     def step(self) -> None:
-        """Sends the next piece and receives what has come."""
+        """Send the next piece and receives what has come."""
         if self.closed:
             return
         if self.pieces:

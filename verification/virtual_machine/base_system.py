@@ -57,7 +57,7 @@ class BuildError(Exception):
 
 
 def install_missing_packages() -> None:
-    """Installs missing host packages, the only installation outside of the project's folder, and prints their names."""
+    """Install missing host packages, the only installation outside of the project's folder, and print their names."""
     missing = [package for package in HOST_PACKAGES if not _installed(package)]
     if not missing:
         return
@@ -76,7 +76,7 @@ def _installed(package: str) -> bool:
 
 
 def run(command: Sequence[str | Path]) -> None:
-    """Runs a command and shows its output only where it fails."""
+    """Run a command and shows its output only where it fails."""
     done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     if done.returncode != 0:
         output = done.stdout.decode(errors="replace")
@@ -91,7 +91,7 @@ def fingerprint(*texts: bytes) -> str:
 
 
 def base_system() -> Path:
-    """Returns the archive with these packages and dependencies, and builds it where it does not exist."""
+    """Return the archive with these packages and dependencies, and builds it where it does not exist."""
     key = fingerprint(
         " ".join([*_debian_command(), *INITRAMFS.values(), *PLATFORMS]).encode(), (REQUIREMENTS / LOCK).read_bytes()
     )

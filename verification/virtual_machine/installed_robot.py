@@ -40,7 +40,7 @@ class Disk(NamedTuple):
 
 
 def installed_robot() -> Disk:
-    """Returns a disk that was never booted; copy it before booting."""
+    """Return a disk that was never booted; copy it before booting."""
     install_missing_packages()
     archive = base_system()
     disk = Disk(STORE / "robot.ext4", STORE / "kernel", STORE / "initramfs")
@@ -58,7 +58,7 @@ def _key(archive: Path) -> str:
 
 
 def _project_files() -> list[Path]:
-    """Returns the files that git tracks or would add: the working tree without build products."""
+    """Return the files that git tracks or would add: the working tree without build products."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(command, cwd=PROJECT, check=True, capture_output=True, text=True).stdout
     paths = (PROJECT / name for name in sorted(names.split("\0")) if name)
@@ -85,7 +85,7 @@ def _owned_by_root(member: tarfile.TarInfo) -> tarfile.TarInfo:
 
 
 def installation() -> str:
-    """Returns the script that runs in the disk's folder."""
+    """Return the script that runs in the disk's folder."""
     lines = [line for heading in HEADINGS for line in _guide_commands(heading)]
     wanted = [line for line in lines if not line.startswith((*DONE_ALREADY, *NEEDS_A_RUNNING_ROBOT))]
     before = (GUEST_FILES / "before_installation.sh").read_text(encoding="utf-8")
@@ -96,7 +96,7 @@ def installation() -> str:
 
 
 def _guide_commands(heading: str) -> Iterator[str]:
-    """Yields the lines of the first shell block below a heading."""
+    """Yield the lines of the first shell block below a heading."""
     _, found, below = (PROJECT / GUIDE).read_text(encoding="utf-8").partition(f"\n{heading}\n")
     _, opening, rest = below.partition("```sh\n")
     if not found or not opening:

@@ -80,7 +80,7 @@ class Machine:
         return [*command, *(COUNTED_CLOCK if emulated else ())]
 
     def run(self, command: str, user: str = "", longest_s: float = 30.0) -> Answer:
-        """Runs a command as root, or as `user` in a new login, for at most `longest_s` of the guest's time."""
+        """Run a command as root, or as `user` in a new login, for at most `longest_s` of the guest's time."""
         if user:
             command = f"runuser --login {user} --command {shlex.quote(command)}"
         assert self._connection is not None
@@ -89,7 +89,7 @@ class Machine:
         return Answer(int(answer["status"]), str(answer["output"]), str(answer["errors"]))
 
     def read(self, path: str) -> bytes:
-        """Reads a file of the guest."""
+        """Read a file of the guest."""
         answer = self.run(f"base64 {shlex.quote(path)}", longest_s=60.0)
         if answer.status != 0:
             raise MachineError(answer.errors)
@@ -137,7 +137,7 @@ def _bare_machine(accelerator: str, kernel: Path) -> list[str]:
 
 
 def _kvm_works(kernel: Path) -> bool:
-    """Boots a kernel without a disk, which must panic and end at once: a device file alone proves nothing."""
+    """Boot a kernel without a disk, which must panic and end at once: a device file alone proves nothing."""
     if not os.access("/dev/kvm", os.R_OK | os.W_OK):
         return False
     probe = [*_bare_machine("kvm", kernel), "-append", "panic=-1 quiet"]

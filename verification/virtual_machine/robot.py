@@ -34,13 +34,13 @@ class Robot:
         self.machine = machine
 
     def shell(self, command: str, longest_s: float = 60.0) -> str:
-        """Runs a command as root and returns its output. Fails where the command fails."""
+        """Run a command as root and return its output. Fails where the command fails."""
         answer = self.machine.run(command, longest_s=longest_s)
         assert answer.status == 0, f"{command}\n{answer.output}{answer.errors}{self.journal()}"
         return answer.output
 
     def operate(self, *arguments: str, user: str = OPERATOR) -> Answer:
-        """Runs `mudskipper ARGUMENTS`, whether it succeeds or not."""
+        """Run `mudskipper ARGUMENTS`, whether it succeeds or not."""
         return self.machine.run(" ".join(("mudskipper", *arguments)), user=user)
 
     def succeed(self, *arguments: str) -> str:
@@ -53,29 +53,29 @@ class Robot:
         return report
 
     def checks(self) -> dict[str, dict[str, Any]]:
-        """Returns the lines of `mudskipper check` by their identity."""
+        """Return the lines of `mudskipper check` by their identity."""
         return {item["id"]: item for item in json.loads(self.operate("check", "--json").output)}
 
     def unit(self, name: str) -> str:
-        """Returns a property of the service from systemd."""
+        """Return a property of the service from systemd."""
         return self.shell(f"systemctl show --value --property={name} mudskipper").strip()
 
     def journal(self) -> str:
         return self.machine.run("journalctl --boot --unit=mudskipper --no-pager --output=cat --lines=40").output
 
     def wait_for(self, condition: str, longest_s: float = 20.0) -> None:
-        """Waits until a shell command succeeds."""
+        """Wait until a shell command succeeds."""
         self.shell(f"until {condition}; do sleep 0.5; done", longest_s)
 
     def wait_until_answers(self) -> None:
         self.wait_for("mudskipper status --json | grep -q closed_loop")
 
     def wait_until_ready(self) -> None:
-        """Waits until the robot can be armed."""
+        """Wait until the robot can be armed."""
         self.wait_for("mudskipper check >/dev/null")
 
     def walk(self) -> None:
-        """Walks from idle; returns in the first stride."""
+        """Walk from idle; return in the first stride."""
         assert self.succeed("arm") == "hold\n"
         self.succeed("walk", "--depth", "3")
 
@@ -87,12 +87,12 @@ class Robot:
         return report["mode"] == "walking" and not report["faults"]
 
     def rest(self) -> None:
-        """Returns the robot to idle without faults, as after a start."""
+        """Return the robot to idle without faults, as after a start."""
         self.shell(REST)
         self.wait_until_ready()
 
     def put_back(self) -> None:
-        """Moves the flippers back from beyond their limits, as an operator does by hand."""
+        """Move the flippers back from beyond their limits, as an operator does by hand."""
         self.shell("systemctl kill --signal=USR1 simulated-robot; sleep 0.2")
 
     def torque_is_off(self) -> bool:

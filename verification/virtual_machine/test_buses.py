@@ -23,7 +23,7 @@ WARNING, PASSIVE, OFF, RESTARTED = "20000004#0004", "20000004#0010", "20000040#"
 
 
 def rates_hz(robot: Robot) -> dict[str, dict[int, float]]:
-    """Returns the rate by bus and identifier, from the stamps of candump."""
+    """Return the rate by bus and identifier, from the stamps of candump."""
     text = robot.shell(f"timeout {LISTENING_S} candump -L vcan0 vcan1; true")
     frames = [line.split() for line in text.splitlines()]
     stamps_s = [float(stamp.strip("()")) for stamp, _, _ in frames]

@@ -39,7 +39,7 @@ END
 
 
 def set_up(robot: Robot, mtu: int) -> None:
-    """Starts daemon and simulated robot on buses of this frame size."""
+    """Start daemon and simulated robot on buses of this frame size."""
     robot.shell("systemctl stop mudskipper simulated-robot")
     for bus in NODES:  # one after the other: the kernel refuses another size while the interface is up
         robot.shell(f"ip link set {bus} down && ip link set {bus} mtu {mtu} && ip link set {bus} up")

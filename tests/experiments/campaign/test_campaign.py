@@ -13,11 +13,12 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.campaign import campaign as campaign_module
 from experiments.campaign.campaign_file import Campaign, load_campaign
+from experiments.campaign.points import with_values
 from experiments.campaign.walk_trial import run_walk
-from experiments.reports.report_page import PAGE
+from experiments.studies import campaign as campaign_module
 from experiments.study.notebook import NAME, Notebook
+from experiments.study.results_folder import PAGE
 from firmware_host.configuration.file_problems import ConfigurationError
 from logs.catalogue.catalogue import Catalogue, CatalogueError
 from logs.catalogue.entry import COLUMNS, TRIALS
@@ -50,6 +51,11 @@ def refusal(folder: Path, text: str) -> str:
     return message
 
 
+def tables_of(campaign: Campaign) -> list[dict[str, Any]]:
+    """Return the tables of the walk at each point."""
+    return [campaign.plates.in_configuration(with_values(campaign.base, values)) for values in campaign.points]
+
+
 # points
 
 
@@ -64,7 +70,7 @@ def test_a_grid_has_every_combination_of_its_values(tmp_path: Path) -> None:
         """,
     )
     assert len(campaign.points) == 12 and len({json.dumps(point) for point in campaign.points}) == 12
-    last = campaign.tables[-1]
+    last = tables_of(campaign)[-1]
     assert last["robot"] == {"drive": "mit:AK80-9"} and last["configuration"] == {"adaptation": {"method": "paper"}}
     assert last["world"]["segment"] == [{"start_m": 0.0, "end_m": 100.0, "strength_pa": 3200.0}]
 
@@ -98,8 +104,8 @@ def test_another_key_changes_no_draw_of_the_first(tmp_path: Path) -> None:
 def test_a_plate_comes_from_a_file_next_to_the_campaign(tmp_path: Path) -> None:
     written(tmp_path, (ROOT / "examples/plates/paddle.csv").read_text(encoding="utf-8"), "paddle.csv")
     campaign = loaded(tmp_path, f'{SHORT}robot.plate = ["", "paddle.csv"]\n')
-    corners = [tables["configuration"].get("geometry", {}).get("plate_corners_m") for tables in campaign.tables]
-    assert corners[0] is None and len(corners[1]) == 17 and "plate" not in campaign.tables[1]["robot"]
+    corners = [tables["configuration"].get("geometry", {}).get("plate_corners_m") for tables in tables_of(campaign)]
+    assert corners[0] is None and len(corners[1]) == 17 and "plate" not in tables_of(campaign)[1]["robot"]
 
 
 def test_the_example_is_a_campaign() -> None:
@@ -194,10 +200,10 @@ def test_one_and_two_workers_find_the_same_digits_and_the_catalogue_reads_them(
     assert command("--workers", "2") == exit_codes.OK
     report = json.loads(capsys.readouterr().out)
     campaign = load_campaign(tmp_path / "mud.toml")
-    here = [run_walk(trial.tables, trial.seed) for trial in campaign.trials[:2]]
+    here = [run_walk(tables_of(campaign)[0], seed) for seed in (1, 2)]
     lines = (tmp_path / "out" / NAME).read_text(encoding="utf-8").splitlines()
-    entries = {line["key"]: line["entry"] for line in map(json.loads, lines[1:])}
-    assert [entries[trial.key] for trial in campaign.trials[:2]] == json.loads(json.dumps(here))
+    entries = [line["entry"] for line in sorted(map(json.loads, lines[1:]), key=lambda line: str(line["key"]))]
+    assert entries[:2] == json.loads(json.dumps(here))
     found = rows(tmp_path, "point, seed, world_segment_strength_pa, strides, speed_m_s, muds[1].k_p, state")
     assert [row[:4] for row in found] == [(1, 1, 1000.0, 2), (1, 2, 1000.0, 2), (2, 1, 3000.0, 2), (2, 2, 3000.0, 2)]
     assert all(row[4] > 0.0 and row[6] == "whole" for row in found) and found[0][5] < found[2][5]
@@ -314,10 +320,10 @@ def test_a_changed_file_and_a_changed_program_are_refused_in_the_same_folder(
 
 
 def test_a_robot_that_does_not_start_is_a_row_with_its_reason(tmp_path: Path) -> None:
-    (trial,) = loaded(
+    campaign = loaded(
         tmp_path, "[walk]\nstrides = 1\n[grid]\nworld.segment.strength_pa = [800.0]\nwalk.depth_m = [0.19]\n"
-    ).trials
-    entry = run_walk(trial.tables, trial.seed)
+    )
+    entry = run_walk(tables_of(campaign)[0], 1)
     assert entry["state"] == "broken" and entry["reason"] and entry["strides"] == 0
 
 

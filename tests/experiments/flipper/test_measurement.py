@@ -149,14 +149,14 @@ def test_the_daemons_strides_count_and_the_papers_method_is_next_to_them() -> No
     (entry,) = measured()[0].values()
     assert list(entry["strides"]) == [DEFAULT, PAPER]
     assert report().muds[0].k_s.trials == [entry["strides"][DEFAULT][0]["k_s"]["value"]]
-    assert {row.method for row in report().errors} == {DEFAULT, PAPER}
+    assert {row["method"] for row in report().errors} == {DEFAULT, PAPER}
 
 
 def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
     truth = {MUD: {"k_p": 2e6}}
     reported = report(truth)
     assert reported.muds[0].truth == truth[MUD]
-    assert {row.coefficient for row in reported.errors} == {"k_p"}
+    assert {row["coefficient"] for row in reported.errors} == {"k_p"}
 
 
 def test_the_recorded_profile_is_a_whole_stride_with_three_pauses() -> None:

@@ -178,7 +178,7 @@ def test_errors_are_of_values_and_bounds_are_printed_as_bounds() -> None:
 def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
     stride = make_stride(k_p=None, k_e=None)
     errors = error_table([ComparedStride("49.5", "law", stride, {"k_p": 1e6, "k_s": 1e6, "k_e": 1e6})], "walking")
-    assert [row.coefficient for row in errors] == ["k_s"]
+    assert [row["coefficient"] for row in errors] == ["k_s"]
 
 
 def test_a_table_of_muds_has_a_column_of_the_load_cell() -> None:

@@ -1,14 +1,15 @@
 """Tables of errors from synthetic estimates and truths, with numbers that are easy to check."""
 
 from math import nan
-from typing import Any, TypeVar
+from typing import Any
 
 import pytest
+from pandas import DataFrame
 
 from control.records import Estimate
-from experiments.reports.error_table import Evaluation, error_rows, plate_rows
-
-Row = TypeVar("Row")
+from experiments.reports.error_table import Row, evaluation_of
+from experiments.reports.error_table import error_rows as rows_of_frame
+from experiments.reports.error_table import plate_rows as plates_of_frame
 
 
 def evaluated(
@@ -21,12 +22,20 @@ def evaluated(
     setup: str = "walking",
     mud: str = "49.5",
     **changes: Any,
-) -> Evaluation:
+) -> Row:
     estimate = Estimate(value, std_error, 10, **({"valid": True} | changes))
-    return Evaluation(setup, mud, coefficient, method, estimate, truth, upright)
+    return evaluation_of(setup, mud, coefficient, method, estimate, truth, upright)
 
 
-def bound(value: float, std_error: float = 0.0, **changes: Any) -> Evaluation:
+def error_rows(evaluations: list[Row]) -> list[Row]:
+    return rows_of_frame(DataFrame(evaluations))
+
+
+def plate_rows(evaluations: list[Row]) -> list[Row]:
+    return plates_of_frame(DataFrame(evaluations))
+
+
+def bound(value: float, std_error: float = 0.0, **changes: Any) -> Row:
     return evaluated(value, std_error, at_least=True, reason="it held", **changes)
 
 
@@ -38,47 +47,45 @@ def only(rows: list[Row]) -> Row:
 def test_median_and_95th_percentile_are_of_the_size_of_the_error() -> None:
     """The errors are -10, 0, 20, 30 and 40 %; the 95th percentile lies at four fifths between 30 and 40 %."""
     row = only(error_rows([evaluated(value) for value in (90.0, 100.0, 120.0, 130.0, 140.0)]))
-    assert (row.median, row.p95, row.bias, row.strides) == (0.2, 0.38, 0.2, 5)
-    assert only(error_rows([evaluated(value) for value in (80.0, 90.0, 150.0)])).bias == -0.1  # the bias is signed
+    assert (row["median"], row["p95"], row["bias"], row["strides"]) == (0.2, 0.38, 0.2, 5)
+    assert only(error_rows([evaluated(value) for value in (80.0, 90.0, 150.0)]))["bias"] == -0.1  # the bias is signed
 
 
 def test_the_error_is_relative_to_each_ones_own_truth() -> None:
     row = only(error_rows([evaluated(110.0, truth=100.0), evaluated(220.0, truth=200.0), evaluated(33.0, truth=30.0)]))
-    assert (row.median, row.p95, row.truth_n_m3) == (0.1, 0.1, 100)
+    assert (row["median"], row["p95"], row["truth_n_m3"]) == (0.1, 0.1, 100)
 
 
 @pytest.mark.parametrize(("std_error", "coverage"), [(5.0, 0.0), (5.2, 1.0)])
 def test_the_interval_is_1_96_standard_errors_to_either_side(std_error: float, coverage: float) -> None:
     for value in (90.0, 110.0):
-        assert only(error_rows([evaluated(value, std_error)])).coverage == coverage
+        assert only(error_rows([evaluated(value, std_error)]))["coverage"] == coverage
 
 
 def test_the_coverage_is_a_fraction() -> None:
     rows = error_rows([evaluated(101.0, 1.0), evaluated(105.0, 1.0), evaluated(99.0, 1.0), evaluated(100.0, 1.0)])
-    assert only(rows).coverage == 0.75
+    assert only(rows)["coverage"] == 0.75
 
 
 def test_bounds_have_no_error_and_are_counted_apart() -> None:
     row = only(error_rows([evaluated(110.0), bound(50.0), bound(90.0), bound(130.0)]))
-    assert (row.median, row.strides, row.bounds) == (0.1, 1, 3)
-    assert (row.bounds_hold, row.bound_over_truth) == (0.6667, 0.9)
+    assert (row["median"], row["strides"], row["bounds"]) == (0.1, 1, 3)
+    assert (row["bounds_hold"], row["bound_over_truth"]) == (0.6667, 0.9)
     row = only(error_rows([bound(50.0), bound(50.0, valid=False)]))
-    assert (row.median, row.p95, row.bias, row.coverage, row.strides) == (None, None, None, None, 0)
-    assert (row.bounds, row.not_valid) == (1, 1)
+    assert (row["median"], row["p95"], row["bias"], row["coverage"], row["strides"]) == (None, None, None, None, 0)
+    assert (row["bounds"], row["not_valid"]) == (1, 1)
 
 
 @pytest.mark.parametrize(("std_error", "hold"), [(5.0, 0.0), (5.2, 1.0)])
 def test_a_bound_is_right_if_its_lower_end_is(std_error: float, hold: float) -> None:
-    assert only(error_rows([bound(110.0, std_error)])).bounds_hold == hold
+    assert only(error_rows([bound(110.0, std_error)]))["bounds_hold"] == hold
 
 
 def test_what_is_not_valid_is_counted_and_nothing_else() -> None:
-    lost = Estimate(nan, nan, 0, False, "nothing there")
-    row = only(
-        error_rows([evaluated(110.0), evaluated(1.0)._replace(estimate=lost), evaluated(1.0)._replace(estimate=lost)])
-    )
-    assert (row.median, row.strides, row.not_valid, row.bounds) == (0.1, 1, 2, 0)
-    assert row.bounds_hold is None and row.bound_over_truth is None
+    lost = evaluation_of("walking", "49.5", "k_p", "default", Estimate(nan, nan, 0, False, "none"), 100.0, 80.0)
+    row = only(error_rows([evaluated(110.0), lost, lost]))
+    assert (row["median"], row["strides"], row["not_valid"], row["bounds"]) == (0.1, 1, 2, 0)
+    assert row["bounds_hold"] is None and row["bound_over_truth"] is None
 
 
 def test_there_is_a_row_for_each_setup_mud_coefficient_and_method_in_their_order() -> None:
@@ -91,14 +98,14 @@ def test_there_is_a_row_for_each_setup_mud_coefficient_and_method_in_their_order
             evaluated(1.0, setup="single flipper"),
         ]
     )
-    names = [(row.setup, row.mud, row.coefficient, row.method) for row in rows]
+    names = [(row["setup"], row["mud"], row["coefficient"], row["method"]) for row in rows]
     assert names == [
         ("walking", "49.5", "k_p", "paper"),
         ("walking", "47.6", "k_p", "default"),
         ("walking", "49.5", "k_s", "default"),
         ("single flipper", "49.5", "k_p", "default"),
     ]
-    assert [row.strides for row in rows] == [2, 1, 1, 1]
+    assert [row["strides"] for row in rows] == [2, 1, 1, 1]
 
 
 # the upright plate
@@ -116,12 +123,12 @@ def test_a_difference_is_divided_between_the_lean_and_the_estimate(
     value: float, truth: float, parts: tuple[float, float, float]
 ) -> None:
     row = only(plate_rows([evaluated(value, truth=truth)]))
-    assert (row.upright_over_leaning, row.estimate_over_upright, row.lean_fraction) == parts
+    assert (row["upright_over_leaning"], row["estimate_over_upright"], row["lean_fraction"]) == parts
 
 
 def test_bounds_say_nothing_of_the_plate() -> None:
     row = only(plate_rows([bound(50.0)]))
-    assert (row.upright_over_leaning, row.estimate_over_upright, row.lean_fraction) == (0.8, None, None)
+    assert (row["upright_over_leaning"], row["estimate_over_upright"], row["lean_fraction"]) == (0.8, None, None)
 
 
 def test_the_plates_are_medians_of_the_default_with_a_pose() -> None:
@@ -132,5 +139,5 @@ def test_the_plates_are_medians_of_the_default_with_a_pose() -> None:
         evaluated(500.0, upright=nan),
     ]
     row = only(plate_rows([*reported, *others]))
-    assert (row.setup, row.mud, row.coefficient) == ("walking", "49.5", "k_p")
-    assert (row.upright_over_leaning, row.estimate_over_upright) == (0.8, 1.3)
+    assert (row["setup"], row["mud"], row["coefficient"]) == ("walking", "49.5", "k_p")
+    assert (row["upright_over_leaning"], row["estimate_over_upright"]) == (0.8, 1.3)

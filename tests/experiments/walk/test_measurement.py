@@ -123,8 +123,8 @@ def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> Non
 
 def test_without_compensation_firm_mud_seems_softer_and_less_so_with_it() -> None:
     """The paper reports the same."""
-    rows = [row for row in report().errors if (row.mud, row.coefficient) == ("47.6", "k_s")]
-    biases = {row.method: row.bias or 0.0 for row in rows}
+    rows = [row for row in report().errors if (row["mud"], row["coefficient"]) == ("47.6", "k_s")]
+    biases = {row["method"]: row["bias"] or 0.0 for row in rows}
     assert biases[KNOWN] < biases[KNOWN_COMPENSATED] < 0.0
     assert biases[PAPER] < biases[COMPENSATED] < 0.0
 
@@ -151,7 +151,7 @@ def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
     assert reported.muds[0].truth == {"k_p": 2e6}
     assert reported.muds[1].truth is None
     assert reported.missing_truth.endswith("says nothing of 51.2 %.")
-    assert {(row.mud, row.coefficient) for row in reported.errors} == {("47.6", "k_p")}
+    assert {(row["mud"], row["coefficient"]) for row in reported.errors} == {("47.6", "k_p")}
 
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import pytest
+from pandas import DataFrame
 
-import experiments.estimation.boundaries
+import experiments.trials.transitions
 from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
 from control.records import FLIPPERS
-from experiments.estimation.boundaries import BoundaryRow, Transition, boundary_rows, transitions_of
 from experiments.trials.load_cell_truth import LoadCellTruth, TrueCoefficients
+from experiments.trials.transitions import Transition, transition_rows, transitions_of
 from experiments.trials.trial import SINGLE, Trial, configuration_of
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import Clay
@@ -26,20 +27,23 @@ def transition(strides: int | None, flipper: str = "left", before: str = "soft",
 # rows
 
 
-def test_transitions_within_two_strides_are_given_as_a_fraction() -> None:
-    (row,) = boundary_rows([transition(1), transition(2), transition(3), transition(2, "right")])
-    assert row == BoundaryRow("soft", "firm", transitions=4, within_two=0.75, most_strides=3)
+def rows_of(*transitions: Transition) -> list[dict[str, Any]]:
+    return transition_rows(DataFrame([each._asdict() for each in transitions]))
+
+
+def test_transitions_within_two_strides_are_given_as_a_fraction_for_each_direction() -> None:
+    back = transition(2, before="firm", after="soft")
+    rows = rows_of(transition(1), back, transition(2), transition(3), transition(2, "right"))
+    assert rows == [
+        {"from": "soft", "to": "firm", "transitions": 4, "within_two": 0.75, "most_strides": 3},
+        {"from": "firm", "to": "soft", "transitions": 1, "within_two": 1.0, "most_strides": 2},
+    ]
+    assert rows_of() == []
 
 
 def test_a_transition_that_was_never_followed_is_reported_as_never() -> None:
-    (row,) = boundary_rows([transition(1), transition(None)])
-    assert (row.within_two, row.most_strides) == (0.5, "never")
-
-
-def test_each_direction_is_a_row_of_its_own() -> None:
-    rows = boundary_rows([transition(1), transition(2, before="firm", after="soft"), transition(1)])
-    assert [(row.before, row.after, row.transitions) for row in rows] == [("soft", "firm", 2), ("firm", "soft", 1)]
-    assert boundary_rows([]) == []
+    (row,) = rows_of(transition(1), transition(None))
+    assert (row["within_two"], row["most_strides"]) == (0.5, "never")
 
 
 # transitions
@@ -69,7 +73,7 @@ class Walk:
     def transitions(self, monkeypatch: pytest.MonkeyPatch) -> list[Transition]:
         truths = [stride(flipper, i, mud) for i, mud in enumerate(self.muds) for flipper in FLIPPERS]
         by_index = {i: mud_estimate(k_p, self.depth_m) for i, k_p in enumerate(self.estimates)}
-        monkeypatch.setattr(experiments.estimation.boundaries, "mud_estimates", lambda trial, parameters: by_index)
+        monkeypatch.setattr(experiments.trials.transitions, "mud_estimates", lambda trial, parameters: by_index)
         trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
         return transitions_of(trial, self.cells(truths))
 

@@ -4,10 +4,11 @@ A transition begins with the first stride of a flipper whose insertion is in the
 once the flipper's current k_p is within FOLLOWED of the truth in that mud; the strides up to then are counted.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from pandas import DataFrame
 
 from control.mud_estimate import MudEstimate
 from experiments.trials.load_cell_truth import LoadCellTruth
@@ -24,17 +25,6 @@ class Transition(NamedTuple):
     after: str
     flipper: str
     strides: int | None  # until the estimate followed; None where it did not before the next border or the end
-
-
-@dataclass(frozen=True)
-class BoundaryRow:
-    """All transitions between two muds."""
-
-    before: str = field(metadata={"key": "from"})
-    after: str = field(metadata={"key": "to"})
-    transitions: int = field(metadata={"key": "crossings"})
-    within_two: float  # fraction of the transitions that the estimate followed within two strides
-    most_strides: int | str
 
 
 def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[Transition]:
@@ -68,17 +58,16 @@ def _is_close(
     return bool(abs(value / truths[stride.flipper, stride.index].leaning.k_p - 1.0) <= FOLLOWED)
 
 
-def boundary_rows(transitions: Sequence[Transition]) -> list[BoundaryRow]:
-    groups: dict[tuple[str, str], list[int | None]] = {}
-    for each in transitions:
-        groups.setdefault((each.before, each.after), []).append(each.strides)
+def transition_rows(transitions: DataFrame) -> list[dict[str, Any]]:
+    """Summarise all transitions between two muds: the fraction that the estimate followed within two strides."""
+    groups = transitions.groupby(["before", "after"], sort=False)["strides"] if len(transitions) else ()
     return [
-        BoundaryRow(
-            before,
-            after,
-            transitions=len(strides),
-            within_two=round(sum(count is not None and count <= 2 for count in strides) / len(strides), 4),
-            most_strides="never" if None in strides else max(count or 0 for count in strides),
-        )
-        for (before, after), strides in groups.items()
+        {
+            "from": before,
+            "to": after,
+            "transitions": len(strides),
+            "within_two": round(float((strides <= 2).mean()), 4),
+            "most_strides": "never" if strides.isna().any() else int(strides.max()),
+        }
+        for (before, after), strides in groups
     ]

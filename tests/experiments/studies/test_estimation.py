@@ -1,0 +1,205 @@
+"""The estimation study: its trials, a short part of it in simulation, and its tables and picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pandas import DataFrame
+
+from control.records import Estimate
+from experiments.reports.error_table import COEFFICIENTS, error_rows, evaluation_of
+from experiments.studies import estimation
+from experiments.studies.estimation import (
+    FIELD_OF_LAYER,
+    LATENCY,
+    LAYERS,
+    REPEATS,
+    TORQUE,
+    disturbances_of,
+    draw_errors,
+    methods_of,
+    parse_layers,
+    parse_water,
+    run_part,
+    study,
+)
+from experiments.study.option import OptionError
+from experiments.trials.latency import LATENCY_S
+from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING
+from simulation.mud.clay import clay_of_water
+from simulation.mud.disturbances import LAB, NONE
+from tests.experiments.studies.synthetic_trials import SyntheticTrials
+
+STRONG = clay_of_water(47.6)
+MUDS = [["47.6", STRONG.strength_pa]]
+
+
+def synthetic(setup: str, muds: Any, **row: Any) -> dict[str, Any]:
+    """Return one estimate that is 10 % too large, or a transition that was followed at once."""
+    if len(muds) > 1:
+        return {"evaluated": [], "transitions": [{"before": "a", "after": "b", "flipper": "left", "strides": 1}]}
+    estimate = Estimate(1.1e6, 1e5, 10, True)
+    return {
+        "evaluated": [evaluation_of(setup, muds[0][0], "k_p", "default", estimate, 1e6, 0.8e6)],
+        "transitions": [],
+    }
+
+
+# the trials
+
+
+def test_there_is_a_trial_for_every_mud_and_seed_and_a_walk_over_borders_for_each_seed() -> None:
+    trials = SyntheticTrials(synthetic)
+    study(trials, seeds=3)
+    walks = [row for row in trials.rows if len(row["muds"]) > 1]
+    assert trials.rows[:3] == walks  # the longest first
+    assert walks[0]["muds"] == walks[1]["muds"][::-1] and {row["strides"] for row in walks} == {24}
+    alone = [(row["setup"], row["muds"][0][0], row["strides"], row["seed"]) for row in trials.rows[3:]]
+    assert len({*alone}) == len(alone) == 3 * (5 + 3 + 3)
+    assert {row[::2] for row in alone} == {("single", 2), ("walking", 8), ("measuring", 8)}
+    assert all(row["layers"] == [*LAYERS] for row in trials.rows)
+
+
+def test_muds_setup_and_layers_can_be_chosen() -> None:
+    trials = SyntheticTrials(synthetic)
+    summary = study(trials, setup="single", mud=(parse_water("48.5"), parse_water("50")), seeds=1, layers=()).summary
+    assert [row["muds"][0][0] for row in trials.rows] == ["48.5", "50"] and not any(
+        row["layers"] for row in trials.rows
+    )
+    assert (summary["settings"]["repeats"], summary["settings"]["torque_error"]) == (False, 0.0)
+    trials = SyntheticTrials(synthetic)
+    study(trials, setup="walking", strength=(1500.0,), seeds=1)
+    assert [row["muds"] for row in trials.rows] == [[["1500 Pa", 1500.0]]]
+
+
+def test_wrong_muds_and_layers_are_refused() -> None:
+    for text in ("43.9", "56.1", "nan", "wet"):
+        with pytest.raises(OptionError):
+            parse_water(text)
+    for text in ("fog", "noise,fog", "none,noise"):
+        with pytest.raises(OptionError):
+            parse_layers(text)
+    with pytest.raises(OptionError):
+        study(SyntheticTrials(synthetic), mud=(STRONG,), strength=(1500.0,))
+    assert parse_layers("none") == parse_layers("") == () and parse_layers("noise,torque") == ("noise", "torque")
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_one_layer_is_that_layer_alone(layer: str) -> None:
+    field = FIELD_OF_LAYER.get(layer)
+    assert disturbances_of((layer,)) == (replace(NONE, **{field: getattr(LAB, field)}) if field else NONE)
+    assert disturbances_of(LAYERS) == LAB
+
+
+def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> None:
+    single, walking = (
+        [(each.name, each.setup, each.with_pose, each.parameters.method) for each in methods_of(setup)]
+        for setup in (SINGLE, WALKING)
+    )
+    assert single == [("default", "single flipper", True, "default"), ("paper", "single flipper", True, "paper")]
+    assert walking == [
+        ("default", "walking", True, "default"),
+        ("paper", "walking", True, "paper"),
+        ("paper compensated", "walking", True, "paper"),
+        ("default", "walking without pose", False, "default"),
+    ]
+    assert [each.parameters.paper.compensation for each in methods_of(WALKING)] == [False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("layer", "period_s", "error", "latency_s"),
+    [(REPEATS, 0.005, 0.0, 0.0), (TORQUE, 0.0, 0.032, 0.0), (LATENCY, 0.0, 0.0, LATENCY_S)],
+)
+def test_rows_torque_constants_and_times_are_disturbed_as_asked(
+    layer: str, period_s: float, error: float, latency_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+
+    def run_trial(*arguments: Any) -> Any:
+        asked.extend(arguments)
+        raise InterruptedError
+
+    monkeypatch.setattr(estimation, "run_trial", run_trial)
+    with pytest.raises(InterruptedError):
+        run_part("walking", MUDS, 1, 1, (layer,))
+    setup, _, disturbances, *_, torque_error, latency = asked
+    assert (setup.row_period_s, torque_error, latency) == (period_s, error, latency_s)
+    assert setup.gait == WALKING.gait and disturbances == NONE
+
+
+# in simulation
+
+
+@pytest.fixture(scope="module")
+def parts() -> dict[str, DataFrame]:
+    """Simulate two trials of a single flipper and of a short walk: a trial draws one latency and torque constant."""
+    return {
+        setup: DataFrame([row for seed in (1, 2) for row in run_part(setup, MUDS, strides, seed, LAYERS)["evaluated"]])
+        for setup, strides in (("single", 1), ("walking", 2))
+    }
+
+
+def test_the_default_is_closer_to_the_truth_than_the_paper(parts: dict[str, DataFrame]) -> None:
+    for setup, coefficients in (("single", COEFFICIENTS), ("walking", ("k_p", "k_e"))):
+        rows = {(row["setup"], row["coefficient"], row["method"]): row for row in error_rows(parts[setup])}
+        name = "single flipper" if setup == "single" else setup
+        for coefficient in coefficients:
+            default, paper = (rows[name, coefficient, method] for method in ("default", "paper"))
+            assert default["strides"] == paper["strides"] == (4 if setup == "single" else 8)
+            assert default["median"] < paper["median"]
+
+
+def test_where_the_walking_body_moves_the_default_gives_bounds_and_they_hold(parts: dict[str, DataFrame]) -> None:
+    for row in error_rows(parts["walking"]):
+        if (row["coefficient"], row["method"]) == ("k_s", "default"):
+            assert row["bounds"] >= 4 and row["bounds"] + row["strides"] == 8 and row["bounds_hold"] == 1.0
+
+
+def test_the_measuring_walk_finds_k_e_where_the_quick_one_finds_too_little() -> None:
+    """Without disturbances, in mud of 49.5 %: right after a stance an extraction pulls less."""
+    muds = [[*clay_of_water(49.5)[:2]]]
+    for setup, low, high in (("walking", -1.0, -0.08), ("measuring", -0.06, 0.06)):
+        rows = error_rows(DataFrame(run_part(setup, muds, 2, 1, ())["evaluated"]))
+        (bias,) = [
+            row["bias"]
+            for row in rows
+            if (row["coefficient"], row["method"]) == ("k_e", "default") and "without" not in row["setup"]
+        ]
+        assert low < bias < high
+
+
+def test_a_walk_over_a_border_reports_how_soon_the_estimate_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Strong mud follows after 10 cm; the first stride goes in at l sin 30° = 6 cm, and each is at most 12 cm long.
+
+    So each flipper's transition is reported, and the estimate follows within three strides.
+    """
+    monkeypatch.setattr(estimation, "COMPARTMENT_M", 0.1)
+    soft = [*clay_of_water(51.2)[:2]]
+    part = run_part("walking", [soft, *MUDS], 5, 1, ())
+    assert part["evaluated"] == []
+    assert {(each["before"], each["after"]) for each in part["transitions"]} == {("51.2", "47.6")}
+    assert sorted(each["flipper"] for each in part["transitions"]) == ["left", "right"]
+    assert all(each["strides"] is not None and each["strides"] <= 3 for each in part["transitions"])
+
+
+# tables and picture
+
+
+def test_the_summary_has_errors_plates_boundaries_and_settings() -> None:
+    result = study(SyntheticTrials(synthetic), seeds=1)
+    report = result.json()
+    assert {row["setup"] for row in report["errors"]} == {"single", "walking", "measuring"}
+    assert report["errors"][0]["median"] == 0.1 and report["plates"][0]["upright_over_leaning"] == 0.8
+    assert report["boundaries"] == [{"from": "a", "to": "b", "transitions": 1, "within_two": 1.0, "most_strides": 1}]
+    assert report["settings"]["torque_error"] == TORQUE_ERROR
+    assert "Mud boundaries" in result.text()
+    assert len(draw_errors(report["errors"]).axes) == 3 * len(COEFFICIENTS)
+
+
+def test_muds_without_a_value_are_marked_as_bounds_in_the_picture() -> None:
+    bound = Estimate(0.9e6, 1e4, 10, True, "it held", True)
+    rows = error_rows(DataFrame([evaluation_of("walking", "49.5", "k_s", "default", bound, 1e6, 1e6)]))
+    panel = draw_errors(rows).axes[1]
+    assert [text.get_text() for text in panel.texts] == ["bounds"]
