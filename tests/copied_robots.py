@@ -22,5 +22,5 @@ def copy_of(robot: Robot) -> Robot:
     Work that is not finished cannot be copied; finishing it in this tick changes no digit of its result.
     """
     robot.loop.learning.estimator.work.finish()
-    shared = [robot.loop.configuration, *MESSAGES]
+    shared = [robot.loop.configuration, robot.loop._tick_kind, *MESSAGES]
     return deepcopy(robot, {id(each): each for each in shared})

@@ -1,126 +1,237 @@
-"""Shows the lines on a terminal with textual, and takes the keys.
+"""The screen of `mudskipper watch`, of textual's tables and sparklines, with the keys that operate the robot.
 
-One widget draws everything, and only lines that changed are drawn again: ten times a second costs little.
+Space and d act at once, whatever else is open; the other orders ask first. Each order is sent in a thread of its own.
 """
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from typing import Any
 
-from rich.segment import Segment
-from rich.style import Style
+from rich.text import Text
 from textual.app import App, ComposeResult
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical
+from textual.css.query import NoMatches
 from textual.events import Key
-from textual.geometry import Region
-from textual.strip import Strip
-from textual.widget import Widget
+from textual.widgets import DataTable, Footer, Label, RichLog, Sparkline, Static
 
 from command_line import exit_codes
+from command_line.drive_state import is_stale
+from command_line.operation.confirmation import TORQUE_UNKNOWN
 from command_line.watch.feed import Feed
-from command_line.watch.lines import STYLES, Line
-from command_line.watch.screen_lines import Footer, screen_lines
+from command_line.watch.history import History
+from command_line.watch.machine_cells import BADGES, alarm_text, drive_rows, machine_text, walk_text
+from command_line.watch.mud_cells import COEFFICIENTS, coefficient_rows, stride_rows, strip_text
+from experiments.reports.text_tables import number
 
-MESSAGE_S = 15.0  # how long the answer to a key is shown
-AT_ONCE = {"space": "stop", "d": "disarm"}
-ASKED = {
-    "a": ("arm", "Arm the robot? It holds its pose with torque."),
-    "w": ("walk", "Let the robot walk until it is stopped?"),
-    "c": ("clear", "Clear the faults whose cause is gone?"),
+ALARM_S = 15.0
+ROOMY_ROWS = 36  # from here on the panels are apart
+QUESTIONS = {
+    "arm": "Arm the robot? It holds its pose with torque.",
+    "walk": "Let the robot walk until it is stopped?",
+    "clear": "Clear the faults whose cause is gone?",
 }
-ENDING_KEYS = {"q": exit_codes.OK, "ctrl+q": exit_codes.OK, "ctrl+c": exit_codes.INTERRUPTED}
-RICH_STYLES = {name: Style.parse(style) for name, style in STYLES.items()}
+HELP = """
+space   stop: end the walk, raise the flippers, hold the pose
+d       disarm: switch torque off at once; the joints sink
+a       arm: switch torque on; the robot holds its pose
+w       walk with a depth that adapts to the mud, until a stop
+c       clear faults whose cause is gone
+?       this help
+q       leave; the robot goes on with what it does
+
+Space and d act at once; the others ask first.
+No key is an emergency stop: that is the switch of the motors' power.
+
+≥ marks a lower bound: the mud did not yield.
+↗ ↘ →  the last stride against the one before, beyond their errors
+▁▄█    forces of the last seconds; k of the last strides;
+       mud along the path on a logarithmic scale, ▲ is the robot
+Values in italics are old. Torque is unknown where a drive is silent."""
+STRIDE_COLUMNS = (
+    ("no", 3), ("flipper", 8), *((name, 17) for name in COEFFICIENTS), ("depth", 6), ("next", 6), ("step", 6),
+)  # fmt: skip
+DRIVE_COLUMNS = (
+    ("drive", 16), ("angle", 9), ("current / limit", 18), ("motor", 8), ("age", 9), ("torque", 9), ("", 40),
+)  # fmt: skip
+FORCES = {"forward": "force_x_n", "up": "force_z_n"}
 
 
-class Panels(Widget):
-    """Owns the lines on the screen."""
+class Rows(DataTable[Any]):
+    """A table without a cursor that draws only the cells that changed."""
 
-    DEFAULT_CSS = "Panels { width: 100%; height: 100%; }"
-    lines: list[Line] = []
+    def __init__(self, columns: Sequence[tuple[str, int]], name: str) -> None:
+        """Make a table of columns with their heads and widths."""
+        super().__init__(cursor_type="none", cell_padding=0, id=name)
+        self.can_focus = False
+        for head, width in columns:
+            self.add_column(Text(head, justify="left" if head == "drive" else "right"), width=width)
 
-    def show(self, lines: list[Line]) -> None:
-        before, self.lines = self.lines, lines
-        if len(before) != len(lines):
-            self.refresh()
+    def show(self, rows: Sequence[Sequence[Any]]) -> None:
+        if len(rows) != self.row_count:
+            self.clear()
+            self.add_rows(rows)
             return
-        changed = [y for y, (old, new) in enumerate(zip(before, lines, strict=True)) if old != new]
-        if changed:
-            self.refresh(*(Region(0, y, self.size.width, 1) for y in changed))
+        for y, row in enumerate(rows):
+            for x, cell in enumerate(row):
+                if self.get_cell_at((y, x)) != cell:  # type: ignore[arg-type]
+                    self.update_cell_at((y, x), cell)  # type: ignore[arg-type]
 
-    def render_line(self, y: int) -> Strip:
-        if y >= len(self.lines):
-            return Strip.blank(self.size.width)
-        return Strip([Segment(text, RICH_STYLES[style]) for text, style in self.lines[y]], self.size.width)
+
+class Force(Horizontal):
+    """One direction of the force on one flipper, in the last seconds."""
+
+    def __init__(self, flipper: str, direction: str) -> None:
+        super().__init__()
+        self._flipper, self._direction = flipper, direction
+
+    def compose(self) -> ComposeResult:
+        yield Label(f"{self._direction:8}")
+        yield Sparkline()
+        yield Label(classes="value")
+
+    def show(self, history: History) -> None:
+        samples = list(history.forces.get(f"{self._flipper} {FORCES[self._direction]}", ()))
+        drives = [drive for drive in history.status["drives"] if drive["joint"].startswith(self._flipper)]
+        self.set_class(any(map(is_stale, drives)), "old")
+        self.query_one(Sparkline).data = [sample for sample in samples if sample is not None][-self.size.width :]
+        self.query_one(".value", Label).update(f"{number(samples[-1] if samples else None, 1):>7} N ")
 
 
 class WatchApp(App[int]):
     """Owns the feed, and what the operator is asked."""
 
     ENABLE_COMMAND_PALETTE = False
-    CSS = "Screen { background: ansi_default; } Panels { background: ansi_default; }"
-    BINDINGS = []
+    CSS = """
+    * { background: ansi_default; }
+    #alarm { height: auto; max-height: 3; }
+    #help { height: 1fr; }
+    #forces, #walk, #strip, #machine, Label { height: auto; }
+    #forces Horizontal { height: 1; }
+    Force { width: 1fr; height: 1; }
+    Force Sparkline { width: 1fr; height: 1; }
+    Sparkline > .sparkline--max-color, Sparkline > .sparkline--min-color { color: ansi_cyan; }
+    .old { text-style: dim italic; }
+    Rows { height: auto; scrollbar-size: 0 0; overflow: hidden; }
+    Rows > .datatable--header { text-style: dim; background: ansi_default; }
+    #strides { height: 1fr; min-height: 3; }
+    #messages, #question { height: 1; scrollbar-size: 0 0; }
+    .roomy #messages { height: 4; }
+    .roomy #body > * { margin-bottom: 1; }
+    """
+    BINDINGS = [
+        Binding("space", "order('stop')", "stop", priority=True),
+        Binding("d", "order('disarm')", "disarm", priority=True),
+        Binding("a", "ask('arm')", "arm"),
+        Binding("w", "ask('walk')", "walk"),
+        Binding("c", "ask('clear')", "clear"),
+        Binding("y", "confirm", show=False),
+        Binding("question_mark", "help", "help"),
+        Binding("q", f"exit({exit_codes.OK})", "leave"),
+        Binding("ctrl+q", f"exit({exit_codes.OK})", show=False, priority=True),
+        Binding("ctrl+c", f"exit({exit_codes.INTERRUPTED})", show=False, priority=True),
+    ]
 
-    def __init__(self, feed: Feed, period_s: float, send: Callable[[str], str]) -> None:
+    def __init__(self, feed: Feed, flippers: Sequence[str], period_s: float, send: Callable[[str], str]) -> None:
         super().__init__(ansi_color=True)
-        self.feed, self._period_s, self._send = feed, period_s, send
-        self.panels = Panels()
-        self.footer = Footer()
-        self.help_shown = False
+        self.feed, self._flippers, self._period_s, self._send = feed, flippers, period_s, send
         self._asked = ""  # the order that waits for an answer
-        self._message_until_s = 0.0
 
     def compose(self) -> ComposeResult:
-        yield self.panels
+        yield Static(id="alarm")
+        yield Static(HELP, id="help")
+        with Vertical(id="body"):
+            yield Static(id="walk")
+            columns = [((f"{flipper} (N/cm³)", 18), ("", 3), ("", 9)) for flipper in self._flippers]
+            yield Rows([("", 4), *(column for each in columns for column in each)], "mud")
+            with Vertical(id="forces"):
+                for direction in FORCES:
+                    with Horizontal():
+                        yield from (Force(flipper, direction) for flipper in self._flippers)
+            yield Static(id="strip")
+            yield Rows(STRIDE_COLUMNS, "strides")
+            yield Rows(DRIVE_COLUMNS, "drives")
+            yield Static(id="machine")
+        yield Static(id="question")
+        yield RichLog(id="messages", min_width=0, max_lines=100)
+        yield Footer()
 
     def on_mount(self) -> None:
+        self.query_one("#messages").can_focus = False
+        self.query_one("#help").display = self.query_one("#question").display = False
         self.feed.start()
         self.set_interval(self._period_s, self.redraw)
-        self.redraw()
 
     def on_unmount(self) -> None:
         self.feed.stop()
 
-    def on_resize(self) -> None:
-        self.redraw()
-
     def redraw(self) -> None:
-        now_s = time.monotonic()
-        if now_s > self._message_until_s:
-            self.footer.message = ""
-        width, height = self.size
-        with self.feed.lock:
-            lines = screen_lines(self.feed.history, now_s, width, height, self.footer, self.help_shown)
-        self.panels.show(lines)
+        """Show the newest history."""
+        history, now_s = self.feed.history, time.monotonic()
+        with self.feed.lock, suppress(NoMatches):  # while the screen closes, its widgets are gone one after another
+            if history.status:
+                self._show(history, now_s)
+
+    def _show(self, history: History, now_s: float) -> None:
+        heard, roomy = not history.silence_s(now_s), self.size.height >= ROOMY_ROWS
+        self.screen.set_class(roomy, "roomy")
+        self.query_one("#body").set_class(not heard, "old")
+        self.query_one("#alarm", Static).update(alarm_text(history, now_s))
+        self.query_one("#walk", Static).update(walk_text(history))
+        self.query_one("#mud", Rows).show(coefficient_rows(history, self._flippers))
+        for force in self.query(Force):
+            force.show(history)
+        self.query_one("#strip", Static).update(
+            strip_text(history, self.size.width, COEFFICIENTS if roomy else ("k_s",))
+        )
+        self.query_one("#strides", Rows).show(stride_rows(history))
+        self.query_one("#drives", Rows).show(drive_rows(history, heard))
+        self.query_one("#machine", Static).update(machine_text(history, roomy))
 
     def on_key(self, event: Key) -> None:
-        event.prevent_default()
-        event.stop()
-        if event.key in ENDING_KEYS:
-            self.exit(ENDING_KEYS[event.key])
-            return
-        asked, self._asked, self.footer.question = self._asked, "", ""
-        if event.key in AT_ONCE:
-            self.order(AT_ONCE[event.key])
-        elif asked:
-            if event.key == "y":
-                self.order(asked)
-        elif event.key in ASKED:
-            self._asked, self.footer.question = ASKED[event.key]
-        else:
-            self.help_shown = event.character == "?" and not self.help_shown
-        self.redraw()
+        """Take any key but y as a no to a question; the actions of keys follow this."""
+        if event.key != "y":
+            self._ask("")
 
-    def order(self, method: str) -> None:
+    def action_ask(self, method: str) -> None:
+        self._ask(method)
+
+    def _ask(self, method: str) -> None:
+        """Show the question of an order in place of the messages, or the messages again."""
+        self._asked = method
+        question, messages = self.query_one("#question", Static), self.query_one("#messages")
+        question.display, messages.display = bool(method), not method
+        question.update(Text(f"{QUESTIONS.get(method, '')} y: yes, any other key: no", BADGES["arming"]))
+
+    def action_confirm(self) -> None:
+        if self._asked:
+            self.action_order(self._asked)
+
+    def action_help(self) -> None:
+        self._ask("")
+        for name in ("#help", "#body"):
+            self.query_one(name).display = not self.query_one(name).display
+
+    def action_exit(self, status: int) -> None:
+        self.exit(status)
+
+    def action_order(self, method: str) -> None:
         """Send an order in a thread of its own: the screen goes on, and the next order need not wait."""
+        self._ask("")
         self.say(f"{method} ...")
         threading.Thread(target=self._deliver, args=(method,), name=method, daemon=True).start()
 
     def _deliver(self, method: str) -> None:
         answer = self._send(method)
-        with suppress(RuntimeError):  # the operator has left meanwhile
+        with suppress(RuntimeError, NoMatches):  # the operator has left meanwhile
             self.call_from_thread(self.say, answer)
 
     def say(self, message: str) -> None:
-        self.footer.message = message
-        self._message_until_s = time.monotonic() + MESSAGE_S
-        self.redraw()
+        """Write a message to the log; one that asks the operator to act also stays above the screen for a while."""
+        is_alarm = message.startswith(TORQUE_UNKNOWN)
+        if is_alarm:
+            self.notify(message, severity="error", timeout=ALARM_S)
+        style = BADGES["fault"] if is_alarm else ""
+        self.query_one(RichLog).write(Text.assemble((f"{time.strftime('%H:%M:%S')} ", "dim"), (message, style)))

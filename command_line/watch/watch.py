@@ -28,12 +28,12 @@ def watch(
 ) -> int:
     """Begin only with a daemon that answers; later the screen survives its restart."""
     with connect(socket) as client:
-        client.call("status")
+        flippers = list(client.call("status")["loads"])
     if _can_show_screen(lines):
         from command_line.watch.screen_app import WatchApp  # textual takes half a second to import
 
         period_s = period or SCREEN_PERIOD_S
-        app = WatchApp(Feed(socket, period_s), period_s, partial(send_order, socket))
+        app = WatchApp(Feed(socket, period_s), flippers, period_s, partial(send_order, socket))
         return app.run(mouse=False) or exit_codes.OK
     period_s = period or LINES_PERIOD_S
     print_lines(Feed(socket, period_s), period_s)

@@ -48,16 +48,15 @@ def _section(command: argparse.ArgumentParser) -> Iterator[str]:
 def _options(command: argparse.ArgumentParser) -> Iterator[str]:
     rows = [_row(command, action) for action in command._actions if _is_documented(action)]
     if rows:
-        yield from table(("argument", "meaning", "default"), rows)
+        yield from table(("argument", "meaning"), rows)
 
 
 def _is_documented(action: argparse.Action) -> bool:
     return not isinstance(action, argparse._HelpAction | argparse._SubParsersAction)
 
 
-def _row(command: argparse.ArgumentParser, action: argparse.Action) -> tuple[str, str, str]:
+def _row(command: argparse.ArgumentParser, action: argparse.Action) -> tuple[str, str]:
     formatter = command._get_formatter()
     value = formatter._format_args(action, formatter._get_default_metavar_for_optional(action))
     name = ", ".join(action.option_strings)
-    default = "" if action.default in (None, False, argparse.SUPPRESS) else action.default
-    return code(f"{name} {value}".strip()), formatter._expand_help(action) if action.help else "", code(default)
+    return code(f"{name} {value}".strip()), formatter._expand_help(action) if action.help else ""

@@ -1,0 +1,120 @@
+"""What the robot feels, as cells and texts: its coefficients, its strides, and the mud along its path."""
+
+from collections.abc import Sequence
+from itertools import accumulate
+from math import log
+from typing import Any
+
+from rich.text import Text
+from textual.renderables.sparkline import Sparkline
+
+from command_line.screen import coefficient
+from command_line.watch.history import History
+from experiments.reports.text_tables import number
+from experiments.reports.value_text import N_CM3, value_text
+
+COEFFICIENTS = ("k_p", "k_s", "k_e")
+TREND = 6  # strides that the trend shows
+SIGNIFICANT = 2.0  # standard errors that a change must exceed
+PIECE_M = 0.05  # of the mud along the path
+MUD, BOUND = "#c08040", "yellow"
+Report = dict[str, Any]
+Row = list[Any]  # cells, each a Text or a Sparkline
+
+
+def right(text: str, style: str = "") -> Text:
+    return Text(text, style, justify="right")
+
+
+def coefficient_rows(history: History, flippers: Sequence[str]) -> list[Row]:
+    """Return a row for each coefficient: name, then estimate, change and the last strides of each flipper."""
+    return [
+        [Text(name, "dim"), *(cell for flipper in flippers for cell in _coefficient(history, flipper, name))]
+        for name in COEFFICIENTS
+    ]
+
+
+def _coefficient(history: History, flipper: str, name: str) -> Row:
+    estimate = history.status["mud"].get(flipper, {}).get(name)
+    readings = [stride[name] for stride in history.of(flipper)][-TREND:]
+    values = [reading["value"] for reading in readings if reading["valid"]]
+    text, style = "-", ""
+    if estimate and estimate["value"] is not None:
+        style = BOUND if estimate["at_least"] else ""
+        bound = "≥ " if estimate["at_least"] else ""
+        text = bound + value_text(estimate["value"], estimate["std_error"], per=N_CM3)
+    last = Sparkline(values, width=len(values)) if values else Text()
+    return [right(text, style), Text(trend(readings), "bold", justify="center"), last]
+
+
+def trend(readings: Sequence[Report]) -> str:
+    """Return an arrow: whether the last valid reading differs from the one before by more than their errors."""
+    valid = [reading for reading in readings if reading["valid"] and reading["value"] is not None]
+    if len(valid) < 2:
+        return " "
+    before, last = valid[-2:]
+    change = last["value"] - before["value"]
+    error = (last["std_error"] or 0.0) + (before["std_error"] or 0.0)
+    if abs(change) <= SIGNIFICANT * error:
+        return "→"
+    return "↗" if change > 0.0 else "↘"
+
+
+def stride_rows(history: History) -> list[Row]:
+    """Return a row for each stride that is remembered, the newest first."""
+    return [
+        [
+            right(f"{stride['index']}"),
+            Text(f" {stride['flipper']}"),
+            *(right(coefficient(stride[name])) for name in COEFFICIENTS),
+            *(right(cm(stride[name], 1)) for name in ("depth_m", "chosen_depth_m")),
+            right(cm(stride["step_m"], 1)) if stride["released"] else right("stuck", "bold red"),
+        ]
+        for stride in reversed(history.strides)
+    ]
+
+
+def cm(value_m: float | None, digits: int) -> str:
+    return number(None if value_m is None else 100.0 * value_m, digits)
+
+
+def strip_text(history: History, width: int, names: Sequence[str]) -> Text:
+    """Return coefficients along the path on logarithmic scales, above a scale with the robot's position."""
+    pieces = {int(each["place_m"] // PIECE_M) for each in history.strides if each["place_m"] is not None}
+    if not pieces:
+        return Text("mud     no stride with a position yet" + "\n" * len(names), "dim")
+    room = max(width - 8, 1)
+    x_m = history.status["body_x_m"]
+    last = max(*pieces, min(pieces) if x_m is None else int(x_m // PIECE_M))
+    first = max(min(pieces), last - room + 1)
+    cells = min(room // (last - first + 1), 6)
+    end = f" {(last + 1) * PIECE_M:.2f} m"
+    scale = Text(f"{first * PIECE_M:.2f} m".ljust((last + 1 - first) * cells - len(end)) + end, "dim")
+    if x_m is not None and 0 <= (cell := int((x_m / PIECE_M - first) * cells)) < room:
+        scale.pad_right(max(0, cell + 1 - len(scale)))
+        scale = Text.assemble(scale[:cell], ("▲", "bold"), scale[cell + 1 :])
+    rows = [Text.assemble((f"mud {name} ", "bold"), *_blocks(history, name, first, last, cells)) for name in names]
+    lines = Text("\n").join([*rows, Text.assemble("        ", scale)])
+    lines.no_wrap, lines.overflow = True, "crop"
+    return lines
+
+
+def _blocks(history: History, name: str, first: int, last: int, cells: int) -> list[tuple[str, str]]:
+    """Return the newest valid values by the logarithm, as muds differ by factors. One counts until the next."""
+    newest = {
+        int(stride["place_m"] // PIECE_M): stride[name]
+        for stride in history.strides
+        if stride["place_m"] is not None and stride[name]["valid"] and stride[name]["value"]
+    }
+    readings: list[Report | None] = list(
+        accumulate(map(newest.get, range(first, last + 1)), lambda before, new: new or before)
+    )
+    logs = [log(reading["value"]) for reading in readings if reading]
+    low, high = min(logs, default=0.0) - 0.35, max(logs, default=0.0) + 0.1  # little mud is not no mud
+    blocks = []
+    for reading in readings:
+        block = "·"
+        if reading:
+            block = Sparkline.BARS[int((log(reading["value"]) - low) / (high - low) * len(Sparkline.BARS))]
+        blocks.append((block * cells, BOUND if reading and reading["at_least"] else MUD))
+    return blocks
