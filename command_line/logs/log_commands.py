@@ -2,14 +2,13 @@
 
 import argparse
 import os
-from collections.abc import Sequence
 from functools import partial
 from math import fsum, nan
 from pathlib import Path
 
 from command_line import exit_codes
 from command_line.json_output import print_json
-from command_line.logs.lab_findings import chosen_vertical, complain_of, show_lab_log
+from command_line.logs.lab_findings import chosen_vertical, complain_of
 from command_line.logs.refusals import UsageError, complain_of_end, explain_errors
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
@@ -17,7 +16,6 @@ from experiments.pictures.stride_choice import Stride, choose_strides, duration_
 from experiments.reports.shown_values import value_shown
 from experiments.reports.style import save_picture
 from experiments.reports.text_tables import table
-from firmware_host.configuration.configuration import CaptureAxis
 from firmware_host.configuration.loading import load_configuration
 from firmware_host.log.log_folder import ACTIVE, DONE
 from firmware_host.operator.reports import known, map_report, stride_report
@@ -26,7 +24,7 @@ from logs.files.log_summary import log_summary
 from logs.files.scanned_log import scan_logs
 from logs.lab.lab_csv import is_lab_csv, read_lab_csv
 from logs.lab.summary import finding_reports, lab_summary
-from logs.replay import Replay, replay_files
+from logs.replay import replay_files
 
 Options = argparse.Namespace
 
@@ -39,22 +37,17 @@ def replay(options: Options) -> int:
     configuration = load_configuration(options.config) if options.config else None
     with watched() as watch:
         replayed = replay_files(options.files, configuration, options.method, watch, options.vertical)
-    _show_replay(options.files, replayed, options.json)
-    return exit_codes.OK
-
-
-def _show_replay(files: Sequence[Path], replayed: Replay, as_json: bool) -> None:
-    path = files[0]
+    path = options.files[0]
     chosen_m = replayed.chosen_depths_m or [nan] * len(replayed.strides)
     strides = [
         stride_report(stride) | {"chosen_depth_m": known(depth_m)}
         for stride, depth_m in zip(replayed.strides, chosen_m, strict=True)
     ]
-    if as_json:
+    if options.json:
         report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
         findings = finding_reports(path, replayed.findings)
         print_json("replay", report | {"complete": replayed.complete, "findings": findings})
-        return
+        return exit_codes.OK
     complain_of(path, replayed.findings)
     print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):
@@ -67,7 +60,8 @@ def _show_replay(files: Sequence[Path], replayed: Replay, as_json: bool) -> None
             f"the run's segments before {replayed.segment} are not given: "
             "the first strides can differ from those computed live"
         )
-    complain_of_end(files, replayed.complete)
+    complain_of_end(options.files, replayed.complete)
+    return exit_codes.OK
 
 
 @explain_errors
@@ -153,23 +147,17 @@ def _chosen_strides(options: Options, walk: RecordedWalk, moving: bool) -> list[
 
 @explain_errors
 def info(options: Options) -> int:
-    vertical = chosen_vertical(options)
-    if len(options.files) == 1 and is_lab_csv(options.files[0]):
-        _show_lab_info(options.files[0], vertical, options.json)
-        return exit_codes.OK
-    with watched() as watch:
-        summary = log_summary(scan_logs(options.files, watch))
+    vertical, path = chosen_vertical(options), options.files[0]
+    if len(options.files) == 1 and is_lab_csv(path):
+        lab = read_lab_csv(path, vertical)
+        summary = lab_summary(path, lab)
+        findings = lab.findings
+    else:
+        with watched() as watch:
+            summary, findings = log_summary(scan_logs(options.files, watch)), ()
     if options.json:
         print_json("log-info", summary)
     else:
-        print(table([(name, value_shown(value)) for name, value in summary.items()]))
+        print(table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"]))
+        complain_of(path, findings)
     return exit_codes.OK
-
-
-def _show_lab_info(path: Path, vertical: CaptureAxis, as_json: bool) -> None:
-    """Raises LogError."""
-    lab = read_lab_csv(path, vertical)
-    if as_json:
-        print_json("log-info", lab_summary(path, lab))
-    else:
-        show_lab_log(path, lab)

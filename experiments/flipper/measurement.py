@@ -18,9 +18,9 @@ from experiments.flipper.base_check import INVALID_M, load_remarks, moved_text, 
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm, rest, walk
 from experiments.study.notebook import Entry
+from experiments.study.session import Show
 from experiments.trials.estimation_methods import DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.session import Show
 from experiments.trials.stride_profile import Floats, StrideProfile, profile_of, profile_row, thinned
 from firmware_host.configuration.configuration import Configuration
 from logs.files.log_reader import Log

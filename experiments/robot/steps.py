@@ -13,13 +13,13 @@ from experiments.study.notebook import Entry, Notebook
 from experiments.study.session import Show
 
 
-class Step(NamedTuple):
+class OperatorStep(NamedTuple):
     key: str  # of its entry
-    prepare: Callable[[], str]  # returns GO_ON, SKIP to leave it out, REDO for the one before, or else prepares again
+    prepare: Callable[[], str | None]  # returns GO_ON, SKIP to leave it out, REDO for the one before, None to repeat
     measure: Callable[[], Entry | None]  # returns nothing to prepare it again
 
 
-def conduct_steps(steps: Sequence[Step], notebook: Notebook, show: Show, skipped: Entry) -> None:
+def conduct_steps(steps: Sequence[OperatorStep], notebook: Notebook, show: Show, skipped: Entry) -> None:
     """Take every step that is not in the notebook. `skipped` is the entry of one that the operator leaves out."""
     index = 0
     while index < len(steps):

@@ -28,10 +28,10 @@ from experiments.robot.bench_robot import (
     walk,
 )
 from experiments.study.notebook import Entry
+from experiments.study.session import Show
 from experiments.trackway.bench import UNSEEN, UNSEEN_S, Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.session import Show
 from experiments.trials.stride_profile import profile_of, profile_of_walk, profile_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
 from logs.files.log_reader import Log

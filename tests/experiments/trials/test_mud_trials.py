@@ -13,7 +13,7 @@ from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.robot.prompt import GO_ON, REDO, SKIP
 from experiments.study.notebook import Entry, Notebook, NotebookError
 from experiments.trials import mud_trials
-from experiments.trials import session as session_module
+from experiments.study import session as session_module
 from experiments.trials.mud_trials import (
     KEEP,
     Bench,
