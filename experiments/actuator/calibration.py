@@ -65,7 +65,7 @@ class Calibration:
             )
             for step in steps_of(self.plan)
         ]
-        conduct_steps(steps, self.notebook, self.show, {"skipped": "on request"})
+        conduct_steps(steps, self.notebook, self.operator, self.show, {"skipped": "on request"})
         return self.notebook.entries
 
     def _attempt(self, act: Callable[[Step], Answer], step: Step) -> Answer | None:

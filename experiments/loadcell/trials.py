@@ -80,7 +80,7 @@ def measure_all(bench: TrialBench, plan: TrialPlan) -> None:
         OperatorStep(trial.key, partial(bench.stage.prepare, trial, plan.trials), partial(measure, bench, trial, plan))
         for trial in plan.list_trials()
     ]
-    conduct_steps(steps, bench.notebook, bench.show, {"skipped": True})
+    conduct_steps(steps, bench.notebook, bench.operator, bench.show, {"skipped": True})
 
 
 def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> Entry:
