@@ -14,8 +14,8 @@ from command_line import exit_codes
 from command_line.experiments.terminal_prompt import TerminalPrompt
 from command_line.screen import Progress, complain
 from experiments.robot.bench_errors import AccessDeniedError, DaemonLostError
-from experiments.robot.prompt import AutomaticOperator
 from experiments.study.notebook import count_entries
+from experiments.study.prompt import AutomaticOperator
 from experiments.study.results_folder import make_folder, require_unfinished, set_aside
 from experiments.study.session import Ending, Session
 from experiments.study.workers import WorkersError

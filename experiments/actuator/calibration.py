@@ -21,9 +21,9 @@ from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmErr
 from experiments.actuator.weight_handling import WeightHandler
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, arm, ask_to_clear_faults, require_hold
-from experiments.robot.prompt import GO_ON, SKIP, Operator
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import GO_ON, SKIP, Operator
 from experiments.study.session import Show
 from operator_client.status_client import CallRefusedError
 
@@ -65,7 +65,7 @@ class Calibration:
             )
             for step in steps_of(self.plan)
         ]
-        conduct_steps(steps, self.notebook, self.show, {"skipped": "on request"})
+        conduct_steps(steps, self.notebook, self.operator, self.show, {"skipped": "on request"})
         return self.notebook.entries
 
     def _attempt(self, act: Callable[[Step], Answer], step: Step) -> Answer | None:

@@ -1,6 +1,5 @@
 """Conducting an experiment: prompts on the terminal, the report, and how each ending is reported."""
 
-
 import argparse
 import json
 import os
