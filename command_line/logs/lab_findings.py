@@ -1,17 +1,14 @@
-"""What is special to a CSV of the paper's authors: its vertical axis, what the reader noticed in it, its contents."""
+"""What is special to a CSV of the paper's authors: its vertical axis, and what the reader noticed in it."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 from command_line.errors import usage_error
 from command_line.screen import complain
-from experiments.reports.shown_values import value_shown
-from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.lab.body_track import VERTICAL_AXIS
 from logs.lab.findings import Finding
-from logs.lab.lab_csv import LabLog, is_lab_csv
-from logs.lab.summary import lab_summary
+from logs.lab.lab_csv import is_lab_csv
 
 
 def chosen_vertical(given: CaptureAxis | None, file: Path) -> CaptureAxis:
@@ -24,10 +21,3 @@ def chosen_vertical(given: CaptureAxis | None, file: Path) -> CaptureAxis:
 def complain_of(path: Path, findings: Sequence[Finding]) -> None:
     """Print each finding on standard error, with the file."""
     complain(*(f"{path}: {finding}" for finding in findings))
-
-
-def show_lab_log(path: Path, lab: LabLog) -> None:
-    """Print the summary as lines, and the findings as warnings."""
-    summary = lab_summary(path, lab)
-    print(table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"]))
-    complain_of(path, lab.findings)

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from command_line import exit_codes
 from command_line.errors import usage_error
 from command_line.json_output import print_json
-from command_line.logs.lab_findings import chosen_vertical, complain_of, show_lab_log
+from command_line.logs.lab_findings import chosen_vertical, complain_of
 from command_line.logs.log_options import MOST, LogFiles, Segments, Vertical, Walk
 from command_line.logs.refusals import complain_of_end
 from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
@@ -31,7 +31,7 @@ from logs.files.log_summary import log_summary
 from logs.files.scanned_log import scan_logs
 from logs.lab.lab_csv import is_lab_csv, read_lab_csv
 from logs.lab.summary import finding_reports, lab_summary
-from logs.replay import Replay, replay_files
+from logs.replay import replay_files
 
 LONGEST_FILM_S = 60.0
 
@@ -50,22 +50,17 @@ def replay(
     configuration = load_configuration(config) if config else None
     with watched() as watch:
         replayed = replay_files(files, configuration, method, watch, vertical)
-    _show_replay(files, replayed, json)
-    return exit_codes.OK
-
-
-def _show_replay(files: Sequence[Path], replayed: Replay, as_json: bool) -> None:
     path = files[0]
     chosen_m = replayed.chosen_depths_m or [nan] * len(replayed.strides)
     strides = [
         stride_report(stride) | {"chosen_depth_m": known(depth_m)}
         for stride, depth_m in zip(replayed.strides, chosen_m, strict=True)
     ]
-    if as_json:
+    if json:
         report = {"strides": strides, "map": map_report(replayed.map), "flippers": replayed.flippers}
         findings = finding_reports(path, replayed.findings)
         print_json("replay", report | {"complete": replayed.complete, "findings": findings})
-        return
+        return exit_codes.OK
     complain_of(path, replayed.findings)
     print(f"{STRIDE_HEAD}  {'f_z in':>7} {'f_x':>6} {'f_z out':>7}\n{STRIDE_UNITS}  {'(N)':>7} {'(N)':>6} {'(N)':>7}")
     for report, stride in zip(strides, replayed.strides, strict=True):
@@ -79,6 +74,7 @@ def _show_replay(files: Sequence[Path], replayed: Replay, as_json: bool) -> None
             "the first strides can differ from those computed live"
         )
     complain_of_end(files, replayed.complete)
+    return exit_codes.OK
 
 
 def plot(
@@ -176,23 +172,17 @@ def _chosen_strides(file: Path, numbers: Sequence[int], walk: RecordedWalk, movi
 
 
 def info(files: Segments, *, vertical: Vertical = None, json: Json = False) -> int:
-    axis = chosen_vertical(vertical, files[0])
-    if len(files) == 1 and is_lab_csv(files[0]):
-        _show_lab_info(files[0], axis, json)
-        return exit_codes.OK
-    with watched() as watch:
-        summary = log_summary(scan_logs(files, watch))
+    axis, path = chosen_vertical(vertical, files[0]), files[0]
+    if len(files) == 1 and is_lab_csv(path):
+        lab = read_lab_csv(path, axis)
+        summary = lab_summary(path, lab)
+        findings = lab.findings
+    else:
+        with watched() as watch:
+            summary, findings = log_summary(scan_logs(files, watch)), ()
     if json:
         print_json("log-info", summary)
     else:
-        print(table([(name, value_shown(value)) for name, value in summary.items()]))
+        print(table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"]))
+        complain_of(path, findings)
     return exit_codes.OK
-
-
-def _show_lab_info(path: Path, vertical: CaptureAxis, as_json: bool) -> None:
-    """Raises LogError."""
-    lab = read_lab_csv(path, vertical)
-    if as_json:
-        print_json("log-info", lab_summary(path, lab))
-    else:
-        show_lab_log(path, lab)

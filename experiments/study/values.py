@@ -49,12 +49,6 @@ finite = _number_where(isfinite, "a number")
 positive = _number_where(lambda value: value > 0.0 and isfinite(value), "more than 0")
 depth_cm = _number_where(lambda value: 0.0 < value <= 20.0, "more than 0 and at most 20 cm")
 any_depth_cm = _number_where(lambda value: 0.0 < value < inf, "more than 0 cm")  # the daemon knows the robot's limit
-_lever_cm = between(1.0, 100.0, "cm")
-
-
-def lever_m(text: str) -> float:
-    """Parses a length in cm."""
-    return _lever_cm(text) / 100.0
 
 
 def mud_length(text: str) -> tuple[str, float]:
@@ -72,16 +66,6 @@ def group_rule(text: str) -> tuple[str, str]:
     if not (pattern and name):
         raise argparse.ArgumentTypeError(f"{text}: must be a pattern and a name, such as 'single_12.5N*=soft'")
     return pattern, name
-
-
-def weights_g(text: str) -> tuple[float, ...]:
-    try:
-        values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
-    except ValueError:
-        values = ()
-    if len(values) < 2 or not all(1.0 <= value <= 5000.0 for value in values):
-        raise argparse.ArgumentTypeError(f"{text}: must be two weights or more, from 1 to 5000 g, such as 100,200,400")
-    return values
 
 
 def folder(text: str) -> Path:

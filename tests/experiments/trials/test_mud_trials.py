@@ -129,7 +129,7 @@ def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
 def test_before_the_first_there_is_none_to_measure_again(tmp_path: Path) -> None:
     session = Session(tmp_path, bed=ScriptedBed(REDO)).conduct()
     assert session.measured == ALL
-    assert "no trial was measured" in session.operator.reported[0]
+    assert "nothing was measured" in session.operator.reported[0]
 
 
 def test_a_fault_is_reported_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
