@@ -41,5 +41,5 @@ COMMANDS: Mapping[str, Command] = {
     "plot": ("options.logs.add_plot", "Draw a walk against time: forces, coefficients, depth."),
     "film": ("options.logs.add_film", "Draw strides from the side, as a strip or a film."),
     "log": ("options.logs.add_log", "Read and manage logs."),
-    "experiment": ("options.experiments.add_experiment", "The paper's experiments."),
+    "experiment": ("options.studies.add_experiment", "The paper's experiments."),
 }
