@@ -52,5 +52,5 @@ COMMANDS: Mapping[str, Command] = {
     "plot": ("logs.log_commands.plot", "Draw a walk against time: forces, coefficients, depth."),
     "film": ("logs.log_commands.film", "Draw strides from the side, as a strip or a film."),
     "log": (LOGS, "Read and manage logs."),
-    "experiment": ("options.experiments.add_experiment", "The paper's experiments."),
+    "experiment": ("options.studies.add_experiment", "The paper's experiments."),
 }

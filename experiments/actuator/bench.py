@@ -15,8 +15,8 @@ from experiments.actuator.report import Readings
 from experiments.actuator.simulation import simulated_bench
 from experiments.actuator.weight_handling import ManualWeights
 from experiments.robot.bench_robot import BenchRobot, disarm, leave
-from experiments.robot.prompt import GO_ON, AutomaticOperator
 from experiments.study.notebook import Entry, Notebook, count_entries
+from experiments.study.prompt import GO_ON, AutomaticOperator
 from experiments.study.session import Session
 from experiments.study.workers import LocalWorkers, run_parallel
 from firmware_host.configuration.configuration import Configuration

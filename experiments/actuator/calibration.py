@@ -21,9 +21,9 @@ from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmErr
 from experiments.actuator.weight_handling import WeightHandler
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, arm, ask_to_clear_faults, require_hold
-from experiments.robot.prompt import GO_ON, SKIP, Operator
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import GO_ON, SKIP, Operator
 from experiments.study.session import Show
 from operator_client.status_client import CallRefusedError
 

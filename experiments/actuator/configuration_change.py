@@ -11,7 +11,7 @@ from pathlib import Path
 from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
 from experiments.actuator.fit import JointFit
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.prompt import Operator
+from experiments.study.prompt import Operator
 from experiments.study.session import Ending, Session
 from firmware_host.configuration.toml_records import read_text
 

@@ -24,7 +24,7 @@ from experiments.actuator.fit import JointFit
 from experiments.actuator.plan import Plan, Step
 from experiments.reports.value_text import miss_text
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import GO_ON
+from experiments.study.prompt import GO_ON
 from experiments.trials.trial import BENCH_CURRENT_A
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.bench_mount import BenchMount

@@ -29,9 +29,9 @@ from experiments.loadcell.recording import (
 )
 from experiments.loadcell.stage import Stage, Trial
 from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Mask, Shear, StageSettings
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.study.session import Show
 
 KEEP, WITHOUT = "k", "w"

@@ -8,8 +8,8 @@ an interrupted experiment.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.study.session import Show
 
 

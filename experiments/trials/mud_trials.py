@@ -7,7 +7,7 @@ does not ask for them again. Torque is off whenever hands may be in the mud.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -16,10 +16,11 @@ from experiments.reports.mud_names import mud_text
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, ask_to_clear_faults, disarm, leave, rest
 from experiments.robot.daemon_robot import DaemonRobot
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
-from experiments.trials.session import Session
+from experiments.study.option import OptionError
+from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
+from experiments.study.session import Session
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document
 from simulation.mud.clay import clay_of_water
@@ -152,13 +153,14 @@ def _left_out(why: Sequence[str] = ()) -> Entry:
     return {"skipped": True, "why": list(why)}
 
 
-def why_not_simulated(muds: Iterable[str]) -> str | None:
-    """Return a message where one of these muds cannot be simulated."""
+def require_named(muds: Sequence[str], session: Session, example: str) -> None:
+    """Raises OptionError where no mud is named, and where one of them cannot be simulated in a simulated session."""
+    if not muds:
+        raise OptionError(f"no mud is named: give the muds {example}")
     try:
-        [clay_of_water(float(mud)) for mud in muds]
+        [clay_of_water(float(mud)) for mud in muds if session.simulated]
     except ValueError as problem:
-        return f"--mud: simulated muds are named after their water in percent: {problem}"
-    return None
+        raise OptionError(f"--mud: simulated muds are named after their water in percent: {problem}") from None
 
 
 def open_bench(

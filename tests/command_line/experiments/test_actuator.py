@@ -17,9 +17,9 @@ from experiments.actuator.plan import Plan
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import AutomaticOperator
 from experiments.studies import actuator
 from experiments.study.notebook import Notebook
+from experiments.study.prompt import AutomaticOperator
 from experiments.study.session import Ending, Session
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.file_recorder import FileRecorder

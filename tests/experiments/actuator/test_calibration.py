@@ -13,7 +13,7 @@ from experiments.actuator.plan import Step, steps_of
 from experiments.actuator.reading import MovedError
 from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import LEAVE
-from experiments.robot.prompt import GO_ON, REDO
+from experiments.study.prompt import GO_ON, REDO
 from tests.experiments.actuator.scripted_calibration import LOOP, PLAN, Case, ScriptedJoint, say
 
 

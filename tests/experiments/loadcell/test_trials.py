@@ -17,7 +17,7 @@ from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
 from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial
 from experiments.loadcell.trials import KEEP, list_problems, record
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.study.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Make, laboratories

@@ -10,10 +10,10 @@ import pytest
 from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import CLEAR, LEAVE, leave
 from experiments.robot.lockstep_robot import simulated_configuration
-from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.study import session as session_module
 from experiments.study.notebook import Entry, Notebook, NotebookError
+from experiments.study.prompt import GO_ON, REDO, SKIP
 from experiments.trials import mud_trials
-from experiments.trials import session as session_module
 from experiments.trials.mud_trials import (
     KEEP,
     Bench,
