@@ -83,9 +83,8 @@ def test_a_file_that_is_not_toml_is_refused_by_name_and_line(
 def test_without_a_configuration_a_folder_of_logs_has_to_be_named(
     command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for module in ("command_line.options.shared", "command_line.logs.catalogue_commands"):
-        monkeypatch.setattr(f"{module}.DEFAULT_CONFIG", "/none/mudskipper.toml")
-    assert "name the folder" in refusal(capsys, "log", command)
+    monkeypatch.setattr("command_line.logs.catalogue_commands.DEFAULT_CONFIG", "/none/robot.toml")
+    assert "name the folder" in refusal(capsys, "log", command, "--config", "/none/robot.toml")
 
 
 def test_unknown_arguments_are_refused_with_the_usage_of_their_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -58,8 +58,8 @@ def test_the_record_says_what_computed_and_when() -> None:
 
 
 def test_two_modules_have_the_digest_of_all_that_they_import() -> None:
-    one, two = identity(STUDY)["sources"], identity("experiments.actuator.run")["sources"]
-    both = identity(STUDY, "experiments.actuator.run")["sources"]
+    one, two = identity(STUDY)["sources"], identity("experiments.studies.actuator")["sources"]
+    both = identity(STUDY, "experiments.studies.actuator")["sources"]
     assert len({one, two, both}) == 3
     assert identity(STUDY, "experiments.trackway.walk")["sources"] == one  # the study imports it
 
