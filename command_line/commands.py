@@ -18,6 +18,17 @@ DRIVES: Mapping[str, Command] = {
     ),
     "zero": ("drives.zero.zero", "Make a joint's present position its angle zero, in the configuration file."),
 }
+LOGS: Mapping[str, Command] = {
+    "info": ("logs.log_commands.info", "Print what a log contains."),
+    "report": ("logs.log_report.log_report", "Write a run, or a comparison of runs, as a page."),
+    "export": ("logs.log_export.export", "Write a log in a form that other programs read."),
+    "preserve": ("logs.log_folder_commands.preserve_log", "Exclude logs from the quota."),
+    "index": ("logs.catalogue_commands.index", "Read all new logs of a folder into its catalogue."),
+    "query": ("logs.catalogue_commands.query", "Answer a SELECT on the catalogue of the logs."),
+    "open": ("viewers.open_log.open_log", "Open a log in a viewer, with the project's layout."),
+    "list": ("logs.log_folder_commands.list_logs", "List the logs and the room that is left."),
+    "recover": ("logs.log_folder_commands.recover", "Repair logs whose writer was interrupted."),
+}
 COMMANDS: Mapping[str, Command] = {
     "status": ("operation.operation.status", "Print the state of the robot."),
     "arm": ("operation.operation.arm", "Switch torque on. The robot holds its present pose."),
@@ -37,9 +48,9 @@ COMMANDS: Mapping[str, Command] = {
     "drives": (DRIVES, "Find and set up motor drives, while the daemon does not run."),
     "demo": ("demo.demo.demo", "Walk a simulated robot over three muds, in real time."),
     "simulate": ("simulate.simulate", "Simulate the robot on a bus until Ctrl-C."),
-    "replay": ("options.logs.add_replay", "Run the estimator over a recorded log."),
-    "plot": ("options.logs.add_plot", "Draw a walk against time: forces, coefficients, depth."),
-    "film": ("options.logs.add_film", "Draw strides from the side, as a strip or a film."),
-    "log": ("options.logs.add_log", "Read and manage logs."),
-    "experiment": ("options.experiments.add_experiment", "The paper's experiments."),
+    "replay": ("logs.log_commands.replay", "Run the estimator over a recorded log."),
+    "plot": ("logs.log_commands.plot", "Draw a walk against time: forces, coefficients, depth."),
+    "film": ("logs.log_commands.film", "Draw strides from the side, as a strip or a film."),
+    "log": (LOGS, "Read and manage logs."),
+    "experiment": ("options.studies.add_experiment", "The paper's experiments."),
 }

@@ -35,9 +35,9 @@ def add_function_options(parser: argparse.ArgumentParser, *functions: Callable[.
 
 def given_options(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:
     """Return the values that the operator gave to parameters of the function, and computed defaults."""
-    names = [each.parameter for each in declared_options(function) if hasattr(options, each.parameter)]
-    values = {name: getattr(options, name) for name in names}
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
+    values = {each.parameter: getattr(options, each.parameter, None) for each in declared_options(function)}
+    given = {name: value for name, value in values.items() if value is not None}
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
 
 
 def flag_of(parameter: str) -> str:
@@ -59,7 +59,8 @@ def _keywords(declared: DeclaredOption) -> dict[str, Any]:
         keywords["metavar"] = option.metavar or option.unit.upper() or METAVARS.get(declared.type, "VALUE")
     if not declared.named:
         at_least_none, at_least_one = ("*", "+") if declared.repeatable else ("?", None)
-        return keywords | {"nargs": at_least_one if is_required else at_least_none}
+        # argparse would parse a default of text, SUPPRESS too
+        return keywords | {"nargs": at_least_one if is_required else at_least_none, "default": None}
     if declared.repeatable:
         keywords["action"] = "append"
     if option.without_value is not None:

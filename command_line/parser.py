@@ -53,7 +53,7 @@ class Parser(argparse.ArgumentParser):
         elif target:
             module, name = target.rsplit(".", 1)
             function = getattr(import_module(f"command_line.{module}"), name)
-            if target.startswith("options."):  # of the logs and the experiments, which are not declared yet
+            if target.startswith("options."):  # of the studies, which declare their own
                 function(self)
             else:
                 add_function_options(self, function)

@@ -83,7 +83,7 @@ def doctor(
             metavar="PATH",
             default=_given_socket,
         ),
-    ],
+    ] = None,
 ) -> int:
     try:
         configuration = load_configuration(config)

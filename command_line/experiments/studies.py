@@ -21,7 +21,6 @@ from command_line.experiments.conduct import (
     run_with_progress,
     session_in,
 )
-from command_line.experiments.workers import workers_of
 from command_line.function_options import flag_of, given_options
 from command_line.json_output import print_value
 from command_line.options.studies import has_files, takes_session
@@ -32,7 +31,7 @@ from experiments.study.notebook import NotebookError, count_entries, plan_in
 from experiments.study.option import OptionError, declared_options
 from experiments.study.provenance import identity, provenance
 from experiments.study.results_folder import PAGE, remove_unused
-from experiments.study.workers import WorkersError
+from experiments.study.workers import LocalWorkers, Workers, WorkersError
 from firmware_host.configuration.file_problems import ConfigurationError
 from operator_client.status_client import CallRefusedError
 
@@ -118,7 +117,7 @@ def _run(
         if takes_session(function.func):  # type: ignore[attr-defined]
             return function(session_in(options, results, progress, program)), None
         plan = {"experiment": options.name, "simulated": True, **program}
-        trials = Trials(results, plan, progress.show, workers_of(options))
+        trials = Trials(results, plan, progress.show, _workers_of(options))
         return function(trials), trials
 
     result, trials = run_with_progress("trials", run)
@@ -137,3 +136,11 @@ def _run(
         print(result.text())
     print_written(written)
     return EXIT_STATUS[result.ending]
+
+
+def _workers_of(options: argparse.Namespace) -> Workers:
+    if options.cluster:
+        from experiments.study.cluster_workers import ClusterWorkers  # distributed is slow to import, and an extra
+
+        return ClusterWorkers(options.cluster)
+    return LocalWorkers(options.workers)

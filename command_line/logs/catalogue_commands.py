@@ -1,22 +1,22 @@
 """Commands on the catalogue of many logs: index, query; and its use by `log list`."""
 
-import argparse
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from command_line import exit_codes
+from command_line.errors import usage_error
 from command_line.json_output import print_json
-from command_line.logs.refusals import UsageError, explain_errors
-from command_line.options.shared import DEFAULT_CONFIG
+from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
 from command_line.screen import complain, watched
+from command_line.shared_options import DEFAULT_CONFIG, Json
 from experiments.reports.counted_nouns import counted
 from experiments.reports.shown_values import value_shown
 from experiments.reports.text_tables import table
+from experiments.study.option import Option
 from logs.catalogue.entry import LogEntry
 from logs.files.log_error import LogError
 
-Options = argparse.Namespace
 LISTING_READS_S = 1.0  # new logs that `log list` reads; it describes the others by the summary at their end
 
 
@@ -49,45 +49,49 @@ def _update(catalogue: Any, longest_s: float = inf, broken_again: bool = False) 
 
 
 def configured_folder(path: Path) -> Path:
-    """Raises UsageError where no folder is named at all."""
+    """Raises CommandError where no folder is named at all."""
     if str(path) == DEFAULT_CONFIG and not path.exists():
-        raise UsageError(f"name the folder of the logs: there is no {path} that names one")
+        raise usage_error(f"name the folder of the logs: there is no {path} that names one")
     from firmware_host.configuration.loading import load_configuration  # slow to import
 
     return Path(load_configuration(path).log.directory)
 
 
-def chosen_folder(options: Options) -> Path:
+def chosen_folder(named: Path | None, config: Path) -> Path:
     """Return the named folder of logs, or the configured one. Raises LogError where there is no such folder."""
-    folder: Path = options.folder or configured_folder(options.config)
+    folder = named or configured_folder(config)
     if not folder.is_dir():
         raise LogError(f"{folder}: there is no such folder")
     return folder
 
 
-@explain_errors
-def index(options: Options) -> int:
+def index(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED, json: Json = False) -> int:
     from logs.catalogue.catalogue import Catalogue
 
-    catalogue = Catalogue(chosen_folder(options))
+    catalogue = Catalogue(chosen_folder(folder, config))
     stored = _update(catalogue, broken_again=True)
     states = [entry.state for entry in catalogue.entries()]
     report = {"catalogue": str(catalogue.path), "logs": len(states), "broken": states.count("broken")}
-    if options.json:
+    if json:
         print_json("log-index", report)
     else:
         print(f"{report['catalogue']}: {counted(len(states), 'log')}, {report['broken']} broken")
     return exit_codes.OK if stored else exit_codes.UNHEALTHY
 
 
-@explain_errors
-def query(options: Options) -> int:
+def query(
+    sql: Annotated[str, Option('such as "select file, strides, speed_m_s from logs"', metavar="SQL")],
+    folder: Folder = None,
+    *,
+    config: FolderConfiguration = CONFIGURED,
+    json: Json = False,
+) -> int:
     from logs.catalogue.catalogue import Catalogue
 
-    catalogue = Catalogue(chosen_folder(options))
+    catalogue = Catalogue(chosen_folder(folder, config))
     _update(catalogue)
-    names, rows = catalogue.query(options.sql)
-    if options.json:
+    names, rows = catalogue.query(sql)
+    if json:
         print_json("log-query", {"rows": [dict(zip(names, map(_for_json, row), strict=True)) for row in rows]})
     else:
         print(table([names, *([value_shown(value) for value in row] for row in rows)]))

@@ -1,34 +1,23 @@
-"""What is special to a CSV of the paper's authors: its vertical axis, what the reader noticed in it, its contents."""
+"""What is special to a CSV of the paper's authors: its vertical axis, and what the reader noticed in it."""
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from command_line.logs.refusals import UsageError
+from command_line.errors import usage_error
 from command_line.screen import complain
-from experiments.reports.shown_values import value_shown
-from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.lab.body_track import VERTICAL_AXIS
 from logs.lab.findings import Finding
-from logs.lab.lab_csv import LabLog, is_lab_csv
-from logs.lab.summary import lab_summary
+from logs.lab.lab_csv import is_lab_csv
 
 
-def chosen_vertical(options: argparse.Namespace) -> CaptureAxis:
-    """Return the axis of the capture that points up. Raises UsageError for a log that has none."""
-    if options.vertical and not is_lab_csv(options.files[0]):
-        raise UsageError(f"--vertical {options.vertical}: {options.files[0]} is not a CSV log with a motion capture")
-    return options.vertical or VERTICAL_AXIS
+def chosen_vertical(given: CaptureAxis | None, file: Path) -> CaptureAxis:
+    """Return the axis of the capture that points up. Raises CommandError for a log that has none."""
+    if given and not is_lab_csv(file):
+        raise usage_error(f"--vertical {given}: {file} is not a CSV log with a motion capture")
+    return given or VERTICAL_AXIS
 
 
 def complain_of(path: Path, findings: Sequence[Finding]) -> None:
     """Print each finding on standard error, with the file."""
     complain(*(f"{path}: {finding}" for finding in findings))
-
-
-def show_lab_log(path: Path, lab: LabLog) -> None:
-    """Print the summary as lines, and the findings as warnings."""
-    summary = lab_summary(path, lab)
-    print(table([(name, value_shown(value)) for name, value in summary.items() if name != "findings"]))
-    complain_of(path, lab.findings)

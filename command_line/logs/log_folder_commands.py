@@ -1,9 +1,8 @@
 """Commands on the log folder: list, recover, preserve."""
 
-import argparse
 from pathlib import Path
 from shutil import disk_usage
-from typing import Any
+from typing import Annotated, Any
 
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
@@ -11,9 +10,11 @@ from mcap.reader import make_reader
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.catalogue_commands import catalogued, chosen_folder, configured_folder
-from command_line.logs.refusals import explain_errors
+from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
 from command_line.screen import QUIET_S, Progress, complain
+from command_line.shared_options import Json
 from experiments.reports.text_tables import number, table
+from experiments.study.option import Option
 from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import (
     BROKEN,
@@ -32,7 +33,6 @@ from firmware_host.log.log_folder import (
 from logs.catalogue.entry import LogEntry
 from logs.files.log_error import DAMAGE, LogError
 
-Options = argparse.Namespace
 BEING_WRITTEN = "being written"
 SOUND = ("whole", "export", BEING_WRITTEN)
 
@@ -42,9 +42,8 @@ LEGEND = (
 )
 
 
-@explain_errors
-def list_logs(options: Options) -> int:
-    folder = chosen_folder(options)
+def list_logs(folder: Folder = None, *, config: FolderConfiguration = CONFIGURED, json: Json = False) -> int:
+    folder = chosen_folder(folder, config)
     entries = catalogued(folder)
     paths = {*stored_files(folder), *log_files(folder, PRESERVED), *entries}
     logs = [describe(path, entries.get(path)) for path in sorted(paths, key=lambda path: path.name)]
@@ -56,7 +55,7 @@ def list_logs(options: Options) -> int:
         "disk_bytes": disk_usage(folder).total,
         "free_bytes": space.free_bytes,
     }
-    if options.json:
+    if json:
         print_json("log-list", report)
     else:
         print(_listing(report))
@@ -130,13 +129,17 @@ def _listed(log: dict[str, Any]) -> list[str]:
     return [log["name"], log["place"], size, number(log["duration_s"], 1), number(strides, 0), speed, ", ".join(marks)]
 
 
-@explain_errors
-def recover(options: Options) -> int:
-    given = options.places or [configured_folder(options.config)]
+def recover(
+    places: Annotated[tuple[Path, ...], Option("(default: the configured folder)", metavar="FILE|DIR")] = (),
+    *,
+    config: FolderConfiguration = CONFIGURED,
+    json: Json = False,
+) -> int:
+    given = places or (configured_folder(config),)
     named = {path for path in given if not path.is_dir()}
     paths = [path for each in given for path in ([each] if each in named else unfinished_files(each))]
     recovered, problems = _recover_each(paths, named)
-    if options.json:
+    if json:
         logs = [{"path": str(log.path), "rows": log.rows, "lost": log.lost, "note": log.note} for log in recovered]
         print_json("log-recover", {"recovered": logs, "problems": problems})
     else:
@@ -169,12 +172,16 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[
     return recovered, problems
 
 
-def preserve_log(options: Options) -> int:
+def preserve_log(
+    files: Annotated[tuple[Path, ...], Option("log in done/ of a folder of logs")],
+    *,
+    undo: Annotated[bool, Option("include them again")] = False,
+) -> int:
     """Preserve each log that can be moved, and reports the others."""
     status = exit_codes.OK
-    for path in options.files:
+    for path in files:
         try:
-            print(preserve(path, options.undo))
+            print(preserve(path, undo))
         except ValueError as problem:
             complain(str(problem))
             status = exit_codes.REFUSED

@@ -1,26 +1,28 @@
 """`mudskipper log report`: makes a page of a run, or one that compares several, with pictures, tables and the logs."""
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Annotated, Any
 
 from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.lab_findings import chosen_vertical, complain_of
-from command_line.logs.refusals import explain_errors
+from command_line.logs.log_options import Vertical
 from command_line.screen import watched
+from command_line.shared_options import Json
 from experiments.pictures.mud_layout import MudLayout, layout_of_lengths, layout_of_track
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.run_report.page import comparison_result, comparison_sentences, run_result
 from experiments.run_report.results import Entry, differences, headline_of, headline_sentences
 from experiments.run_report.run import Run, read_runs
+from experiments.study.option import Option
 from experiments.study.page import write_result
 from experiments.study.result import to_json
 from experiments.study.results_folder import PAGE
+from experiments.study.values import folder, mud_length
 from firmware_host.operator.reports import known, map_report, stride_report
 from logs.files.log_error import LogError
 from logs.files.log_summary import log_summary
@@ -31,12 +33,30 @@ TERMINAL = 80  # letters in a line
 FIT = ("r_squared", "r_squared_about_mean", "rms_residual_nm")
 
 
-@explain_errors
-def log_report(options: argparse.Namespace) -> int:
-    vertical = chosen_vertical(options)
-    layout = _layout(options)
+def log_report(
+    files: Annotated[
+        tuple[Path, ...],
+        Option("log of this project, its segments, or a CSV file of the paper's authors; several runs are compared"),
+    ],
+    *,
+    out: Annotated[Path | None, Option("(default: a folder named after the log)", metavar="DIR", parse=folder)] = None,
+    mud: Annotated[
+        tuple[tuple[str, float], ...],
+        Option(
+            "mud and its length (default: 61), repeatable, in the order of the track",
+            metavar="NAME[=CM]",
+            parse=mud_length,
+            alternative="mud",
+        ),
+    ] = (),
+    world: Annotated[Path | None, Option("of the simulated robot: names the muds", alternative="mud")] = None,
+    vertical: Vertical = None,
+    json: Json = False,
+) -> int:
+    axis = chosen_vertical(vertical, files[0])
+    layout = _layout(mud, world)
     with watched() as watch:
-        runs = read_runs(options.files, layout, watch, vertical)
+        runs = read_runs(files, layout, watch, axis)
         headlines = [headline_of(run) for run in runs]
         if len(runs) == 1:
             name, report = "report", _run_report(runs[0], headlines[0])
@@ -44,31 +64,31 @@ def log_report(options: argparse.Namespace) -> int:
         else:
             name, report = "comparison", _comparison_report(runs, headlines)
             result, sentences = comparison_result(runs, headlines), comparison_sentences(runs, headlines)
-        folder = options.out or Path(f"{runs[0].name}-{name}")  # the user may have no right to write where the log is
+        out = out or Path(f"{runs[0].name}-{name}")  # the user may have no right to write where the log is
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            logs = [_copy(path, folder) for path in options.files]
-            written = write_result(folder, replace(result, logs=logs), report, watch=watch)
+            out.mkdir(parents=True, exist_ok=True)
+            logs = [_copy(path, out) for path in files]
+            written = write_result(out, replace(result, logs=logs), report, watch=watch)
         except OSError as problem:
-            raise LogError(f"{problem.filename or folder}: {problem.strerror or problem}") from None
+            raise LogError(f"{problem.filename or out}: {problem.strerror or problem}") from None
     for run in runs:
         complain_of(run.paths[0], run.replay.findings)
     print(fill(" ".join(sentences), TERMINAL), file=sys.stderr)
-    if options.json:
+    if json:
         print_json(f"log-{name}", to_json(report))
     else:
-        print(folder / PAGE)
-    print(f"written  {len(written)} files in {folder}", file=sys.stderr)
+        print(out / PAGE)
+    print(f"written  {len(written)} files in {out}", file=sys.stderr)
     return exit_codes.OK
 
 
-def _layout(options: argparse.Namespace) -> MudLayout | None:
+def _layout(mud: Sequence[tuple[str, float]], world: Path | None) -> MudLayout | None:
     """Raises ConfigurationError for a wrong world."""
-    if options.world:
+    if world:
         from simulation.harness.world import load_world  # slow to import
 
-        return layout_of_track(load_world(options.world).track)
-    return layout_of_lengths([(name, cm / 100.0) for name, cm in options.mud]) if options.mud else None
+        return layout_of_track(load_world(world).track)
+    return layout_of_lengths([(name, cm / 100.0) for name, cm in mud]) if mud else None
 
 
 def _copy(log: Path, folder: Path) -> Path:

@@ -15,15 +15,16 @@ from types import ModuleType
 from typing import Any, get_type_hints
 
 from command_line.function_options import add_function_options
-from command_line.options.shared import Commands, add_json, add_socket
+from command_line.options.shared import add_json, add_socket
 from experiments.study.catalogue import load_study, study_texts
 from experiments.study.option import declared_options
 from experiments.study.session import Session
 from experiments.study.values import folder, whole
 
 
-def add_studies(names: Commands) -> None:
+def add_experiment(experiment: argparse.ArgumentParser) -> None:
     """Add the command of every study."""
+    names = experiment.add_subparsers(dest="name", required=True, metavar="name")
     for name, text in study_texts().items():
         command = names.add_parser(
             name, help=text.partition("\n")[0], description=text, target=partial(_add_options, name)

@@ -3,19 +3,19 @@
 The viewers read a log as it is: Rerun shows every field of every row by itself, the others have a layout here.
 """
 
-import argparse
 import shlex
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from shutil import which
+from typing import Annotated, Literal
 
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
 from command_line import exit_codes
-from command_line.logs.refusals import explain_errors
 from command_line.screen import complain
+from experiments.study.option import Option
 from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import why_not_read
 from logs.files.log_error import DAMAGE, LogError
@@ -24,15 +24,19 @@ LAYOUTS = Path(__file__).parent / "layouts"
 FOXGLOVE_PROGRAMS = ("lichtblick", "foxglove-studio", "foxglove")  # the first one that is installed
 
 
-@explain_errors
-def open_log(options: argparse.Namespace) -> int:
-    log: Path = options.file
+def open_log(
+    log: Annotated[Path, Option("log of this project")],
+    *,
+    viewer: Annotated[
+        Literal["foxglove", "plotjuggler", "rerun"], Option("foxglove: Lichtblick or Foxglove", name="--with")
+    ],
+) -> int:
     _require_finished(log)
-    if options.viewer == "foxglove":
+    if viewer == "foxglove":
         program = next(filter(None, map(which, FOXGLOVE_PROGRAMS)), None)
         print(f"the layout: menu View, 'Import layout from file', {LAYOUTS / 'foxglove.json'}")
         return _start(program, [str(log)], f"neither Lichtblick (free) nor Foxglove is installed: open {log} in one")
-    if options.viewer == "plotjuggler":
+    if viewer == "plotjuggler":
         arguments = ["-d", str(log), "-l", str(LAYOUTS / "plotjuggler.xml")]
         return _start(
             which("plotjuggler"), arguments, f"install PlotJuggler, then: plotjuggler {shlex.join(arguments)}"

@@ -64,6 +64,7 @@ class FailureMode:
     lasts_s: float = 0.5
     phases: tuple[str, ...] = EVERYWHERE
     bound_ticks: int | None = None  # where this mode is detected sooner than the kind's bound
+    any_reaction: bool = False  # and none: only energy, torque and arming are bounded
     turns: bool = False  # only a joint that turns in the phase is chosen: it is detected at no other
 
     instead: tuple[str, ...] = ()  # faults that may be reported in its place
@@ -83,32 +84,28 @@ class FailureMode:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The faults as one of which it may be reported."""
+        """Return the faults as one of which it may be reported."""
         return self.fault, *self.instead
 
     @property
     def by_daemon(self) -> bool:
-        """Whether the daemon causes it itself, on any robot."""
+        """Return whether the daemon causes it itself, on any robot."""
         return not self.drive and not self.act
 
     @property
     def ends_loop(self) -> bool:
-        """Whether the loop of the daemon ends or hangs."""
+        """Return whether the loop of the daemon ends or hangs."""
         return self.fault in ("daemon_killed", "daemon_hung", "bug_in_the_tick")
 
     @property
     def demands_reaction(self) -> bool:
-        """Whether a fault must be reported; otherwise only energy, torque and arming are bounded."""
-        return not self.waived and self.fault not in ANY_REACTION and (self.fault, self.how) not in SELDOM_DETECTED
+        """Return whether a fault must be reported."""
+        return not (self.waived or self.any_reaction)
 
     def joints(self, phase: str) -> tuple[str, ...]:
         """Return the joints from which one is drawn."""
         turning = TURNING_JOINT.get(phase, "") if self.turns else ""
         return tuple(joint for joint in JOINTS if joint.endswith(turning))
-
-
-ANY_REACTION = ("wrong_motor", "foreign_torque", "degraded")
-SELDOM_DETECTED = (("encoder_stuck", "in any phase"), ("encoder_stuck", "at zero speed"))
 
 
 def expects(fault: str, lasts_s: float = 0.5, phases: tuple[str, ...] = EVERYWHERE, **more: Any) -> dict[str, Any]:
@@ -126,7 +123,9 @@ def _rows(
 def _degraded(part: str, kind: str, effect: str, **of_failure: Any) -> Iterator[FailureMode]:
     """Yield the mode of a component that is slow, intermittent or full of garbage."""
     phases = EVERYWHERE if part in MOTION_PARTS else ("hold", "stance")
-    yield from _rows(part, kind, effect, expects("degraded", 1.0, phases, how=f"{part} {kind}"), **of_failure)
+    yield from _rows(
+        part, kind, effect, expects("degraded", 1.0, phases, how=f"{part} {kind}", any_reaction=True), **of_failure
+    )
 
 
 MOTION_PARTS = ("JOINT", "JOINT.position", "JOINT.current", "JOINT.command", "bus.NAME")  # the path of the control
@@ -150,7 +149,7 @@ def _foreign_torques() -> Iterator[FailureMode]:
     for every, ordinal in ((2, "second"), (10, "tenth")):
         for path, heard in (("on the bus", True), ("unheard", False)):
             how = f"after every {ordinal} command, {path}"
-            expected = expects("foreign_torque", 1.0, MOVING, how=how)
+            expected = expects("foreign_torque", 1.0, MOVING, how=how, any_reaction=True)
             act = ("commanded_by_another", FOREIGN_NM, every, heard)
             yield from _rows("JOINT.master", how, "", expected, act=act, scheduled=True, torque_nm=FOREIGN_NM)
 
@@ -159,9 +158,9 @@ def _wrong_motor(
     kind: str, factor: str, error_deg: float, *expected: dict[str, Any], scheduled: bool = False
 ) -> Iterator[FailureMode]:
     """Yield a motor whose commutation is wrong, by the factor of its torque."""
-    any_reaction = expects("wrong_motor", 1.0, (*MOVING, "recovery"), how=f"torque x {factor}")
+    bounded = expects("wrong_motor", 1.0, (*MOVING, "recovery"), how=f"torque x {factor}", any_reaction=True)
     drive = {"commutation_error_deg": error_deg}
-    yield from _rows("JOINT.motor", kind, "", *expected, any_reaction, drive=drive, scheduled=scheduled)
+    yield from _rows("JOINT.motor", kind, "", *expected, bounded, drive=drive, scheduled=scheduled)
 
 
 BUGGY_METHODS = {  # of the loop, by the part of the tick in which the method is called
@@ -202,7 +201,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     # its signals
     *_signal("JOINT.position", "position", (expects("position_stale", REPORTED_S), expects("position_silent", 1.0)),
              (expects("encoder_stuck", 1.0, GAIT, turns=True),
-              expects("encoder_stuck", 1.0, PHASES, how="in any phase"))),
+              expects("encoder_stuck", 1.0, PHASES, how="in any phase", any_reaction=True))),
     *_signal("JOINT.current", "current",
              (expects("current_stale", REPORTED_S, PHASES), expects("current_silent", 1.0))),
     *_signal("JOINT.heartbeat", "heartbeat", (expects("heartbeat_silent", 1.0),)),
@@ -266,7 +265,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     *_rows("JOINT.supply", "lower", "", expects("voltage_under"), drive={"bus_voltage_v": 17.0}, scheduled=True),
     *_rows("JOINT.encoder", "shifted", "", expects("encoder_jump", phases=PHASES), drive={"encoder_offset_rad": 0.6},
            scheduled=True),
-    *_rows("JOINT.encoder", "frozen", "", expects("encoder_stuck", 1.0, PHASES, how="at zero speed"),
+    *_rows("JOINT.encoder", "frozen", "", expects("encoder_stuck", 1.0, PHASES, how="at zero speed", any_reaction=True),
            drive={"encoder_frozen": True}, scheduled=True),
     *_rows("JOINT.encoder", "noisy", drive={"encoder_noise_rad": 0.005, "velocity_noise_rad_s": 1.0}, scheduled=True),
 

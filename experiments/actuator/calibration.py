@@ -7,23 +7,27 @@ a weight hangs, the operator takes the weight off.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import degrees
-from typing import Any
+from typing import Any, TypeVar
 
 from experiments.actuator.fit import current_per_nm
 from experiments.actuator.friction import Loop, swing_arm
-from experiments.actuator.mismatch import Mismatch, find_mismatch
+from experiments.actuator.mismatch import find_mismatch
 from experiments.actuator.plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
 from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmError
 from experiments.actuator.weight_handling import WeightHandler
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, arm, ask_to_clear_faults, require_hold
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.study.notebook import Notebook
-from experiments.trials.session import Show
+from experiments.robot.steps import OperatorStep, conduct_steps
+from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import GO_ON, SKIP, Operator
+from experiments.study.session import Show
 from operator_client.status_client import CallRefusedError
+
+Answer = TypeVar("Answer")
 
 KEEP, OTHER = "k", "o"  # keys of answers
 MOST_FAULTS = 5  # during the attempts at one weight
@@ -55,37 +59,32 @@ class Calibration:
 
     def run(self) -> Mapping[str, Any]:
         """Return the readings by the steps' keys. Raises BenchError where the robot is lost or cannot be armed."""
-        steps, index = steps_of(self.plan), 0
-        while index < len(steps):
-            self.show(index, len(steps))
-            step = steps[index]
-            if step.key not in self.notebook.entries and self._measure(step) == REDO:
-                index = max(index - 1, 0)
-                self.notebook.forget(steps[index].key)
-            elif step.key in self.notebook.entries:
-                index += 1
-        self.show(index, len(steps))
+        steps = [
+            OperatorStep(
+                step.key, partial(self._attempt, self._prepare, step), partial(self._attempt, self._read, step)
+            )
+            for step in steps_of(self.plan)
+        ]
+        conduct_steps(steps, self.notebook, self.operator, self.show, {"skipped": "on request"})
         return self.notebook.entries
 
-    def _measure(self, step: Step) -> str:
-        """Return the operator's answer. A step that is not in the notebook then is measured again."""
+    def _attempt(self, act: Callable[[Step], Answer], step: Step) -> Answer | None:
+        """Return nothing where the robot let go, or its winding got warm: the step is prepared again."""
         try:
-            self._hold(step)
-            self.warned = False
-            answer = self.weights.hang(step, self._attend_hold)
-            if answer == SKIP:
-                self.notebook.write(step.key, {"skipped": "on request"})
-            elif answer == GO_ON:
-                self._read(step)
+            return act(step)
         except WarmError as problem:
             self._count(step, problem)
             self.operator.report(f"{step.name} was not read: {problem}.")
             self.weights.take_off()
         except (BenchError, CallRefusedError) as problem:
             self._recover(step, problem)
-        else:
-            return answer
-        return GO_ON
+        return None
+
+    def _prepare(self, step: Step) -> str:
+        """Hold the joint and hang the weight; return the operator's answer."""
+        self._hold(step)
+        self.warned = False
+        return self.weights.hang(step, self._attend_hold)
 
     def _count(self, step: Step, problem: Exception) -> None:
         """Raise the problem after too many of them."""
@@ -163,34 +162,46 @@ class Calibration:
 
     # readings
 
-    def _read(self, step: Step) -> None:
-        reading = self._read_at_rest(step)
-        if reading is None:
-            return
-        mismatch = find_mismatch(self.plan, self.notebook.entries, step, reading.current_a, self.constant_nm_a)
-        if mismatch is not None:
-            self._ask_about_mismatch(mismatch, step, reading)
-        elif step.weight_g:
-            self._keep(step, reading)
-        else:
-            self._keep(step, reading, loops=self._measure_friction())
-
-    def _read_at_rest(self, step: Step) -> Reading | None:
-        """Return nothing for a step that is left out."""
+    def _read(self, step: Step) -> Entry | None:
+        """Return the entry of the notebook; nothing where the weight is hung again."""
         assert self.held is not None
         trouble = ""
         for _ in range(MOST_REPEATS):
             try:
-                return self.held.read()
+                reading = self.held.read()
             except MovedError as problem:
                 trouble = str(problem)
+            else:
+                return self._checked(step, reading)
             answers = {GO_ON: "read it again", SKIP: "skip it"}
             question = f"{step.name} did not come to rest: {trouble}. Let it hang still and touch nothing."
             if self.operator.ask(question, answers, self._attend_hold) == SKIP:
                 break
-        self.notebook.write(step.key, {"skipped": trouble})
         self.operator.report(f"{step.name} of trial {step.reported_trial} is left out: {trouble}.")
+        return {"skipped": trouble}
+
+    def _checked(self, step: Step, reading: Reading) -> Entry | None:
+        """Ask about a reading of another weight at most MOST_REPEATS times; then keep it as doubtful."""
+        mismatch = find_mismatch(self.plan, self.notebook.entries, step, reading.current_a, self.constant_nm_a)
+        if mismatch is None:
+            return self._entry(step, reading, loops=() if step.weight_g else self._measure_friction())
+        answers = {GO_ON: "read it again", KEEP: "keep it, marked as doubtful"}
+        if mismatch.other_g is not None:
+            answers[OTHER] = f"it was the {mismatch.other_g:g} g"
+        self.mismatches[step.key] += 1
+        question = f"{step.name}: {mismatch.message}"
+        answer = self.operator.ask(question, answers, self._attend)  # the reading counts even if the robot lets go
+        if answer == OTHER and mismatch.other_g is not None:
+            self._keep_other(replace(step, weight_g=mismatch.other_g), reading)
+        elif answer == KEEP or self.mismatches[step.key] >= MOST_REPEATS:
+            return self._entry(step, reading, mismatch.message)
         return None
+
+    def _keep_other(self, other: Step, reading: Reading) -> None:
+        if other.key in self.notebook.entries:
+            self.operator.report(f"{other.name} of trial {other.trial} was read already and is not replaced.")
+        else:
+            self.notebook.write(other.key, self._entry(other, reading))
 
     def _measure_friction(self) -> Sequence[Loop]:
         """Return no loops where the arm does not swing freely: only friction is missing then."""
@@ -201,42 +212,21 @@ class Calibration:
             self.operator.report(f"friction was not measured this time: {problem}")
             return ()
 
-    def _ask_about_mismatch(self, mismatch: Mismatch, step: Step, reading: Reading) -> None:
-        """Ask again at most MOST_REPEATS times; then keep the reading as doubtful."""
-        answers = {GO_ON: "read it again", KEEP: "keep it, marked as doubtful"}
-        if mismatch.other_g is not None:
-            answers[OTHER] = f"it was the {mismatch.other_g:g} g"
-        self.mismatches[step.key] += 1
-        question = f"{step.name}: {mismatch.message}"
-        answer = self.operator.ask(question, answers, self._attend)  # the reading counts even if the robot lets go
-        if answer == OTHER and mismatch.other_g is not None:
-            other = replace(step, weight_g=mismatch.other_g)
-            if other.key in self.notebook.entries:
-                self.operator.report(f"{other.name} of trial {step.trial} was read already and is not replaced.")
-            else:
-                self._keep(other, reading)
-        elif answer == KEEP or self.mismatches[step.key] >= MOST_REPEATS:
-            self._keep(step, reading, mismatch.message)
-
-    def _keep(self, step: Step, reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> None:
-        self.notebook.write(step.key, entry_of(reading, doubt, loops))
+    def _entry(self, step: Step, reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> Entry:
+        """Return the notebook's entry; loops are those of the empty arm."""
         held_nm = self.constant_nm_a * reading.current_a
         self.operator.report(
             f"{self.joint}, trial {step.reported_trial}, {step.name}: {reading.current_a:+.3f} A,"
             f" {held_nm:+.4f} N·m by the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
         )
-
-
-def entry_of(reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> dict[str, Any]:
-    """Return the notebook's entry; loops are those of the empty arm."""
-    entry = {
-        "current_a": reading.current_a,
-        "rest_friction_a": reading.rest_friction_a,
-        "angle_rad": reading.angle_rad,
-        "winding_c": reading.winding_c,
-        "at_s": reading.at_s,
-        "below": reading.below._asdict(),
-        "above": reading.above._asdict(),
-    }
-    entry |= {"loops": [loop._asdict() for loop in loops]} if loops else {}
-    return entry | ({"doubt": doubt} if doubt else {})
+        entry = {
+            "current_a": reading.current_a,
+            "rest_friction_a": reading.rest_friction_a,
+            "angle_rad": reading.angle_rad,
+            "winding_c": reading.winding_c,
+            "at_s": reading.at_s,
+            "below": reading.below._asdict(),
+            "above": reading.above._asdict(),
+        }
+        entry |= {"loops": [loop._asdict() for loop in loops]} if loops else {}
+        return entry | ({"doubt": doubt} if doubt else {})

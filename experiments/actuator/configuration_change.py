@@ -11,8 +11,8 @@ from pathlib import Path
 from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
 from experiments.actuator.fit import JointFit
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.prompt import Operator
-from experiments.trials.session import Ending, Session
+from experiments.study.prompt import Operator
+from experiments.study.session import Ending, Session
 from firmware_host.configuration.toml_records import read_text
 
 COPY = "mudskipper.toml"  # of a simulated robot's configuration
@@ -21,9 +21,9 @@ WRITE, LEAVE = "y", ""
 SAVED = "the measurements are saved"
 
 
-def find_target(path: Path, text: str, session: Session, simulated: bool) -> Path:
+def find_target(path: Path, text: str, session: Session) -> Path:
     """Return the file to change, a copy for a simulated robot. Raises BenchError where it cannot be changed."""
-    if simulated:
+    if session.simulated:
         copy = session.folder / COPY
         copy.write_text(text, encoding="utf-8")
         return copy

@@ -28,6 +28,8 @@ from math import cos, fsum, hypot, nan, sqrt
 from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from estimation.strokes.origin_fit import student_factor
 from experiments.actuator.friction import Friction, Loop, friction_of
 from experiments.actuator.plan import Plan, Step, steps_of
@@ -61,19 +63,20 @@ class Line(NamedTuple):
 
 def fit_line(x: Sequence[float], y: Sequence[float]) -> Line:
     """Needs FEWEST points with at least two values of x."""
-    count, x_mean = len(x), fmean(x)
-    spread = fsum((each - x_mean) ** 2 for each in x)
-    slope = fsum((a - x_mean) * b for a, b in zip(x, y, strict=True)) / spread
-    intercept = fmean(y) - slope * x_mean
-    slope_square = intercept_square = 0.0
-    for a, b in zip(x, y, strict=True):
-        fraction = (a - x_mean) / spread  # this point's weight in the slope
-        leverage = 1.0 / count + fraction * (a - x_mean)
-        left_out = (b - intercept - slope * a) / (1.0 - leverage)  # residual from the line of the other points
-        slope_square += (fraction * left_out) ** 2
-        intercept_square += ((1.0 / count - x_mean * fraction) * left_out) ** 2
-    student = student_factor(count - 2)
-    return Line(slope, intercept, student * sqrt(slope_square), student * sqrt(intercept_square), count)
+    columns = np.column_stack([x, np.ones(len(x))])
+    inverse = np.linalg.pinv(columns)
+    slope, intercept = (inverse @ y).tolist()
+    leverages = np.sum(columns.T * inverse, axis=0)
+    left_out = (y - columns @ (slope, intercept)) / (1.0 - leverages)  # residuals from the line of the other points
+    errors = student_factor(len(x) - 2) * np.sqrt(np.sum((inverse * left_out) ** 2, axis=1))
+    slope_error, intercept_error = errors.tolist()
+    return Line(
+        slope_a_nm=slope,
+        intercept_a=intercept,
+        slope_error=slope_error,
+        intercept_error=intercept_error,
+        readings=len(x),
+    )
 
 
 class Load(NamedTuple):
@@ -172,7 +175,16 @@ def raw_loads(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
         if step.weight_g and entry and "current_a" in entry and tare_a is not None:
             torque_nm = plan.torque_nm(step.weight_g) * cos(entry["angle_rad"])
             current_a, doubtful = entry["current_a"] - tare_a, bool(entry.get("doubt"))
-            found.append(Load(step.trial, step.weight_g, torque_nm, current_a, entry["rest_friction_a"], doubtful))
+            found.append(
+                Load(
+                    trial=step.trial,
+                    weight_g=step.weight_g,
+                    torque_nm=torque_nm,
+                    current_a=current_a,
+                    rest_friction_a=entry["rest_friction_a"],
+                    doubtful=doubtful,
+                )
+            )
     return found
 
 
@@ -220,18 +232,18 @@ def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_n
     tares = (step for step in steps_of(plan) if not step.weight_g)
     empty = [entries[step.key] for step in tares if _tare_a(entries, step.trial) is not None]  # at least one
     fit = JointFit(
-        joint,
-        tuple(loads),
-        line_of(loads),
-        plan.torque_error,
-        configured_nm_a,
-        direction_of(raw_loads(plan, entries)),
-        _rmse(loads, lambda load: configured_nm_a * load.current_a),
-        nan,
-        repeatability(loads),
-        tuple(Loop(**loop) for entry in empty for loop in entry.get("loops", ())),
-        fmean(entry["rest_friction_a"] for entry in empty),
-        tuple(entry["current_a"] for entry in empty),
+        joint=joint,
+        loads=tuple(loads),
+        line=line_of(loads),
+        torque_error=plan.torque_error,
+        configured_nm_a=configured_nm_a,
+        direction=direction_of(raw_loads(plan, entries)),
+        rmse_configured_nm=_rmse(loads, lambda load: configured_nm_a * load.current_a),
+        rmse_fitted_nm=nan,
+        repeatability=repeatability(loads),
+        loops=tuple(Loop(**loop) for entry in empty for loop in entry.get("loops", ())),
+        rest_friction_a=fmean(entry["rest_friction_a"] for entry in empty),
+        tares_a=tuple(entry["current_a"] for entry in empty),
     )
     constants = {trial: fit.constant_without(trial) for trial in {load.trial for load in loads}}
     return fit._replace(rmse_fitted_nm=_rmse(loads, lambda load: constants[load.trial] * load.current_a))

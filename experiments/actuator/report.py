@@ -1,11 +1,12 @@
 """The report of the actuator calibration, for programs and for people: the paper's numbers next to ours."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
-from math import isfinite, nan
+from math import nan
 from statistics import fmean, stdev
 from typing import Any
+
+from pandas import DataFrame
 
 from experiments.actuator.fit import (
     PAPER_CONSTANT_NM_A,
@@ -17,16 +18,26 @@ from experiments.actuator.fit import (
     repeatability,
 )
 from experiments.actuator.plan import Plan, steps_of
-from experiments.actuator.plots import plot_friction, plot_torques
-from experiments.reports.report_page import Figure, Section
-from experiments.reports.text_tables import Rows, TitledRows
+from experiments.actuator.plots import draw_friction, draw_torques
+from experiments.actuator.simulation import truth_rows
+from experiments.reports.text_tables import number
 from experiments.reports.value_text import fraction_text, value_text
+from experiments.study.result import Figure, Result, Table
 
 Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
 TITLE = "Actuator calibration"
-CONSTANTS = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"
-FRICTION = "Friction and offset ± one standard error"
+CONSTANTS, FRICTION, TRUTH = "Torque constants", "Friction and offset", "The simulated motors themselves"
+CONSTANTS_HEADING = "Torque constants ± one standard error; RMSE and repeatability by the paper's definitions"
+FRICTION_HEADING = "Friction and offset ± one standard error"
 
+TORQUES = (
+    "Torque by the motor's current against the weights' own, as in the paper's figure 3: with the configured and with "
+    "the fitted constant. Grey: where both are equal, give or take the paper's RMSE."
+)
+LOOPS = (
+    "Torque of friction on loops of the empty arm at two speeds: each loop, and the line whose height at zero is dry "
+    "friction and whose slope is viscous. Dotted: what acts at rest. The paper neglects friction."
+)
 METHOD = (
     "A motor holds the flipper level while calibration weights hang on it (the paper's section II-B). A trial is one "
     "pass through all weights, with the empty arm before and after it as the tare. The mean of two approaches, from "
@@ -55,43 +66,52 @@ SETTING = (
 )
 
 
-@dataclass(frozen=True)
-class LeftOut:
-    """A reading that was skipped, or kept as doubtful and not fitted."""
-
-    joint: str
-    trial: int
-    weight_g: float
-    why: str
+PAPER = {
+    "rmse_nm": PAPER_RMSE_NM,
+    "repeatability": PAPER_REPEATABILITY,
+    "torque_constant_nm_a": PAPER_CONSTANT_NM_A,
+}
 
 
-@dataclass(frozen=True)
-class ActuatorReport:
-    plan: Plan
-    joints: Sequence[Mapping[str, Any]]  # of the fits
-    not_fitted: Sequence[str]
-    left_out: Sequence[LeftOut]
-    readings: Readings
-    applied: str | None  # a message on the configuration file
-    paper: Mapping[str, Any] = field(
-        default_factory=lambda: {
-            "rmse_nm": PAPER_RMSE_NM,
-            "repeatability": PAPER_REPEATABILITY,
-            "torque_constant_nm_a": PAPER_CONSTANT_NM_A,
-        }
+def make_result(
+    plan: Plan, readings: Readings, fits: Sequence[JointFit], applied: str | None, simulated: bool
+) -> Result:
+    """Return tables, figures and numbers. `applied` is a message on the configuration file."""
+    fitted, left_out = {fit.joint for fit in fits}, list_left_out(plan, readings)
+    tables, figures = [_constant_table(fits), _friction_table(fits)], list[Figure]()
+    if simulated:
+        tables.append(Table("truth", TRUTH, {}, DataFrame(truth_rows(fits)), TRUTH))
+    for fit in fits:
+        section = f"Weights on {fit.joint}"
+        tables.append(Table(section, "", {}, DataFrame(_weight_rows(fit)), section, on_page_only=True))
+    if left_out:
+        tables.append(Table("left_out", "", {}, DataFrame(left_out), "Left out", on_page_only=True))
+    if fits:
+        figures.append(Figure("torques", TORQUES, partial(draw_torques, fits), CONSTANTS))
+        if all(fit.loops for fit in fits):
+            figures.append(Figure("friction", LOOPS, partial(draw_friction, fits), FRICTION))
+    method = METHOD.format(
+        lever_mm=1000.0 * plan.lever_tolerance_m,
+        weight_percent=100.0 * plan.weight_tolerance,
+        lever_cm=100.0 * plan.lever_m,
+        millimetre_percent=0.1 / plan.lever_m,
     )
-    experiment: str = "actuator"
-
-
-def make_report(plan: Plan, readings: Readings, fits: Sequence[JointFit], applied: str | None = None) -> ActuatorReport:
-    fitted = {fit.joint for fit in fits}
-    return ActuatorReport(
-        plan=plan,
-        joints=[_joint_entries(fit) for fit in fits],
-        not_fitted=[joint for joint in plan.joints if joint not in fitted],
-        left_out=list_left_out(plan, readings),
-        readings=readings,
-        applied=applied,
+    summary = {
+        "plan": plan,
+        "joints": [_joint_entries(fit) for fit in fits],
+        "not_fitted": [joint for joint in plan.joints if joint not in fitted],
+        "left_out": left_out,
+        "readings": readings,
+        "applied": applied,
+        "paper": PAPER,
+    }
+    texts = {CONSTANTS: DEFINITIONS, **{table.section: "" for table in tables[1:]}}
+    return Result(
+        tables=tables,
+        figures=figures,
+        summary=summary,
+        title=TITLE,
+        texts=texts | {"What to set where": SETTING, "How it was measured": method},
     )
 
 
@@ -122,94 +142,79 @@ def _joint_entries(fit: JointFit) -> dict[str, Any]:
     }
 
 
-def list_left_out(plan: Plan, readings: Readings) -> list[LeftOut]:
+def list_left_out(plan: Plan, readings: Readings) -> list[dict[str, Any]]:
+    """Return the readings that were skipped, or kept as doubtful and not fitted."""
     return [
-        LeftOut(joint, step.trial, step.weight_g, why)
+        {"joint": joint, "trial": step.trial, "weight_g": step.weight_g, "why": why}
         for joint, entries in readings.items()
         for step in steps_of(plan)
         if (why := entries.get(step.key, {}).get("skipped") or entries.get(step.key, {}).get("doubt"))
     ]
 
 
-def make_sections(plan: Plan, readings: Readings, fits: Sequence[JointFit]) -> list[Section]:
-    sections = []
-    if fits:
-        sections.append(
-            Section("Torque constants", DEFINITIONS, rows=constant_rows(fits), figures=[_torque_figure(fits)])
-        )
-        figures = _friction_figures(fits)
-        sections.append(Section("Friction and offset", rows=friction_rows(fits), figures=figures))
-    sections += [Section(f"Weights on {fit.joint}", rows=_weight_rows(fit)) for fit in fits]
-    omitted = list_left_out(plan, readings)
-    if omitted:
-        rows = [[row.joint, str(row.trial), f"{row.weight_g:g} g", row.why] for row in omitted]
-        sections.append(Section("Left out", rows=[["joint", "trial", "weight", "why"], *rows]))
-    method = METHOD.format(
-        lever_mm=1000.0 * plan.lever_tolerance_m,
-        weight_percent=100.0 * plan.weight_tolerance,
-        lever_cm=100.0 * plan.lever_m,
-        millimetre_percent=0.1 / plan.lever_m,
-    )
-    return [*sections, Section("What to set where", SETTING), Section("How it was measured", method)]
+def _constant_table(fits: Sequence[JointFit]) -> Table:
+    """Return one line per joint, and the paper's numbers last."""
+    rows = [
+        {
+            "joint": fit.joint,
+            "k_t": value_text(fit.constant_nm_a, fit.constant_error_nm_a),
+            "configured": f"{fit.configured_nm_a:g}",
+            "RMSE": f"{fit.rmse_configured_nm:.4f}",
+            "RMSE fitted": f"{fit.rmse_fitted_nm:.4f}",
+            "repeatability": fraction_text(fit.repeatability),
+            "readings": fit.line.readings,
+        }
+        for fit in fits
+    ]
+    rows += [
+        {
+            "joint": f"paper, {kind}",
+            "k_t": "-",
+            "configured": f"{PAPER_CONSTANT_NM_A:g}",
+            "RMSE": f"{rmse_nm:.4f}",
+            "RMSE fitted": "-",
+            "repeatability": fraction_text(PAPER_REPEATABILITY),
+            "readings": "-",
+        }
+        for kind, rmse_nm in PAPER_RMSE_NM.items()
+    ]
+    units = {"k_t": "N·m/A", "configured": "N·m/A", "RMSE": "N·m", "RMSE fitted": "N·m"}
+    return Table("constants", CONSTANTS_HEADING, units, DataFrame(rows), CONSTANTS)
 
 
-def constant_rows(fits: Sequence[JointFit]) -> Rows:
-    """List one line per joint, and the paper's numbers last."""
-    errors = ("RMSE (N·m)", "RMSE fitted (N·m)")
-    rows = [["joint", "k_t (N·m/A)", "configured (N·m/A)", *errors, "repeatability", "readings"]]
-    for fit in fits:
-        constant = value_text(fit.constant_nm_a, fit.constant_error_nm_a)
-        rmse = (f"{fit.rmse_configured_nm:.4f}", f"{fit.rmse_fitted_nm:.4f}")
-        count = str(fit.line.readings)
-        rows.append([fit.joint, constant, f"{fit.configured_nm_a:g}", *rmse, fraction_text(fit.repeatability), count])
-    for kind, rmse_nm in PAPER_RMSE_NM.items():
-        known = [f"{PAPER_CONSTANT_NM_A:g}", f"{rmse_nm:.4f}", "-", fraction_text(PAPER_REPEATABILITY)]
-        rows.append([f"paper, {kind}", "-", *known, "-"])
-    return rows
+def _friction_table(fits: Sequence[JointFit]) -> Table:
+    rows = [
+        {
+            "joint": fit.joint,
+            "dry friction": value_text(*fit.friction_nm),
+            "viscous": value_text(*fit.viscous_nm_s),
+            "at rest at least": f"{fit.rest_friction_a * fit.constant_nm_a:.4f}",
+            "offset": value_text(fit.offset_nm, fit.offset_error_nm),
+            "empty arm": value_text(fit.tare_nm, fit.tare_spread_nm),
+        }
+        for fit in fits
+    ]
+    units = dict.fromkeys(("dry friction", "at rest at least", "offset", "empty arm"), "N·m") | {"viscous": "N·m·s"}
+    return Table("friction", FRICTION_HEADING, units, DataFrame(rows), FRICTION)
 
 
-def friction_rows(fits: Sequence[JointFit]) -> Rows:
-    kinds = ("dry friction (N·m)", "viscous (N·m·s)", "at rest at least (N·m)")
-    rows = [["joint", *kinds, "offset (N·m)", "empty arm (N·m)"]]
-    for fit in fits:
-        at_rest = f"{fit.rest_friction_a * fit.constant_nm_a:.4f}"
-        others = (value_text(fit.offset_nm, fit.offset_error_nm), value_text(fit.tare_nm, fit.tare_spread_nm))
-        rows.append([fit.joint, value_text(*fit.friction_nm), value_text(*fit.viscous_nm_s), at_rest, *others])
-    return rows
-
-
-def _weight_rows(fit: JointFit) -> Rows:
-    sensed = ("τ_sense configured (N·m)", "τ_sense fitted (N·m)", "error fitted (mN·m)", "spread fitted (mN·m)")
-    rows = [["weight", "trials", "τ_ext (N·m)", *sensed, "repeatability"]]
+def _weight_rows(fit: JointFit) -> list[dict[str, Any]]:
+    rows = []
     for weight_g in sorted({load.weight_g for load in fit.loads}):
         loads = [load for load in fit.loads if load.weight_g == weight_g]
         external_nm = fmean(load.torque_nm for load in loads)
-        configured_nm = fit.configured_nm_a * fmean(load.current_a for load in loads)
         fitted_nm = fmean(fit.fitted_nm(load) for load in loads)
         spread_nm = fit.constant_nm_a * stdev(load.current_a for load in loads) if len(loads) > 1 else nan
-        torques = (f"{each:.4f}" for each in (external_nm, configured_nm, fitted_nm))
-        error_mnm = round(1e3 * (fitted_nm - external_nm), 1) + 0.0  # without a minus before zero
-        spread = [f"{1e3 * spread_nm:.1f}" if isfinite(spread_nm) else "-", fraction_text(repeatability(loads))]
-        rows.append([f"{weight_g:g} g", str(len(loads)), *torques, f"{error_mnm:+.1f}", *spread])
+        rows.append(
+            {
+                "weight": f"{weight_g:g} g",
+                "trials": len(loads),
+                "τ_ext (N·m)": f"{external_nm:.4f}",
+                "τ_sense configured (N·m)": f"{fit.configured_nm_a * fmean(load.current_a for load in loads):.4f}",
+                "τ_sense fitted (N·m)": f"{fitted_nm:.4f}",
+                "error fitted (mN·m)": f"{1e3 * (fitted_nm - external_nm):+z.1f}",
+                "spread fitted (mN·m)": number(1e3 * spread_nm, 1),
+                "repeatability": fraction_text(repeatability(loads)),
+            }
+        )
     return rows
-
-
-def _torque_figure(fits: Sequence[JointFit]) -> Figure:
-    caption = (
-        "Torque by the motor's current against the weights' own, as in the paper's figure 3: with the configured and "
-        "with the fitted constant. Grey: where both are equal, give or take the paper's RMSE."
-    )
-    return Figure("torques", caption, partial(plot_torques, fits))
-
-
-def _friction_figures(fits: Sequence[JointFit]) -> list[Figure]:
-    """Return no figure for readings without loops."""
-    caption = (
-        "Torque of friction on loops of the empty arm at two speeds: each loop, and the line whose height at zero is "
-        "dry friction and whose slope is viscous. Dotted: what acts at rest. The paper neglects friction."
-    )
-    return [Figure("friction", caption, partial(plot_friction, fits))] * all(fit.loops for fit in fits)
-
-
-def make_tables(fits: Sequence[JointFit]) -> list[TitledRows]:
-    return [(CONSTANTS, constant_rows(fits)), (FRICTION, friction_rows(fits))]

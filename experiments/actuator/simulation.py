@@ -24,7 +24,7 @@ from experiments.actuator.fit import JointFit
 from experiments.actuator.plan import Plan, Step
 from experiments.reports.value_text import miss_text
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import GO_ON
+from experiments.study.prompt import GO_ON
 from experiments.trials.trial import BENCH_CURRENT_A
 from firmware_host.configuration.configuration import Configuration
 from simulation.body.bench_mount import BenchMount
@@ -48,13 +48,18 @@ def bench_configuration() -> Configuration:
     return simulated_configuration(sections, drive=f"current_limit_a = {BENCH_CURRENT_A}")
 
 
-def truth_rows(fits: Sequence[JointFit]) -> list[list[str]]:
+def truth_rows(fits: Sequence[JointFit]) -> list[dict[str, str]]:
     """List the true constants of the simulated motors, and the errors of the fitted ones."""
-    rows = [["joint", "true k_t (N·m/A)", "k_t error", "true dry friction (N·m)", "dry friction error"]]
-    for fit in fits:
-        constant = [f"{TRUE_CONSTANT_NM_A:.5f}", miss_text(fit.constant_nm_a, TRUE_CONSTANT_NM_A)]
-        rows.append([fit.joint, *constant, f"{COULOMB_NM:.4f}", miss_text(fit.friction_nm[0], COULOMB_NM)])
-    return rows
+    return [
+        {
+            "joint": fit.joint,
+            "true k_t (N·m/A)": f"{TRUE_CONSTANT_NM_A:.5f}",
+            "k_t error": miss_text(fit.constant_nm_a, TRUE_CONSTANT_NM_A),
+            "true dry friction (N·m)": f"{COULOMB_NM:.4f}",
+            "dry friction error": miss_text(fit.friction_nm[0], COULOMB_NM),
+        }
+        for fit in fits
+    ]
 
 
 def simulated_bench(

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from experiments.actuator.friction import SWING_RAD
 from experiments.actuator.plan import OPERATOR_S, Plan, Step
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
+from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
 
 EMPTY = (
     "take everything off the flipper, and let it rest. Keep clear: after its reading it swings by"

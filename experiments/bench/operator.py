@@ -13,7 +13,7 @@ from control.controller import UP_RAD
 from control.rate import PERIOD_S
 from experiments.bench.rig import SimulatedRig
 from experiments.robot.bench_robot import CLEAR, LEAVE
-from experiments.robot.prompt import GO_ON, Operator
+from experiments.study.prompt import GO_ON, Operator
 from simulation.body.plant import END_STOPS_RAD
 
 MOTIONS = {"sweep": "swing forward", "adduction": "rise"}

@@ -56,7 +56,9 @@ def let_watchdogs_trip(test_rig: TestRig, others: Others = ()) -> tuple[list[Sam
 
 def check_watchdog_times(test_rig: TestRig) -> Readings:
     if not all(_asked_by_command(test_rig)):
-        yield from _observed_times(test_rig)
+        fed = "set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
+        yield from _observed_readings(test_rig, "after the last command", fed)
+        yield from _reasons(test_rig)
     if any(_asked_by_command(test_rig)):
         yield from _asked_times(test_rig)
 
@@ -65,23 +67,20 @@ def _asked_by_command(test_rig: TestRig) -> list[bool]:
     return [axis.parameters.asking_ends_torque for axis in test_rig.drives.axes]
 
 
-def _observed_times(test_rig: TestRig) -> Readings:
-    pressed, silence = let_watchdogs_trip(test_rig)
+def _observed_readings(test_rig: TestRig, when: str, advice: str, others: Others = ()) -> Readings:
+    """Let the watchdogs trip and watch the reports of the drives that need not be asked by a command."""
+    pressed, silence = let_watchdogs_trip(test_rig, others)
     late_s = LATE_TICKS * PERIOD_S
     for index, (health, by_command) in enumerate(zip(test_rig.drives.health, _asked_by_command(test_rig), strict=True)):
-        timeout_s, joint = health.watchdog_s, health.joint
         if by_command:
             continue
-        advice = f"set enable_watchdog and watchdog_timeout of {joint}, and look for another program that feeds it"
-        idle_s = _idle_s(pressed, silence, index)
-        drive = test_rig.configuration.drive[joint]
-        latest_s = timeout_s + late_s + drive.heartbeat_period_s
-        yield Reading(f"{joint}: idle after the last command", idle_s, "s", timeout_s - late_s, latest_s, advice)
-        if "adduction" in joint:
-            gone_s = _gone_s(pressed, silence, index)
-            latest_s = latest_s if drive.holds_idle_current else timeout_s + late_s
-            yield Reading(f"{joint}: no current after it", gone_s, "s", timeout_s - late_s, latest_s, advice)
-    yield from _reasons(test_rig)
+        joint, drive = health.joint, test_rig.configuration.drive[health.joint]
+        earliest_s, gone_s = health.watchdog_s - late_s, health.watchdog_s + late_s
+        latest_s, todo = gone_s + drive.heartbeat_period_s, advice.format(joint=joint)
+        yield Reading(f"{joint}: idle {when}", _idle_s(pressed, silence, index), "s", earliest_s, latest_s, todo)
+        if "adduction" in joint and not others:
+            seen_s, latest_s = _gone_s(pressed, silence, index), latest_s if drive.holds_idle_current else gone_s
+            yield Reading(f"{joint}: no current after it", seen_s, "s", earliest_s, latest_s, todo)
 
 
 def _asked_times(test_rig: TestRig) -> Readings:
@@ -145,21 +144,9 @@ def _readings_among(test_rig: TestRig, kind: str, others: Others) -> Readings:
         yield from _asked_readings(test_rig, latest_s, False, f"among {kind}", others)
         clear(test_rig)
     if not all(_asked_by_command(test_rig)):
-        yield from _observed_among(test_rig, kind, others)
-
-
-def _observed_among(test_rig: TestRig, kind: str, others: Others) -> Readings:
-    pressed, silence = let_watchdogs_trip(test_rig, others)
-    late_s = LATE_TICKS * PERIOD_S
-    for index, health in enumerate(test_rig.drives.health):
-        joint, timeout_s = health.joint, health.watchdog_s
-        if _asked_by_command(test_rig)[index]:
-            continue
-        idle_s = _idle_s(pressed, silence, index)
-        latest_s = timeout_s + late_s + test_rig.configuration.drive[joint].heartbeat_period_s
         advice = f"{kind} feed its watchdog: no program may send them while torque is on; update its firmware"
-        yield Reading(f"{joint}: idle among {kind}", idle_s, "s", timeout_s - late_s, latest_s, advice)
-    clear(test_rig)
+        yield from _observed_readings(test_rig, f"among {kind}", advice, others)
+        clear(test_rig)
 
 
 def clear(test_rig: TestRig) -> Sequence[DriveHealth]:

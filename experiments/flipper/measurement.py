@@ -18,9 +18,9 @@ from experiments.flipper.base_check import INVALID_M, load_remarks, moved_text, 
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm, rest, walk
 from experiments.study.notebook import Entry
+from experiments.study.session import Show
 from experiments.trials.estimation_methods import DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.session import Show
 from experiments.trials.stride_profile import Floats, StrideProfile, profile_of, profile_row, thinned
 from firmware_host.configuration.configuration import Configuration
 from logs.files.log_reader import Log
@@ -33,7 +33,7 @@ PROTOCOL = "single_flipper"
 
 
 @dataclass(frozen=True)
-class Plan:
+class FlipperTrials:
     muds: tuple[str, ...] = MUDS
     trials: int = 3
     depth_m: float = 0.03
@@ -86,14 +86,14 @@ def require_flipper(configuration: Configuration, flipper: str) -> None:
         raise BenchError(f"the robot has no {flipper} flipper, rig.flippers is {list(own)}: give --flipper {own[0]}")
 
 
-def run(bench: Bench, plan: Plan, show: Show) -> None:
+def run(bench: Bench, plan: FlipperTrials, show: Show) -> None:
     """Make every trial that is not in the notebook yet. Raises BenchError."""
     require_fixed_base(bench.robot.configuration)
     require_flipper(bench.robot.configuration, plan.flipper)
     conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
 
 
-def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
+def measure(bench: Bench, plan: FlipperTrials, trial: PlannedTrial) -> Entry:
     """Make one trial. Raises InvalidTrialError, BenchError."""
     robot = bench.robot
     arm(robot, bench.operator)

@@ -1,7 +1,6 @@
 """The single flipper's trials as pictures, after the paper's figures 4 and 5."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from experiments.reports.coefficient_table import PER_CM3, MudSummary
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
-    DOTS_PER_INCH,
     GREY,
     INK,
     LABELS,
@@ -33,16 +31,16 @@ THIN: dict[str, Any] = {"linewidth": 1.1}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
 
 
-def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path) -> None:
+def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
     """Draw depth, angles and forces of one stride against time, with the forces by the laws: figure 4."""
     profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
     laws = modelled_forces(profile, geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method)
-    figure = Figure(figsize=(7.0, 8.2), layout="constrained")
+    figure = Figure(figsize=(7.0, 8.2))
     panels = figure.subplots(4, 1, sharex=True)
-    _plot_depths(panels[0], profile, stride["surface_m"] or 0.0)
-    _plot_angles(panels[1], profile)
-    _plot_upward(panels[2], profile, laws)
-    _plot_forward(panels[3], profile, laws)
+    _draw_depths(panels[0], profile, stride["surface_m"] or 0.0)
+    _draw_angles(panels[1], profile)
+    _draw_upward(panels[2], profile, laws)
+    _draw_forward(panels[3], profile, laws)
     for letter, panel in zip("BCDE", panels, strict=True):  # the paper's A is a drawing
         panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
         _shade(panel, profile)
@@ -54,7 +52,7 @@ def plot_stride(trial: Entry, geometry: FlipperGeometry, method: str, path: Path
                                va="bottom", fontsize="small")  # fmt: skip
     panels[0].set_title(f"mud {mud_text(trial['mud'])}, trial {trial['trial']}\n", fontsize="medium", loc="left")
     panels[-1].set_xlabel("time (s)")
-    figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 def _shade(panel: Axes, profile: StrideProfile) -> None:
@@ -64,7 +62,7 @@ def _shade(panel: Axes, profile: StrideProfile) -> None:
             panel.axvspan(float(times_s[0]), float(times_s[-1]), color=colour, linewidth=0.0, zorder=0)
 
 
-def _plot_depths(panel: Axes, profile: StrideProfile, surface_m: float) -> None:
+def _draw_depths(panel: Axes, profile: StrideProfile, surface_m: float) -> None:
     panel.plot(profile.time_s, 100.0 * profile.depth_command_m, "--", color=GREY, label="$z_c$ commanded", **THIN)
     panel.plot(profile.time_s, 100.0 * profile.depth_m, color=INK, label="$z$ actual", **THIN)
     panel.axhline(100.0 * surface_m, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
@@ -73,7 +71,7 @@ def _plot_depths(panel: Axes, profile: StrideProfile, surface_m: float) -> None:
     panel.legend(fontsize="small", loc="center", bbox_to_anchor=(0.82, 0.62))
 
 
-def _plot_angles(panel: Axes, profile: StrideProfile) -> None:
+def _draw_angles(panel: Axes, profile: StrideProfile) -> None:
     panel.plot(profile.time_s, np.degrees(profile.sweep_rad), color="tab:blue", label="sweep $\\alpha$", **THIN)
     panel.plot(
         profile.time_s, np.degrees(profile.adduction_rad), "--", color="tab:red", label="adduction $\\beta$", **THIN
@@ -82,7 +80,7 @@ def _plot_angles(panel: Axes, profile: StrideProfile) -> None:
     panel.legend(fontsize="small", loc="center left", bbox_to_anchor=(0.06, 0.5))
 
 
-def _plot_upward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
+def _draw_upward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
     measured_n = np.where(profile.during(Phase.STANCE), np.nan, profile.force_z_n)
     panel.plot(profile.time_s, measured_n, color="tab:green", label="$f_z$ measured", **THIN)
     for phase, colour, label in (
@@ -96,7 +94,7 @@ def _plot_upward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> N
     panel.legend(fontsize="small", ncols=3, loc="upper right")
 
 
-def _plot_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
+def _draw_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
     panel.plot(profile.time_s, profile.force_x_n, color="tab:blue", label="$f_x$ measured", **THIN)
     panel.plot(profile.time_s, laws.force_x_n, color="tab:red", label="by $k_s$", **MODELLED)
     panel.axhline(0.0, color=GREY, linewidth=0.6)
@@ -107,31 +105,29 @@ def _plot_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> 
 # figure 5
 
 
-def plot_coefficients(
-    muds: Sequence[MudSummary], firsts: Mapping[str, Entry], geometry: FlipperGeometry, path: Path
-) -> None:
+def draw_coefficients(muds: Sequence[MudSummary], firsts: Mapping[str, Entry], geometry: FlipperGeometry) -> Figure:
     """Draw the forces of one trial in each mud, the coefficients, and their comparison with a load cell: figure 5."""
     compared = any(mud.truth for mud in muds)
     rows = 3 if compared else 2
-    figure = Figure(figsize=(11.0, 3.3 * rows + 0.5), layout="constrained")
+    figure = Figure(figsize=(11.0, 3.3 * rows + 0.5))
     panels = figure.subplots(rows, 3)
     looks = looks_of([mud.mud for mud in muds])
-    _plot_curves(panels[0], firsts, looks)
+    _draw_curves(panels[0], firsts, looks)
     for column, name in enumerate(COEFFICIENTS):
-        _plot_by_mud(panels[1][column], muds, name, looks)
+        _draw_by_mud(panels[1][column], muds, name, looks)
         if compared:
-            _plot_compared(panels[2][column], muds, name, looks)
+            _draw_compared(panels[2][column], muds, name, looks)
     for letter, panel in zip("ABCDEFGHI", panels.flat, strict=False):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
     handles, labels = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 6), fontsize="small")
-    figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 Curve = Callable[[StrideProfile], tuple[Floats, Floats]]
 
 
-def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Mapping[str, dict[str, Any]]) -> None:
+def _draw_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw f_z against depth in insertion, f_x against sweep in stance, and f_z against depth in extraction."""
     wanted: tuple[tuple[Phase, Curve, str, str], ...] = (
         (Phase.INSERTION, lambda c: (100.0 * c.depth_m, c.force_z_n), "depth $z$ (cm)", "$f_z$ in insertion (N)"),
@@ -150,7 +146,7 @@ def _plot_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
             panel.invert_xaxis()  # in the direction of the motion
 
 
-def _plot_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
+def _draw_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw mean and standard deviation over the trials; a lower bound has an arrow up."""
     names = [mud.mud for mud in muds]
     waters = waters_of(names)
@@ -170,7 +166,7 @@ def _plot_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapp
         panel.set_xticks(range(len(names)), names)
 
 
-def _plot_compared(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
+def _draw_compared(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw against a load cell's values, with two standard errors, and the grey line on which both are equal."""
     largest = 0.0
     for mud in muds:

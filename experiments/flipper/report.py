@@ -10,7 +10,7 @@ from statistics import fmean
 from typing import Any
 
 from control.records import Phase
-from experiments.flipper.measurement import Plan
+from experiments.flipper.measurement import FlipperTrials
 from experiments.flipper.modelled_force import drawn_coefficients, misfit_n, modelled_forces
 from experiments.reports.coefficient_table import ComparedStride, MudSummary, error_table, gather_coefficients
 from experiments.reports.error_table import COEFFICIENTS, Row
@@ -45,7 +45,7 @@ class FlipperReport:
 
 
 def report_of(
-    plan: Plan,
+    plan: FlipperTrials,
     entries: Mapping[str, Entry],
     configuration: Configuration,
     truth: TruthOfMud | None,
@@ -74,7 +74,7 @@ def report_of(
     )
 
 
-def muds_of(plan: Plan, entries: Mapping[str, Entry]) -> list[str]:
+def muds_of(plan: FlipperTrials, entries: Mapping[str, Entry]) -> list[str]:
     return list(dict.fromkeys([*plan.muds, *(entry["mud"] for entry in entries.values())]))
 
 

@@ -1,4 +1,4 @@
-"""The single flipper's finding: sections with tables and pictures for the page, and tables for the screen.
+"""The single flipper's tables, figures and explanations.
 
 The walking robot's page uses the same explanations of errors (experiments/walk/text.py).
 """
@@ -8,30 +8,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from experiments.flipper.measurement import Plan, run
-from experiments.flipper.report import STROKES, FlipperReport, muds_of, report_of, trials_of
-from experiments.flipper.simulation import flipper_bench
+from experiments.flipper.measurement import FlipperTrials
+from experiments.flipper.plots import draw_coefficients, draw_stride
+from experiments.flipper.report import STROKES, FlipperReport, muds_of, trials_of
 from experiments.loadcell.comparison import OTHER_PLATE
 from experiments.reports.coefficient_table import MudSummary, error_text_rows, mud_rows
 from experiments.reports.error_table import Row
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
-from experiments.reports.report_page import Figure, Section
-from experiments.reports.text_tables import TitledRows, text_of_tables
 from experiments.study.notebook import Entry
+from experiments.study.result import Figure, Result, Table, text_table
 from experiments.trials.estimation_methods import DEFAULT
-from experiments.trials.mud_trials import SEED, left_out_texts, open_bench, run_trials
-from experiments.trials.session import Finding, Session
-from experiments.trials.truth_file import load_truth
+from experiments.trials.mud_trials import left_out_texts
 from firmware_host.configuration.configuration import Configuration
 
 # Least and largest force of first strokes in N, from the authors' raw logs in the mud that they call 12.5N.
 AUTHORS_MUD, AUTHORS_N = "12.5N", {"insertion": (2.5, 2.8), "stance": (7.4, 8.3), "extraction": (1.9, 2.3)}
-INSTRUCTIONS = (
-    "Torque is off and the flippers are down. Level the mud to its nominal height and put the flipper over a fresh "
-    "spot, or re-mix the mud: the same hole loses 15 to 20 % with each stroke. Take your hands away: the flipper moves "
-    "next"
-)
 TRUTHS = {
     "bed": "The load cell is a virtual one: it repeats each stroke with the flipper's own plate, to the same depth. "
     "Insertion and extraction follow the flipper's own arc, without the load on the plate's face, which is no part of "
@@ -59,7 +51,14 @@ UNCERTAINTIES = (
 )
 HEADING = "Coefficients ± one standard error of the trials ± one that all trials share; explained in the report"
 ERRORS = "Median error of single strides against the load cell, in brackets the bias"
-FORCES = "Largest forces, in brackets the misfit of the laws"
+COEFFICIENTS, COMPARISON, FORCES, STRIDES = (  # the parts of the page
+    "Coefficients of the muds", "Comparison with the load cell", "Forces", "Strides"
+)  # fmt: skip
+FORCES_TEXT = (
+    "Largest forces of first strides, mean over the trials, and in brackets the misfit of the laws in one trial (root "
+    f"mean square). The authors' forces are from their raw logs in the mud that they call {AUTHORS_MUD}, whose water "
+    "content they do not report."
+)
 MODELLED = (
     "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients, where each is fitted. The "
     "default method's laws give the torque of one joint; it replaces the measured torque, and with the other joint's "
@@ -71,40 +70,43 @@ MODELLED_PAPER = (
 )
 
 
-def run_flipper(plan: Plan, session: Session, truth_path: Path | None) -> Finding:
-    """Make the trials and report them. Raises BenchError."""
-    truth = load_truth(truth_path) if truth_path else None
-    simulated = partial(flipper_bench, session.folder, plan.muds, SEED, plan.simulated_rig)
-    bench = open_bench(session, plan.identity, lambda trial: INSTRUCTIONS, simulated)
-    configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
-    report = report_of(plan, entries, configuration, truth, bench.notebook.left_out)
-    sections = sections_of(report, plan, entries, configuration)
-    return Finding(report, "A single flipper through muds", sections, text_of_tables(tables_of(report)), logs)
-
-
-def sections_of(
-    report: FlipperReport, plan: Plan, entries: Mapping[str, Entry], configuration: Configuration
-) -> list[Section]:
+def result_of(
+    report: FlipperReport,
+    plan: FlipperTrials,
+    entries: Mapping[str, Entry],
+    configuration: Configuration,
+    logs: Sequence[Path],
+) -> Result:
+    """Return the tables, figures and explanations of all trials."""
     firsts = {mud: trials[0] for mud in muds_of(plan, entries) if (trials := trials_of(mud, entries))}
-    sections = [_coefficients(report, firsts, configuration)]
-    if report.errors:
-        text = f"{ERRORS}. {TRUTHS[report.settings['truth']]}"
-        sections.append(Section("Comparison with the load cell", text, rows=error_text_rows(report.errors)))
-    sections += [_forces(report), _strides(firsts, configuration, report.settings["method"])]
+    method = report.settings["method"]
     remarks = [f"{mud_text(mud.mud)}: {remark}" for mud in report.muds for remark in mud.remarks]
-    return sections + remarks_sections(remarks, report.left_out)
+    return Result(
+        tables=[*coefficient_tables(report.muds, report.errors, COEFFICIENTS), _force_table(report)],
+        figures=[_coefficient_figure(report, firsts, configuration), *_stride_figures(firsts, configuration, method)],
+        summary=report,
+        title="A single flipper through muds",
+        texts={
+            COEFFICIENTS: _explanation(report),
+            COMPARISON: TRUTHS[report.settings["truth"]] if report.errors else "",
+            FORCES: FORCES_TEXT,
+            STRIDES: MODELLED_PAPER if method == "paper" else MODELLED,
+        }
+        | remark_texts(remarks, report.left_out),
+        logs=logs,
+    )
 
 
-def remarks_sections(remarks: Sequence[str], left_out: Mapping[str, Entry]) -> list[Section]:
-    """Return a section with the remarks of all trials; nothing where there are none."""
-    text = "\n\n".join(f"{remark.rstrip('.')}." for remark in [*remarks, *left_out_texts(left_out)])
-    return [Section("Remarks", text)] * bool(text)
+def remark_texts(remarks: Sequence[str], left_out: Mapping[str, Entry]) -> dict[str, str]:
+    """Return the section with the remarks of all trials; nothing where there are none."""
+    sentences = [f"{remark.rstrip('.')}." for remark in [*remarks, *left_out_texts(left_out)]]
+    return {"Remarks": "\n\n".join(sentences)} if sentences else {}
 
 
-def coefficient_tables(muds: Sequence[MudSummary], errors: Sequence[Row]) -> list[TitledRows]:
-    """Return the tables that every report of coefficients has on the screen."""
-    tables: list[TitledRows] = [(HEADING, mud_rows(muds))]
-    return tables + [(ERRORS, error_text_rows(errors))] * bool(errors)
+def coefficient_tables(muds: Sequence[MudSummary], errors: Sequence[Row], section: str) -> list[Table]:
+    """Return the tables of every report of coefficients; `section` is the part of the page with the muds."""
+    tables = [text_table("muds", HEADING, mud_rows(muds), section)]
+    return [*tables, text_table("errors", ERRORS, error_text_rows(errors), COMPARISON)] if errors else tables
 
 
 def error_paragraphs(settings: Mapping[str, Any]) -> list[str]:
@@ -113,18 +115,15 @@ def error_paragraphs(settings: Mapping[str, Any]) -> list[str]:
     return known + [WRONG_CONSTANTS] * settings["simulated"]
 
 
-def _coefficients(report: FlipperReport, firsts: Mapping[str, Entry], configuration: Configuration) -> Section:
-    from experiments.flipper.plots import plot_coefficients  # matplotlib takes its time
-
+def _coefficient_figure(report: FlipperReport, firsts: Mapping[str, Entry], configuration: Configuration) -> Figure:
     caption = (
         "Figure 5 of the paper. A to C: force of one trial in each mud. D to F: coefficients, mean and standard "
         "deviation over the trials; each grey dash is a trial."
     )
     if any(mud.truth for mud in report.muds):
         caption += " G to I: against the load cell, with two standard errors; on the grey line both are equal."
-    draw = partial(plot_coefficients, report.muds, firsts, configuration.geometry)
-    figure = Figure("figure5", caption, draw)
-    return Section("Coefficients of the muds", _explanation(report), rows=mud_rows(report.muds), figures=[figure])
+    draw = partial(draw_coefficients, report.muds, firsts, configuration.geometry)
+    return Figure("figure5", caption, draw, COEFFICIENTS)
 
 
 def _explanation(report: FlipperReport) -> str:
@@ -140,22 +139,13 @@ def _explanation(report: FlipperReport) -> str:
     return "\n\n".join([*paragraphs, UNCERTAINTIES, *error_paragraphs(report.settings)])
 
 
-def _forces(report: FlipperReport) -> Section:
-    text = (
-        "Largest forces of first strides, mean over the trials, and in brackets the misfit of the laws in one trial "
-        f"(root mean square). The authors' forces are from their raw logs in the mud that they call {AUTHORS_MUD}, "
-        "whose water content they do not report."
-    )
-    return Section("Forces", text, rows=force_rows(report))
-
-
-def force_rows(report: FlipperReport) -> list[list[str]]:
+def _force_table(report: FlipperReport) -> Table:
     rows = [["mud", *(f"{stroke} (N)" for stroke in STROKES)]]
     for mud, forces in report.largest_forces_n.items():
         misfits = report.misfit_n[mud]
         rows.append([mud_text(mud), *(_force_text(forces[stroke], misfits[stroke]) for stroke in STROKES)])
     rows.append(["authors' logs", *(f"{low:g} to {high:g}" for low, high in AUTHORS_N.values())])
-    return rows
+    return text_table("forces", "Largest forces, in brackets the misfit of the laws", rows, FORCES)
 
 
 def _force_text(force_n: float | None, misfit_n: float | None) -> str:
@@ -163,19 +153,13 @@ def _force_text(force_n: float | None, misfit_n: float | None) -> str:
     return text if misfit_n is None else f"{text} ({misfit_n:.2f})"
 
 
-def _strides(firsts: Mapping[str, Entry], configuration: Configuration, method: str) -> Section:
-    from experiments.flipper.plots import plot_stride
-
-    figures = [
+def _stride_figures(firsts: Mapping[str, Entry], configuration: Configuration, method: str) -> list[Figure]:
+    return [
         Figure(
             f"figure4_{file_name(mud)}",
             f"Figure 4 of the paper, mud {mud_text(mud)}.",
-            partial(plot_stride, trial, configuration.geometry, method),
+            partial(draw_stride, trial, configuration.geometry, method),
+            STRIDES,
         )
         for mud, trial in firsts.items()
     ]
-    return Section("Strides", MODELLED_PAPER if method == "paper" else MODELLED, figures=figures)
-
-
-def tables_of(report: FlipperReport) -> list[TitledRows]:
-    return [*coefficient_tables(report.muds, report.errors), (FORCES, force_rows(report))]

@@ -10,6 +10,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
+from experiments.lablogs.lab_trial import LabTrial
+from experiments.study.option import OptionError
+
 ENDINGS = (".csv", ".csv.gz", ".mcap")
 LABEL = re.compile(r"(?<![0-9.])(\d+(?:\.\d+)?N)(?![A-Za-z0-9])")
 KIND = re.compile(r"(?:^|[^A-Za-z])(single|walk)(?:ing)?(?![A-Za-z])", re.IGNORECASE)
@@ -22,6 +25,14 @@ class GroupRule(NamedTuple):
 
     pattern: str
     name: str
+
+
+def parse_rule(text: str) -> GroupRule:
+    """Parse PATTERN=NAME. Raises OptionError."""
+    pattern, _, name = text.rpartition("=")
+    if not (pattern and name):
+        raise OptionError(f"{text}: must be a pattern and a name, such as 'single_12.5N*=soft'")
+    return GroupRule(pattern, name)
 
 
 def find_logs(folders: Sequence[Path]) -> list[Paths]:
@@ -68,3 +79,12 @@ def group_key(group: str) -> tuple[bool, bool, float, str]:
     """Return a key that sorts groups: labels before names, single flippers before walks, stronger mud first."""
     label = re.fullmatch(r"(walk )?(\d+(?:\.\d+)?)N", group)
     return label is None, bool(label and label[1]), -float(label[2]) if label else 0.0, group
+
+
+def group_trials(trials: Sequence[tuple[LabTrial, str | None]]) -> dict[str, list[LabTrial]]:
+    """Return the trials in mud by group, the groups in order."""
+    names = {group for trial, group in trials if group is not None and trial.in_mud}
+    return {
+        name: [trial for trial, group in trials if group == name and trial.in_mud]
+        for name in sorted(names, key=group_key)
+    }

@@ -29,8 +29,8 @@ from experiments.lablogs.repeatability import (
 )
 from experiments.lablogs.sensitivity import SensitivityReport, sensitivity
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.report_page import FLAT
 
+FLAT = {"flat": True}  # metadata of a field whose entries stand next to those of its record
 Groups = Mapping[str, Sequence[LabTrial]]  # by name, without logs in air
 
 

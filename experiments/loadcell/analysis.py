@@ -32,7 +32,7 @@ from experiments.loadcell.strokes import (
     find_contact,
     without_spikes,
 )
-from experiments.trials.session import Show
+from experiments.study.session import Show
 
 COEFFICIENTS = ("k_p", "k_s", "k_e")
 LEAST_SPEED_UNCERTAINTY, LEAST_RAMP_UNCERTAINTY = 0.005, 0.1  # of a stage, from trial to trial

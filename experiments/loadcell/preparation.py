@@ -22,7 +22,7 @@ from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import TrialBench
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.prompt import GO_ON, Operator
+from experiments.study.prompt import GO_ON, Operator
 
 CALIBRATION = "calibration.json"
 WEIGHING_S = 2.0

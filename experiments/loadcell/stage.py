@@ -11,7 +11,7 @@ from typing import NamedTuple
 from control.records import UNKNOWN
 from drivers.load_cell.line_formats import GRAVITY_M_S2
 from experiments.loadcell.strokes import INSERTION, SHEAR, StageSettings
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
+from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.trials.load_cell_truth import TrueCoefficients, true_coefficients
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import clay_of_water

@@ -29,9 +29,9 @@ from experiments.loadcell.recording import (
 )
 from experiments.loadcell.stage import Stage, Trial
 from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Mask, Shear, StageSettings
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
-from experiments.robot.steps import Step, conduct_steps
+from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
 from experiments.study.session import Show
 
 KEEP, WITHOUT = "k", "w"
@@ -77,10 +77,10 @@ class TrialBench:
 def measure_all(bench: TrialBench, plan: TrialPlan) -> None:
     """Measure every trial that is not in the notebook."""
     steps = [
-        Step(trial.key, partial(bench.stage.prepare, trial, plan.trials), partial(measure, bench, trial, plan))
+        OperatorStep(trial.key, partial(bench.stage.prepare, trial, plan.trials), partial(measure, bench, trial, plan))
         for trial in plan.list_trials()
     ]
-    conduct_steps(steps, bench.notebook, bench.show, {"skipped": True})
+    conduct_steps(steps, bench.notebook, bench.operator, bench.show, {"skipped": True})
 
 
 def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> Entry:

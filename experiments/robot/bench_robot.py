@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 from experiments.reports.counted_nouns import counted
 from experiments.robot.bench_errors import BenchError, DaemonLostError, EndedError, RobotInUseError
-from experiments.robot.prompt import Operator
+from experiments.study.prompt import Operator
 from firmware_host.configuration.configuration import Configuration
 from logs.files.log_reader import Log
 from operator_client.status_client import CallRefusedError

@@ -120,7 +120,8 @@ def _page(folder: Path, result: Result) -> Iterator[str]:
     yield f"<style>\n{PAGE_STYLE}</style></head><body>\n<h1>{title}</h1>"
     yield f'<p class="when">{made}, mudskipper {version}</p>'
     parts: list[Table | Figure] = [*result.tables, *result.figures]
-    for section in dict.fromkeys([*result.texts, *(part.section for part in parts)]):
+    explained = [section for section, text in result.texts.items() if text]
+    for section in dict.fromkeys([*explained, *(part.section for part in parts)]):
         yield f"<h2>{escape(section)}</h2>"
         yield from (f"<p>{escape(text)}</p>" for text in result.texts.get(section, "").split("\n\n") if text)
         for part in parts:

@@ -37,6 +37,11 @@ class Table:
         return f"{self.title}\n{aligned(self.cells())}".lstrip("\n")
 
 
+def text_table(name: str, title: str, cells: Sequence[Sequence[str]], section: str = "Result") -> Table:
+    """Return a table of formatted cells, the head first."""
+    return Table(name, title, {}, DataFrame(cells[1:], columns=cells[0]), section)
+
+
 @dataclass(frozen=True)
 class Figure:
     """A picture, which is drawn in the one style of all studies (page.py)."""
@@ -66,8 +71,9 @@ class Result:
 
     def json(self) -> dict[str, Any]:
         """Return the summary as JSON has it."""
-        tables = {table.name: table.rows.to_dict("records") for table in self.tables}
-        return dict(to_json(tables if self.summary is None else self.summary))
+        if self.summary is not None:
+            return dict(to_json(self.summary))
+        return {table.name: to_json(table.rows.to_dict("records")) for table in self.tables}
 
 
 def _cell(value: Any) -> str:

@@ -36,10 +36,10 @@ def _numbered(path: Path) -> Iterator[Path]:
     return (path.with_name(path.name + (f"-{number}" if number > 1 else "")) for number in count(1))
 
 
-def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any] | None = None) -> None:
+def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any]) -> None:
     """Raises NotebookError for results of another experiment, and for a finished one.
 
-    With `options`, one that was finished with others, such as fewer trials, may continue: its notebook decides.
+    One that was finished with other options, such as fewer trials, may continue: its notebook decides.
     """
     summary: dict[str, Any] = {}
     with suppress(OSError, ValueError):
@@ -48,7 +48,7 @@ def require_unfinished(folder: Path, experiment: str, options: Mapping[str, Any]
     if earlier != experiment:
         raise NotebookError(f"{folder} has the results of experiment {earlier}: choose another folder with --out")
     record = summary.get("provenance", {})
-    if (folder / PAGE).exists() and options in (None, record.get("options", options)):
+    if (folder / PAGE).exists() and options == record.get("options", options):
         raise NotebookError(
             f"{folder} has a finished experiment {experiment}, of {record.get('date', 'an unknown date')} by "
             f"{program_text(record)}: choose another folder with --out, or begin again with --restart, which renames "

@@ -5,7 +5,7 @@ from enum import Enum, auto
 from pathlib import Path
 from typing import NamedTuple
 
-from experiments.robot.prompt import Operator
+from experiments.study.prompt import Operator
 
 Show = Callable[[int, int], None]  # how many steps are done, of how many
 

@@ -5,7 +5,7 @@ study, and a finished one with further rows. A row is known by its function and 
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from pandas import DataFrame
 
 from experiments.study.notebook import Entry, Notebook
 from experiments.study.session import Show
-from experiments.study.workers import Workers, run_parallel
+from experiments.study.workers import Result, Workers, run_parallel
 
 Row = Mapping[str, Any]
 
@@ -61,3 +61,7 @@ class Trials:
             self.measured.append(DataFrame([row | notebook.entries[key] for key, row in ended]))
         self._ended += len({*keys})
         return self.measured[-1]
+
+    def compute(self, calls: Sequence[Callable[[], Result]]) -> list[Result]:
+        """Return the result of each call, which need not be JSON and is not kept for a continued study."""
+        return run_parallel(calls, self._show, self._workers)

@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Callable
 from contextlib import suppress
-from math import inf, isfinite, nan
+from math import nan
 from pathlib import Path
 
 
@@ -26,35 +26,11 @@ def _number_where(allowed: Callable[[float], bool], must_be: str) -> Callable[[s
     return value_of
 
 
-def between(low: float, high: float, unit: str = "") -> Callable[[str], float]:
-    """Returns a parser of numbers from `low` to `high`."""
-    return _number_where(lambda value: low <= value <= high, f"from {low:.15g} to {high:.15g}{unit and ' '}{unit}")
-
-
-def above(low: float, high: float | None = None, unit: str = "") -> Callable[[str], float]:
-    """Returns a parser of numbers above `low`, and up to `high` where there is one."""
-    highest, most = (inf, "") if high is None else (high, f" and at most {high:.15g}")
-    must_be = f"more than {low:.15g}{most}{unit and ' '}{unit}"
-    return _number_where(lambda value: low < value <= highest and isfinite(value), must_be)
-
-
 def whole(low: int, high: int) -> Callable[[str], int]:
     """Returns a parser of whole numbers from `low` to `high`."""
     must_be = f"a whole number from {low} to {high}"
     value_of = _number_where(lambda value: low <= value <= high and value == int(value), must_be)
     return lambda text: int(value_of(text))
-
-
-finite = _number_where(isfinite, "a number")
-positive = _number_where(lambda value: value > 0.0 and isfinite(value), "more than 0")
-depth_cm = _number_where(lambda value: 0.0 < value <= 20.0, "more than 0 and at most 20 cm")
-any_depth_cm = _number_where(lambda value: 0.0 < value < inf, "more than 0 cm")  # the daemon knows the robot's limit
-_lever_cm = between(1.0, 100.0, "cm")
-
-
-def lever_m(text: str) -> float:
-    """Parses a length in cm."""
-    return _lever_cm(text) / 100.0
 
 
 def mud_length(text: str) -> tuple[str, float]:
@@ -64,24 +40,6 @@ def mud_length(text: str) -> tuple[str, float]:
     if not (name and 20.0 <= value <= 10000.0):
         raise argparse.ArgumentTypeError(f"{text}: must be a mud and its length from 20 to 10000 cm, such as 47.6=61")
     return name, value
-
-
-def group_rule(text: str) -> tuple[str, str]:
-    """Parses PATTERN=NAME."""
-    pattern, _, name = text.rpartition("=")
-    if not (pattern and name):
-        raise argparse.ArgumentTypeError(f"{text}: must be a pattern and a name, such as 'single_12.5N*=soft'")
-    return pattern, name
-
-
-def weights_g(text: str) -> tuple[float, ...]:
-    try:
-        values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
-    except ValueError:
-        values = ()
-    if len(values) < 2 or not all(1.0 <= value <= 5000.0 for value in values):
-        raise argparse.ArgumentTypeError(f"{text}: must be two weights or more, from 1 to 5000 g, such as 100,200,400")
-    return values
 
 
 def folder(text: str) -> Path:

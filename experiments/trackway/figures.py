@@ -7,7 +7,7 @@ from pathlib import Path
 from experiments.pictures.recorded_walk import RecordedWalk, numbered_walk
 from experiments.reports.mud_styles import file_name
 from experiments.robot.log_copies import cut_log
-from experiments.robot.prompt import Operator
+from experiments.study.prompt import Operator
 from experiments.study.result import Figure
 from experiments.trackway.bench import LoggedTime
 from firmware_host.log.log_folder import first_path, run_files

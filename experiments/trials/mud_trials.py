@@ -6,7 +6,8 @@ kept or repeated as the operator decides. The notebook also has the trials that 
 does not ask for them again. Torque is off whenever hands may be in the mud.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -15,9 +16,11 @@ from experiments.reports.mud_names import mud_text
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, ask_to_clear_faults, disarm, leave, rest
 from experiments.robot.daemon_robot import DaemonRobot
-from experiments.robot.prompt import GO_ON, REDO, SKIP, Operator
+from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
-from experiments.trials.session import Session
+from experiments.study.option import OptionError
+from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
+from experiments.study.session import Session
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.toml_records import parse_document
 from simulation.mud.clay import clay_of_water
@@ -96,80 +99,68 @@ def conduct_trials(
     bench: Bench, planned: Sequence[PlannedTrial], measure: Measure, show: Callable[[int, int], None]
 ) -> None:
     """Measure all trials that are not in the notebook. Raises BenchError where one cannot be measured."""
-    entries, index, attempts = bench.notebook.entries, 0, 0
-    while index < len(planned):
-        trial = planned[index]
-        show(sum(each.key in entries for each in planned), len(planned))
-        answer = GO_ON if trial.key in entries else bench.bed.prepare(trial)
-        if answer == REDO:
-            index = _forget_last(bench, planned[:index])
-        elif answer == SKIP:
-            _leave_out(bench, trial)
-        elif trial.key in entries or _settle(bench, trial, measure, attempts + 1):
-            index, attempts = index + 1, 0
-        else:
-            attempts += 1
-    show(len(planned), len(planned))
+    attempts = Counter[str]()
+    steps = [
+        OperatorStep(
+            trial.key, partial(bench.bed.prepare, trial), partial(_measure_once, bench, trial, measure, attempts)
+        )
+        for trial in planned
+    ]
+    conduct_steps(steps, bench.notebook, bench.operator, show, _left_out())
 
 
-def _forget_last(bench: Bench, before: Sequence[PlannedTrial]) -> int:
-    """Open the last measured or skipped trial again; return its index."""
-    for index in reversed(range(len(before))):
-        if before[index].key in bench.notebook.entries:
-            bench.notebook.forget(before[index].key)
-            return index
-    bench.operator.report("no trial was measured before this one")
-    return len(before)
-
-
-def _settle(bench: Bench, trial: PlannedTrial, measure: Measure, attempt: int) -> bool:
-    """Measure a trial; return False where it has to be repeated. Raises BenchError after too many attempts."""
+def _measure_once(bench: Bench, trial: PlannedTrial, measure: Measure, attempts: Counter[str]) -> Entry | None:
+    """Return the trial's entry; nothing where it is repeated. Raises BenchError after too many attempts."""
+    attempts[trial.key] += 1
     try:
         entry = measure(trial)
     except (InvalidTrialError, BenchError) as problem:
         rest(bench.robot)
-        return _settle_invalid(bench, trial, problem, attempt)
-    rest(bench.robot)
+        settled = _settle_invalid(bench, trial, problem, attempts[trial.key])
+    else:
+        rest(bench.robot)
+        settled = _settle(bench, trial, entry)
+    if settled is not None:
+        del attempts[trial.key]
+    return settled
+
+
+def _settle(bench: Bench, trial: PlannedTrial, entry: Entry) -> Entry | None:
     for remark in entry["remarks"]:
         bench.operator.report(f"{trial}: {remark}")
     answer = _ask(bench, "Is this trial to count?", DOUBTFUL) if entry["remarks"] else GO_ON
-    if answer == GO_ON:
-        bench.notebook.write(trial.key, entry)
-    elif answer == SKIP:
-        _leave_out(bench, trial, entry["remarks"])
-    return answer != REDO
+    return {GO_ON: entry, SKIP: _left_out(entry["remarks"])}.get(answer)
 
 
-def _settle_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> bool:
-    """Leave an invalid trial out, or keep it; return False to repeat it. Raises BenchError after too many attempts."""
+def _settle_invalid(bench: Bench, trial: PlannedTrial, problem: Exception, attempt: int) -> Entry | None:
+    """Leave an invalid trial out, or keep it."""
     entry = problem.entry if isinstance(problem, InvalidTrialError) else None
     often = attempt >= MOST_ATTEMPTS
     message = f"{trial} went wrong{f' {attempt} times; the last time' if often else ''}: {str(problem).rstrip('.')}."
     answer = _ask(bench, message, (INVALID_OFTEN if often else INVALID) | ({} if entry is None else KEPT))
     if often and answer == GO_ON:
         raise BenchError(message) from problem
-    if answer == SKIP:
-        _leave_out(bench, trial, [str(problem)])
-    elif answer == KEEP and entry is not None:
-        bench.notebook.write(trial.key, entry | {"remarks": [*entry["remarks"], str(problem)]})
-    return answer in (SKIP, KEEP)
+    if answer == KEEP and entry is not None:
+        return entry | {"remarks": [*entry["remarks"], str(problem)]}
+    return _left_out([str(problem)]) if answer == SKIP else None
 
 
 def _ask(bench: Bench, question: str, answers: Mapping[str, str]) -> str:
     return bench.operator.ask(question, answers, partial(bench.robot.wait, POLL_S))
 
 
-def _leave_out(bench: Bench, trial: PlannedTrial, why: Sequence[str] = ()) -> None:
-    bench.notebook.write(trial.key, {"skipped": True, "why": list(why)})
+def _left_out(why: Sequence[str] = ()) -> Entry:
+    return {"skipped": True, "why": list(why)}
 
 
-def why_not_simulated(muds: Iterable[str]) -> str | None:
-    """Return a message where one of these muds cannot be simulated."""
+def require_named(muds: Sequence[str], session: Session, example: str) -> None:
+    """Raises OptionError where no mud is named, and where one of them cannot be simulated in a simulated session."""
+    if not muds:
+        raise OptionError(f"no mud is named: give the muds {example}")
     try:
-        [clay_of_water(float(mud)) for mud in muds]
+        [clay_of_water(float(mud)) for mud in muds if session.simulated]
     except ValueError as problem:
-        return f"--mud: simulated muds are named after their water in percent: {problem}"
-    return None
+        raise OptionError(f"--mud: simulated muds are named after their water in percent: {problem}") from None
 
 
 def open_bench(

@@ -17,7 +17,7 @@ from control.modes import Mode
 from control.rate import PERIOD_S
 from experiments.robot.bench_robot import disarm
 from experiments.robot.lockstep_robot import LockstepRobot
-from experiments.robot.prompt import GO_ON
+from experiments.study.prompt import GO_ON
 from experiments.trials.load_cell_truth import true_coefficients
 from experiments.trials.mud_trials import PlannedTrial, Truths
 from experiments.trials.trial import TORQUE_ERROR

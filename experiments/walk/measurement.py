@@ -28,10 +28,10 @@ from experiments.robot.bench_robot import (
     walk,
 )
 from experiments.study.notebook import Entry
+from experiments.study.session import Show
 from experiments.trackway.bench import UNSEEN, UNSEEN_S, Mud, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, configured_method, strides_by_method
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
-from experiments.trials.session import Show
 from experiments.trials.stride_profile import profile_of, profile_of_walk, profile_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
 from logs.files.log_reader import Log
@@ -47,7 +47,7 @@ DRAWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start 
 
 
 @dataclass(frozen=True)
-class Plan:
+class WalkTrials:
     muds: tuple[Mud, ...] = MUDS
     trials: int = 3  # as in the paper
     depth_m: float = 0.03
@@ -102,12 +102,12 @@ def soft_key(mud: str, depth_m: float, number: int) -> str:
     return f"soft {soft_name(mud, depth_m)}/{number}"
 
 
-def run(bench: Bench, plan: Plan, show: Show) -> None:
+def run(bench: Bench, plan: WalkTrials, show: Show) -> None:
     """Make every trial that is not in the notebook yet. Raises BenchError."""
     conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
 
 
-def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
+def measure(bench: Bench, plan: WalkTrials, trial: PlannedTrial) -> Entry:
     """Make one walk. Raises InvalidTrialError, BenchError."""
     depths = {soft_key(mud, depth_m, trial.number): depth_m for mud in plan.soft for depth_m in SOFT_DEPTHS_M}
     if trial.key in depths:
@@ -115,7 +115,7 @@ def measure(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
     return _walk_over(bench, plan, trial)
 
 
-def _walk_over(bench: Bench, plan: Plan, trial: PlannedTrial) -> Entry:
+def _walk_over(bench: Bench, plan: WalkTrials, trial: PlannedTrial) -> Entry:
     robot = bench.robot
     arm(robot, bench.operator)
     before: Status = robot.call("status")
@@ -147,7 +147,7 @@ def _add_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
         stride["slip_m"] = slips_m[stride["t_start_s"]]
 
 
-def _follow(bench: Bench, plan: Plan, start_m: float | None) -> tuple[int, str | None]:
+def _follow(bench: Bench, plan: WalkTrials, start_m: float | None) -> tuple[int, str | None]:
     """Walk until the plates go down past the last mud. Return the ordered strides and why the walk was stopped.
 
     The reason is empty at the proper end, and None where the walk was not stopped from here.
@@ -198,7 +198,7 @@ def require_mud(strides: Sequence[Mapping[str, Any]], flipper: str) -> None:
         raise InvalidTrialError("no stride met mud: measure the height of the axes (geometry.axis_height_m)")
 
 
-def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float) -> Entry:
+def _walk_in_soft(bench: Bench, plan: WalkTrials, trial: PlannedTrial, depth_m: float) -> Entry:
     robot = bench.robot
     arm(robot, bench.operator)
     before: Status = robot.call("status")
@@ -211,7 +211,7 @@ def _walk_in_soft(bench: Bench, plan: Plan, trial: PlannedTrial, depth_m: float)
     return entry | {"depth_m": depth_m, "course": profile_row(profile), "remarks": []}
 
 
-def _entry(bench: Bench, plan: Plan, trial: PlannedTrial, log: Log, closed: int) -> Entry:
+def _entry(bench: Bench, plan: WalkTrials, trial: PlannedTrial, log: Log, closed: int) -> Entry:
     """Return the part of an entry that all walks have. Raises InvalidTrialError."""
     robot = bench.robot
     rest(robot)  # on a slow computer, the estimation takes longer than the robot may be left unattended

@@ -1,7 +1,6 @@
 """The walks over several muds as pictures, after the paper's figures 6 and 7."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,12 @@ from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import PER_CM3, ComparedStride, GatheredCoefficient
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
-from experiments.reports.mud_styles import DOTS_PER_INCH, GREY, INK, LABELS
+from experiments.reports.mud_styles import GREY, INK, LABELS
 from experiments.study.notebook import Entry
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.stride_profile import StrideProfile, profile_from_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
-from experiments.walk.measurement import Plan
+from experiments.walk.measurement import WalkTrials
 from experiments.walk.report import SoftMud
 
 THIN: dict[str, Any] = {"linewidth": 0.8}
@@ -40,20 +39,20 @@ DEPTH_STYLES: dict[float, dict[str, Any]] = {
 }
 
 
-def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[ComparedStride], reach_m: float, path: Path) -> None:
+def draw_walk_over(plan: WalkTrials, walk: Entry, strides: Sequence[ComparedStride], reach_m: float) -> Figure:
     """Draw position, forces and coefficients of one walk against time: figure 6."""
     profile = profile_from_row(walk["course"])
     own = [each for each in strides if each.trial == walk["trial"]]
     begun_s = float(profile.time_s[0])
     borders_s = _borders_s(plan, walk, profile, own, reach_m)
-    figure = Figure(figsize=(9.0, 11.0), layout="constrained")
+    figure = Figure(figsize=(9.0, 11.0))
     panels = figure.subplots(6, 1, sharex=True)
-    _plot_position(panels[0], walk, profile, begun_s)
-    _plot_force(panels[1], profile, profile.force_x_n, begun_s, "$f_x$ forward (N)")
+    _draw_position(panels[0], walk, profile, begun_s)
+    _draw_force(panels[1], profile, profile.force_x_n, begun_s, "$f_x$ forward (N)")
     upward_n = np.where(profile.phase == Phase.STANCE, np.nan, profile.force_z_n)
-    _plot_force(panels[2], profile, upward_n, begun_s, "$f_z$ up (N)")
+    _draw_force(panels[2], profile, upward_n, begun_s, "$f_z$ up (N)")
     for panel, name in zip(panels[3:], COEFFICIENTS, strict=True):
-        _plot_coefficient(panel, plan, name, own, begun_s)
+        _draw_coefficient(panel, plan, name, own, begun_s)
     for letter, panel in zip("ABCDEF", panels, strict=True):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
         for border_s in borders_s:
@@ -61,11 +60,11 @@ def plot_walk_over(plan: Plan, walk: Entry, strides: Sequence[ComparedStride], r
     _name_muds(panels[0], plan, [begun_s, *borders_s, float(profile.time_s[-1])], begun_s)
     panels[0].set_xlim(0.0, float(profile.time_s[-1]) - begun_s)
     panels[-1].set_xlabel("time (s)")
-    figure.savefig(path, dpi=DOTS_PER_INCH)
+    return figure
 
 
 def _borders_s(
-    plan: Plan, walk: Entry, profile: StrideProfile, own: Sequence[ComparedStride], reach_m: float
+    plan: WalkTrials, walk: Entry, profile: StrideProfile, own: Sequence[ComparedStride], reach_m: float
 ) -> list[float]:
     """Return when the plates first went down past each border; by the order of the strides where there is no pose."""
     found = []
@@ -79,13 +78,13 @@ def _borders_s(
     return found
 
 
-def _name_muds(panel: Axes, plan: Plan, edges_s: Sequence[float], begun_s: float) -> None:
+def _name_muds(panel: Axes, plan: WalkTrials, edges_s: Sequence[float], begun_s: float) -> None:
     for mud, start_s, end_s in zip(plan.muds, edges_s, edges_s[1:], strict=False):
         middle_s = (start_s + end_s) / 2.0 - begun_s
         panel.annotate(mud_text(mud.name), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
 
 
-def _plot_position(panel: Axes, walk: Entry, profile: StrideProfile, begun_s: float) -> None:
+def _draw_position(panel: Axes, walk: Entry, profile: StrideProfile, begun_s: float) -> None:
     panel.set_ylabel("body (cm)")
     if walk["start_m"] is None:
         panel.text(0.5, 0.5, "no pose", transform=panel.transAxes, ha="center", color=GREY)
@@ -93,7 +92,7 @@ def _plot_position(panel: Axes, walk: Entry, profile: StrideProfile, begun_s: fl
     panel.plot(profile.time_s - begun_s, 100.0 * (profile.body_m - walk["start_m"]), color=INK, linewidth=1.2)
 
 
-def _plot_force(panel: Axes, profile: StrideProfile, force_n: Any, begun_s: float, label: str) -> None:
+def _draw_force(panel: Axes, profile: StrideProfile, force_n: Any, begun_s: float, label: str) -> None:
     """Draw a force coloured by phase, as in the paper; the line is grey outside of the strokes."""
     time_s = profile.time_s - begun_s
     panel.plot(time_s, force_n, color="#bbbbbb", **THIN)
@@ -109,7 +108,7 @@ def _plot_force(panel: Axes, profile: StrideProfile, force_n: Any, begun_s: floa
     panel.legend(ncols=3, **LEGEND)
 
 
-def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
+def _draw_coefficient(panel: Axes, plan: WalkTrials, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
     """Draw the estimates by all methods; triangles are lower bounds, dashed lines the load cell's values."""
     methods = [method for method in METHOD_STYLES if method != COMPENSATED or name == "k_s"]
     valid = [each for each in own if each.method in methods and each.stride[name]["valid"]]
@@ -123,7 +122,7 @@ def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[Compared
         marker = "^" if estimate["at_least"] else ("$\\uparrow$" if value > top else style["marker"])
         panel.errorbar(each.stride["t_end_s"] - begun_s, min(value, 0.97 * top), uncertainty, linestyle="",
                        color=style["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
-    _plot_truth(panel, plan, name, own, begun_s)
+    _draw_truth(panel, plan, name, own, begun_s)
     for method in methods:
         style = METHOD_STYLES[method]
         panel.plot([], [], color=style["color"], marker=style["marker"], linestyle="", label=method)
@@ -134,7 +133,7 @@ def _plot_coefficient(panel: Axes, plan: Plan, name: str, own: Sequence[Compared
     panel.legend(ncols=5, **LEGEND)
 
 
-def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
+def _draw_truth(panel: Axes, plan: WalkTrials, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
     """Draw the load cell's values over each mud, from its first stride to its last."""
     label = "load cell"
     for mud in plan.muds:
@@ -150,12 +149,12 @@ def _plot_truth(panel: Axes, plan: Plan, name: str, own: Sequence[ComparedStride
 # figure 7
 
 
-def plot_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]], path: Path) -> None:
+def draw_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]]) -> Figure:
     """Draw f_x in one stance at each depth, and k_s by method with the load cell's: figure 7."""
-    figure = Figure(figsize=(11.0, 4.2), layout="constrained")
+    figure = Figure(figsize=(11.0, 4.2))
     forces, bars = figure.subplots(1, 2, width_ratios=(1.0, 1.5))
     for depth_cm, trials in walks.items():
-        _plot_stance(forces, depth_cm, trials[0])
+        _draw_stance(forces, depth_cm, trials[0])
     forces.axhline(PAPER_DRAG_N / 2.0, color=GREY, linewidth=1.2, linestyle=":",
                    label=f"half of the paper's {PAPER_DRAG_N:g} N of body drag")  # fmt: skip
     forces.set_xlabel("time in stance (s)")
@@ -163,11 +162,11 @@ def plot_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]], path: Path)
     forces.set_ylim(bottom=0.0)
     forces.legend(fontsize="small", loc="lower right")
     forces.set_title(f"A   mud {mud_text(soft.mud)}", loc="left", fontsize="medium")
-    _plot_bars(bars, soft)
-    figure.savefig(path, dpi=DOTS_PER_INCH)
+    _draw_bars(bars, soft)
+    return figure
 
 
-def _plot_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
+def _draw_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
     profile = profile_from_row(trial["course"])
     stance = profile.during(Phase.STANCE)
     time_s = profile.time_s[stance]
@@ -175,7 +174,7 @@ def _plot_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
     panel.plot(time_s - time_s[0], profile.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **style)
 
 
-def _plot_bars(panel: Axes, soft: SoftMud) -> None:
+def _draw_bars(panel: Axes, soft: SoftMud) -> None:
     """Draw k_s by the paper's law, the default method and the load cell; a lower bound is hatched."""
     deepest_first = sorted(soft.depths, key=lambda each: -each.depth_cm)
     names: list[str] = []
@@ -183,10 +182,10 @@ def _plot_bars(panel: Axes, soft: SoftMud) -> None:
         for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
             own = DEPTH_STYLES.get(each.depth_cm, {"color": INK})["color"]
             gathered = each.k_s.get(method)
-            _plot_bar(panel, len(names), gathered.value if gathered else None, colour or own, gathered)
+            _draw_bar(panel, len(names), gathered.value if gathered else None, colour or own, gathered)
             names.append(f"{label}\n{each.depth_cm:g} cm")
     for each in deepest_first:
-        _plot_bar(panel, len(names), each.truth, "#d9d9d9")
+        _draw_bar(panel, len(names), each.truth, "#d9d9d9")
         names.append(f"load cell\n{each.depth_cm:g} cm")
     panel.set_xticks(range(len(names)), names, fontsize="small")
     panel.set_ylabel("$k_s$ (N/cm³)")
@@ -195,7 +194,7 @@ def _plot_bars(panel: Axes, soft: SoftMud) -> None:
     panel.set_title("B   $k_s$ by method", loc="left", fontsize="medium")
 
 
-def _plot_bar(
+def _draw_bar(
     panel: Axes, x: int, value_n_m3: float | None, colour: str, gathered: GatheredCoefficient | None = None
 ) -> None:
     """Draw a value, with the standard deviation of the trials from which it was gathered."""

@@ -31,7 +31,7 @@ from experiments.trials.estimation_methods import configured_method
 from experiments.trials.stride_profile import profile_from_row
 from experiments.trials.truth_file import TruthOfMud, missing_text, truth_in
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
-from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, soft_key, soft_name
+from experiments.walk.measurement import SOFT_DEPTHS_M, WalkTrials, soft_key, soft_name
 from firmware_host.configuration.configuration import Configuration
 
 StrideReport = Mapping[str, Any]  # as the daemon reports it
@@ -75,17 +75,17 @@ class WalkReport:
     left_out: Mapping[str, Entry]
 
 
-def walks_of(plan: Plan, entries: Mapping[str, Entry]) -> list[Entry]:
+def walks_of(plan: WalkTrials, entries: Mapping[str, Entry]) -> list[Entry]:
     return [entries[trial.key] for trial in plan.planned if trial.key in entries and trial.key.startswith("walk/")]
 
 
-def soft_walks_of(plan: Plan, entries: Mapping[str, Entry], mud: str, depth_m: float) -> list[Entry]:
+def soft_walks_of(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, depth_m: float) -> list[Entry]:
     keys = [soft_key(mud, depth_m, number) for number in range(1, plan.trials + 1)]
     return [entries[key] for key in keys if key in entries]
 
 
 def located_strides(
-    plan: Plan, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
+    plan: WalkTrials, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
 ) -> list[ComparedStride]:
     """Locate the strides of the walks over all muds. `truth` of another experiment replaces the bed's own."""
     return [
@@ -97,7 +97,12 @@ def located_strides(
 
 
 def _locate(
-    plan: Plan, walk: Entry, method: str, strides: Sequence[StrideReport], reach_m: float, truth: TruthOfMud | None
+    plan: WalkTrials,
+    walk: Entry,
+    method: str,
+    strides: Sequence[StrideReport],
+    reach_m: float,
+    truth: TruthOfMud | None,
 ) -> Iterator[ComparedStride]:
     for number, stride in enumerate(strides):
         position_m, start_m = stride["place_m"], walk["start_m"]
@@ -110,7 +115,7 @@ def _locate(
         yield ComparedStride(mud, method, stride, compared, trial=walk["trial"], plates_m=plates_m)
 
 
-def soft_strides(plan: Plan, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[ComparedStride]:
+def soft_strides(plan: WalkTrials, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[ComparedStride]:
     """Return the strides in soft muds, without the first of each walk, which starts from a standing body."""
     return [
         ComparedStride(soft_name(mud, depth_m), method, stride, _truth_of(mud, walk, stride, truth))
@@ -130,7 +135,7 @@ def _truth_of(mud: str, walk: Entry, stride: StrideReport, truth: TruthOfMud | N
 
 
 def report_of(
-    plan: Plan,
+    plan: WalkTrials,
     entries: Mapping[str, Entry],
     configuration: Configuration,
     truth: TruthOfMud | None,
@@ -166,7 +171,7 @@ def median_truth(rows: Sequence[ComparedStride]) -> dict[str, float]:
 
 
 def _soft_depths(
-    plan: Plan, entries: Mapping[str, Entry], mud: str, strides: Sequence[ComparedStride]
+    plan: WalkTrials, entries: Mapping[str, Entry], mud: str, strides: Sequence[ComparedStride]
 ) -> list[SoftDepth]:
     """Gather k_s by depth and method, with the load cell's."""
     return [
@@ -199,7 +204,7 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
 
 
 def _findings(
-    plan: Plan, entries: Mapping[str, Entry], certain: Sequence[ComparedStride], soft: Sequence[ComparedStride]
+    plan: WalkTrials, entries: Mapping[str, Entry], certain: Sequence[ComparedStride], soft: Sequence[ComparedStride]
 ) -> list[PaperFinding]:
     """Pair each finding in the paper's text with ours, by its law with a known surface."""
     rows = [
@@ -210,7 +215,7 @@ def _findings(
 
 
 def _soft_findings(
-    plan: Plan, entries: Mapping[str, Entry], mud: str, soft: Sequence[ComparedStride]
+    plan: WalkTrials, entries: Mapping[str, Entry], mud: str, soft: Sequence[ComparedStride]
 ) -> list[PaperFinding]:
     """The paper's load cell measured at 3 cm."""
     at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)

@@ -6,7 +6,7 @@ from pathlib import Path
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.trials.mud_trials import MOST_ATTEMPTS, PlannedTrial
 from experiments.trials.simulated_bed import CarriedBed, simulated_bench
-from experiments.walk.measurement import Plan
+from experiments.walk.measurement import WalkTrials
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
@@ -16,7 +16,7 @@ SOFT_WALK_M, STRIP_M = 2.0, 1000.0  # length for a walk in soft mud, length of e
 SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_error_m:.4g}  # as an operator would see it\n"
 
 
-def walking_bench(folder: Path, plan: Plan, seed: int) -> tuple[LockstepRobot, CarriedBed]:
+def walking_bench(folder: Path, plan: WalkTrials, seed: int) -> tuple[LockstepRobot, CarriedBed]:
     """Make a robot over the plan's muds, named after their water content. Raises ValueError for an unknown mud."""
     lengths_m = [mud.length_m for mud in plan.muds]
     lengths_m[-1] += TAIL_M

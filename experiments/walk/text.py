@@ -1,42 +1,31 @@
-"""The finding of the walks over several muds: sections with tables and pictures, and tables for the screen."""
+"""The tables, figures and explanations of the walks over several muds."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 from experiments.flipper.text import (
-    ERRORS,
+    COMPARISON,
     TRUTHS,
     UNCERTAINTIES,
     coefficient_tables,
     error_paragraphs,
-    remarks_sections,
+    remark_texts,
 )
-from experiments.reports.coefficient_table import error_text_rows, mud_rows
 from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
-from experiments.reports.report_page import Figure, Section
-from experiments.reports.text_tables import TitledRows, text_of_tables
 from experiments.study.notebook import Entry
+from experiments.study.result import Figure, Result, text_table
 from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
-from experiments.trials.mud_trials import SEED, PlannedTrial, open_bench, run_trials
-from experiments.trials.session import Finding, Session
-from experiments.trials.truth_file import TruthOfMud, load_truth
-from experiments.walk.measurement import SOFT_DEPTHS_M, Plan, run
-from experiments.walk.report import SoftMud, WalkReport, located_strides, report_of, soft_walks_of, walks_of
-from experiments.walk.simulation import walking_bench
+from experiments.trials.truth_file import TruthOfMud
+from experiments.walk.measurement import SOFT_DEPTHS_M, WalkTrials
+from experiments.walk.plots import draw_soft, draw_walk_over
+from experiments.walk.report import SoftMud, WalkReport, located_strides, soft_walks_of, walks_of
 from firmware_host.configuration.configuration import Configuration
 
-TRACKWAY_INSTRUCTIONS = (
-    "Torque is off. Re-mix the surface of all muds and level it to its nominal height, and put the robot so that the "
-    "sweep axes are over the beginning of the first mud. Take your hands away: the robot walks next"
-)
-SOFT_INSTRUCTIONS = (
-    "Torque is off. Re-mix and level the soft mud, and put the robot where it has at least 80 cm of it ahead. Take "
-    "your hands away: the robot walks next"
-)
+TRACK = "Coefficients along the track"
 SIMULATED_DRAG = (
     "The drag on the simulated body grows with speed, to more than twice the paper's 2.5 N. So the mud that yields at "
     "3 cm and does not yield at 5 cm is firmer here than the paper's. Part of the difference between these depths is "
@@ -61,61 +50,57 @@ METHODS = (
 FINDINGS = "The paper's findings, and ours by its law below the default method's surface"
 
 
-def run_walk(plan: Plan, session: Session, truth_path: Path | None) -> Finding:
-    """Make the walks and report them. Raises BenchError."""
-    truth = load_truth(truth_path) if truth_path else None
-    bench = open_bench(session, plan.identity, _instructions, partial(walking_bench, session.folder, plan, SEED))
-    configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
-    report = report_of(plan, entries, configuration, truth, bench.notebook.left_out)
-    sections = sections_of(report, plan, entries, configuration, truth)
-    return Finding(report, "The walking robot over several muds", sections, text_of_tables(tables_of(report)), logs)
-
-
-def _instructions(trial: PlannedTrial) -> str:
-    return TRACKWAY_INSTRUCTIONS if trial.key.startswith("walk/") else SOFT_INSTRUCTIONS
-
-
-def sections_of(
+def result_of(
     report: WalkReport,
-    plan: Plan,
+    plan: WalkTrials,
     entries: Mapping[str, Entry],
     configuration: Configuration,
     truth: TruthOfMud | None,
-) -> list[Section]:
-    sections = [_walk_section(report, plan, entries, configuration, truth)]
+    logs: Sequence[Path],
+) -> Result:
+    """Return the tables, figures and explanations of all walks."""
+    findings = [[row.what, row.paper, "-" if row.ours is None else f"{row.ours:.2f}"] for row in report.findings]
     walked = [soft for soft in report.soft if soft.depths]
-    sections += [_soft_section(soft, plan, entries, is_first=soft is walked[0]) for soft in walked]
-    if report.errors:
-        sections.append(Section(ERRORS, METHODS, rows=error_text_rows(report.errors)))
-    sections.append(Section(FINDINGS, rows=finding_rows(report)))
-    return sections + remarks_sections(report.remarks, report.left_out)
+    drag = f"{DRAG_NOT_STRENGTH} {SIMULATED_DRAG}" if plan.simulated else DRAG_NOT_STRENGTH
+    return Result(
+        tables=[
+            *coefficient_tables(report.muds, report.errors, TRACK),
+            text_table("findings", FINDINGS, [["", "paper", "ours"], *findings], "Findings"),
+        ],
+        figures=[
+            *_walk_figures(plan, entries, configuration, truth),
+            *(_soft_figure(soft, plan, entries) for soft in walked),
+        ],
+        summary=report,
+        title="The walking robot over several muds",
+        texts={
+            TRACK: _explanation(report, configuration),
+            **{_soft_section(soft): drag for soft in walked[:1]},  # the first one explains what all have in common
+            COMPARISON: METHODS if report.errors else "",
+        }
+        | remark_texts(report.remarks, report.left_out),
+        logs=logs,
+    )
 
 
-def _walk_section(
-    report: WalkReport,
-    plan: Plan,
-    entries: Mapping[str, Entry],
-    configuration: Configuration,
-    truth: TruthOfMud | None,
-) -> Section:
-    from experiments.walk.plots import plot_walk_over  # matplotlib takes its time
-
+def _walk_figures(
+    plan: WalkTrials, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
+) -> list[Figure]:
     strides = located_strides(plan, entries, configuration, truth)
     caption = (
         "Figure 6 of the paper, trial {}. A: position of the body; at a vertical line the plates first go down past a "
         "border. B, C: forces of the {} flipper. D to F: coefficients by stride; bars are two standard errors, "
         "triangles lower bounds, arrows values beyond the picture, grey dashes the load cell."
     )
-    figures = [
+    return [
         Figure(
             f"figure6_trial{walk['trial']}",
             caption.format(walk["trial"], plan.flipper),
-            partial(plot_walk_over, plan, walk, strides, reach_of(configuration)),
+            partial(draw_walk_over, plan, walk, strides, reach_of(configuration)),
+            TRACK,
         )
         for walk in walks_of(plan, entries)
     ]
-    text = _explanation(report, configuration)
-    return Section("Coefficients along the track", text, rows=mud_rows(report.muds), figures=figures)
 
 
 def _explanation(report: WalkReport, configuration: Configuration) -> str:
@@ -135,26 +120,16 @@ def _explanation(report: WalkReport, configuration: Configuration) -> str:
     return "\n\n".join([*paragraphs, report.missing_truth])
 
 
-def _soft_section(soft: SoftMud, plan: Plan, entries: Mapping[str, Entry], is_first: bool) -> Section:
-    """Make the section of one soft mud; the first one explains what all have in common."""
-    from experiments.walk.plots import plot_soft
+def _soft_section(soft: SoftMud) -> str:
+    return f"Soft mud, {mud_text(soft.mud)}"
 
+
+def _soft_figure(soft: SoftMud, plan: WalkTrials, entries: Mapping[str, Entry]) -> Figure:
     walks = {100.0 * depth_m: soft_walks_of(plan, entries, soft.mud, depth_m) for depth_m in SOFT_DEPTHS_M}
     caption = (
         "Figure 7 of the paper. A: forward force in one stance. B: k_s by method, mean and standard deviation over "
         "strides; hatched: a lower bound. The paper's law is used with the default method's surface, because its own "
         "trigger at 0.5 N finds the surface of soft mud too deep."
     )
-    draw = partial(plot_soft, soft, {depth_cm: made for depth_cm, made in walks.items() if made})
-    text = f"{DRAG_NOT_STRENGTH} {SIMULATED_DRAG}" if plan.simulated else DRAG_NOT_STRENGTH
-    figure = Figure(f"figure7_{file_name(soft.mud)}", caption, draw)
-    return Section(f"Soft mud, {mud_text(soft.mud)}", text if is_first else "", figures=[figure])
-
-
-def tables_of(report: WalkReport) -> list[TitledRows]:
-    return [*coefficient_tables(report.muds, report.errors), (FINDINGS, finding_rows(report))]
-
-
-def finding_rows(report: WalkReport) -> list[list[str]]:
-    rows = [[row.what, row.paper, "-" if row.ours is None else f"{row.ours:.2f}"] for row in report.findings]
-    return [["", "paper", "ours"], *rows]
+    draw = partial(draw_soft, soft, {depth_cm: made for depth_cm, made in walks.items() if made})
+    return Figure(f"figure7_{file_name(soft.mud)}", caption, draw, _soft_section(soft))

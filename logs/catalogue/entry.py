@@ -42,13 +42,17 @@ class LogEntry(NamedTuple):
 
 
 MUDS = "STRUCT(strides INTEGER, k_p DOUBLE, k_s DOUBLE, k_e DOUBLE, speed_m_s DOUBLE)[]"
-COLUMNS = {  # name -> type in SQL
-    "file": "VARCHAR", "state": "VARCHAR", "reason": "VARCHAR", "bytes": "BIGINT", "changed_ns": "BIGINT",
-    "run": "VARCHAR", "segment": "INTEGER", "robot": "VARCHAR", "started": "TIMESTAMP", "duration_s": "DOUBLE",
-    "walks": "INTEGER", "strides": "INTEGER", "stuck_strides": "INTEGER", "distance_m": "DOUBLE", "speed_m_s": "DOUBLE",
-    "muds": MUDS, "faults": "VARCHAR[]", "recovered": "BOOLEAN", "configuration_sha256": "VARCHAR",
-    "version": "VARCHAR", "commit": "VARCHAR",
-}  # fmt: skip
+SQL_TYPES: dict[Any, str] = {
+    str: "VARCHAR",
+    int: "BIGINT",
+    int | None: "INTEGER",
+    float | None: "DOUBLE",
+    datetime | None: "TIMESTAMP",
+    bool: "BOOLEAN",
+    tuple[MudEntry, ...]: MUDS,
+    tuple[str, ...]: "VARCHAR[]",
+}
+COLUMNS = {name: SQL_TYPES[kind] for name, kind in LogEntry.__annotations__.items()}  # name -> type in SQL
 
 
 TRIALS = "trials.parquet"  # the results of a campaign, which have the same columns and more

@@ -10,7 +10,8 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.walk import measurement
+from experiments.studies import walk
+from experiments.walk.measurement import WalkTrials
 
 FLIPPER = ["experiment", "flipper", "--simulated", "--mud", "49.5", "--trials", "1"]
 WALK = ["experiment", "walk", "--simulated", "--mud", "51.2=20", "--trials", "1", "--soft", "51.2"]
@@ -56,7 +57,7 @@ def test_another_depth_is_another_experiment(first: int, folder: Path, capsys: p
 def test_a_walk_reads_the_flippers_summary_as_its_truth(
     first: int, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(measurement, "Plan", partial(measurement.Plan, soft_strides=2))
+    monkeypatch.setattr(walk, "WalkTrials", partial(WalkTrials, soft_strides=2))
     assert main([*WALK, "--truth", str(folder / "summary.json"), "--out", str(tmp_path)]) == exit_codes.OK
     assert {"report.html", "summary.json", "figure6_trial1.png", "figure7_51.2.png"} <= names(tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())

@@ -9,6 +9,7 @@ import pytest
 
 from command_line import exit_codes
 from command_line.experiments import conduct as bench
+from command_line.experiments import studies
 from command_line.main import main
 from command_line.operation import operation
 from command_line.screen import coefficient
@@ -82,9 +83,8 @@ def test_a_file_that_is_not_toml_is_refused_by_name_and_line(
 def test_without_a_configuration_a_folder_of_logs_has_to_be_named(
     command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for module in ("command_line.options.shared", "command_line.logs.catalogue_commands"):
-        monkeypatch.setattr(f"{module}.DEFAULT_CONFIG", "/none/mudskipper.toml")
-    assert "name the folder" in refusal(capsys, "log", command)
+    monkeypatch.setattr("command_line.logs.catalogue_commands.DEFAULT_CONFIG", "/none/robot.toml")
+    assert "name the folder" in refusal(capsys, "log", command, "--config", "/none/robot.toml")
 
 
 def test_unknown_arguments_are_refused_with_the_usage_of_their_command(capsys: pytest.CaptureFixture[str]) -> None:
@@ -137,11 +137,12 @@ def test_a_wrong_value_of_an_option_is_refused_by_that_value(
     assert said in refusal(capsys, "experiment", *arguments)
 
 
-@pytest.mark.parametrize("experiment", ["flipper", "walk", "trackway"])
+@pytest.mark.parametrize("experiment", ["walk", "trackway", "actuator"])
 def test_without_matplotlib_no_experiment_begins(
     experiment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(bench, "find_spec", lambda name: None)
+    for module in (bench, studies):
+        monkeypatch.setattr(module, "find_spec", lambda name: None)
     arguments = ("experiment", experiment, "--simulated", "--out", str(tmp_path / "none"))
     assert "extra 'plots'" in failure(capsys, *arguments)
     assert not (tmp_path / "none").exists()

@@ -17,7 +17,6 @@ from control.modes import ENERGISED, Mode, Request
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.recorder import NullRecorder
 from simulation.harness.world import World
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE
@@ -26,6 +25,7 @@ from simulation.mud.track import Track
 from tests.copied_robots import copy_of
 from tests.dst.scenario import Surroundings
 from tests.folders import ROOT
+from verification.behaviour import RowList
 from verification.faults.failing_robot import FailingRobot
 
 TRACK_M, STONE_LENGTH_M, STONE_TOP_M = 5.0, 0.2, 0.02
@@ -40,22 +40,11 @@ STARTS = ("power-on", "idle", "hold", "path", *PHASES)  # in the order in which 
 STUCK_PA, STUCK_M = 9000.0, 0.05  # mud and depth in which most extractions leave the flippers stuck
 
 
-class Rows(NullRecorder):
-    """A recording that owns the rows themselves, so that a copied robot has the rows of the walk before."""
-
-    def __init__(self) -> None:
-        self.rows: list[tuple[int, bytes]] = []
-
-    def put(self, number: int, row: bytes) -> bool:
-        self.rows.append((number, row))
-        return True
-
-
 class RecordedRobot(FailingRobot):
     """A robot that also owns the rows of its log, and the numbers of its ticks with and without torque."""
 
     def __init__(self, configuration: Configuration, world: World, seed: int) -> None:
-        self.rows = Rows()
+        self.rows = RowList()
         self.energised_ticks: list[int] = []
         self.resting_ticks: list[int] = []
         super().__init__(

@@ -18,7 +18,7 @@ from drivers.fault_injection.failures import Failures
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import arm, ask_to_clear_faults, leave, move, rest, walk
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import AutomaticOperator
+from experiments.study.prompt import AutomaticOperator
 from logs.files.log_reader import read_log
 from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep

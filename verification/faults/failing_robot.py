@@ -128,7 +128,7 @@ class CountingRecorder(NullRecorder):
     def __init__(self) -> None:
         self.ticks = 0
         self.texts: list[str] = []
-        self.reported = HEALTHY
+        self.reported = HEALTHY  # by the log's writer
 
     def report(self) -> LogReport:
         return self.reported

@@ -10,7 +10,6 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.actuator import run as actuator_run
 from experiments.actuator.configuration_change import apply_fits, find_target
 from experiments.actuator.fit import fit_joint
 from experiments.actuator.friction import QUICK, SLOW
@@ -18,9 +17,10 @@ from experiments.actuator.plan import Plan
 from experiments.actuator.simulation import COULOMB_NM, TRUE_CONSTANT_NM_A
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import AutomaticOperator
+from experiments.studies import actuator
 from experiments.study.notebook import Notebook
-from experiments.trials.session import Ending, Session
+from experiments.study.prompt import AutomaticOperator
+from experiments.study.session import Ending, Session
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
@@ -104,7 +104,7 @@ def test_an_operator_at_a_terminal_is_prompted_and_may_skip_weights(
     configuration = simulated_configuration()
     recorder = FileRecorder(tmp_path / "robot.mcap", configuration)
     robot = LockstepRobot(Lockstep(configuration, paper_track(), 1, recorder), recorder)
-    monkeypatch.setattr(actuator_run, "DaemonRobot", lambda socket: robot)
+    monkeypatch.setattr(actuator, "DaemonRobot", lambda socket: robot)
     command = ["experiment", "actuator", "--joint", "right_adduction", "--weights", "10,20", "--trials", "1"]
     with typed(monkeypatch, "\n\n\ns\ns\ns\n\n"):
         assert main([*command, "--out", str(tmp_path)]) == exit_codes.OK
@@ -143,7 +143,7 @@ def test_only_the_file_that_the_daemon_runs_with_is_changed(tmp_path: Path, exam
     path = tmp_path / "other.toml"
     path.write_text(example_text + "# edited\n", encoding="utf-8")
     with pytest.raises(BenchError, match=r"the daemon does not run with .*other.toml"):
-        find_target(path, example_text, make_session(tmp_path, []), simulated=False)
+        find_target(path, example_text, make_session(tmp_path, []))
 
 
 def test_a_file_that_may_not_be_written_is_refused_before_the_work(
@@ -151,10 +151,10 @@ def test_a_file_that_may_not_be_written_is_refused_before_the_work(
 ) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(example_text, encoding="utf-8")
-    assert find_target(path, example_text, make_session(tmp_path, []), simulated=False) == path
+    assert find_target(path, example_text, make_session(tmp_path, [])) == path
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(BenchError, match="you may not write"):
-        find_target(path, example_text, make_session(tmp_path, []), simulated=False)
+        find_target(path, example_text, make_session(tmp_path, []))
 
 
 def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, example_text: str) -> None:

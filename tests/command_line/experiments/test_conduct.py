@@ -1,7 +1,5 @@
 """Conducting an experiment: prompts on the terminal, the report, and how each ending is reported."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -10,17 +8,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from errno import ENOSPC
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Annotated
 
 import pytest
+from pandas import DataFrame
 
 from command_line import exit_codes
-from command_line.experiments.conduct import conduct, conduct_bench
+from command_line.experiments import studies
 from command_line.experiments.terminal_prompt import TerminalPrompt
-from experiments.reports.report_page import Section
 from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
 from experiments.study import provenance
 from experiments.study.notebook import NAME, Notebook
-from experiments.trials.session import Finding, Session, Show
+from experiments.study.option import Option
+from experiments.study.result import Result, Table
+from experiments.study.session import Session
 
 STUDY = "experiments.reports.value_text"  # any module of the product
 ANSWERS = {"": "it hangs", "s": "skip it", "r": "the last one again"}
@@ -93,31 +95,43 @@ def test_the_end_of_the_input_is_reported(monkeypatch: pytest.MonkeyPatch) -> No
         TerminalPrompt().ask("Well?", ANSWERS, nothing)
 
 
-def options(folder: Path, **changes: object) -> argparse.Namespace:
+def options(folder: Path | None, **changes: object) -> argparse.Namespace:
     return argparse.Namespace(
         **({"out": folder, "restart": False, "json": False, "simulated": True, "name": "walk"} | changes)
     )
 
 
-def found(session: Session) -> Finding:
+def conduct(options: argparse.Namespace, run: Callable[[Session], Result]) -> int:
+    """Run an experiment in place of the one that the options name."""
+
+    def study(session: Session, *, trials: Annotated[int, Option("of each")] = 1) -> Result:
+        return run(session)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(studies, "load_study", lambda name: SimpleNamespace(__name__=STUDY, study=study))
+        return studies.run_study(options)
+
+
+def found(session: Session) -> Result:
     session.operator.report(session.operator.ask("Well?", ANSWERS, nothing) or "it hangs")
-    return Finding({"experiment": "trial", "value": 1.0}, "A trial", [Section("Result", "Fine.")], "value 1.0")
+    table = Table("values", "A table", {}, DataFrame({"value": [1.0]}))
+    return Result([table], summary={"value": 1.0}, title="A trial")
 
 
 def test_it_ends_in_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert conduct_bench(options(tmp_path / "out"), "trials", found, STUDY) == exit_codes.OK
+    assert conduct(options(tmp_path / "out"), found) == exit_codes.OK
     said = capsys.readouterr()
-    assert said.out == "value 1.0\n" and "report.html" in said.err
+    assert said.out == "A table\nvalue\n1\n" and "report.html" in said.err
     assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["value"] == 1.0
 
 
 def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def run(session: Session) -> Finding:
+    def run(session: Session) -> Result:
         session.show(1, 2)
         session.operator.report("half of it")
         return found(session)
 
-    conduct_bench(options(tmp_path, json=True), "trials", run, STUDY)
+    conduct(options(tmp_path, json=True), run)
     said = capsys.readouterr()
     report = json.loads(said.out)
     assert report["schema"] == "experiment-walk/1" and report["value"] == 1.0 and report["simulated"] is True
@@ -128,17 +142,17 @@ def test_json_alone_goes_to_standard_output(tmp_path: Path, capsys: pytest.Captu
 def test_without_a_folder_each_run_makes_one_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("mudskipper-walk", "mudskipper-walk-2", "mudskipper-walk-3"):
-        assert conduct_bench(options(tmp_path, out=None), "trials", found, STUDY) == exit_codes.OK
+        assert conduct(options(tmp_path, out=None), found) == exit_codes.OK
         assert (tmp_path / name / "report.html").exists()
 
 
 def test_a_new_folder_in_which_nothing_was_measured_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def run(session: Session) -> Finding:
+    def run(session: Session) -> Result:
         Notebook(session.folder, {})
         raise DaemonLostError("no daemon answers")
 
     monkeypatch.chdir(tmp_path)
-    assert conduct_bench(options(tmp_path, out=None), "trials", run, STUDY) == exit_codes.NO_DAEMON
+    assert conduct(options(tmp_path, out=None), run) == exit_codes.NO_DAEMON
     assert not list(tmp_path.iterdir())
 
 
@@ -154,49 +168,49 @@ def test_a_new_folder_in_which_nothing_was_measured_goes(tmp_path: Path, monkeyp
 def test_measurements_remain_however_the_experiment_ends(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], problem: BaseException, status: int, message: str
 ) -> None:
-    def run(session: Session) -> Finding:
+    def run(session: Session) -> Result:
         Notebook(session.folder, {}).write("10 g", {"torque_nm": 0.1})
         raise problem
 
-    assert conduct_bench(options(tmp_path), "trials", run, STUDY) == status
+    assert conduct(options(tmp_path), run) == status
     said = capsys.readouterr().err
     assert message in said and "the same command" in said
     assert Notebook(tmp_path, {}).entries
 
 
 def test_without_a_measurement_no_result_is_announced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def run(session: Session) -> Finding:
+    def run(session: Session) -> Result:
         Notebook(session.folder, {})
         raise DaemonLostError("no daemon answers")
 
-    assert conduct_bench(options(tmp_path), "trials", run, STUDY) == exit_codes.NO_DAEMON
+    assert conduct(options(tmp_path), run) == exit_codes.NO_DAEMON
     assert capsys.readouterr().err.strip().endswith("no daemon answers")
 
 
 def test_another_plan_is_refused_without_advice_to_continue(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Notebook(tmp_path, {"depth_m": 0.03}).write("one", {})
 
-    def run(session: Session) -> Finding:
+    def run(session: Session) -> Result:
         Notebook(session.folder, {"depth_m": 0.05})
         raise AssertionError("it is refused")
 
-    assert conduct_bench(options(tmp_path), "trials", run, STUDY) == exit_codes.REFUSED
+    assert conduct(options(tmp_path), run) == exit_codes.REFUSED
     assert "the same command" not in capsys.readouterr().err
 
 
 # finished, continued, begun again
 
 
-def measured_by(trials: int, calls: list[int]) -> Callable[[Session], Finding]:
+def measured_by(trials: int, calls: list[int]) -> Callable[[Session], Result]:
     """Return an experiment that measures what is missing, under the session's version and sources."""
 
-    def run(session: Session) -> Finding:
+    def run(session: Session) -> Result:
         notebook = Notebook(session.folder, {"depth_m": 0.03, **session.program})
         for number in range(trials):
             if str(number) not in notebook.entries:
                 calls.append(number)
                 notebook.write(str(number), {})
-        return Finding({"experiment": "walk", "trials": trials}, "Trials", [], "")
+        return Result(summary={"trials": trials})
 
     return run
 
@@ -207,7 +221,7 @@ def test_a_finished_experiment_is_refused_and_with_more_trials_it_continues(
     calls = list[int]()
 
     def conduct_with(trials: int) -> int:
-        return conduct_bench(options(tmp_path, trials=trials), "trials", measured_by(trials, calls), STUDY)
+        return conduct(options(tmp_path, trials=trials), measured_by(trials, calls))
 
     assert conduct_with(2) == exit_codes.OK
     finished = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
@@ -226,7 +240,7 @@ def test_another_version_and_other_sources_are_refused_and_the_same_continue(
 ) -> None:
     def continued() -> int:
         (tmp_path / "report.html").unlink(missing_ok=True)  # an experiment that is not finished
-        return conduct_bench(options(tmp_path), "trials", measured_by(1, []), STUDY)
+        return conduct(options(tmp_path), measured_by(1, []))
 
     assert continued() == continued() == exit_codes.OK
     before = (tmp_path / NAME).read_bytes()
@@ -243,7 +257,7 @@ def test_another_version_and_other_sources_are_refused_and_the_same_continue(
 def test_restart_begins_again_and_keeps_the_earlier_results(tmp_path: Path) -> None:
     calls, folder = list[int](), tmp_path / "out"
     for names in (["out"], ["out", "out-old"], ["out", "out-old", "out-old-2"]):
-        assert conduct_bench(options(folder, restart=True), "trials", measured_by(1, calls), STUDY) == exit_codes.OK
+        assert conduct(options(folder, restart=True), measured_by(1, calls)) == exit_codes.OK
         assert sorted(each.name for each in tmp_path.iterdir()) == names
         assert all((tmp_path / name / "report.html").exists() and (tmp_path / name / NAME).exists() for name in names)
     assert calls == [0, 0, 0]
@@ -254,21 +268,6 @@ def test_restart_in_the_working_directory_leaves_its_results(tmp_path: Path, mon
     folder.mkdir()
     monkeypatch.chdir(folder)
     for _ in range(2):
-        status = conduct_bench(options(Path(), restart=True), "trials", measured_by(1, calls), STUDY)
+        status = conduct(options(Path(), restart=True), measured_by(1, calls))
         assert status == exit_codes.OK
     assert calls == [0, 0] and (tmp_path / "out-old" / NAME).exists() and (folder / NAME).exists()
-
-
-def test_a_computed_experiment_is_not_repeated_over_its_report(tmp_path: Path) -> None:
-    def run(show: Show) -> Finding:
-        return Finding({"experiment": "walk"}, "Computed", [], "")
-
-    for changes, status in (
-        ({}, exit_codes.OK),
-        ({}, exit_codes.REFUSED),
-        ({"seeds": 2}, exit_codes.REFUSED),
-        ({"restart": True}, exit_codes.OK),
-        ({"name": "sweep"}, exit_codes.REFUSED),
-    ):
-        assert conduct(options(tmp_path / "out", **changes), "walks", run, STUDY) == status
-    assert (tmp_path / "out-old" / "report.html").exists()

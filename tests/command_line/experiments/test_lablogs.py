@@ -21,6 +21,13 @@ REPEATABILITY = {"first_cv", "later_cv", "chi", "n", "values", "bounds", "invali
 measured = pytest.mark.skipif(not LOGS.is_dir(), reason="the shared measurements are not next to the repository")
 
 
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Results without --out go to a folder of the test."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+
+
 def test_folders_patterns_and_groups_that_lead_nowhere_are_refused(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -93,5 +100,6 @@ def test_disturbances_are_reported_for_each_coefficient(report: Any) -> None:
 
 @measured
 def test_the_folder_has_a_page_and_figures(written: Path) -> None:
-    figures = {f"{name}.png" for name in ("strokes", "scatter", "left_right", "sensitivity")}
+    names = ("strokes", "scatter", "left_right", "sensitivity")
+    figures = {f"{name}.{ending}" for name in names for ending in ("png", "svg", "pdf")}
     assert {path.name for path in written.iterdir()} == {"report.html", "summary.json", *figures}

@@ -203,3 +203,9 @@ def test_a_wrong_option_is_refused(wrong: str) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["init", "-", wrong])
     assert ended.value.code == exit_codes.USAGE
+
+
+def test_the_file_has_a_default_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init"]) == exit_codes.OK
+    assert [path.name for path in tmp_path.iterdir()] == ["mudskipper.toml"]

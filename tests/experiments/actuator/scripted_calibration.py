@@ -14,8 +14,8 @@ from experiments.actuator.plan import Plan, Step
 from experiments.actuator.reading import MovedError, Reading, Side
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.prompt import GO_ON
 from experiments.study.notebook import Notebook
+from experiments.study.prompt import GO_ON
 from firmware_host.configuration.configuration import Configuration
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from experiments.actuator.bench import FALLS, RobotBench
 from experiments.actuator.plan import Plan
-from experiments.actuator.run import FALLS, RobotBench
 from experiments.robot.bench_errors import BenchError, DaemonLostError, RobotInUseError
 from experiments.robot.bench_robot import ALONE
+from experiments.study.session import Session
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
 
@@ -59,10 +60,14 @@ class Holding(ScriptedOperator):
         return super().ask(question, answers, meanwhile)
 
 
+def bench_of(robot: HoldingRobot, operator: ScriptedOperator, folder: Path) -> RobotBench:
+    return RobotBench(robot, Session(folder, operator, lambda done, total: None))
+
+
 def test_weights_are_taken_off_before_an_interrupted_calibration_disarms(tmp_path: Path) -> None:
     robot = HoldingRobot()
     operator = Holding(robot)
-    RobotBench(robot).leave(tmp_path, operator)
+    bench_of(robot, operator, tmp_path).leave()
     assert len(operator.asked) == 1 and operator.asked[0].endswith(HOLD_IT)
     assert robot.mode == "idle" and robot.closed
 
@@ -70,7 +75,7 @@ def test_weights_are_taken_off_before_an_interrupted_calibration_disarms(tmp_pat
 def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), Impatient()
     with pytest.raises(KeyboardInterrupt):
-        RobotBench(robot).leave(tmp_path, operator)
+        bench_of(robot, operator, tmp_path).leave()
     assert len(operator.asked) == 1
     assert robot.mode == "idle" and robot.closed
 
@@ -78,14 +83,14 @@ def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None
 def test_an_idle_robot_makes_no_prompt(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), ScriptedOperator()
     robot.mode = "idle"
-    RobotBench(robot).leave(tmp_path, operator)
+    bench_of(robot, operator, tmp_path).leave()
     assert not operator.asked and robot.closed
 
 
 def test_the_torque_of_a_robot_that_was_taken_over_stays_on(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(RobotInUseError("taken over: uid 1")), ScriptedOperator()
     with pytest.raises(RobotInUseError):
-        RobotBench(robot).leave(tmp_path, operator)
+        bench_of(robot, operator, tmp_path).leave()
     assert not operator.asked and robot.mode == "hold" and robot.closed
     assert operator.reported == ["another program operates the robot now: it is left as it is"]
 
@@ -93,20 +98,16 @@ def test_the_torque_of_a_robot_that_was_taken_over_stays_on(tmp_path: Path) -> N
 def test_a_lost_daemon_is_reported_once(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(DaemonLostError("the daemon is gone")), ScriptedOperator()
     with pytest.raises(DaemonLostError):
-        RobotBench(robot).leave(tmp_path, operator)
+        bench_of(robot, operator, tmp_path).leave()
     assert operator.reported == [ALONE] and not operator.asked
 
 
-def test_the_operator_is_warned_of_falling_weights_before_a_joint_is_mounted(tmp_path: Path) -> None:
+def test_torque_goes_off_and_the_operator_is_warned_before_a_joint_is_mounted(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(), Impatient()
+    with pytest.raises(KeyboardInterrupt):
+        bench_of(robot, operator, tmp_path).calibrate(PLAN)
+    assert operator.asked == [f"The robot holds its pose. {HOLD_IT}"]
     robot.mode = "idle"
     with pytest.raises(KeyboardInterrupt):
-        RobotBench(robot).calibrate(PLAN, tmp_path, operator, lambda done, total: None)
-    assert operator.reported == [FALLS] and "Mount the robot" in operator.asked[0]
-
-
-def test_torque_goes_off_before_a_joint_is_mounted(tmp_path: Path) -> None:
-    robot, operator = HoldingRobot(), Impatient()
-    with pytest.raises(KeyboardInterrupt):
-        RobotBench(robot).calibrate(PLAN, tmp_path, operator, lambda done, total: None)
-    assert operator.asked == [f"The robot holds its pose. {HOLD_IT}"]
+        bench_of(robot, operator, tmp_path).calibrate(PLAN)
+    assert operator.reported == [FALLS] and "Mount the robot" in operator.asked[1]

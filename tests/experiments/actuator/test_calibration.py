@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,7 +13,7 @@ from experiments.actuator.plan import Step, steps_of
 from experiments.actuator.reading import MovedError
 from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import LEAVE
-from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.study.prompt import GO_ON, REDO
 from tests.experiments.actuator.scripted_calibration import LOOP, PLAN, Case, ScriptedJoint, say
 
 
@@ -58,20 +57,10 @@ def test_an_arm_that_does_not_swing_costs_its_friction_alone(case: Case, monkeyp
     assert sum("friction was not measured" in reported for reported in case.operator.reported) == PLAN.trials + 1
 
 
-def test_a_skipped_weight_is_noted_and_not_read(case: Case) -> None:
-    case.on(Step(1, 200.0), say(SKIP))
-    assert case.run()[Step(1, 200.0).key] == {"skipped": "on request"}
-
-
 def test_the_one_before_is_read_again_when_asked(case: Case) -> None:
     case.on(Step(1, 200.0), say(REDO))
     assert list(case.run()) == [KEYS[0], *KEYS[1:]]
     assert case.hand.asked[:5] == [KEYS[0], KEYS[1], KEYS[2], KEYS[1], KEYS[2]]
-
-
-def test_there_is_nothing_before_the_first(case: Case) -> None:
-    case.on(Step(0, 0.0), say(REDO))
-    assert len(case.run()) == len(KEYS)
 
 
 def test_an_interrupted_calibration_continues(case: Case) -> None:
@@ -84,25 +73,6 @@ def test_an_interrupted_calibration_continues(case: Case) -> None:
     case.hand.asked.clear()
     entries = case.run()
     assert case.hand.asked == KEYS[3:] and sorted(entries) == sorted(KEYS)
-
-
-def test_a_lost_daemon_ends_the_calibration_and_costs_no_reading(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    def gone(method: str, **params: Any) -> Any:
-        raise BenchError("the daemon on /run/x does not answer")
-
-    def vanish() -> str:
-        monkeypatch.setattr(case.robot, "call", gone)
-        raise BenchError("no answer")
-
-    case.on(Step(1, 200.0), vanish)
-    with pytest.raises(BenchError, match="does not answer"):
-        case.run()
-    monkeypatch.undo()
-    monkeypatch.setattr(actuator, "HeldJoint", ScriptedJoint)
-    monkeypatch.setattr(actuator, "swing_arm", lambda held: [LOOP])
-    case.hand.asked.clear()
-    case.run()
-    assert case.hand.asked == KEYS[2:]
 
 
 def test_a_robot_that_lets_go_is_reported_and_armed_and_the_weight_read_again(case: Case) -> None:
@@ -184,12 +154,6 @@ def test_a_mismatched_reading_is_repeated_or_kept_as_doubtful(case: Case) -> Non
     case.on(Step(2, 400.0), case.hanging(0.0), case.hanging(0.0))
     entry = case.run()[Step(2, 400.0).key]
     assert "slip off" in entry["doubt"] and len(case.operator.asked) == 2
-
-
-def test_pressing_enter_only_comes_to_an_end(case: Case) -> None:
-    case.on(Step(2, 400.0), *[case.hanging(0.0)] * 9)
-    assert "slip off" in case.run()[Step(2, 400.0).key]["doubt"]
-    case.on(Step(2, 400.0))
 
 
 def test_a_reading_that_moved_is_reported_and_repeated(case: Case) -> None:

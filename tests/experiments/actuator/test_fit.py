@@ -51,13 +51,9 @@ def made_loop(random: Random, quick: bool) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_line_is_that_of_an_independent_fit(sign: float) -> None:
-    entries = make_entries(sign=sign)
-    fit = fit_joint("right_sweep", PLAN, entries, 0.083)
+def test_the_constant_does_not_depend_on_the_sign_of_the_current(sign: float) -> None:
+    fit = fit_joint("right_sweep", PLAN, make_entries(sign=sign), 0.083)
     assert fit is not None and fit.direction == -sign
-    x = np.array([load.torque_nm for load in fit.loads])
-    y = np.array([load.current_a for load in fit.loads])
-    assert (fit.line.slope_a_nm, fit.line.intercept_a) == pytest.approx(tuple(np.polyfit(x, y, 1)), rel=1e-9)
     assert fit.line.constant_nm_a == pytest.approx(TRUE_NM_A, rel=0.01)
 
 
@@ -67,13 +63,13 @@ def within_two(reported: list[tuple[float, float]]) -> float:
 
 
 def test_the_errors_contain_scatter_lever_weights_and_friction_at_rest() -> None:
-    """Each of 400 benches has a lever and weights drawn uniformly within their tolerances.
+    """Each of 250 benches has a lever and weights drawn uniformly within their tolerances.
 
     An unknown part of the friction that is missing under a weight shifts each bench's currents, in either direction.
     """
     random, plan = Random(4), replace(PLAN, lever_tolerance_m=0.002, weight_tolerance=0.005)
     constants, offsets, dry, viscous = (list[tuple[float, float]]() for _ in range(4))
-    for seed in range(400):
+    for seed in range(250):
         lever = 1.0 + random.uniform(-1.0, 1.0) * plan.lever_tolerance_m / plan.lever_m
         truth = lever * (1.0 + random.uniform(-1.0, 1.0) * plan.weight_tolerance)
         entries = make_entries(plan, seed=seed, truth=truth, hidden=random.uniform(-1.0, 1.0))
@@ -86,16 +82,6 @@ def test_the_errors_contain_scatter_lever_weights_and_friction_at_rest() -> None
     assert 0.93 < within_two(constants) <= 1.0
     assert 0.93 < within_two(offsets) <= 1.0
     assert 0.93 < within_two(dry) < 0.98 and 0.93 < within_two(viscous) < 0.98
-
-
-def test_a_millimetre_of_lever_is_in_the_error_of_the_constant() -> None:
-    fits = [
-        fit_joint("right_sweep", replace(PLAN, lever_tolerance_m=lever_m, weight_tolerance=0.0), make_entries(), 0.083)
-        for lever_m in (0.0, 0.001)
-    ]
-    exact, coarse = (fit.constant_error_nm_a / fit.constant_nm_a for fit in fits if fit)
-    assert fits[0] is not None and exact == pytest.approx(fits[0].line.constant_error_nm_a / fits[0].constant_nm_a)
-    assert coarse**2 - exact**2 == pytest.approx((0.001 / 0.12) ** 2 / 3.0)
 
 
 def test_a_wrong_constant_shows_in_the_error_and_the_fitted_one_does_not() -> None:
@@ -141,16 +127,6 @@ def test_repeatability_is_the_mean_relative_deviation_over_the_trials() -> None:
     assert isnan(repeatability(loads[:3]))
 
 
-def test_friction_is_that_of_the_loops_with_the_error_of_the_constant() -> None:
-    fit = fit_joint("right_sweep", PLAN, make_entries(), 0.083)
-    assert fit is not None and len(fit.loops) == 4 * (PLAN.trials + 1)
-    dry_nm, error_nm = fit.friction_nm
-    assert dry_nm == pytest.approx(fit.friction.dry_a * fit.constant_nm_a)
-    of_constant_nm = fit.friction.dry_a * fit.constant_error_nm_a
-    assert error_nm**2 == pytest.approx((fit.friction.dry_error_a * fit.constant_nm_a) ** 2 + of_constant_nm**2)
-    assert fit.rest_friction_a == pytest.approx(REST_A, abs=0.02)
-
-
 def test_a_reading_kept_as_doubtful_is_not_fitted() -> None:
     entries = make_entries(noise_a=0.0)
     entries[Step(1, 800.0).key] |= {"current_a": 3.0, "doubt": "the motor holds 180 g"}
@@ -191,6 +167,6 @@ def test_line_and_errors_are_those_of_statsmodels() -> None:
 @pytest.mark.parametrize(("trials", "low"), [(1, 0.9), (2, 0.92), (5, 0.92)])
 def test_two_errors_contain_the_truth_in_nineteen_of_twenty(trials: int, low: float) -> None:
     random, x = Random(2), TORQUES_NM * trials
-    lines = [fit_line(x, make_currents(x, random)) for _ in range(600)]
+    lines = [fit_line(x, make_currents(x, random)) for _ in range(400)]
     assert low < np.mean([abs(line.slope_a_nm - SLOPE) < 2.0 * line.slope_error for line in lines]) < 0.98
     assert low < np.mean([abs(line.intercept_a - INTERCEPT) < 2.0 * line.intercept_error for line in lines]) < 0.99

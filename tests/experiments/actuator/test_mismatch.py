@@ -32,10 +32,10 @@ def test_the_weight_that_was_asked_for_matches(weight_g: float, trial: int, sign
 
 
 @pytest.mark.parametrize("trial", [1, 2])
-@pytest.mark.parametrize("other_g", PAPER_WEIGHTS_G)
-@pytest.mark.parametrize("weight_g", PAPER_WEIGHTS_G)
+@pytest.mark.parametrize("other_g", PAPER_WEIGHTS_G[::2])
+@pytest.mark.parametrize("weight_g", PAPER_WEIGHTS_G[1::2])
 def test_another_weight_of_the_list_is_named(weight_g: float, other_g: float, trial: int) -> None:
-    if weight_g == other_g or {weight_g, other_g} == {10.0, 20.0}:
+    if {weight_g, other_g} == {10.0, 20.0}:
         return  # friction may be as large as the difference
     step = Step(trial, weight_g)
     mismatch = find_mismatch(PLAN, before(step), step, current_a(other_g), CONFIGURED_NM_A)

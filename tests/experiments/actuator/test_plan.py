@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from control.records import Rig
-from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step, in_turn, require_possible, stays_cool, steps_of
+from experiments.actuator.plan import Plan, require_possible, stays_cool, steps_of
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import simulated_configuration
@@ -23,19 +23,6 @@ def test_passes_lie_between_readings_of_the_empty_arm_and_only_the_first_rises()
         (3, 400.0), (3, 10.0), (3, 50.0), (3, 0.0),
     ]  # fmt: skip
     assert len({step.key for step in steps}) == len(steps)
-
-
-def test_heavy_and_light_come_in_turn() -> None:
-    assert in_turn(PAPER_WEIGHTS_G) == [800.0, 10.0, 600.0, 20.0, 400.0, 50.0, 200.0, 100.0]
-
-
-def test_the_torque_is_that_of_the_lever() -> None:
-    assert Plan((), lever_m=0.115).torque_nm(800.0) == pytest.approx(0.9025, abs=1e-4)
-    assert Step(3, 0.0).key == "trial 3, 0 g"
-
-
-def test_the_simulated_bench_can_hold_the_paper_s_weights() -> None:
-    require_possible(Plan(("right_sweep", "right_adduction")), bench_configuration())
 
 
 def test_a_weight_beyond_the_torque_limit_is_refused_with_key_value_and_bound(configuration: Configuration) -> None:

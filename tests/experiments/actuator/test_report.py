@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from math import isnan
-
 from experiments.actuator.fit import JointFit, fit_joint
-from experiments.actuator.report import constant_rows, make_report, make_sections
+from experiments.actuator.report import make_result
+from experiments.study.result import Result
 from tests.experiments.actuator.test_fit import PLAN, Entries, make_entries
 
 
-def make_fit(entries: Entries) -> JointFit:
+def make(entries: Entries) -> tuple[JointFit, Result]:
     fit = fit_joint("right_sweep", PLAN, entries, 0.083)
     assert fit is not None
-    return fit
+    return fit, make_result(PLAN, {"right_sweep": entries}, [fit], None, simulated=False)
 
 
 def test_the_papers_numbers_are_below_those_of_the_same_definition() -> None:
-    fit = make_fit(make_entries())
-    head, ours, _, paper = constant_rows([fit])
-    column = head.index("RMSE (N·m)")
-    assert ours[column] == f"{fit.rmse_configured_nm:.4f}" and paper[column] == "0.0127"
-    assert paper[head.index("RMSE fitted (N·m)")] == "-" and paper[head.index("repeatability")] == "3.2 %"
-    assert {len(row) for row in constant_rows([fit])} == {len(head)}
+    fit, result = make(make_entries())
+    ours, _, paper = result.tables[0].rows.to_dict("records")
+    assert ours["RMSE"] == f"{fit.rmse_configured_nm:.4f}" and paper["RMSE"] == "0.0127"
+    assert paper["RMSE fitted"] == "-" and paper["repeatability"] == "3.2 %"
+    titles = [axis.get_title() for figure in result.figures for axis in figure.draw().axes]
+    assert titles == ["right sweep"] * 2
 
 
 def test_without_loops_there_is_a_report_without_friction() -> None:
     entries = make_entries()
     for entry in entries.values():
         entry.pop("loops", None)
-    fit = make_fit(entries)
-    _, friction, *_ = make_sections(PLAN, {"right_sweep": entries}, [fit])
-    assert friction.heading == "Friction and offset" and not friction.figures
-    assert friction.rows[1][1:3] == ["-", "-"]
-    assert isnan(make_report(PLAN, {"right_sweep": entries}, [fit]).joints[0]["friction_nm"])
+    _, result = make(entries)
+    assert [figure.name for figure in result.figures] == ["torques"]
+    (friction,) = result.tables[1].rows.to_dict("records")
+    assert (friction["dry friction"], friction["viscous"]) == ("-", "-")
+    assert result.json()["joints"][0]["friction_nm"] is None

@@ -15,16 +15,14 @@ import pytest
 from control.records import JOINTS
 from experiments.bench.operator import BenchOperator
 from experiments.bench.reading import Reading
-from experiments.bench.rig import HardwareRig, SimulatedRig, on_channels, refuse_beside_daemon
+from experiments.bench.rig import HardwareRig, on_channels
 from experiments.bench.sign_check import check_nudge
 from experiments.bench.test_rig import TestRig
 from experiments.bench.wiring_check import check_firmware, check_ids, check_unknown_ids, check_watchdogs
 from experiments.robot.bench_errors import BenchError
 from firmware_host.configuration.configuration import BusParameters, Configuration, StatusParameters
-from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
-from tests.bench.staged_bench import reported_of_file
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
@@ -44,25 +42,10 @@ def test_the_bench_does_not_open_while_a_daemon_runs(configuration: Configuratio
         HardwareRig(replace(configuration, status=StatusParameters(str(answering))))
 
 
-def test_a_socket_without_an_answer_is_no_daemon(short_folder: Path) -> None:
-    refuse_beside_daemon(short_folder / "mudskipper.sock")
-
-
 def test_a_bus_that_does_not_open_is_reported(configuration: Configuration, short_folder: Path) -> None:
     changed = replace(on_channels(configuration, ["nocan9"]), status=StatusParameters(str(short_folder / "s")))
     with pytest.raises(BenchError, match=r"bus.left \(socketcan nocan9\) does not open: .*\."):
         HardwareRig(changed)
-
-
-@pytest.mark.parametrize("text", ["[robot", "[gait]\nsweep_angle_deg = 500\nodd = 1\n"])
-def test_each_problem_of_a_configuration_names_its_file_once(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "bad.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigurationError) as caught:
-        load_configuration(path)
-    reported = reported_of_file(path, caught.value.problems).splitlines()
-    assert len(reported) == len(caught.value.problems)
-    assert all(line.startswith(f"{path}: ") and line.count("bad.toml") == 1 for line in reported)
 
 
 @pytest.fixture
@@ -144,13 +127,3 @@ def test_drives_with_the_same_id_do_not_share_a_channel(configuration: Configura
 def test_a_channel_that_fits_no_bus_is_refused(configuration: Configuration, given: str) -> None:
     with pytest.raises(BenchError, match="--can"):
         on_channels(configuration, [given])
-
-
-def test_idle_flippers_of_the_simulated_bench_do_not_move(configuration: Configuration) -> None:
-    rig = SimulatedRig(configuration)
-    before = rig.robot.plant.angles_rad
-    for _ in range(380):
-        rig.loop.tick(rig.wait())
-    assert rig.robot.plant.angles_rad == pytest.approx(before, abs=0.05)
-    low, high = configuration.joint_ranges[1]
-    assert low < before[1] < high

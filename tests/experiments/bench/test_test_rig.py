@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from math import nan
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from control.records import JOINTS, Joints
+from control.records import JOINTS
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from experiments.bench.joint_zero_check import check_level_pose, check_turning
 from experiments.bench.operator import BenchOperator, PromptedBenchOperator, SimulatedBenchOperator
-from experiments.bench.reading import Reading, left_out
+from experiments.bench.reading import Reading
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.sign_check import MOST_NM, check_nudge, check_shown_motion, hold_gently
+from experiments.bench.sign_check import check_nudge, check_shown_motion
 from experiments.bench.stroke_tracking import lag_ticks
-from experiments.bench.test_rig import TestRig, first_lasting
+from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import CLEAR, LEAVE
 from firmware_host.configuration.configuration import Configuration
 from simulation.devices.drive import DriveError
-from tests.bench.bench_table import HEADS, table_lines
-from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench, stage_of
+from tests.bench.staged_bench import FAILED, PASSED, SKIPPED, BenchReport, StagedBench
 from tests.control.synthetic_states import NO_TORQUE
 from tests.scripted_operator import ScriptedOperator
 
@@ -75,31 +73,26 @@ class Asked(PromptedBenchOperator):
     def __init__(self, answer: str) -> None:
         operator = ScriptedOperator(answer)
         super().__init__(operator, sure=True)
-        self.asked = operator.asked
+        self.asked, self.clears = operator.asked, answer == CLEAR
 
 
-@pytest.mark.parametrize("answer", [CLEAR, LEAVE])
-def test_an_earlier_fault_is_cleared_if_the_operator_agrees(rig: SimulatedRig, answer: str) -> None:
+@pytest.mark.parametrize("bench_operator", [Asked(CLEAR), Asked(LEAVE), BenchOperator()])
+def test_an_earlier_fault_is_cleared_only_if_an_operator_agrees(
+    rig: SimulatedRig, bench_operator: BenchOperator
+) -> None:
     """No daemon may run during the bench, so 'mudskipper clear' is not available."""
     rig.robot.drives[1].trip(DriveError.WATCHDOG)
-    bench_operator = Asked(answer)
     opened_rig = TestRig(rig, bench_operator)
-    if answer == CLEAR:
+    if isinstance(bench_operator, Asked) and bench_operator.clears:
         opened_rig.arm(lambda held, states: NO_TORQUE)
         assert energised(rig) == {True}
     else:
         with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
             opened_rig.arm()
         assert rig.robot.drives[1].failed
-    (question,) = bench_operator.asked
-    assert "The left_adduction drive reports error" in question and question.endswith("Is the cause gone?")
-
-
-def test_an_earlier_fault_remains_without_an_operator(rig: SimulatedRig) -> None:
-    rig.robot.drives[1].trip(DriveError.WATCHDOG)
-    with pytest.raises(BenchError, match="cannot be armed: The left_adduction drive reports error"):
-        TestRig(rig, BenchOperator()).arm()
-    assert rig.robot.drives[1].failed
+    if isinstance(bench_operator, Asked):
+        (question,) = bench_operator.asked
+        assert "The left_adduction drive reports error" in question
 
 
 def test_a_drive_that_does_not_go_idle_is_reported(bench: StagedBench, rig: SimulatedRig) -> None:
@@ -120,11 +113,6 @@ def test_a_drive_that_does_not_go_idle_is_reported(bench: StagedBench, rig: Simu
         bench.test_rig.switch_off()
 
 
-def test_the_gentle_hold_law_limits_the_torque(bench: StagedBench) -> None:
-    held = Joints(1.0, -1.0, 0.1, -0.1)
-    assert hold_gently(held, bench.test_rig.loop.states) == (MOST_NM, -MOST_NM, 0.1, -0.1)
-
-
 def test_checks_that_need_an_operator_are_left_out_without_one(configuration: Configuration) -> None:
     opened_rig = TestRig(SimulatedRig(configuration), BenchOperator())
     readings = [
@@ -135,16 +123,6 @@ def test_checks_that_need_an_operator_are_left_out_without_one(configuration: Co
     assert [(reading.left_out, reading.good, reading.value_text) for reading in readings] == [
         (True, True, "left out")
     ] * 3
-
-
-def test_left_out_checks_are_not_reported_as_passed() -> None:
-    report = BenchReport()
-    report.begin(3, "test")
-    report.add(left_out("left_sweep: turned by hand"))
-    report.end()
-    lines = [line for line, _ in report.lines(brief=False)]
-    assert "stage 3, zeros: passed, without 1 checks that were left out" in lines
-    assert report.as_json["tests"][0]["readings"][0]["left_out"] is True
 
 
 @pytest.mark.parametrize("index", [0, 1])
@@ -173,20 +151,6 @@ def test_an_encoder_that_counts_against_its_motor_never_closes_a_loop(rig: Simul
         f"test_a_tiny_torque[{JOINTS[index]}] failed: fix that before anything else moves"
     )
     assert report.own_obstacle(6, "test_joints_follow_a_slow_stroke") == ""
-
-
-def test_the_table_has_one_column_for_each_joint() -> None:
-    well = [Reading(f"{joint}: lag", 1.0 + index, "ms", -9.0, 9.0) for index, joint in enumerate(JOINTS)]
-    lines = list(
-        table_lines("stage 6", [*well[:3], well[3]._replace(value=20.0), Reading("load", 35.0, "%", 0.0, 80.0)])
-    )
-    assert [(line.split(), good) for line, good in lines[1:]] == [
-        (["!", "lag", "1", "2", "3", "!20", "-9", "to", "9", "ms"], False),
-        (["load", "35", "0", "to", "80", "%"], True),
-    ]
-    columns = lines[0][0]
-    assert lines[1][0].index("!20") + 3 == columns.index(HEADS[JOINTS[3]]) + len(HEADS[JOINTS[3]])
-    assert lines[2][0].index("35") + 2 == columns.index("robot") + len("robot")
 
 
 def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -> None:
@@ -223,24 +187,12 @@ def report_with(*outcomes: str) -> BenchReport:
         ((PASSED, FAILED), "stage 2, signs, failed"),
         ((PASSED, SKIPPED), "stage 2, signs, was not passed"),
         ((PASSED,), "stage 2, signs, was not passed"),
+        ((PASSED, PASSED), ""),
     ],
 )
 def test_a_stage_waits_for_all_before_it(outcomes: tuple[str, ...], obstacle: str) -> None:
-    assert obstacle in report_with(*outcomes).obstacle(3)
-
-
-def test_a_stage_begins_where_all_before_it_have_passed() -> None:
-    assert report_with(PASSED, PASSED).obstacle(3) == ""
-    assert report_with().obstacle(1) == ""
-
-
-def test_a_skipped_stage_says_why() -> None:
-    report = report_with(PASSED)
-    report.begin(2, "test")
-    report.worsen(SKIPPED, "interrupted")
-    report.end()
-    lines = [line for line, _ in report.lines(brief=True)]
-    assert lines[:3] == ["stage 1, wiring: passed", "stage 2, signs: skipped: interrupted", "stage 3, zeros: skipped"]
+    reported = report_with(*outcomes).obstacle(3)
+    assert reported.startswith(obstacle) and bool(reported) == bool(obstacle)
 
 
 def test_no_test_begins_after_a_drive_kept_its_torque() -> None:
@@ -249,31 +201,8 @@ def test_no_test_begins_after_a_drive_kept_its_torque() -> None:
     assert [report.obstacle(stage) for stage in (1, 2)] == ["left_sweep: cut the power"] * 2
 
 
-def test_the_first_outcome_of_a_test_remains() -> None:
-    report = BenchReport()
-    report.begin(1, "test")
-    report.worsen(FAILED, "first")
-    report.worsen(PASSED, "second")
-    report.end()
-    assert (report.tests[0]["outcome"], report.tests[0]["why"]) == (FAILED, "first")
-
-
-def test_only_files_with_a_number_are_stages() -> None:
-    assert stage_of(Path("tests/bench/test_3_zeros.py")) == 3
-    assert stage_of(Path("tests/bench/test_other.py")) == 0
-
-
 @pytest.mark.parametrize("shift", [-2.0, 0.0, 1.4, 6.0])
 def test_the_lag_of_a_shifted_motion_is_found(shift: float) -> None:
     ticks = np.arange(600.0)
     commanded, measured = (np.sin((ticks - late) / 20.0) + 0.3 * np.sin((ticks - late) / 7.0) for late in (0.0, shift))
     assert lag_ticks(commanded, 0.9 * measured + 0.5) == pytest.approx(shift, abs=0.05)
-
-
-@pytest.mark.parametrize(("flags", "first"), [("1100111", 4), ("0111", 1), ("0110", None), ("", None)])
-def test_the_first_lasting_flag_is_followed_by_enough_others(flags: str, first: int | None) -> None:
-    assert first_lasting([flag == "1" for flag in flags], 3) == first
-
-
-def test_without_motion_there_is_no_lag() -> None:
-    assert np.isnan(lag_ticks(np.zeros(100), np.zeros(100)))

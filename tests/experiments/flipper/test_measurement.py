@@ -13,10 +13,10 @@ import pytest
 
 from control.records import Phase, Rig
 from experiments.flipper import measurement as flipper
-from experiments.flipper.measurement import Plan, require_fixed_base, require_mud
+from experiments.flipper.measurement import FlipperTrials, require_fixed_base, require_mud
 from experiments.flipper.report import FlipperReport, report_of
 from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
-from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS, force_rows, sections_of, tables_of
+from experiments.flipper.text import COEFFICIENTS, COMPARISON, KNOWN_BIAS, WRONG_CONSTANTS, result_of
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -30,7 +30,7 @@ from tests.experiments.synthetic_strides import make_estimate, make_profile, mak
 from tests.scripted_operator import ScriptedOperator
 
 MUD = "51.2"
-SHORT = Plan((MUD,), trials=1, simulated=True)
+SHORT = FlipperTrials((MUD,), trials=1, simulated=True)
 
 
 @cache
@@ -194,25 +194,27 @@ FORCES = {"insertion_force_n": 2.0, "stance_force_n": 8.0, "extraction_force_n":
 
 
 def test_the_report_says_whether_coefficients_fall_with_water() -> None:
-    plan, configuration = Plan(("51.2", "47.6")), bench_configuration()
+    plan, configuration = FlipperTrials(("51.2", "47.6")), bench_configuration()
     falling = report_of(plan, entries_of(w47_6=[2e6, 2.2e6], w51_2=[1e6]), configuration, None)
     assert falling.falls_with_water["k_p"] is True
     rising = report_of(plan, entries_of(w47_6=[1e6], w51_2=[2e6]), configuration, None)
     assert rising.falls_with_water["k_p"] is False
-    named = report_of(Plan(("a", "b")), entries_of(a=[1e6], b=[2e6]), configuration, None)
+    named = report_of(FlipperTrials(("a", "b")), entries_of(a=[1e6], b=[2e6]), configuration, None)
     assert named.falls_with_water["k_p"] is None
 
 
 def test_muds_that_were_measured_before_stay_in_the_report() -> None:
-    reported = report_of(Plan(("51.2",)), entries_of(w47_6=[2e6], w51_2=[1e6]), bench_configuration(), None)
+    plan, entries = FlipperTrials(("51.2",)), entries_of(w47_6=[2e6], w51_2=[1e6])
+    reported = report_of(plan, entries, bench_configuration(), None)
     assert [mud.mud for mud in reported.muds] == ["51.2", "47.6"]
-    assert force_rows(reported)[1][:2] == ["51.2 %", "2.00 (" + f"{reported.misfit_n['51.2']['insertion']:.2f})"]
+    forces = result_of(reported, plan, entries, bench_configuration(), []).tables[-1]
+    assert forces.cells()[1][:2] == ["51.2 %", "2.00 (" + f"{reported.misfit_n['51.2']['insertion']:.2f})"]
 
 
 def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
     entries = entries_of(w47_6=[2e6])
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
-    reported = report_of(Plan(("47.6",), strides=2), entries, bench_configuration(), None)
+    reported = report_of(FlipperTrials(("47.6",), strides=2), entries, bench_configuration(), None)
     assert reported.later_strokes["k_p"] == pytest.approx([0.8])
     assert reported.muds[0].k_p.value == 2e6
 
@@ -220,22 +222,20 @@ def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
 def test_errors_that_scatter_does_not_show_are_explained_next_to_the_coefficients() -> None:
     configuration, entries, reported = bench_configuration(), entries_of(w47_6=[2e6]), {}
     for simulated in (False, True):
-        plan = Plan(("47.6",), simulated=simulated)
+        plan = FlipperTrials(("47.6",), simulated=simulated)
         report = report_of(plan, entries, configuration, None)
-        reported[simulated] = sections_of(report, plan, entries, configuration)[0].text
-        assert tables_of(report)[0][0].endswith("explained in the report")
+        reported[simulated] = result_of(report, plan, entries, configuration, []).texts[COEFFICIENTS]
     assert KNOWN_BIAS in reported[False] and WRONG_CONSTANTS not in reported[False]
     assert WRONG_CONSTANTS in reported[True]
 
 
 def test_without_a_load_cell_there_are_no_errors() -> None:
-    entries, plan, configuration = entries_of(w47_6=[2e6]), Plan(("47.6",)), bench_configuration()
+    entries, plan, configuration = entries_of(w47_6=[2e6]), FlipperTrials(("47.6",)), bench_configuration()
     reported = report_of(plan, entries, configuration, None)
     assert reported.errors == []
-    assert "Comparison with the load cell" not in [
-        each.heading for each in sections_of(reported, plan, entries, configuration)
-    ]
-    assert len(tables_of(reported)) == 2
+    result = result_of(reported, plan, entries, configuration, [])
+    assert not result.texts[COMPARISON] and [table.name for table in result.tables] == ["muds", "forces"]
+    assert all(figure.draw().axes for figure in result.figures)
 
 
 def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> None:
@@ -245,7 +245,6 @@ def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> Non
     (entry,) = measured()[0].values()
     assert reported.muds[0].k_p.trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
     assert reported.settings["method"] == "paper"
-    assert KNOWN_BIAS not in tables_of(reported)[0][0]
     assert (reported.misfit_n[MUD]["insertion"] or 0.0) > 0.0
 
 

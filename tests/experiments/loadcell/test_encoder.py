@@ -13,7 +13,7 @@ from experiments.loadcell.preparation import CellSettings, examine_encoder
 from experiments.loadcell.recording import RAW, load_counted
 from experiments.loadcell.trials import KEEP, WITHOUT
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.prompt import GO_ON
+from experiments.study.prompt import GO_ON
 from simulation.test_rig.emulated_instruments import EmulatedStageEncoder, StageEncoderParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_operator import ScriptedOperator

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from random import Random
-from statistics import fmean
 from typing import Any
 
 import pytest
 
 from experiments.loadcell.preparation import CellSettings, examine_lines
-from experiments.loadcell.recording import AVERAGED, RAW, correlation, load_counted
+from experiments.loadcell.recording import AVERAGED, RAW, load_counted
 from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
 from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial
 from experiments.loadcell.trials import KEEP, list_problems, record
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.study.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
 from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Make, laboratories
@@ -62,15 +60,6 @@ def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) ->
             record(bench, Trial("lawful", INSERTION, number), laboratory.plan, 1)
     assert [each for each in smeared.operator.reported if AVERAGED in each] == [f"lawful/insertion/1: {AVERAGED}"]
     assert sharp.operator.reported == []
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_samples_are_alike_by_what_averages_them_and_not_by_a_drift_or_a_coarse_step(seed: int) -> None:
-    random = Random(seed)
-    single_n = [random.gauss(0.0, 0.008) for _ in range(80)]
-    assert abs(correlation([force_n + 0.001 * index for index, force_n in enumerate(single_n)])) < 0.4
-    assert 0.5 < correlation([fmean(single_n[index : index + 4]) for index in range(76)]) < 1.0
-    assert correlation([0.1] * 40 + [0.2] * 40) == 0.0
 
 
 def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:

@@ -61,11 +61,6 @@ def test_of_a_run_that_ended_before_the_experiment_began_nothing_is_copied(
     assert copy_since(segments[:4], 4.0, tmp_path) == []
 
 
-def test_of_the_segments_before_one_is_opened(segments: list[Path], tmp_path: Path) -> None:
-    segments[1].write_bytes(b"not to be read")
-    assert len(copy_since(segments, 3.5, tmp_path)) == 2
-
-
 def test_a_segment_that_has_only_just_begun_hides_none_before_it(segments: list[Path], tmp_path: Path) -> None:
     LogFile(segment_path(segments[0].parent.parent / ACTIVE / segments[0].name, 5), OPENING).flush()
     logs = run_files(segments[-1])

@@ -45,10 +45,10 @@ def test_another_location_has_the_same_digest_and_a_changed_constant_another_one
 
 
 def test_an_import_within_a_function_counts(copy: Path) -> None:
-    before = digest_of(copy, "command_line.experiments.workers")
+    before = digest_of(copy, "command_line.experiments.studies")
     with (copy / "experiments/study/cluster_workers.py").open("a") as module:
         module.write("ANOTHER = 1\n")
-    assert digest_of(copy, "command_line.experiments.workers") != before
+    assert digest_of(copy, "command_line.experiments.studies") != before
 
 
 def test_the_record_says_what_computed_and_when() -> None:
@@ -58,8 +58,8 @@ def test_the_record_says_what_computed_and_when() -> None:
 
 
 def test_two_modules_have_the_digest_of_all_that_they_import() -> None:
-    one, two = identity(STUDY)["sources"], identity("experiments.actuator.run")["sources"]
-    both = identity(STUDY, "experiments.actuator.run")["sources"]
+    one, two = identity(STUDY)["sources"], identity("experiments.studies.actuator")["sources"]
+    both = identity(STUDY, "experiments.studies.actuator")["sources"]
     assert len({one, two, both}) == 3
     assert identity(STUDY, "experiments.trackway.walk")["sources"] == one  # the study imports it
 

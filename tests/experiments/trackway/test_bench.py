@@ -11,8 +11,8 @@ import pytest
 
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
-from experiments.robot.prompt import SKIP
 from experiments.study.notebook import Notebook
+from experiments.study.prompt import SKIP
 from experiments.study.result import to_json
 from experiments.trackway.bench import (
     UNSEEN_S,

@@ -10,10 +10,10 @@ import pytest
 from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import CLEAR, LEAVE, leave
 from experiments.robot.lockstep_robot import simulated_configuration
-from experiments.robot.prompt import GO_ON, REDO, SKIP
+from experiments.study import session as session_module
 from experiments.study.notebook import Entry, Notebook, NotebookError
+from experiments.study.prompt import GO_ON, REDO, SKIP
 from experiments.trials import mud_trials
-from experiments.trials import session as session_module
 from experiments.trials.mud_trials import (
     KEEP,
     Bench,
@@ -129,7 +129,7 @@ def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
 def test_before_the_first_there_is_none_to_measure_again(tmp_path: Path) -> None:
     session = Session(tmp_path, bed=ScriptedBed(REDO)).conduct()
     assert session.measured == ALL
-    assert "no trial was measured" in session.operator.reported[0]
+    assert "nothing was measured" in session.operator.reported[0]
 
 
 def test_a_fault_is_reported_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:

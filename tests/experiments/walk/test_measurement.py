@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS
-from experiments.reports.report_page import to_json
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.study.notebook import Entry, Notebook
 from experiments.trackway.bench import Mud
@@ -21,15 +20,15 @@ from experiments.trials.mud_trials import Bench, InvalidTrialError
 from experiments.trials.simulated_bed import CarriedBed
 from experiments.walk import measurement as walk_mapping
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
-from experiments.walk.measurement import MUDS, Advance, Plan, measure, require_mud
+from experiments.walk.measurement import MUDS, Advance, WalkTrials, measure, require_mud
 from experiments.walk.report import WalkReport, located_strides, report_of, walks_of
 from experiments.walk.simulation import walking_bench
-from experiments.walk.text import sections_of, tables_of
+from experiments.walk.text import result_of
 from tests.experiments.synthetic_strides import CONFIGURATION, make_estimate, make_stride
 from tests.scripted_operator import ScriptedOperator
 
-SHORT = Plan((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
-TINY = Plan((Mud("47.6", 0.2),), trials=1, simulated=True)
+SHORT = WalkTrials((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
+TINY = WalkTrials((Mud("47.6", 0.2),), trials=1, simulated=True)
 
 
 @cache
@@ -41,11 +40,11 @@ def measured() -> dict[str, Entry]:
     return bench.notebook.entries
 
 
-def bench_of(folder: Path, plan: Plan) -> Bench:
+def bench_of(folder: Path, plan: WalkTrials) -> Bench:
     return Bench(*walking_bench(folder, plan, 1), ScriptedOperator(), Notebook(folder, plan.identity))
 
 
-def report(plan: Plan = SHORT, truth: dict[str, dict[str, float]] | None = None) -> WalkReport:
+def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> WalkReport:
     return report_of(plan, measured(), CONFIGURATION, truth)
 
 
@@ -53,7 +52,7 @@ def report(plan: Plan = SHORT, truth: dict[str, dict[str, float]] | None = None)
 
 
 def test_the_walks_over_all_muds_come_before_those_at_both_depths_in_each_soft_mud() -> None:
-    keys = [trial.key for trial in Plan(trials=1, soft=("53.1", "51.2")).planned]
+    keys = [trial.key for trial in WalkTrials(trials=1, soft=("53.1", "51.2")).planned]
     soft = ["soft 53.1 at 3 cm/1", "soft 53.1 at 5 cm/1", "soft 51.2 at 3 cm/1", "soft 51.2 at 5 cm/1"]
     assert keys == ["walk/1", *soft]
 
@@ -63,13 +62,13 @@ def test_the_walks_over_all_muds_come_before_those_at_both_depths_in_each_soft_m
     [(0.06, "47.6"), (0.57, "47.6"), (0.59, ""), (0.63, ""), (0.65, "49.5"), (1.5, "51.2"), (1.83, ""), (9.0, "")],
 )
 def test_a_plate_belongs_to_the_mud_in_which_it_went_down_unless_it_is_near_a_border(plates_m: float, mud: str) -> None:
-    assert Plan().mud_at(plates_m) == mud
+    assert WalkTrials().mud_at(plates_m) == mud
 
 
 @pytest.mark.parametrize(("slip_m", "mud"), [(0.0, "49.5"), (0.01, "49.5"), (0.03, ""), (0.07, ""), (0.6, "")])
 def test_a_plate_that_slips_back_to_a_border_belongs_to_no_mud(slip_m: float, mud: str) -> None:
     """It went down 5 cm past the border at 61 cm."""
-    assert Plan().mud_at(0.66, slip_m) == mud
+    assert WalkTrials().mud_at(0.66, slip_m) == mud
 
 
 def test_a_walk_without_any_estimate_is_invalid() -> None:
@@ -156,14 +155,13 @@ def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
     reported = report()
-    assert to_json(reported)["experiment"] == "walk"
-    sections = sections_of(reported, SHORT, measured(), CONFIGURATION, None)
-    assert [f.name for section in sections for f in section.figures] == ["figure6_trial1", "figure7_51.2"]
-    title, rows = tables_of(reported)[0]
-    assert title.startswith("Coefficients")
-    assert rows[0][0] == "mud"
+    result = result_of(reported, SHORT, measured(), CONFIGURATION, None, [])
+    assert result.json()["experiment"] == "walk"
+    assert [figure.name for figure in result.figures] == ["figure6_trial1", "figure7_51.2"]
+    assert [table.name for table in result.tables] == ["muds", "errors", "findings"]
     for uncertainty in (KNOWN_BIAS, WRONG_CONSTANTS):
-        assert uncertainty in sections[0].text
+        assert uncertainty in next(iter(result.texts.values()))
+    assert all(figure.draw().axes for figure in result.figures)
 
 
 # without a pose

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +21,19 @@ def kinds(log: LabLog) -> list[FindingKind]:
     return [finding.kind for finding in log.findings]
 
 
+@cache
+def straight_log(folder: Path, mud: bool) -> LabLog:
+    return read_lab_csv(write_lab_log(folder / f"straight-{mud}.csv", lab_columns(mud=mud)))
+
+
 @pytest.mark.parametrize("mud", [True, False], ids=["mud", "air"])
-@pytest.mark.parametrize("inverted", list(product((1.0, -1.0), repeat=2)), ids=str)
+@pytest.mark.parametrize("inverted", [(1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)], ids=str)
 @pytest.mark.parametrize("joint", range(4), ids=JOINTS)
 def test_inverted_signals_are_inverted_back(
-    joint: int, inverted: tuple[float, float], mud: bool, tmp_path: Path
+    joint: int, inverted: tuple[float, float], mud: bool, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     """In air the arm's weight does the work of the insertion, so this work does not show the sign."""
-    straight = read_lab_csv(write_lab_log(tmp_path / "straight.csv", lab_columns(mud=mud)))
+    straight = straight_log(tmp_path_factory.getbasetemp(), mud)
     columns = lab_columns(mud=mud)
     for signal, sign in zip(("pos", "curr"), inverted, strict=True):
         columns[f"{JOINTS[joint]}_{signal}"] *= sign

@@ -1,18 +1,13 @@
 """The evaluation of real logs as tables for the screen and as a page with figures."""
 
-from collections.abc import Sequence
-from functools import partial
-
 from experiments.lablogs.consistency import Counts
 from experiments.lablogs.lab_trial import DELAY_S, METHODS, MISSING_ROWS
-from experiments.lablogs.lablogs import Evaluated
 from experiments.lablogs.report import LablogsReport, MethodReport, Repeatability
 from experiments.lablogs.sensitivity import MOVED, Moves, Ratios
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.report_page import Figure, Section
-from experiments.reports.text_tables import TitledRows, number, text_of_tables
+from experiments.reports.text_tables import number
 from experiments.reports.value_text import fraction_text, value_text
-from experiments.trials.session import Ending, Finding
+from experiments.study.result import Table, text_table
 
 DEFINITIONS = (
     "first CV: coefficient of variation over trials of the first stroke's value. later CV: the same of each trial's "
@@ -34,45 +29,25 @@ FIGURES = {
 }
 
 
-def lablogs_finding(evaluated: Evaluated) -> Finding:
-    report = evaluated.report
-    sections = [
-        Section("Definitions", DEFINITIONS),
-        *(Section(f"Method {method}", screen=_method_text(report.of(method))) for method in METHODS),
-        Section("Figures", figures=_figures(evaluated)),
-        Section("Logs", screen=text_of_tables(_log_tables(report))),
-    ]
-    ending = Ending.DONE if report.logs else Ending.UNHEALTHY
-    return Finding(report, "Estimates from real logs", sections, lablogs_text(report), ending=ending)
+def tables_of(report: LablogsReport) -> list[Table]:
+    """Return the tables of every method, and those of the logs."""
+    methods = [table for method in METHODS if report.logs for table in _method_tables(method, report.of(method))]
+    return [*methods, *_log_tables(report)]
 
 
-def _figures(evaluated: Evaluated) -> list[Figure]:
-    from experiments.lablogs import plots  # matplotlib takes its time
-
-    draw = {
-        "strokes": plots.plot_strokes,
-        "scatter": plots.plot_scatter,
-        "left_right": plots.plot_left_right,
-        "sensitivity": plots.plot_sensitivity,
-    }
-    return [Figure(name, caption, partial(draw[name], evaluated)) for name, caption in FIGURES.items()]
-
-
-def lablogs_text(report: LablogsReport) -> str:
-    methods = [f"Method {method}\n\n{_method_text(report.of(method))}" for method in METHODS if report.logs]
-    return "\n\n".join([*methods, text_of_tables(_log_tables(report))])
-
-
-def _method_text(report: MethodReport) -> str:
-    tables: list[TitledRows] = [("Repeatability", _repeatability_rows(report))]
+def _method_tables(method: str, report: MethodReport) -> list[Table]:
+    tables = {"Repeatability": _repeatability_rows(report)}
     if report.separation:
-        tables.append(("Separation of first strokes, in pooled standard deviations", _separation_rows(report)))
-    tables.append(("Left against right", _agreement_rows(report)))
-    tables.append(("Values and bounds", _count_rows(report)))
-    tables.append((DISTURBED, _sensitivity_rows(report)))
+        tables["Separation of first strokes, in pooled standard deviations"] = _separation_rows(report)
+    tables |= {"Left against right": _agreement_rows(report), "Values and bounds": _count_rows(report)}
+    tables[DISTURBED] = _sensitivity_rows(report)
     found = report.contradictions["k_e"]
-    bounds = f"Bounds on k_e that contradict a neighbouring stride: {found.contradicting} of {found.with_neighbour}"
-    return f"{text_of_tables(tables)}\n\n{bounds}"
+    tables["Bounds on k_e that contradict a neighbouring stride"] = [
+        ["contradicting", "with a neighbour"],
+        [str(found.contradicting), str(found.with_neighbour)],
+    ]
+    section = f"Method {method}"
+    return [text_table(f"{method} {title}", f"{section}: {title}", rows, section) for title, rows in tables.items()]
 
 
 def _repeatability_rows(report: MethodReport) -> list[list[str]]:
@@ -148,16 +123,13 @@ def _move_cell(moves: Moves) -> str:
     return f"{fraction_text(moves.moved)} of {moves.n}" if moves.n else "-"
 
 
-def _log_tables(report: LablogsReport) -> Sequence[TitledRows]:
+def _log_tables(report: LablogsReport) -> list[Table]:
     rows = [["log", "group", "flippers", "base", "", "strides", "findings"]]
     for log in report.logs:
         base, mud = "fixed" if log.fixed_base else "free", "mud" if log.in_mud else "air"
         flippers, count = " and ".join(log.flippers), str(len(log.findings) or "-")
         rows.append([log.name, log.group or "-", flippers, base, mud, str(log.strides), count])
-    tables: list[TitledRows] = [("Logs", rows)] if report.logs else []
-    tables += [
-        (f"Findings in {log.name}", [[finding] for finding in log.findings]) for log in report.logs if log.findings
-    ]
-    if report.refused:
-        tables.append(("Not evaluated", [["reason"], *([each.reason] for each in report.refused)]))
-    return tables
+    findings = [[log.name, finding] for log in report.logs for finding in log.findings]
+    refused = [[each.name, each.reason] for each in report.refused]
+    tables = {"Logs": rows, "Findings": [["log", "finding"], *findings], "Not evaluated": [["log", "reason"], *refused]}
+    return [text_table(title.lower(), title, cells, "Logs") for title, cells in tables.items() if len(cells) > 1]
