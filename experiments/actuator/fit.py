@@ -145,7 +145,7 @@ def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_n
         if not step.weight_g and _tare_a(entries, step.trial) is not None  # at least one is
     ]
     loops = [Loop(**loop) for entry in empty for loop in entry.get("loops", ())]
-    numbers = {
+    numbers: dict[str, Any] = {
         "joint": joint,
         "readings": len(loads),
         "direction": direction,

@@ -33,8 +33,8 @@ def draw_torques(fits: Sequence[JointFit]) -> Figure:
         axis.fill_between(whole_nm, *around, color=LIGHT_GREY, linewidth=0.0, zorder=0)
         label = f"equal ± {bound_nm:g} N·m, the paper's RMSE"
         axis.plot(whole_nm, whole_nm, color=GREY, linewidth=1.2, label=label, zorder=1)
-        label, look = f"configured: {configured_nm_a:g} N·m/A", {"color": "black", "markersize": 5, "zorder": 2}
-        axis.plot(loads.torque_nm, configured_nm_a * loads.current_a, "x", label=label, **look)
+        configured_nm, label = configured_nm_a * loads.current_a, f"configured: {configured_nm_a:g} N·m/A"
+        axis.plot(loads.torque_nm, configured_nm, "x", color="black", markersize=5, label=label, zorder=2)
         constant = value_text(numbers["torque_constant_nm_a"], numbers["torque_constant_error_nm_a"])
         label = f"fitted: {constant} N·m/A"
         axis.plot(loads.torque_nm, loads.fitted_nm, label=label, zorder=3, **_style(numbers["joint"]))

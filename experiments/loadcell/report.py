@@ -25,7 +25,7 @@ from experiments.loadcell.comparison import OTHER_PLATE, compare_muds
 from experiments.loadcell.plots import draw_coefficients, draw_mud
 from experiments.loadcell.recording import load_counted
 from experiments.loadcell.stage_track import common_alignment
-from experiments.loadcell.strokes import RATE_EXPONENT, AnalysedTrial, Insertion, StageSettings
+from experiments.loadcell.strokes import INSERTION, RATE_EXPONENT, AnalysedTrial, StageSettings
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, miss_text, repeatability_text, value_text
@@ -50,7 +50,6 @@ FITTED = "measured (solid, one colour a trial) and modelled with the mud's coeff
 HEADING = "Coefficients ± one standard error of the trials ± one of the bench; see the report for their parts"
 COMPARED = "Flipper and load cell; see the report for the effects of plate and path alone"
 TRUTH = "The same plate in even motion, without stage, cell and noise"
-ALIGNMENT_KEYS = ("lag_s", "rate_share", "lag_doubt_s", "rate_doubt")  # as in earlier summaries
 UNITS = dict.fromkeys(COEFFICIENTS, "N/cm³") | {"flipper": "N/cm³", "load cell": "N/cm³", "speed": "m/s"}
 Muds = Mapping[str, Mapping[str, MudCoefficient]]  # by mud and coefficient
 
@@ -157,7 +156,7 @@ def _trial_entries(trial: AnalysedTrial, entry: Entry) -> dict[str, Any]:
         "speed_m_s": trial.speed_m_s,
         "is_measured": trial.is_measured,
         "place_error_m": trial.position_error_m if trial.is_measured else None,
-        "alignment": trial.alignment and dict(zip(ALIGNMENT_KEYS, trial.alignment, strict=True)),
+        "alignment": trial.alignment,
         "problem": trial.problem,
         "remark": trial.remark,
     }
@@ -226,7 +225,7 @@ def position_texts(trials: Sequence[AnalysedTrial]) -> list[str]:
     """Explain how the position was measured, or that it was not."""
     measured = [trial for trial in trials if trial.is_measured]
     aligned = [trial.alignment for trial in measured if trial.alignment is not None]
-    insertions = [trial for trial in measured if isinstance(trial.motion, Insertion)]
+    insertions = [trial for trial in measured if trial.recorded.kind == INSERTION]
     if not measured:
         return [UNCONNECTED]
     if not aligned or not insertions:

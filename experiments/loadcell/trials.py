@@ -28,7 +28,7 @@ from experiments.loadcell.recording import (
     write_rows,
 )
 from experiments.loadcell.stage import Stage, Trial
-from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Mask, Shear, StageSettings
+from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Mask, StageSettings
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
 from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
@@ -245,13 +245,7 @@ def _missing_fraction(analysed: AnalysedTrial) -> float:
 
 def _strokes(analysed: AnalysedTrial) -> Iterator[tuple[Mask, float]]:
     """Yield which samples belong to each stroke, and its duration."""
-    motion, spans_s = analysed.motion, list[tuple[float, float]]()
-    if isinstance(motion, Shear):
-        spans_s.append((motion.begin_s, motion.steady_to_s))
-    if isinstance(motion, Insertion):
-        spans_s.append((motion.surface_s, motion.stop_s))
-    if analysed.extraction is not None:
-        spans_s.append((analysed.extraction.lift_s, analysed.extraction.out_s))
-    for begin_s, end_s in spans_s:
+    for stroke in analysed.strokes.values():
         assert analysed.profile is not None
-        yield (analysed.profile.times_s >= begin_s) & (analysed.profile.times_s < end_s), end_s - begin_s
+        times_s = analysed.profile.times_s
+        yield (times_s >= stroke.begin_s) & (times_s < stroke.end_s), stroke.end_s - stroke.begin_s

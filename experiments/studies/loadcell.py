@@ -28,6 +28,7 @@ from experiments.study.result import Result, to_json
 from experiments.study.session import Session
 
 HAS_ROBOT = False
+SCHEMA = 2
 UNNAMED = ("mud",)
 SIMULATED_MUDS = ("47.6", "48.6", "49.5", "50.3", "51.2")  # figure 5 of the paper
 SIMULATED_STEP_UM = 10.0

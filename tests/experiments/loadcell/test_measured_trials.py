@@ -95,7 +95,6 @@ def test_a_wrong_travel_per_count_is_reported(insertion: Recorded) -> None:
 def test_a_gap_in_the_positions_costs_its_own_samples_only(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
     whole = one(insertion)
-    assert whole.motion is not None
     middle_s = times_s[int(np.argmin(np.abs(positions_m + 0.035)))]  # 1.5 cm deep
     kept = np.abs(times_s - middle_s) > 0.04
     reported = one(insertion._replace(positions=StagePositions(times_s[kept], positions_m[kept])))
