@@ -12,8 +12,8 @@ from drivers.bench.drive_bench import SetupFacts
 from drivers.bench.drive_setup import DriveSetup, same
 from drivers.bench.settings_change import Change, Names, Outcome, change_settings
 from drivers.drive_types import DRIVE_BENCHES, DRIVE_TYPES
-from simulation.devices.drive import SimulatedDrive
 from simulation.devices.odrive.settings import BUILD
+from simulation.devices.simulated_drive import SimulatedDrive
 from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
 
 ID, LONGEST_S = 3, 0.3
