@@ -196,15 +196,6 @@ def test_a_file_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert path.read_text() == "mine" and "exists" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "wrong", ["--set=length=1", "--set=drop_m=deep", "--set=drop_m=nan", "--node=tail=1", "--node=left_sweep"]
-)
-def test_a_wrong_option_is_refused(wrong: str) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["init", "-", wrong])
-    assert ended.value.code == exit_codes.USAGE
-
-
 def test_the_file_has_a_default_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["init"]) == exit_codes.OK
