@@ -26,13 +26,13 @@ class BenchMount:
         self.mass_kg = self.lever_m = 0.0
 
     def hang(self, mass_kg: float, lever_m: float) -> None:
-        """Hangs a weight in place of the previous one. Raises ValueError for a negative mass or lever, or for NaN."""
+        """Hang a weight in place of the previous one. Raises ValueError for a negative mass or lever, or for NaN."""
         if not (mass_kg >= 0.0 and lever_m >= 0.0):
             raise ValueError(f"{mass_kg} kg at {lever_m} m: mass and lever must be numbers of at least 0")
         self.mass_kg, self.lever_m = mass_kg, lever_m
 
     def gravity_torques_nm(self, arm: ArmMass, sweep_rad: float, adduction_rad: float) -> tuple[float, float]:
-        """Returns the torques of arm and weight on (sweep, adduction)."""
+        """Return the torques of arm and weight on (sweep, adduction)."""
         if self.on_side:
             moment_nm = GRAVITY_M_S2 * (arm.arm_mass_kg * arm.center_of_mass_m + self.mass_kg * self.lever_m)
             return -moment_nm * cos(sweep_rad), 0.0
@@ -44,7 +44,7 @@ class BenchMount:
         return sweep_nm + more_sweep_nm, lift_nm + more_lift_nm
 
     def inertias_kg_m2(self, arm: ArmMass) -> tuple[float, float]:
-        """Returns the inertias about the sweep and the adduction axle, weight included."""
+        """Return the inertias about the sweep and the adduction axle, weight included."""
         weight_kg_m2 = self.mass_kg * self.lever_m * self.lever_m
         if self.on_side:
             return arm.sweep_inertia_kg_m2 + weight_kg_m2, arm.adduction_inertia_kg_m2

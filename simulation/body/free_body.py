@@ -74,7 +74,7 @@ def axes_of(roll_rad: float, pitch_rad: float) -> Axes:
 
 
 def own_axes(axes: Axes, side: float) -> Axes:
-    """Returns the axes of the flipper on the left (1) or on the right (-1), whose y points to the right."""
+    """Return the axes of the flipper on the left (1) or on the right (-1), whose y points to the right."""
     if side > 0.0:
         return axes
     (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
@@ -82,7 +82,7 @@ def own_axes(axes: Axes, side: float) -> Axes:
 
 
 def in_world(axes: Axes, point: Vector) -> Vector:
-    """Returns (ahead, across, above) of the centre of mass."""
+    """Return (ahead, across, above) of the centre of mass."""
     return dot(axes.forward, point), dot(axes.across, point), dot(axes.up, point)
 
 
@@ -96,14 +96,14 @@ class BodyLoad(NamedTuple):
 
 
 def load_at(axes: Axes, lever_m: Vector, forward_n: float, upward_n: float) -> BodyLoad:
-    """Returns the load of a force in the world that acts `lever_m` from the centre of mass, in the world's axes."""
+    """Return the load of a force in the world that acts `lever_m` from the centre of mass, in the world's axes."""
     ahead_m, across_m, above_m = lever_m
     roll_nm = (axes.forward[0] * upward_n - axes.up[0] * forward_n) * across_m
     return BodyLoad(forward_n, upward_n, roll_nm, above_m * forward_n - ahead_m * upward_n)
 
 
 def load_of_flipper(axes: Axes, joint: Vector, flipper: Pusher, side: float) -> BodyLoad:
-    """Returns the load of the mud through a flipper, in the flipper's own axes; `side`: 1 on the left, -1 on the right.
+    """Return the load of the mud through a flipper, in the flipper's own axes; `side`: 1 on the left, -1 on the right.
 
     Moments about the axes that tilt with adduction are rotated upright, and moved from the joints to the middle.
     """
@@ -136,7 +136,7 @@ class BellyQuarter:
         self.pressed = False
 
     def step(self, clay: Clay, traction: float, depth_m: float, sinking_m_s: float) -> float:
-        """Returns the force up. The damping is half of critical."""
+        """Return the force up. The damping is half of critical."""
         if depth_m <= 0.0:
             self.reset()
             return 0.0
@@ -152,7 +152,7 @@ class BellyQuarter:
         return floating_n + min(max(elastic_n + damping_n, 0.0), traction * slow_n)
 
     def _strain_m(self, stiffness_n_m: float, depth_m: float) -> float:
-        """Returns the strain above the print. Where the mud becomes stiffer the force stays, as along a plate."""
+        """Return the strain above the print. Where the mud becomes stiffer the force stays, as along a plate."""
         strain_m = depth_m - self._print_m
         if strain_m > 0.0 and 0.0 < self._stiffness_n_m < stiffness_n_m:
             strain_m *= self._stiffness_n_m / stiffness_n_m
@@ -203,7 +203,7 @@ class FreeBody:
         return tuple(self._carriage(own_axes(axes, side), side * self.roll_rad_s) for side in self._sides)
 
     def _carriage(self, axes: Axes, roll_rad_s: float) -> Carriage:
-        """Returns the carriage in the flipper's own axes: on the right a roll has the opposite sign."""
+        """Return the carriage in the flipper's own axes: on the right a roll has the opposite sign."""
         (fx, fy, fz), (_, ay, az), (ux, uy, uz) = axes
         turning = (roll_rad_s, ay * self.pitch_rad_s, az * self.pitch_rad_s)
         levered = cross(turning, self._joint)
@@ -233,7 +233,7 @@ class FreeBody:
         self.pitch_rad += dt_s * self.pitch_rad_s
 
     def flipper_loads(self, axes: Axes, *flippers: Pusher) -> Iterator[BodyLoad]:
-        """Yields the loads of the flippers that touch the mud."""
+        """Yield the loads of the flippers that touch the mud."""
         for flipper, side in zip(flippers, self._sides, strict=True):
             if flipper.force is not NO_CONTACT:
                 yield load_of_flipper(own_axes(axes, side), self._joint, flipper, side)
@@ -256,7 +256,7 @@ class FreeBody:
         yield load_at(axes, lever_m, self._drag.step(dt_s, sliding_m_s, largest_n), 0.0)
 
     def _speeds_m_s(self, axes: Axes, lever_m: Vector) -> tuple[float, float]:
-        """Returns (forward, up) in the world of a point on the body, `lever_m` from the centre of mass."""
+        """Return (forward, up) in the world of a point on the body, `lever_m` from the centre of mass."""
         ahead_m, across_m, above_m = lever_m
         rolling_m_s = across_m * self.roll_rad_s
         return (

@@ -52,7 +52,7 @@ class Arm:
         self.reset()
 
     def reset(self) -> None:
-        """Puts the arm at rest with the plate's edge on the mud, as a robot lies when its motors are off."""
+        """Put the arm at rest with the plate's edge on the mud, as a robot lies when its motors are off."""
         self.history.reset()
         self.relief_m = self.track.surface_m(0.0)  # depth of the track's own surface, without earlier strokes
         self.put_back()
@@ -60,7 +60,7 @@ class Arm:
         self.clay = self.track.clay_at(0.0)
 
     def put_back(self) -> None:
-        """Moves the arm as an operator does by hand: straight out, the plate's edge on the mud; level on a bench.
+        """Move the arm as an operator does by hand: straight out, the plate's edge on the mud; level on a bench.
 
         The mud keeps the effects of earlier strokes.
         """
@@ -121,7 +121,7 @@ class Arm:
         self._move(dt_s, sweep_nm, lift_nm, *mount.inertias_kg_m2(mass))
 
     def _meet_mud(self, edge_m: float, attitude: Attitude) -> None:
-        """Finds the clay under the flipper, its remaining firmness after earlier strokes, and its height."""
+        """Find the clay under the flipper, its remaining firmness after earlier strokes, and its height."""
         self.relief_m = self.track.surface_m(edge_m)
         if self._disturbed:
             deepest_m = lowest_point_m(attitude, self.contact.plate.size)
@@ -137,7 +137,7 @@ class Arm:
             self.force = ContactForce(*map(add, self.force, pushed))
 
     def _load_nm(self) -> tuple[float, float]:
-        """Returns the torque of mud, clinging mud, gravity and friction on (sweep, adduction)."""
+        """Return the torque of mud, clinging mud, gravity and friction on (sweep, adduction)."""
         parameters, force = self.parameters, self.force
         sweep_nm, lift_nm = parameters.arm_mass.gravity_torques_nm(self.sweep_rad, self.adduction_rad)
         sweep_nm += force.sweep_nm - parameters.joint_friction_nm_s * self.sweep_velocity_rad_s
@@ -170,7 +170,7 @@ class Arm:
 
 
 def _slowed(velocity_rad_s: float, loss_rad_s: float) -> float:
-    """Returns the velocity after dry friction, which stops the joint but never reverses it."""
+    """Return the velocity after dry friction, which stops the joint but never reverses it."""
     return copysign(max(abs(velocity_rad_s) - loss_rad_s, 0.0), velocity_rad_s)
 
 

@@ -29,6 +29,6 @@ class PlantParameters:
     body: BodyShape = BodyShape()
 
     def __post_init__(self) -> None:
-        """Raises ValueError where the options contradict each other."""
+        """Raise ValueError where the options contradict each other."""
         if self.fixed_base and self.free_body:
             raise ValueError("a body on a fixed base cannot be free")

@@ -67,7 +67,7 @@ class DryDrag:
         self._stretch_m = 0.0
 
     def step(self, dt_s: float, speed_m_s: float, largest_n: float) -> float:
-        """Returns the force on a body that moves at `speed_m_s`."""
+        """Return the force on a body that moves at `speed_m_s`."""
         self._stretch_m += dt_s * speed_m_s
         elastic_n = min(max(-DRAG_STIFFNESS_N_M * self._stretch_m, -largest_n), largest_n)
         self._stretch_m = -elastic_n / DRAG_STIFFNESS_N_M
@@ -81,7 +81,7 @@ class DragPad(NamedTuple):
     depth_m: float
 
     def yield_n(self, clay: Clay, deeper_m: float = 0.0) -> float:
-        """Returns the yield force at the reference speed, with the body `deeper_m` below the mud's surface."""
+        """Return the yield force at the reference speed, with the body `deeper_m` below the mud's surface."""
         depth_m = self.depth_m + deeper_m
         return clay.lateral_n(depth_m, self.width_m) if self.width_m and depth_m > 0.0 else 0.0
 

@@ -136,7 +136,7 @@ class StrokeReference:
         self.reset()
 
     def reset(self) -> None:
-        """Returns to the start of a walk."""
+        """Return to the start of a walk."""
         self.index = 0
         self._phase = Phase.REST
         self._start_stride()
@@ -147,7 +147,7 @@ class StrokeReference:
             flipper.reset()
 
     def step(self, dt_s: float, plant: Plant, phase: Phase) -> list[StrideTruth]:
-        """Returns the strides that this phase has closed: one of each flipper, or none."""
+        """Return the strides that this phase has closed: one of each flipper, or none."""
         closed: list[StrideTruth] = []
         if phase is not self._phase and phase in BORDERS:
             closed = self._close(plant) if phase is not Phase.REST and self._phases.issuperset(STROKES) else []

@@ -1,13 +1,11 @@
-"""The interface of a simulated motor drive to the simulated robot, for every protocol on the bus."""
+"""The parameters of a simulated motor drive, and the errors and forged frames that it may be asked for."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf, pi
-from typing import Annotated, Protocol
+from typing import Annotated
 
 from control.bounds import Bounds
-from drivers.can.frames import Frame
 
 
 @dataclass(frozen=True)
@@ -68,44 +66,3 @@ class DriveError(Enum):
     OVERCURRENT = auto()
     WATCHDOG = auto()
     OVERSPEED = auto()
-
-
-class SimulatedDrive(Protocol):
-    """One drive on the bus and its motor. Angles and torques are the joint's."""
-
-    parameters: SimulatedDriveParameters
-    energised: bool  # it follows torque commands; may be set, as if another program had commanded it
-
-    @property
-    def failed(self) -> bool:
-        """Whether the drive has an active error."""
-
-    def reset(self, now_s: float) -> None:
-        """Returns to the state after power-on."""
-
-    def restart(self, now_s: float) -> None:
-        """Loses and regains the supply; the angle stays."""
-
-    def trip(self, error: DriveError) -> None:
-        """Goes idle by itself with an error."""
-
-    def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
-        """Sets the joint's true angle and velocity."""
-
-    def torque_nm(self, now_s: float) -> float:
-        """Returns the torque that the motor exerts now."""
-
-    def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Executes one frame of the bus and returns the answers to it."""
-
-    def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
-        """Yields the messages that have come due."""
-
-    def forge(self, forgery: Forgery) -> Frame:
-        """Makes a frame for the bus that this drive does not send itself."""
-
-    def forge_current(self, current_a: float) -> Frame:
-        """Makes a report of another current than the motor has."""
-
-    def forge_torque(self, torque_nm: float) -> Frame:
-        """Makes a command of a torque of the joint, as another program on the bus sends it."""

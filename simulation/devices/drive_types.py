@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping
 from random import Random
 
-from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.odrive.device import SimulatedOdrive
 from simulation.devices.odrive.settings import BUILD
 from simulation.devices.odrive05.device import SimulatedOdrive05
+from simulation.devices.simulated_drive import SimulatedDrive
 
 SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
     "odrive": SimulatedOdrive,

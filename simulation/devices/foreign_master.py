@@ -7,7 +7,7 @@ It sends its torque right after every n-th torque command of the loop, so that t
 from dataclasses import dataclass
 
 from drivers.can.frames import Frame
-from simulation.devices.drive import SimulatedDrive
+from simulation.devices.simulated_drive import SimulatedDrive
 
 
 @dataclass(slots=True)
@@ -19,7 +19,7 @@ class ForeignMaster:
     commands: int = 0  # of the loop, so far
 
     def answer(self, frame: Frame) -> Frame | None:
-        """Returns the command that follows a frame of the loop on the bus, or None."""
+        """Return the command that follows a frame of the loop on the bus, or None."""
         own = self.drive.forge_torque(self.torque_nm)
         if frame.arbitration_id != own.arbitration_id or frame.is_remote:
             return None

@@ -38,14 +38,14 @@ class MotionCapture:
         self._in_transit: deque[CameraFrame] = deque()
 
     def step(self, now_s: float, plant: Plant) -> Iterator[CameraFrame]:
-        """Yields the frames that arrive by now. Infrequent calls miss exposures, as a delayed camera does."""
+        """Yield the frames that arrive by now. Infrequent calls miss exposures, as a delayed camera does."""
         if now_s >= self._due_s:
             self._expose(now_s, plant)
         while self._in_transit and self._in_transit[0].exposed_s + self.parameters.latency_s <= now_s:
             yield self._in_transit.popleft()
 
     def _expose(self, now_s: float, plant: Plant) -> None:
-        """Adds a frame. Exposures lie on a grid of time, at which the position is extrapolated."""
+        """Add a frame. Exposures lie on a grid of time, at which the position is extrapolated."""
         period_s = self._period_s
         exposed_s = self._due_s if now_s - self._due_s < period_s else now_s
         self._due_s = exposed_s + period_s

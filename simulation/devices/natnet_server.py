@@ -75,7 +75,7 @@ def encode_frame(
 
 
 def _sections(version: NatNetVersion, bodies: list[bytes], crowded: bool) -> list[list[bytes]]:
-    """Returns the sections that frames of this version have."""
+    """Return the sections that frames of this version have."""
     bone = encode_rigid_body(version, 65537, RecordedPose(0.0, (9.0, 9.0, 9.0)))
     labelled = pack("<i4f", 7, 1.0, 2.0, 3.0, 0.01) + pack("<H", 2) + (pack("<f", 1e-4) if version >= (3, 0) else b"")
     asset = (
@@ -108,7 +108,7 @@ def _frame_end(version: NatNetVersion, times: FrameTimes, models_changed: bool) 
 
 
 def encode_models(version: NatNetVersion, bodies: Iterable[tuple[str, int]]) -> bytes:
-    """Encodes a marker set, then rigid bodies by name and streaming id, each with one marker."""
+    """Encode a marker set, then rigid bodies by name and streaming id, each with one marker."""
     described = [(0, b"all\0" + pack("<i", 1) + b"Marker 1\0")]
     for name, identity in bodies:
         body = name.encode() + b"\0" + pack("<ii3f", identity, -1, 0.0, 0.0, 0.0)
@@ -150,11 +150,11 @@ class NatNetServer:
         self.address: Address = self._socket.getsockname()
 
     def add(self, pose: RecordedPose) -> None:
-        """Queues a pose, to be sent when it is due."""
+        """Queue a pose, to be sent when it is due."""
         self._poses.append(pose)
 
     def change_model(self, identity: int) -> None:
-        """Gives the body another streaming id, which the next frame announces."""
+        """Give the body another streaming id, which the next frame announces."""
         self.identity, self._models_changed = identity, True
 
     def step(self, now_s: float) -> int:
@@ -176,7 +176,7 @@ class NatNetServer:
         self.send_packet(encode_frame(self.version, self._number, [body], times, self.crowded, changed))
 
     def send_packet(self, packet: bytes) -> None:
-        """Sends to all clients. A packet that a client does not take is lost, as on any network."""
+        """Send to all clients. A packet that a client does not take is lost, as on any network."""
         for client in self._clients:
             with suppress(ConnectionRefusedError, BlockingIOError):
                 self._socket.sendto(packet, client)

@@ -44,7 +44,7 @@ class NatNetLine(PoseLine):
     """A NatNet server on this computer."""
 
     def __init__(self, pose: PoseParameters) -> None:
-        """Raises OSError for an address that this computer does not have."""
+        """Raise OSError for an address that this computer does not have."""
         natnet = pose.natnet
         self._direction = parse_axis(pose.axis) or AXES["x"]
         self._origin_m = pose.origin_m
@@ -72,7 +72,7 @@ class RailEncoderLine(PoseLine):
     """A rail encoder on a pseudo-terminal, under the device's name."""
 
     def __init__(self, pose: PoseParameters) -> None:
-        """Raises OSError where the name is taken."""
+        """Raise OSError where the name is taken."""
         encoder = pose.rail_encoder
         self._origin_m = pose.origin_m
         self.counter = EmulatedRailEncoder(Path(encoder.device), encoder.metres_per_count, encoder.label)
@@ -88,7 +88,7 @@ class PoseBroadcast:
     """Sends the body's position as motion capture measures it."""
 
     def __init__(self, pose: PoseParameters, seed: int) -> None:
-        """Raises OSError where this computer cannot provide that source."""
+        """Raise OSError where this computer cannot provide that source."""
         self.line = _line(pose)
         self._capture = MotionCapture(OF_THE_PAPER, seed)
 

@@ -17,7 +17,7 @@ class PseudoTerminal:
     """Owns both ends. `device` is the path of the program's end."""
 
     def __init__(self, link: Path | None = None) -> None:
-        """Raises FileExistsError where the link's name is taken."""
+        """Raise FileExistsError where the link's name is taken."""
         self._master, self.slave = os.openpty()
         tty.setraw(self.slave)
         os.set_blocking(self._master, False)
@@ -31,14 +31,14 @@ class PseudoTerminal:
                 raise
 
     def write(self, data: bytes) -> int:
-        """Returns how many bytes the program's buffer took."""
+        """Return how many bytes the program's buffer took."""
         try:
             return os.write(self._master, data)
         except BlockingIOError:
             return 0
 
     def read(self) -> bytes:
-        """Returns what the program has written since."""
+        """Return what the program has written since."""
         with suppress(BlockingIOError):
             return os.read(self._master, 65536)
         return b""

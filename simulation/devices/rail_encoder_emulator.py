@@ -23,7 +23,7 @@ class EmulatedRailEncoder:
         self.write(f"{self.label}{round((position_m - self._zero_m) / self.metres_per_count)}{self.line_end}".encode())
 
     def write(self, data: bytes) -> None:
-        """Writes raw bytes, malformed lines included."""
+        """Write raw bytes, malformed lines included."""
         self.lost_lines += self._terminal.write(data) == 0
 
     def unplug(self) -> None:

@@ -67,7 +67,7 @@ class SerialTalker:
             self._terminal, self.waiting = None, b""
 
     def step(self, now_s: float) -> None:
-        """Prints every line up to now, and delivers the adapter's buffer when it is due."""
+        """Print every line up to now, and deliver the adapter's buffer when it is due."""
         period_s = 1.0 / self.parameters.rate_hz
         if not self._started:
             self._started, self._due_s = True, now_s + period_s
@@ -93,11 +93,11 @@ class SerialTalker:
         return line if opened_at == self.parameters.baud else self._noise(len(line))
 
     def _noise(self, length: int) -> bytes:
-        """Returns what a receiver decodes at another rate: any bytes, few of them line ends."""
+        """Return what a receiver decodes at another rate: any bytes, few of them line ends."""
         return bytes(self._random.choice((0x00, 0x80, 0xE0, 0xF8, 0xFE, 0xFF, 0x9C, 0x66, 0x1E)) for _ in range(length))
 
     def deliver(self) -> None:
-        """Writes the buffer and waits until it can be read: a pseudo-terminal delivers a moment later."""
+        """Write the buffer and wait until it can be read: a pseudo-terminal delivers a moment later."""
         terminal = self._terminal
         if terminal is None or not self.waiting:
             return

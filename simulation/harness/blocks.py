@@ -14,12 +14,12 @@ CUSHION = Track([(1.0, Clay("cushion", 1e3))])  # supports an idle arm and yield
 
 
 def resting_drop_m(geometry: FlipperGeometry) -> float:
-    """Returns how far below its axis an idle flipper's edge should lie on the bench."""
+    """Return how far below its axis an idle flipper's edge should lie on the bench."""
     return -geometry.edge_position(0.0, RESTING_RAD)[2]
 
 
 def on_blocks(configuration: Configuration) -> World:
-    """Makes the world of a bench, with realistic drives: some lag, some cogging, and delayed messages."""
+    """Make the world of a bench, with realistic drives: some lag, some cogging, and delayed messages."""
     geometry = replace(configuration.geometry, axis_height_m=resting_drop_m(configuration.geometry))
     robot = {"fixed_base": True, "geometry": geometry, "joint_coulomb_nm": 0.005}
     drives = {"current_lag_s": 0.0005, "cogging_nm": 0.003, "message_delay_s": 0.0005}

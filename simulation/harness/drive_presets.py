@@ -22,7 +22,7 @@ DATA_BIT_RATE_KBIT_S = 5000
 
 
 def with_drive_type(text: str, drive: str, **settings: float) -> str:
-    """Returns the text of the configuration with this type for every joint: "mit", or with a model "mit:AK80-9".
+    """Return the text of the configuration with this type for every joint: "mit", or with a model "mit:AK80-9".
 
     The default type returns it unchanged. `settings` are keys of the drives, for a type that knows them.
     """

@@ -41,12 +41,12 @@ class FileRecorder(NullRecorder):
         self._rows = []
 
     def flush(self) -> None:
-        """Makes every row so far readable."""
+        """Make every row so far readable."""
         self._write()
         self._file.flush()
 
     def close(self, timeout_s: float = 0.0) -> bool:
-        """Finishes the file, however long that takes."""
+        """Finish the file, however long that takes."""
         if self.is_open:
             self._write()
             self.path = self._file.finish()

@@ -74,7 +74,7 @@ WIRED = {"left_sweep": (0, 1), "left_adduction": (1, -1), "right_sweep": (3, -1)
 
 
 def configuration_template(rig: Rig = TWO_FLIPPERS) -> str:
-    """Returns the configuration of a simulated rig, each flipper on a bus of its name; paths are still to be filled in.
+    """Return the configuration of a simulated rig, each flipper on a bus of its name; paths are still to be filled in.
 
     `WIRED` has node id and sign of each joint.
     """
@@ -94,7 +94,7 @@ CONFIGURATION = configuration_template()
 
 
 def named_folder(name: str) -> Path:
-    """Returns the same private folder for every process of this user: short, as the path of a Unix socket must be.
+    """Return the same private folder for every process of this user: short, as the path of a Unix socket must be.
 
     Raises ValueError for a name with a path in it, and OSError where another user could write to the folder.
     """
@@ -104,13 +104,13 @@ def named_folder(name: str) -> Path:
 
 
 def make_buses(folder: Path) -> None:
-    """Makes the folders of the two local buses."""
+    """Make the folders of the two local buses."""
     for name in ("left", "right"):
         make_own_folder(folder / name)
 
 
 def write_local_setup(folder: Path, logs: Path) -> Path:
-    """Returns the configuration's path, for `mudskipperd --config` and for the simulated robot."""
+    """Return the configuration's path, for `mudskipperd --config` and for the simulated robot."""
     make_buses(folder)
     path = folder / "mudskipper.toml"
     write_private_file(path, configuration_text(folder, logs.absolute()))
@@ -121,7 +121,7 @@ def write_local_setup(folder: Path, logs: Path) -> Path:
 
 
 def configuration_text(folder: Path, logs: Path) -> str:
-    """Writes paths as JSON strings, which are TOML strings too."""
+    """Write paths as JSON strings, which are TOML strings too."""
     paths = {
         "left": folder / "left",
         "right": folder / "right",

@@ -32,7 +32,7 @@ from simulation.mud.track import Track
 
 
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
-    """Returns simulated drives with the configuration's ids, signs, zeros, models and torque constants."""
+    """Return simulated drives with the configuration's ids, signs, zeros, models and torque constants."""
     of_all = ("type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a", "serial_number")
     given = (*of_all, "model", "torque_range_nm", "encoder_counts", "encoder_direction", "watchdog_s")
     return {
@@ -46,7 +46,7 @@ def drives_of(configuration: Configuration, **changes: Any) -> dict[str, Simulat
 def plant_of(
     configuration: Configuration, disturbances: Disturbances = NONE, fixed_base: bool = False, **changes: Any
 ) -> PlantParameters:
-    """Returns mechanics that fit a configuration, with changes by name."""
+    """Return mechanics that fit a configuration, with changes by name."""
     fitting: dict[str, Any] = {
         "rig": configuration.rig,
         "geometry": configuration.geometry,
@@ -95,11 +95,11 @@ class Lockstep:
         wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
         ports = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
         pose: PoseSource = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
-        rows, wall_clock = recorder or NullRecorder(), self._wall_s
+        rows, wall_clock = recorder or NullRecorder(), lambda: self.now_s + self.wall_offset_s
         if failures is not None:
             pose, rows = FailingPose(pose, failures), FailingRecorder(rows, failures)
             wall_clock = FailingClock(wall_clock, failures)
-        self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock, period_s)
+        self.loop = Loop(configuration, ports, pose, rows, lambda: self.now_s, wall_clock, period_s)
         self._can_fail = failures is not None
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
@@ -109,12 +109,6 @@ class Lockstep:
     @property
     def now_s(self) -> float:
         return self.tick_number * self.period_s
-
-    def _now_s(self) -> float:
-        return self.now_s
-
-    def _wall_s(self) -> float:
-        return self.now_s + self.wall_offset_s
 
     def step(self) -> None:
         missed = int(self._stalls.next_s() / self.period_s) + self.late_ticks
@@ -128,7 +122,7 @@ class Lockstep:
         self.loop.tick(Tick(self.now_s, missed * self.period_s, self.tick_number, missed))
 
     def fail(self, component: str, kind: str, for_s: float = USUAL_S) -> None:
-        """Makes a component fail from the next tick on. Raises RuntimeError where it is refused."""
+        """Make a component fail from the next tick on. Raises RuntimeError where it is refused."""
         refused = self.failures.refusal(component, kind, for_s) if self._can_fail else "no failures were given"
         if refused:
             raise RuntimeError(refused)
@@ -140,7 +134,7 @@ class Lockstep:
             self.step()
 
     def run_until(self, done: Callable[[], bool], longest_s: float) -> bool:
-        """Returns whether `done` became true within `longest_s` of simulated time."""
+        """Return whether `done` became true within `longest_s` of simulated time."""
         for _ in range(round(longest_s / self.period_s)):
             if done():
                 return True
@@ -148,14 +142,14 @@ class Lockstep:
         return done()
 
     def arm(self, forced: bool = False) -> None:
-        """Goes from power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
+        """Go from power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
         self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(forced), 3.0)
         refused = self.loop.request(Request.ARM, self.now_s, forced=forced)
         if refused or not self.run_until(lambda: self.loop.mode is Mode.HOLD, 3.0):
             raise RuntimeError(refused or f"not armed: {self.loop.fault}")
 
     def walk(self, order: WalkOrder) -> None:
-        """Starts a walk. Raises RuntimeError where it is refused."""
+        """Start a walk. Raises RuntimeError where it is refused."""
         refused = self.loop.request(Request.WALK, self.now_s, order)
         if refused:
             raise RuntimeError(refused)

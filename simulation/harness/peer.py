@@ -76,12 +76,12 @@ class Peer:
 
 
 def track_of(waters: Sequence[str], length_m: float = COMPARTMENT_M) -> Track:
-    """Returns compartments of the named water contents, one after the other."""
+    """Return compartments of the named water contents, one after the other."""
     return Track([(length_m, MUDS[water]) for water in waters])
 
 
 def end_with_parent() -> None:
-    """Asks the kernel for SIGTERM when the starting process dies, so that no robot is left over."""
+    """Ask the kernel for SIGTERM when the starting process dies, so that no robot is left over."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
@@ -104,14 +104,14 @@ class Ground(NamedTuple):
     on_blocks: bool = False
 
     def make_world(self, configuration: Configuration) -> World:
-        """Raises ConfigurationError."""
+        """Raise ConfigurationError."""
         if self.on_blocks:
             return on_blocks(configuration)
         return load_world(self.world) if self.world else World(track_of(self.waters or list(MUDS)))
 
 
 def take_precedence() -> None:
-    """Raises this process's priority where it is permitted: a real robot does not wait for its computer.
+    """Raise this process's priority where it is permitted: a real robot does not wait for its computer.
 
     On a single processor it stays out of real time: a simulation that cannot keep up would block all other processes.
     """
@@ -123,11 +123,11 @@ def take_precedence() -> None:
 
 
 def nothing() -> None:
-    """Announces nothing."""
+    """Announce nothing."""
 
 
 def simulate(configuration: Configuration, ground: Ground, seed: int, announce: Callable[[], None] = nothing) -> int:
-    """Simulates the robot until a signal ends the process; returns the exit status.
+    """Simulate the robot until a signal ends the process; return the exit status.
 
     `announce` is called once the robot has its buses: another one that is simulated on them is left alone.
     """

@@ -12,9 +12,10 @@ from drivers.can.can_port import CanPort
 from drivers.can.frames import Frame
 from simulation.body.plant import STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
-from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive
 from simulation.devices.foreign_master import ForeignMaster
+from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.mud.track import Track
 
 
@@ -49,7 +50,7 @@ class SimulatedRobot:
         self._measure()
 
     def advance(self, until_s: float) -> None:
-        """Executes the frames that have arrived, then simulates until `until_s` and sends messages as they come due."""
+        """Execute the frames that have arrived, then simulate until `until_s` and send messages as they come due."""
         self._execute_frames()
         if self._put_back_requested:
             self._put_back_requested = False
@@ -68,11 +69,11 @@ class SimulatedRobot:
                     port.send(frame)
 
     def request_put_back(self) -> None:
-        """Puts the flippers back as an operator does by hand, before the next step: safe in a signal handler."""
+        """Put the flippers back as an operator does by hand, before the next step: safe in a signal handler."""
         self._put_back_requested = True
 
     def restart_drive(self, joint: int) -> None:
-        """Interrupts the supply of one drive for a moment. `joint`: its index in the rig's joints."""
+        """Interrupt the supply of one drive for a moment. `joint`: its index in the rig's joints."""
         self.drives[joint].restart(self.now_s)
 
     def _execute_frames(self) -> None:
@@ -86,7 +87,7 @@ class SimulatedRobot:
                         self._command(master, frame, port)
 
     def _command(self, master: ForeignMaster, frame: Frame, port: CanPort) -> None:
-        """Lets another program command its drive after a frame of the loop."""
+        """Let another program command its drive after a frame of the loop."""
         foreign = master.answer(frame)
         if foreign is not None:
             master.drive.receive(foreign, self.now_s)
@@ -94,7 +95,7 @@ class SimulatedRobot:
                 port.send(foreign)
 
     def _measure(self) -> None:
-        """Gives each drive its joint's true motion; without records in between, as this runs in every step."""
+        """Give each drive its joint's true motion; without records in between, as this runs in every step."""
         drives, joint = self.drives, 0
         for arm in self.plant.arms:
             drives[joint].measure(arm.sweep_rad, arm.sweep_velocity_rad_s)

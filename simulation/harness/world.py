@@ -6,8 +6,7 @@ because the daemon knows these and does not know the world.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from math import nan
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -52,7 +51,7 @@ class World:
     warnings: tuple[str, ...] = ()  # about keys that the file gives under their former names
 
     def plant(self, configuration: Configuration) -> PlantParameters:
-        """Raises ConfigurationError where the world has a free body and the configuration a fixed base."""
+        """Raise ConfigurationError where the world has a free body and the configuration a fixed base."""
         fixed_base = configuration.estimation.fixed_base
         if fixed_base and self.robot_changes.get("free_body"):
             raise ConfigurationError(["robot.free_body = true: the configuration says estimation.fixed_base = true"])
@@ -106,119 +105,78 @@ FORMER_KEYS = {"drives.repeated_share": "repeated_fraction"}  # of version 0.1, 
 
 
 def load_world(path: Path) -> World:
-    """Reads a world file. Raises ConfigurationError, also where the file cannot be read."""
+    """Read a world file. Raises ConfigurationError, also where the file cannot be read."""
     return parse_world(read_text(path), path)
 
 
 def parse_world(text: str, file: Path | None = None) -> World:
-    """Reads a world. Raises ConfigurationError with all problems at once."""
+    """Read a world. Raises ConfigurationError with all problems."""
     return read_world(parse_document(text, file))
 
 
 def read_world(document: dict[str, Any]) -> World:
-    """Reads a world from the tables of its file. Raises ConfigurationError with all problems at once."""
+    """Read a world from the tables of its file. Raises ConfigurationError with all problems."""
     warnings = tuple(rename_former_keys(document, FORMER_KEYS))
-    problems = _READER.problems(document) + list(_contradictions(document))
+    text = WorldText(**_READER.read(document))
+    problems = list(_contradictions(text))
     if problems:
         raise ConfigurationError(problems)
-    return replace(WorldText(**_READER.read(document)).world, warnings=warnings)
+    return replace(text.world, warnings=warnings)
 
 
-def _contradictions(document: Mapping[str, Any]) -> Iterator[str]:
-    """Yields contradictions between fields. A value that is not a number contradicts nothing."""
-    segments = _tables(document, "segment")
-    if document.get("segment") == []:
+def _contradictions(text: WorldText) -> Iterator[str]:
+    """Yield contradictions between fields."""
+    if not text.segment:
         yield "segment = []: must be at least one"
-    yield from _border_problems(segments)
-    for number, segment in enumerate(segments, 1):
-        yield from _mud_problems(f"segment {number}", segment)
-        yield from _layer_problems(f"segment {number}", segment)
-    yield from _stone_problems(document)
-    yield from _drive_problems(document)
-
-
-def _tables(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
-    """Returns the tables of an array; any other item counts as an empty table, so that the numbering stays."""
-    array = table.get(key)
-    return [item if isinstance(item, dict) else {} for item in array] if isinstance(array, list) else []
-
-
-def _number(table: Mapping[str, Any], key: str) -> float:
-    """Returns NaN, with which no comparison is true, where there is no number."""
-    value = table.get(key)
-    try:
-        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else nan
-    except OverflowError:  # a whole number beyond all floats
-        return nan
-
-
-def _border_problems(segments: list[dict[str, Any]]) -> Iterator[str]:
     expected_m, where = 0.0, "where the track begins"
-    for number, segment in enumerate(segments, 1):
-        start_m, end_m = _number(segment, "start_m"), _number(segment, "end_m")
+    for number, segment in enumerate(text.segment, 1):
+        key, start_m, end_m = f"segment {number}", segment.start_m, segment.end_m
         if abs(start_m - expected_m) > SAME_POSITION_M:
             wrong = "overlap" if start_m < expected_m else "gap"
-            yield f"segment {number}.start_m = {start_m:g}: must be {expected_m:g}, {where}, without {wrong}"
+            yield f"{key}.start_m = {start_m:g}: must be {expected_m:g}, {where}, without {wrong}"
         if end_m <= start_m:
-            yield f"segment {number}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
+            yield f"{key}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
+        yield from _mud_problems(key, segment)
         expected_m, where = end_m, f"where segment {number} ends"
+    yield from _stone_problems(text)
+    for source, names in DRIVE_FIELDS.items():
+        disturbance = getattr(text.disturbances, source)
+        for name in text.drives.keys() & set(names) if disturbance else ():
+            conflicting = f"disturbances.{source} = {disturbance:g}"
+            yield f"drives.{name} = {shown(text.drives[name])}: cannot be combined with {conflicting}"
 
 
-def _mud_problems(key: str, segment: dict[str, Any]) -> Iterator[str]:
-    if "water_percent" in segment and "strength_pa" in segment:
-        yield (
-            f"{key}.water_percent = {shown(segment['water_percent'])}: cannot be combined with"
-            f" strength_pa = {shown(segment['strength_pa'])}; remove one of them"
-        )
-    if "water_percent" not in segment and "strength_pa" not in segment:
+def _mud_problems(key: str, segment: SegmentText) -> Iterator[str]:
+    water, strength = segment.water_percent, segment.strength_pa
+    if water is None and strength is None:
         yield f"{key}: water_percent or strength_pa is missing"
+    elif water is None or strength is None:
+        yield from _layer_problems(key, segment.layer, segment.clay.strength_pa)
+    else:
+        wrong = f"cannot be combined with strength_pa = {strength:g}; remove one of them"
+        yield f"{key}.water_percent = {water:g}: {wrong}"
 
 
-def _layer_problems(key: str, segment: dict[str, Any]) -> Iterator[str]:
-    strength_pa, last_m = _strength_pa(segment), 0.0
-    for number, layer in enumerate(_tables(segment, "layer"), 1):
-        top_m, bottom_m, factor = (_number(layer, name) for name in ("top_m", "bottom_m", "factor"))
+def _layer_problems(key: str, layers: list[Layer], strength_pa: float) -> Iterator[str]:
+    last_m = 0.0
+    for number, (top_m, bottom_m, factor) in enumerate(map(astuple, layers), 1):
         if top_m < last_m:
             yield f"{key}.layer {number}.top_m = {top_m:g}: must be at least {last_m:g}, where layer {number - 1} ends"
         if bottom_m <= top_m:
             yield f"{key}.layer {number}.bottom_m = {bottom_m:g}: must be more than top_m = {top_m:g}"
         if factor * strength_pa > STRONGEST_PA:
-            yield (
-                f"{key}.layer {number}.factor = {factor:g}: must be at most {STRONGEST_PA / strength_pa:.3g}"
-                f" in mud of {strength_pa:.0f} Pa"
-            )
+            most = f"at most {STRONGEST_PA / strength_pa:.3g} in mud of {strength_pa:.0f} Pa"
+            yield f"{key}.layer {number}.factor = {factor:g}: must be {most}"
         last_m = bottom_m
 
 
-def _strength_pa(segment: dict[str, Any]) -> float:
-    water_percent = _number(segment, "water_percent")
-    if DRIEST_PERCENT <= water_percent <= WETTEST_PERCENT:
-        return clay_of_water(water_percent).strength_pa
-    return _number(segment, "strength_pa")
-
-
-def _stone_problems(document: Mapping[str, Any]) -> Iterator[str]:
-    ridges = document.get("ridges")
-    amplitude_m = _number(ridges, "amplitude_m") if isinstance(ridges, dict) else 0.0
-    last_m = -1.0
-    for number, stone in enumerate(_tables(document, "stone"), 1):
-        start_m, end_m, top_m = (_number(stone, name) for name in ("start_m", "end_m", "top_m"))
+def _stone_problems(text: WorldText) -> Iterator[str]:
+    last_m, amplitude_m = -1.0, text.ridges.amplitude_m
+    for number, (start_m, end_m, top_m) in enumerate(map(astuple, text.stone), 1):
         if start_m <= last_m:
             yield f"stone {number}.start_m = {start_m:g}: must be more than {last_m:g}, where stone {number - 1} ends"
         if end_m <= start_m:
             yield f"stone {number}.end_m = {end_m:g}: must be more than start_m = {start_m:g}"
-        if 0.0 <= top_m < amplitude_m:
+        if top_m < amplitude_m:
             yield f"stone {number}.top_m = {top_m:g}: must be at least {amplitude_m:g}, ridges.amplitude_m"
         last_m = end_m
-
-
-def _drive_problems(document: Mapping[str, Any]) -> Iterator[str]:
-    """Yields the fields of the drives that a disturbance sets too."""
-    disturbances, drives = document.get("disturbances"), document.get("drives")
-    if not isinstance(disturbances, dict) or not isinstance(drives, dict):
-        return
-    for source, names in DRIVE_FIELDS.items():
-        if _number(disturbances, source) > 0.0:
-            for name in drives.keys() & set(names):
-                conflicting = f"disturbances.{source} = {disturbances[source]}"
-                yield f"drives.{name} = {shown(drives[name])}: cannot be combined with {conflicting}"

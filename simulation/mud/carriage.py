@@ -39,7 +39,7 @@ def cross(one: Vector, other: Vector) -> Vector:
 
 
 def plate_directions(sweep_rad: float, adduction_rad: float) -> tuple[Vector, Vector, Vector]:
-    """Returns n, r and s."""
+    """Return n, r and s."""
     sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
     return (ca, -sa * cb, -sa * sb), (sa, ca * cb, ca * sb), (0.0, -sb, cb)
 

@@ -50,7 +50,7 @@ class Clay(NamedTuple):
     layers: tuple[Layer, ...] = ()
 
     def lateral_n(self, depth_m: float, width_m: float) -> float:
-        """Returns the sideways yield force on an upright plate at the reference speed."""
+        """Return the sideways yield force on an upright plate at the reference speed."""
         if not self.layers:
             return _lateral_n(self.strength_pa, depth_m, width_m)
         borders_m = {border_m for layer in self.layers for border_m in (layer.top_m, layer.bottom_m)}
@@ -61,7 +61,7 @@ class Clay(NamedTuple):
         return force_n
 
     def scaled(self, factor: float) -> Clay:
-        """Returns the same mud, stronger or weaker in all its layers."""
+        """Return the same mud, stronger or weaker in all its layers."""
         return Clay(self.name, factor * self.strength_pa, self.layers)
 
     def strength_at_pa(self, depth_m: float) -> float:
@@ -71,7 +71,7 @@ class Clay(NamedTuple):
         return self.strength_pa
 
     def mean_strength_pa(self, from_m: float, to_m: float) -> float:
-        """Returns the mean strength between two depths."""
+        """Return the mean strength between two depths."""
         fraction = 1.0
         for layer in self.layers:
             top_m = layer.top_m if layer.top_m > from_m else from_m
@@ -82,7 +82,7 @@ class Clay(NamedTuple):
 
 
 def _lateral_n(strength_pa: float, depth_m: float, width_m: float) -> float:
-    """Integrates Matlock's law over uniform mud from the surface to `depth_m`."""
+    """Integrate Matlock's law over uniform mud from the surface to `depth_m`."""
     rise_per_m = lateral_rise_per_m(strength_pa, width_m)
     shallow_m = min(depth_m, (DEEP_FACTOR - SURFACE_FACTOR) / rise_per_m)
     factor_m = SURFACE_FACTOR * shallow_m + rise_per_m * shallow_m * shallow_m / 2.0
@@ -91,12 +91,12 @@ def _lateral_n(strength_pa: float, depth_m: float, width_m: float) -> float:
 
 
 def lateral_rise_per_m(strength_pa: float, width_m: float) -> float:
-    """Returns the rise of pressure over strength with depth, which is 3 at the surface and at most 9."""
+    """Return the rise of pressure over strength with depth, which is 3 at the surface and at most 9."""
     return UNIT_WEIGHT_N_M3 / strength_pa + MATLOCK_J / width_m
 
 
 def rate_factor(speed_m_s: float) -> float:
-    """Returns g(v): faster is stronger."""
+    """Return g(v): faster is stronger."""
     return float((1.0 + RATE_COEFFICIENT * speed_m_s**RATE_EXPONENT) / _AT_REFERENCE)
 
 
@@ -108,7 +108,7 @@ DRIEST_PERCENT, WETTEST_PERCENT = 44.0, 56.0
 
 
 def clay_of_water(percent: float) -> Clay:
-    """Interpolates the strengths of the three muds exponentially, and extrapolates them with the nearest slope.
+    """Interpolate the strengths of the three muds exponentially, and extrapolate them with the nearest slope.
 
     Raises ValueError outside of the range that they support.
     """

@@ -94,7 +94,7 @@ DRIVE_FIELDS = {
 
 
 def drive_changes(disturbances: Disturbances) -> dict[str, float]:
-    """Returns the drives' parameters that differ from their own."""
+    """Return the drives' parameters that differ from their own."""
     changes = {name: getattr(disturbances, source) for source, names in DRIVE_FIELDS.items() for name in names}
     return {name: value for name, value in changes.items() if value}
 
@@ -102,7 +102,7 @@ def drive_changes(disturbances: Disturbances) -> dict[str, float]:
 def clinging_torques_nm(
     geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, weight_n: float
 ) -> tuple[float, float]:
-    """Returns the torque -W ∂z/∂q of a weight on (sweep, adduction), with z = l cos α sin β + (s - h) cos β."""
+    """Return the torque -W ∂z/∂q of a weight on (sweep, adduction), with z = l cos α sin β + (s - h) cos β."""
     length_m, below_arm_m = geometry.flipper_length_m, geometry.drop_m - CLINGING_ABOVE_EDGE_M
     lever_m = length_m * cos(sweep_rad) * cos(adduction_rad) + below_arm_m * sin(adduction_rad)
     return weight_n * length_m * sin(sweep_rad) * sin(adduction_rad), -weight_n * lever_m
@@ -142,7 +142,7 @@ class StrokeHistory:
         self._shake_off(lowest_m)
 
     def _shake_off(self, lowest_m: float) -> None:
-        """Finds how much of the way down from its highest point the plate has gone; what fell off does not return."""
+        """Find how much of the way down from its highest point the plate has gone; what fell off does not return."""
         self._highest_m = min(self._highest_m, lowest_m)
         way_m = max(self.surface_m - self._highest_m, SHORTEST_FALL_M)
         self._shaken = max(self._shaken, (lowest_m - self._highest_m) / way_m)
@@ -166,5 +166,5 @@ class StrokeHistory:
         self._next_surface_m = self._draw_surface_m()
 
     def _draw_surface_m(self) -> float:
-        """Draws how far the surface lies below the nominal height."""
+        """Draw how far the surface lies below the nominal height."""
         return self.trial_surface_m + self._random.gauss(0.0, self.disturbances.surface_sd_m)

@@ -65,7 +65,7 @@ def attitude_of(
 
 
 def twist_of(geometry: FlipperGeometry, motion: ArmMotion) -> Twist:
-    """Returns the plate's motion through the mud, which is the same at any adduction angle."""
+    """Return the plate's motion through the mud, which is the same at any adduction angle."""
     sweep_rad, _, sweep_rad_s, adduction_rad_s, body_m_s = motion
     length_m, drop_m, sa, ca = geometry.flipper_length_m, geometry.drop_m, sin(sweep_rad), cos(sweep_rad)
     return Twist(

@@ -45,10 +45,10 @@ class PlateStep(NamedTuple):
 Strip = tuple[float, float, float, float]
 
 
-def submerged_strips(
-    submerged_m: float, strip_m: float, per_upward: float, clay: Clay, foot_m: float = 0.0
-) -> list[Strip]:
-    """Returns the strips of a column in the mud up to `submerged_m` above its foot, which is at the height `foot_m`."""
+def submerged_strips(step: PlateStep, outward_m: float, foot_m: float, strip_m: float) -> list[Strip]:
+    """Return the strips in the mud of a column whose foot is `outward_m` outward, at the height `foot_m`."""
+    clay, (depth_m, per_outward, per_upward) = step.clay, step.attitude
+    submerged_m = (depth_m + per_outward * outward_m) / per_upward - foot_m
     strips, strength_pa, layers = [], clay.strength_pa, clay.layers
     for strip in range(STRIPS):
         low_m = strip * strip_m
@@ -93,7 +93,7 @@ class PressedColumn(Springs):
     def step(
         self, step: PlateStep, strips: list[Strip], breadth_m: float, speed_m_s: float, per_upward_s: float
     ) -> tuple[float, float]:
-        """Returns the force against a motion that grows by `per_upward_s` upward, and its moment."""
+        """Return the force against a motion that grows by `per_upward_s` upward, and its moment."""
         dt_s, clay, rate, _, _ = step
         layered, per_yield = bool(clay.layers), dt_s / self.yield_m
         rise_per_m = lateral_rise_per_m(clay.strength_pa, self.profile_width_m)
@@ -136,7 +136,7 @@ class RubbedColumn(Springs):
     def step(
         self, step: PlateStep, strips: list[Strip], breadth_m: float, velocity_m_s: complex, per_upward_s: float
     ) -> tuple[complex, float]:
-        """Returns the force against a motion whose outward part grows by `per_upward_s` upward, and that part's moment.
+        """Return the force against a motion whose outward part grows by `per_upward_s` upward, and that part's moment.
 
         `breadth_m`: of all surfaces that mud sticks to.
         """
@@ -174,7 +174,7 @@ class LowerEdge(Springs):
     def step(
         self, step: PlateStep, positions_m: tuple[float, float], depths_m: tuple[float, float], wet_m: float
     ) -> tuple[float, float]:
-        """Returns the force upward, and its moment outward."""
+        """Return the force upward, and its moment outward."""
         dt_s, clay, rate, _, twist = step
         fractions, limits_n = self._fractions, self._limits_n
         force_n = moment_nm = 0.0

@@ -29,7 +29,6 @@ from simulation.mud.mud_springs import (
     PressedColumn,
     RubbedColumn,
     Springs,
-    Strip,
     submerged_strips,
 )
 from simulation.mud.plate_panels import GAUSS, Panel, panels_of, sides_m
@@ -53,7 +52,7 @@ class PanelContact:
         self.parts: tuple[Springs, ...] = (*self._pressed, *self._rubbed, self._edge)
 
     def step(self, step: PlateStep) -> tuple[float, ...]:
-        """Returns the panel's part of the wrench."""
+        """Return the panel's part of the wrench."""
         attitude, panel = step.attitude, self.panel
         wet_m, middle_m = panel.wet_part_m(attitude)
         positions_m = (middle_m - GAUSS * wet_m, middle_m + GAUSS * wet_m)
@@ -66,19 +65,13 @@ class PanelContact:
     def _step_column(self, step: PlateStep, half: int, outward_m: float, breadth_m: float) -> tuple[float, ...]:
         v_n, v_r, v_s, n_u, n_s, r_s, s_u = step.twist
         foot_m, strip_m = self.panel.foot_at_m(outward_m), self.panel.length_at_m(outward_m) / STRIPS
-        strips = strips_at(step, outward_m, foot_m, strip_m)
+        strips = submerged_strips(step, outward_m, foot_m, strip_m)
         normal_n, normal_nm = self._pressed[half].step(step, strips, breadth_m, v_n + n_u * outward_m, n_s)
         sticky_m = 2.0 * breadth_m + self._side_m
         velocity_m_s = complex(v_r, v_s + s_u * outward_m)
         along_n, outward_nm = self._rubbed[half].step(step, strips, sticky_m, velocity_m_s, r_s)
         up_n = along_n.imag
         return normal_n, along_n.real, up_n, normal_n * outward_m, normal_nm, outward_nm, up_n * outward_m
-
-
-def strips_at(step: PlateStep, outward_m: float, foot_m: float, strip_m: float) -> list[Strip]:
-    depth_m, per_outward, per_upward = step.attitude
-    submerged_m = (depth_m + per_outward * outward_m) / per_upward - foot_m
-    return submerged_strips(submerged_m, strip_m, per_upward, step.clay, foot_m)
 
 
 class PlateContact:
@@ -108,7 +101,7 @@ class PlateContact:
         self._touched = False
 
     def leaves(self, attitude: Attitude) -> bool:
-        """Returns whether the plate is clear of the mud; the mud then forgets it."""
+        """Return whether the plate is clear of the mud; the mud then forgets it."""
         if lowest_point_m(attitude, self.size) > 0.0:
             return False
         if self._touched:
@@ -119,7 +112,7 @@ class PlateContact:
         return NO_WRENCH if self.leaves(attitude) else self.press(dt_s, clay, attitude, twist)
 
     def press(self, dt_s: float, clay: Clay, attitude: Attitude, twist: Twist) -> Wrench:
-        """Steps a plate that does not leave the mud."""
+        """Step a plate that does not leave the mud."""
         self._touched = True
         speed_m_s = sqrt(twist.normal_m_s**2 + twist.outward_m_s**2 + twist.upward_m_s**2)
         if self.relaxation:
@@ -127,7 +120,7 @@ class PlateContact:
         return self._wrench(PlateStep(dt_s, clay, rate_factor(speed_m_s), attitude, twist))
 
     def _wrench(self, step: PlateStep) -> Wrench:
-        """Returns the sum over all pieces."""
+        """Return the sum over all pieces."""
         parts = [panel.step(step) for panel in self._panels]
         parts += [self._rub_side(step, side, outward_m) for side, outward_m in self._rubbed_sides]
         n, r, s, n_u, n_s, r_s, s_u = parts[0] if len(parts) == 1 else map(sum, zip(*parts, strict=True))
@@ -136,7 +129,7 @@ class PlateContact:
         return Wrench(n, r + inner_n + outer_n, s, n_u, n_s, r_s + inner_nm + outer_nm, s_u)
 
     def _relax(self, dt_s: float, speed_m_s: float) -> None:
-        """Fades the load at rest. Motion forgets the rest, and the distance it covers loads the springs again."""
+        """Fade the load at rest. Motion forgets the rest, and the distance it covers loads the springs again."""
         before = self._rested
         if speed_m_s >= RESTING_M_S:
             self._rested *= exp(-speed_m_s * dt_s / WAKING_M)
@@ -147,15 +140,15 @@ class PlateContact:
             part.fade(remaining)
 
     def _rub_side(self, step: PlateStep, side: RubbedColumn, outward_m: float) -> tuple[float, ...]:
-        """Returns the part of the mud that sticks to a narrow side in the wrench."""
+        """Return the part of the mud that sticks to a narrow side in the wrench."""
         _, v_r, v_s, _, _, r_s, s_u = step.twist
-        strips = strips_at(step, outward_m, 0.0, self._strip_m)
+        strips = submerged_strips(step, outward_m, 0.0, self._strip_m)
         velocity_m_s = complex(v_r, v_s + s_u * outward_m)
         along_n, outward_nm = side.step(step, strips, self.size.thickness_m, velocity_m_s, r_s)
         return 0.0, along_n.real, along_n.imag, 0.0, 0.0, outward_nm, along_n.imag * outward_m
 
     def _step_side(self, step: PlateStep, side: PressedColumn, outward_m: float) -> tuple[float, float]:
-        """Returns the force outward, and its moment upward."""
-        strips, twist = strips_at(step, outward_m, 0.0, self._strip_m), step.twist
+        """Return the force outward, and its moment upward."""
+        strips, twist = submerged_strips(step, outward_m, 0.0, self._strip_m), step.twist
         breadth_m = self.size.thickness_m / 2.0
         return side.step(step, strips, breadth_m, twist.outward_m_s, twist.outward_per_upward_s)

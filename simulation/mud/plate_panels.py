@@ -38,7 +38,7 @@ class Panel(NamedTuple):
         return depth_m + per_outward * outward_m - per_upward * self.foot_at_m(outward_m)
 
     def wet_part_m(self, attitude: Attitude) -> tuple[float, float]:
-        """Returns the width of the submerged part of the lower boundary, and how far outward its middle is."""
+        """Return the width of the submerged part of the lower boundary, and how far outward its middle is."""
         inner_m, outer_m = self.inner_m, self.outer_m
         low_m, high_m = self.foot_depth_m(attitude, inner_m), self.foot_depth_m(attitude, outer_m)
         if low_m < 0.0 or high_m < 0.0:
@@ -78,7 +78,7 @@ def _slice(corners: Sequence[Corner], inner_m: float, outer_m: float) -> Iterato
 
 
 def chords_m(corners: Sequence[Corner], outward_m: float) -> list[tuple[float, float]]:
-    """Returns the lower and upper end of each part of the outline at one distance outward."""
+    """Return the lower and upper end of each part of the outline at one distance outward."""
     edges = zip(corners, [*corners[1:], corners[0]], strict=True)
     heights_m = sorted(
         a[1] + (b[1] - a[1]) * (outward_m - a[0]) / (b[0] - a[0])
@@ -89,7 +89,7 @@ def chords_m(corners: Sequence[Corner], outward_m: float) -> list[tuple[float, f
 
 
 def sides_m(size: PlateSize, heights: int) -> tuple[float, float]:
-    """Returns how far outward the inner and the outer narrow side are: the middle of each one's range."""
+    """Return how far outward the inner and the outer narrow side are: the middle of each one's range."""
     if not size.corners_m:
         return -size.width_m / 2.0, size.width_m / 2.0
     turned = [(s, u) for u, s in size.corners_m]

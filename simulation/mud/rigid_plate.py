@@ -26,12 +26,12 @@ class Attitude(NamedTuple):
     per_upward: float
 
     def below(self, surface_m: float) -> Attitude:
-        """Counts depth from a surface that lies `surface_m` lower."""
+        """Count depth from a surface that lies `surface_m` lower."""
         return Attitude(self.depth_m - surface_m, self.per_outward, self.per_upward)
 
 
 def lowest_point_m(attitude: Attitude, size: PlateSize) -> float:
-    """Returns the depth of the deepest corner."""
+    """Return the depth of the deepest corner."""
     if not size.corners_m:
         return attitude.depth_m + abs(attitude.per_outward) * size.width_m / 2.0
     return attitude.depth_m + max(attitude.per_outward * u - attitude.per_upward * s for u, s in size.corners_m)

@@ -44,7 +44,7 @@ class Stone:
         return depth_m > self.top_m and self.start_m < position_m < self.end_m
 
     def penetration_m(self, face: Face, position_m: float, depth_m: float) -> float:
-        """Returns how far a point in the stone has penetrated one of its faces."""
+        """Return how far a point in the stone has penetrated one of its faces."""
         if face is Face.TOP:
             return depth_m - self.top_m
         return position_m - self.start_m if face is Face.REAR else self.end_m - position_m
@@ -64,7 +64,7 @@ NO_PUSH = Push(0.0, 0.0)
 
 
 def push_wrench(geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, push: Push) -> Wrench:
-    """Resolves F_x forward on the middle of the lower edge and F_z upward on its lower corner along the plate:
+    """Resolve F_x forward on the middle of the lower edge and F_z upward on its lower corner along the plate:
 
     F_n = F_x cos α - F_z sin α sin β    F_r = F_x sin α + F_z cos α sin β    F_s = F_z cos β
     """
@@ -109,7 +109,7 @@ class StoneContact:
         return Push(-force_n if face is Face.REAR else force_n, 0.0)
 
     def _find_stone(self, position_m: float, depth_m: float) -> None:
-        """Finds the stone that contains the edge, and the face through which it came."""
+        """Find the stone that contains the edge, and the face through which it came."""
         self.reset()
         if depth_m <= self._highest_m:  # above all stones, as in swing
             return

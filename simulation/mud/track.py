@@ -91,12 +91,12 @@ class Track:
         return clay.scaled(self._chain.factor_at(x_m)) if self._chain else clay
 
     def surface_m(self, x_m: float) -> float:
-        """Returns how far the mud's surface lies below its nominal height because of the ridges."""
+        """Return how far the mud's surface lies below its nominal height because of the ridges."""
         if not self.ridges.amplitude_m:
             return 0.0
         return -self.ridges.amplitude_m * sin(2.0 * pi * x_m / self.ridges.wavelength_m)
 
 
 def paper_track() -> Track:
-    """Makes the track of section II-F: w = 48.5, 53.1 and 45.3 %."""
+    """Make the track of section II-F: w = 48.5, 53.1 and 45.3 %."""
     return Track([(COMPARTMENT_M, clay) for clay in MUDS.values()])

@@ -57,7 +57,7 @@ class JointCell:
         return self._geometry.adduction_rad(self._sweep_rad, depth_m + self._surface_m)
 
     def move(self, to_depth_m: float, speed_m_s: float) -> ArcCurve:
-        """Moves down or up, in whole steps of depth."""
+        """Move down or up, in whole steps of depth."""
         from_m, path_m = self._depth_m, to_depth_m - self._depth_m
         steps = max(1, round(abs(path_m) / STEP_M))
         curve = ArcCurve([], [], [])
@@ -99,7 +99,7 @@ def measure_arc(
     relaxation: float = 0.0,
     hold_s: float = 0.0,
 ) -> ArcStroke:
-    """Measures from free air down to `depth_m` below the surface, or to the arm's reach; after a hold, up again."""
+    """Measure from free air down to `depth_m` below the surface, or to the arm's reach; after a hold, up again."""
     cell = JointCell(clay, geometry, sweep_rad, surface_m, relaxation)
     down = cell.move(min(depth_m, cell.deepest_m), speed_m_s)
     cell.hold(hold_s)

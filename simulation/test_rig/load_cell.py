@@ -58,7 +58,7 @@ class LoadCell:
         self.depth_m = self.clear_m
 
     def step(self, dt_s: float, forward_m_s: float, upward_m_s: float) -> tuple[float, float]:
-        """Returns the force (forward, upward) at the end of a step of this motion."""
+        """Return the force (forward, upward) at the end of a step of this motion."""
         self.depth_m -= dt_s * upward_m_s
         twist = Twist(*(axis[0] * forward_m_s + axis[2] * upward_m_s for axis in self.axes))
         wrench = self.plate.step(dt_s, self.clay, self._upright._replace(depth_m=self.depth_m), twist)
@@ -67,7 +67,7 @@ class LoadCell:
         return forward_n, fsum(force_n * axis[2] for force_n, axis in zip(forces_n, self.axes, strict=True))
 
     def lower(self, to_depth_m: float, speed_m_s: float) -> LoadCurve:
-        """Moves straight down or up to a depth, in whole steps."""
+        """Move straight down or up to a depth, in whole steps."""
         path_m = to_depth_m - self.depth_m
         steps = max(1, ceil(abs(path_m) / (speed_m_s * STEP_S)))
         return self._record(steps, -path_m / (steps * STEP_S))
@@ -93,7 +93,7 @@ def measure_insertion(
     relaxation: float = 0.0,
     hold_s: float = 0.0,
 ) -> Insertion:
-    """Measures the force from just above the mud down to `depth_m`, during a hold, and up again."""
+    """Measure the force from just above the mud down to `depth_m`, during a hold, and up again."""
     cell = LoadCell(clay, geometry, sweep_rad, adduction_rad, relaxation)
     down = cell.lower(depth_m, speed_m_s)
     held = cell.hold(hold_s)
@@ -109,7 +109,7 @@ def measure_shear(
     speed_m_s: float,
     distance_m: float = 0.2,
 ) -> float:
-    """Returns the forward force on a plate dragged backward at a depth: the mean over the second half of the distance.
+    """Return the forward force on a plate dragged backward at a depth: the mean over the second half of the distance.
 
     Raises ValueError where the first half is too short for all the mud to yield.
     """

@@ -33,7 +33,7 @@ PAPER_PLATE = FlipperGeometry(plate_width_m=0.03, plate_height_m=0.035, plate_th
 
 
 def clay_plate(water_percent: float, plate: FlipperGeometry = PAPER_PLATE) -> LoadCell:
-    """Raises ValueError where no mud has this water content."""
+    """Raise ValueError where no mud has this water content."""
     return LoadCell(clay_of_water(water_percent), plate, 0.0, 0.0, RELAXATION)
 
 
@@ -77,7 +77,7 @@ class EmulatedBench:
 
 
 def execute(bench: EmulatedBench, words: list[str]) -> str:
-    """Executes one command of the operator at the emulated bench and returns the answer."""
+    """Execute one command of the operator at the emulated bench and return the answer."""
     stage, now_s = bench.stage, bench.now_s()
     number = float(words[1]) if len(words) > 1 else None
     commands: dict[str, Callable[[], None]] = {

@@ -23,10 +23,10 @@ class CarriedPlate(Protocol):
     depth_m: float  # of the lower edge
 
     def reset(self) -> None:
-        """Puts the plate over fresh mud."""
+        """Put the plate over fresh mud."""
 
     def step(self, dt_s: float, forward_m_s: float, upward_m_s: float) -> tuple[float, float]:
-        """Returns the force (forward, upward) of the mud on the plate."""
+        """Return the force (forward, upward) of the mud on the plate."""
 
 
 class Move(NamedTuple):
@@ -62,7 +62,7 @@ class PlateStage:
         self.reset()
 
     def reset(self) -> None:
-        """Puts the plate above fresh mud."""
+        """Put the plate above fresh mud."""
         self.plate.reset()
         self.plate.depth_m = -LIFTED_M
         self.force_n = 0.0
@@ -72,13 +72,13 @@ class PlateStage:
         self.ends_s = NEVER_S  # the end of the last requested move
 
     def move_over(self, plate: CarriedPlate, sideways: bool) -> None:
-        """Moves over another mud, or the same one re-mixed, and turns the cell along the coming move."""
+        """Move over another mud, or the same one re-mixed, and turn the cell along the coming move."""
         now_s, self.plate = self._time_s, plate
         self.reset()
         self._time_s, self.measures_sideways = now_s, sideways
 
     def insert(self, start_s: float, depth_m: float, speed_m_s: float, hold_s: float) -> None:
-        """Inserts the plate from above the mud, holds it, and lifts it again."""
+        """Insert the plate from above the mud, hold it, and lift it again."""
         path_m = LIFTED_M + depth_m
         self._start(start_s, (-path_m, path_m), speed_m_s, hold_s, manual=self.parameters.manual)
 
@@ -100,7 +100,7 @@ class PlateStage:
         sideways: bool = False,
         manual: ManualMotionParameters | None = None,
     ) -> None:
-        """Plans moves with a hold between them."""
+        """Plan moves with a hold between them."""
         self._clear_moves()
         for path_m in paths_m:
             motion: Motion = RampedMotion(abs(path_m), speed_m_s, self.parameters.acceleration_m_s2)
@@ -115,11 +115,11 @@ class PlateStage:
         self._moves = []
 
     def travelled_m(self, at_s: float) -> float:
-        """Returns the stage's travel, forward and upward, that an encoder on it counts. `at_s` may lie in the past."""
+        """Return the stage's travel, forward and upward, that an encoder on it counts. `at_s` may lie in the past."""
         return self._travelled_m + fsum(move.position_m(at_s) for move in self._moves)
 
     def mean_force_n(self, until_s: float) -> float:
-        """Returns the mean force since the last call, as an integrating converter measures it."""
+        """Return the mean force since the last call, as an integrating converter measures it."""
         if self._time_s == NEVER_S:
             self._time_s = until_s
         start_s, sum_ns = self._time_s, 0.0
@@ -128,7 +128,7 @@ class PlateStage:
         return sum_ns / (until_s - start_s) if until_s > start_s else self.force_n * self.parameters.cell_sign
 
     def _step(self, until_s: float) -> float:
-        """Advances to the next change of motion and returns force times time."""
+        """Advance to the next change of motion and return force times time."""
         before_s = self._time_s
         under_way = (move for move in self._moves if move.start_s <= before_s < move.start_s + move.motion.duration_s)
         move = next(under_way, None)

@@ -19,7 +19,7 @@ class Motion(Protocol):
     duration_s: float
 
     def path_m(self, time_s: float) -> float:
-        """Returns the distance covered since the start: 0 before it, all after the end."""
+        """Return the distance covered since the start: 0 before it, all after the end."""
 
 
 class RampedMotion:
@@ -78,7 +78,7 @@ class ManualMotion:
         return self._end_m - self._knots[-1].position_m
 
     def _push(self, random: Random) -> None:
-        """Adds a piece at another speed, or the rest of the distance."""
+        """Add a piece at another speed, or the rest of the distance."""
         hand = self._hand
         speed_m_s = random.uniform(hand.slowest_m_s, hand.fastest_m_s)
         distance_m = random.uniform(hand.shortest_m, hand.longest_m)
@@ -94,7 +94,7 @@ class ManualMotion:
             self._knots.append(self._knots[-1]._replace(time_s=self._knots[-1].time_s + rest_s))
 
     def _finish(self, speed_m_s: float) -> None:
-        """Covers the rest, at most at the speed from which it can still stop at the end."""
+        """Cover the rest, at most at the speed from which it can still stop at the end."""
         a, before_m_s = self._hand.acceleration_m_s2, self._knots[-1].speed_m_s
         speed_m_s = min(speed_m_s, sqrt(a * self._remaining_m() + before_m_s**2 / 2.0))
         self._change_speed(speed_m_s)

@@ -23,7 +23,8 @@ from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.socket_methods import Level
 from firmware_host.ticker import Tick
-from simulation.devices.drive import DriveError, SimulatedDrive
+from simulation.devices.drive import DriveError
+from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track

@@ -74,7 +74,7 @@ class SerialWalk(Lockstep):
         self.lines = {name: Line(port) for name, port in self.loop.drives.ports.items()}
         ports = {name: line.port for name, line in self.lines.items()}
         drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
-        self.loop = Loop(configuration, drives, self.loop.pose, NullRecorder(), self._now_s)
+        self.loop = Loop(configuration, drives, self.loop.pose, NullRecorder(), lambda: self.now_s)
 
     def step(self) -> None:
         self.tick_number += 1

@@ -23,8 +23,9 @@ from firmware_host.log.recorder import HEALTHY, LogReport, NullRecorder
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK_KIND
 from firmware_host.ticker import Tick
 from simulation.body.plant import Arm
-from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive
+from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import Track
 

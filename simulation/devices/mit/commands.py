@@ -18,7 +18,7 @@ AT_REST = Command()
 
 
 def decode_command(data: bytes, position_rad: float, velocity_rad_s: float, torque_nm: float) -> Command:
-    """Decodes a payload of eight bytes by a drive's ranges: unpack_cmd of Core/Src/can.c of bgkatz/motorcontrol."""
+    """Decode a payload of eight bytes by a drive's ranges: unpack_cmd of Core/Src/can.c of bgkatz/motorcontrol."""
     number = int.from_bytes(data, "big")
     torque, kd, kp, velocity = (number >> shift & 0xFFF for shift in (0, 12, 24, 36))
     return Command(

@@ -6,69 +6,57 @@ watchdog runs in the mode only and is fed by commands alone. Once it expires, a 
 "lost commands" until its errors are cleared; a CubeMars here remains in the mode without torque, as the motors of
 the mini cheetah do, and reports nothing. Sources: Core/Src/can.c and fsm.c of bgkatz/motorcontrol; damiao-motor 1.0.6.
 
-It sends nothing but the answer to a command, with the values of before. Between the drive and the joint lie the same
-imperfections as in simulation/devices/odrive/device.py.
+It sends nothing but the answer to a command, with the values of before. Its angles are radians.
 """
 
-from collections.abc import Iterable
-from math import exp, isnan, nan, pi
+from math import isnan, nan
 from random import Random
 
-from control.records import NEVER_S
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.mit import codec
 from drivers.mit.codec import Answer
 from drivers.mit.models import MODELS
-from drivers.mit.settings import PMAX, TIMEOUT, TIMEOUT_UNIT_S, TMAX, VMAX
+from drivers.mit.settings import PMAX, SERIAL, SOFTWARE, TIMEOUT, TIMEOUT_UNIT_S, TMAX, VMAX
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.late_messages import LateAnswers
 from simulation.devices.mit.commands import AT_REST, decode_command
-from simulation.devices.mit.forgeries import forged_frame
-from simulation.devices.mit.registers import answer_register, first_values
-from simulation.devices.motor import encoder_turns, joint_torque_nm
+from simulation.devices.mit.registers import answer_register, encode_value, first_values, write_frame
+from simulation.devices.simulated_drive import TURN_RAD, SimulatedDrive
 
-TURN_RAD = 2.0 * pi
-BOOT_S = 0.5  # silence of a drive that restarts
 DEFAULT_MODEL = "DM4310"
 # The status of a Damiao; its last three bits are the fault that a CubeMars reports.
 ERRORS = {DriveError.OVERCURRENT: 0xA, DriveError.OVERSPEED: 0xE, DriveError.WATCHDOG: codec.LOST_COMMANDS}
 
 
-class SimulatedMit:
-    """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
+FORGED_COMMANDS = {Forgery.EMERGENCY_STOP: codec.LEAVE, Forgery.CLOSE_LOOP: codec.ENTER}
+FORGED_ANSWERS = {  # a drive that starts has no firmware version yet
+    Forgery.OLD_FIRMWARE: (SOFTWARE, 0.0),
+    Forgery.STARTING: (SOFTWARE, 0.0),
+    Forgery.WATCHDOG_OFF: (TIMEOUT, 0.0),
+    Forgery.OTHER_DRIVE: (SERIAL, float(0xABCDEF)),
+}
+
+
+class SimulatedMit(SimulatedDrive):
+    """Owns one drive's state."""
+
+    units_per_turn = TURN_RAD
 
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
-        self.parameters = parameters
-        self._random = random
-        self._answers = LateAnswers(random)
         model = MODELS[parameters.model or DEFAULT_MODEL]
         self._model = model._replace(torque_nm=parameters.torque_range_nm or model.torque_nm)
         self._feedback_id = codec.feedback_id(parameters.node_id, self._model)
         self.stored: dict[int, float] = {}  # registers that outlast a restart
-        self.reset(0.0)
+        super().__init__(parameters, random)
 
     def reset(self, now_s: float) -> None:
-        """Restores the state after power-on."""
+        super().reset(now_s)
         self.registers = first_values(self.parameters, self._model) | self.stored
         self.status = codec.DISABLED
         self._command = AT_REST
         self._limp = False  # a CubeMars whose watchdog has expired: in the mode, without torque
-        self._fed_s = self._stepped_s = now_s
         self._torque_nm = 0.0  # of the motor, by the drive's own torque constant
-        self._rad = self._rad_s = self._reported_rad = 0.0
-        self._boots_until_s = NEVER_S
-        self._answers.reset()
-        self._forged_current_a = nan
-
-    def restart(self, now_s: float) -> None:
-        """Restarts as after a supply dip: ignores and answers nothing for BOOT_S."""
-        rad, rad_s = self._rad, self._rad_s
-        self.reset(now_s + BOOT_S)
-        self._rad, self._rad_s, self._stepped_s = rad, rad_s, now_s
-        self._boots_until_s = now_s + BOOT_S
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Executes one frame of the bus and returns the answer to it, if it is not late."""
         if frame.is_fd or frame.is_extended or frame.is_remote or now_s < self._boots_until_s:
             return []
         try:
@@ -77,7 +65,7 @@ class SimulatedMit:
             return []
         if not data:
             return []
-        return self._answers.give(Frame(self._feedback_id, data, stamp_s=now_s), self.parameters.message_delay_s)
+        return self._send(Frame(self._feedback_id, data, stamp_s=now_s))
 
     def _answer(self, frame: Frame, now_s: float) -> bytes:
         """Answers with the values of before, and executes the frame."""
@@ -88,7 +76,8 @@ class SimulatedMit:
             return answer_register(self.registers, self.stored, parameters.node_id, frame.data)
         if frame.arbitration_id != parameters.node_id or len(frame.data) != codec.ANSWER_BYTES:
             return b""
-        answer = self._answers.new_or_repeated(self._state(), parameters.repeated_fraction)
+        state = self._state()
+        answer = self._new_or_repeated(Answer, lambda: state)
         self._execute(frame.data, now_s)
         return answer
 
@@ -108,8 +97,8 @@ class SimulatedMit:
         answer = Answer(
             parameters.node_id,
             0 if not model.has_registers else self.status,
-            self._measured_rad(),
-            self._measured_rad_s(),
+            self._measured_angle(),
+            self._measured_speed(),
             self._measured_nm(),
             parameters.temperature_c,
             int(parameters.temperature_c) if model.has_registers else self.status & 0x7 if self.failed else 0,
@@ -117,22 +106,12 @@ class SimulatedMit:
         ranges = model._replace(torque_nm=self.registers[TMAX])
         return codec.encode_answer(answer, ranges)
 
-    def _measured_rad(self) -> float:
-        if not self.parameters.encoder_frozen:
-            self._reported_rad = encoder_turns(self.parameters, self._rad / TURN_RAD, self._random) * TURN_RAD
-        return self._reported_rad
-
-    def _measured_rad_s(self) -> float:
-        noise_rad_s = self.parameters.velocity_noise_rad_s
-        noise_rad_s = self._random.gauss(0.0, noise_rad_s) if noise_rad_s else 0.0
-        return 0.0 if self.parameters.encoder_frozen else self._rad_s + noise_rad_s
-
     def _measured_nm(self) -> float:
-        constant_nm_a, noise_a = self.parameters.torque_constant_nm_a, self.parameters.current_noise_a
-        forged_a, self._forged_current_a = self._forged_current_a, nan
+        constant_nm_a = self.parameters.torque_constant_nm_a
+        forged_a, self._forged_a = self._forged_a, nan
         if not isnan(forged_a):
             return forged_a * constant_nm_a
-        return self._torque_nm + (constant_nm_a * self._random.gauss(0.0, noise_a) if noise_a else 0.0)
+        return self._torque_nm + constant_nm_a * self._noise(self.parameters.current_noise_a)
 
     @property
     def energised(self) -> bool:
@@ -150,50 +129,38 @@ class SimulatedMit:
         self.status = ERRORS[error]
 
     def forge(self, forgery: Forgery) -> Frame:
-        return forged_frame(self.parameters.node_id, self._feedback_id, forgery)
+        node_id = self.parameters.node_id
+        if forgery in FORGED_COMMANDS:
+            return Frame(node_id, FORGED_COMMANDS[forgery])
+        if forgery is Forgery.OTHER_SETTING:
+            return write_frame(node_id, TMAX, 3.0)
+        register, value = FORGED_ANSWERS[forgery]
+        data = codec.encode_register(node_id, codec.READ, register, encode_value(register, value))
+        return Frame(self._feedback_id, data)
 
     def forge_current(self, current_a: float) -> Frame:
         """The next answer reports this current; the frame itself, for another drive, says nothing."""
-        self._forged_current_a = current_a
+        self._forged_a = current_a
         return Frame(codec.REGISTER_ID, bytes(codec.ANSWER_BYTES))
 
     def forge_torque(self, torque_nm: float) -> Frame:
         data = codec.encode_torque(self.parameters.sign * torque_nm, self.registers[TMAX])
         return Frame(self.parameters.node_id, data)
 
-    def torque_nm(self, now_s: float) -> float:
-        """Returns the torque that the motor exerts at the joint now."""
+    def _motor_nm(self, now_s: float) -> float:
         expired = 0.0 < self.registers[TIMEOUT] * TIMEOUT_UNIT_S < now_s - self._fed_s
         self._limp = expired and not self._model.has_registers
         if expired and self.energised:
             self.trip(DriveError.WATCHDOG)
-        torque_nm = 0.0
-        if self.energised:
-            torque_nm = self._computed_nm(now_s)
-        else:
+        if not self.energised:
             self._torque_nm = 0.0
-        self._stepped_s = now_s
-        return joint_torque_nm(self.parameters, torque_nm, self._rad / TURN_RAD)
-
-    def _computed_nm(self, now_s: float) -> float:
-        """Returns the torque by the drive's own torque constant, after its limits and the lag of the current."""
+            return 0.0
         parameters, command = self.parameters, self._command
-        torque_nm = command.torque_nm + command.kp_nm_rad * (command.position_rad - self._rad)
-        torque_nm += command.kd_nm_s_rad * (command.velocity_rad_s - self._rad_s)
-        largest_nm = parameters.motor_current_limit_a * parameters.torque_constant_nm_a
-        largest_nm = min(self.registers[TMAX], largest_nm)
+        torque_nm = command.torque_nm + command.kp_nm_rad * (command.position_rad - self._angle)
+        torque_nm += command.kd_nm_s_rad * (command.velocity_rad_s - self._speed)
+        largest_nm = min(self.registers[TMAX], parameters.motor_current_limit_a * parameters.torque_constant_nm_a)
         torque_nm = max(-largest_nm, min(largest_nm, torque_nm))
         if parameters.current_lag_s:
-            torque_nm += (self._torque_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
+            torque_nm = self._lagged_nm(torque_nm, self._torque_nm, now_s)
         self._torque_nm = torque_nm
-        return torque_nm
-
-    def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
-        """Sets the joint's true angle and velocity, from which the answers are made."""
-        parameters = self.parameters
-        self._rad = parameters.sign * angle_rad + parameters.zero_turn * TURN_RAD
-        self._rad_s = parameters.sign * velocity_rad_s
-
-    def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
-        """Returns the answers that have arrived by now, where they are late; it sends nothing by itself."""
-        return self._answers.arrived(now_s, self.parameters.message_delay_s)
+        return self._torque_nm

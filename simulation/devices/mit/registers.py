@@ -24,7 +24,7 @@ FIRMWARE = 5013
 
 
 def first_values(parameters: SimulatedDriveParameters, model: Model) -> dict[int, float]:
-    """Returns the registers after delivery, with the watchdog and the serial number that are asked for."""
+    """Return the registers after delivery, with the watchdog and the serial number that are asked for."""
     return {
         MST_ID: parameters.node_id + 16,
         ESC_ID: parameters.node_id,
@@ -43,7 +43,7 @@ def encode_value(register: int, value: float) -> bytes:
 
 
 def answer_register(values: dict[int, float], stored: dict[int, float], node_id: int, data: bytes) -> bytes:
-    """Executes one register frame; returns the answer, empty for another drive's and for unknown registers."""
+    """Execute one register frame; return the answer, empty for another drive's and for unknown registers."""
     addressed, kind, register, value = codec.decode_register(data)
     if addressed == node_id and kind == codec.STORE:
         stored.update(values)

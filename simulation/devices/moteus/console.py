@@ -28,7 +28,7 @@ class MoteusConsole:
         self._input = self._output = b""
 
     def write(self, text: bytes) -> None:
-        """Executes the lines that are complete."""
+        """Execute the lines that are complete."""
         *lines, self._input = (self._input + text).split(b"\n")
         for line in lines:
             self._output += f"{self._answer(line.decode(errors='replace').split())}\r\n".encode()
@@ -50,7 +50,7 @@ class MoteusConsole:
         return UNKNOWN_KEY
 
     def load(self) -> None:
-        """Restores what is stored, as a restart does."""
+        """Restore what is stored, as a restart does."""
         self.settings.update(self.stored)
 
     def read(self, most_bytes: int) -> bytes:

@@ -6,68 +6,52 @@ runs in position mode only and is fed by commands alone. Once it expires, the mo
 the drive does what `servo.timeout_mode` says: 12 damps with the scale of kd of the last command, as the firmware does
 (ISR_DoZeroVelocity of fw/bldc_servo_control.h), 15 shorts the windings, 10 holds the position, 0 lets go.
 
-It sends nothing unless it is asked. An answer has the current, mode and torque of before the frame's command. Between
-the drive and the joint lie the same imperfections as in simulation/devices/odrive/device.py.
+It sends nothing unless it is asked. An answer has the current, mode and torque of before the frame's command.
 """
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from math import exp, isnan, nan, pi
+from math import isnan
 from random import Random
 
-from control.records import NEVER_S
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.moteus import codec, registers
 from drivers.moteus.codec import Mode, Reply
 from drivers.moteus.registers import Register, Subframe
 from drivers.moteus.settings import MAX_CURRENT, REGISTER_MAP, TIMEOUT_MODE, WATCHDOG
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.late_messages import LateAnswers
 from simulation.devices.moteus.console import MoteusConsole
 from simulation.devices.moteus.forgeries import answer_frame, command_frame, forged_frame
 from simulation.devices.moteus.torque import DEFAULTS, PURE_TORQUE, position_mode_nm, timeout_nm
-from simulation.devices.motor import encoder_turns, joint_torque_nm
+from simulation.devices.simulated_drive import SimulatedDrive
 
-TURN_RAD = 2.0 * pi
-BOOT_S = 0.5  # silence of a drive that restarts
 FIRMWARE = 0x010100  # 1.1.0
 FAULTS = {DriveError.OVERCURRENT: 33, DriveError.OVERSPEED: 50}
 
 
-class SimulatedMoteus:
-    """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
+class SimulatedMoteus(SimulatedDrive):
+    """Owns one drive's state."""
 
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
-        self.parameters = parameters
-        self._random = random
-        self._answers = LateAnswers(random)
         self._ids = (codec.command_id(parameters.node_id), parameters.node_id)
-        self.reset(0.0)
+        super().__init__(parameters, random)
 
     def reset(self, now_s: float) -> None:
-        """Restores the state after power-on."""
+        super().reset(now_s)
         self.console = MoteusConsole(self.parameters)
         self.mode = Mode.STOPPED
         self.fault = 0
         self._command = dict(DEFAULTS)
-        self._fed_s = self._stepped_s = now_s
-        self._current_a = self._setpoint_nm = 0.0  # the motor's current, and the torque that it follows
-        self._turns = self._turns_s = self._reported_turns = self._held_turns = 0.0
-        self._boots_until_s = NEVER_S
-        self._answers.reset()
-        self._forged_current_a = nan
+        self._setpoint_nm = self._held_turns = 0.0  # the torque that the current follows, the angle at position mode
 
     def restart(self, now_s: float) -> None:
-        """Restarts as after a supply dip: ignores and answers nothing for BOOT_S."""
-        turns, turns_s, console = self._turns, self._turns_s, self.console
-        self.reset(now_s + BOOT_S)
+        """Restart with the settings that are stored."""
+        console = self.console
+        super().restart(now_s)
         self.console = console
         console.load()
-        self._turns, self._turns_s, self._stepped_s = turns, turns_s, now_s
-        self._boots_until_s = now_s + BOOT_S
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Executes one frame of the bus and returns the answer to it, if it wants one and is not late."""
         if frame.arbitration_id not in self._ids or not frame.is_fd or now_s < self._boots_until_s:
             return []
         if self.parameters.any_frame_feeds:
@@ -77,7 +61,7 @@ class SimulatedMoteus:
             data = self._usual_answer(frame.data, now_s) or self._any_answer(frame.data, now_s)
         if not data or not frame.arbitration_id & codec.REPLY_WANTED:
             return []
-        return self._answers.give(answer_frame(self.parameters.node_id, data, now_s), self.parameters.message_delay_s)
+        return self._send(answer_frame(self.parameters.node_id, data, now_s))
 
     def _any_answer(self, data: bytes, now_s: float) -> bytes:
         """Answers with the values of before, as a drive does, and executes the frame."""
@@ -97,7 +81,7 @@ class SimulatedMoteus:
                 self.mode,
                 self._value(Register.POSITION),
                 self._value(Register.VELOCITY),
-                self._measured_current_a(),
+                self._measured_a(),
                 parameters.temperature_c,
                 parameters.bus_voltage_v,
                 self.fault,
@@ -107,10 +91,10 @@ class SimulatedMoteus:
         )
         if data != codec.QUERY_ALONE:
             self._follow(PURE_TORQUE | {Register.COMMAND_TORQUE: torque_nm}, now_s)
-        return self._answers.new_or_repeated(answer, parameters.repeated_fraction)
+        return self._new_or_repeated(Reply, lambda: answer)
 
     def _execute(self, subframes: Iterable[Subframe], now_s: float) -> None:
-        """Writes the registers; the mode comes first, and all that a command does not write is at its default."""
+        """Write the registers; the mode comes first, and all that a command does not write is at its default."""
         written: dict[int, float] = {}
         for each in subframes:
             if each.kind == registers.CONSOLE_INPUT:
@@ -129,12 +113,12 @@ class SimulatedMoteus:
         if self.mode not in (Mode.STOPPED, Mode.POSITION):
             return
         if self.mode is Mode.STOPPED:
-            self._held_turns = self._turns
+            self._held_turns = self._angle
         self._command = {**DEFAULTS, **written}
         self.mode, self._fed_s = Mode.POSITION, now_s
 
     def _answer(self, subframe: Subframe) -> bytes:
-        """Returns the answer to one subframe: values for a read, text for a poll."""
+        """Return the answer to one subframe: values for a read, text for a poll."""
         if subframe.kind == registers.CONSOLE_POLL:
             return registers.encode_console(registers.CONSOLE_OUTPUT, self.console.read(subframe.length))
         if subframe.kind != registers.READ:
@@ -148,13 +132,11 @@ class SimulatedMoteus:
             case Register.MODE:
                 return float(self.mode)
             case Register.POSITION:
-                return self._measured_turns()
+                return self._measured_angle()
             case Register.VELOCITY:
-                noise_rad_s = parameters.velocity_noise_rad_s
-                noise_turn_s = self._random.gauss(0.0, noise_rad_s) / TURN_RAD if noise_rad_s else 0.0
-                return 0.0 if parameters.encoder_frozen else self._turns_s + noise_turn_s
+                return self._measured_speed() + 0.0  # without a negative zero
             case Register.Q_CURRENT:
-                return self._measured_current_a()
+                return self._measured_a()
             case Register.MOTOR_TEMPERATURE | Register.BOARD_TEMPERATURE:
                 return parameters.temperature_c
             case Register.VOLTAGE:
@@ -168,23 +150,11 @@ class SimulatedMoteus:
         return self._serial_part(register - Register.SERIAL_NUMBER)
 
     def _serial_part(self, index: int) -> float:
-        """Returns one of the three words of the serial number; 0 for any other register."""
+        """Return one of the three words of the serial number; 0 for any other register."""
         if not 0 <= index < 3:
             return 0.0
         word = int(self.parameters.serial_number.rjust(24, "0")[8 * index : 8 * index + 8], 16)
         return float(word - (1 << 32) if word >> 31 else word)
-
-    def _measured_turns(self) -> float:
-        if not self.parameters.encoder_frozen:
-            self._reported_turns = encoder_turns(self.parameters, self._turns, self._random)
-        return self._reported_turns
-
-    def _measured_current_a(self) -> float:
-        forged_a, self._forged_current_a = self._forged_current_a, nan
-        if not isnan(forged_a):
-            return forged_a
-        noise_a = self.parameters.current_noise_a
-        return self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
 
     @property
     def energised(self) -> bool:
@@ -200,7 +170,7 @@ class SimulatedMoteus:
 
     def trip(self, error: DriveError) -> None:
         if error is DriveError.WATCHDOG:
-            self.mode, self._held_turns = Mode.TIMEOUT, self._turns
+            self.mode, self._held_turns = Mode.TIMEOUT, self._angle
         else:
             self.mode, self.fault = Mode.FAULT, FAULTS[error]
 
@@ -209,54 +179,32 @@ class SimulatedMoteus:
 
     def forge_current(self, current_a: float) -> Frame:
         """The next answer reports this current; the frame itself, an empty answer, says nothing."""
-        self._forged_current_a = current_a
+        self._forged_a = current_a
         return answer_frame(self.parameters.node_id, registers.padded(b""))
 
     def forge_torque(self, torque_nm: float) -> Frame:
-        """Asks for nothing: the answers would go to the other program, not to this one."""
+        """Ask for nothing: the answers would go to the other program, not to this one."""
         data = codec.encode_torque(self.parameters.sign * torque_nm).removesuffix(codec.QUERY)
         return command_frame(self.parameters.node_id, registers.padded(data))
 
-    def torque_nm(self, now_s: float) -> float:
-        """Returns the torque that the motor exerts at the joint now."""
-        if self.mode is Mode.POSITION and 0.0 < self._timeout_s() < now_s - self._fed_s:
+    def _motor_nm(self, now_s: float) -> float:
+        timeout_s = self._command[Register.WATCHDOG] or self.console.settings[WATCHDOG]  # of the last command
+        if self.mode is Mode.POSITION and 0.0 < timeout_s < now_s - self._fed_s:
             self.trip(DriveError.WATCHDOG)
-        torque_nm = 0.0
-        if self.mode in (Mode.POSITION, Mode.TIMEOUT):
-            torque_nm = self._computed_nm(now_s)
-        else:
-            self._current_a = self._setpoint_nm = 0.0
-        self._stepped_s = now_s
-        return joint_torque_nm(self.parameters, torque_nm, self._turns)
-
-    def _timeout_s(self) -> float:
-        """Returns the time-out of the last command; 0 for none."""
-        timeout_s = self._command[Register.WATCHDOG] or self.console.settings[WATCHDOG]
-        return 0.0 if isnan(timeout_s) else timeout_s
-
-    def _computed_nm(self, now_s: float) -> float:
-        """Returns the torque by the drive's own torque constant, after its limits and the lag of the current."""
-        parameters, motion = self.parameters, (self._turns, self._turns_s, self._held_turns)
-        if self.mode is Mode.TIMEOUT:
+        motion = self._angle, self._speed, self._held_turns
+        if self.mode is Mode.POSITION:
+            torque_nm = position_mode_nm(self._command, *motion)
+        elif self.mode is Mode.TIMEOUT:
             torque_nm = timeout_nm(self.console.settings[TIMEOUT_MODE], self._command[Register.KD_SCALE], *motion)
         else:
-            torque_nm = position_mode_nm(self._command, *motion)
+            self._current_a = self._setpoint_nm = 0.0
+            return 0.0
+        parameters = self.parameters
         largest_a = min(self.console.settings[MAX_CURRENT], parameters.motor_current_limit_a)
         largest_nm = largest_a * parameters.torque_constant_nm_a
         torque_nm = -largest_nm if torque_nm < -largest_nm else largest_nm if torque_nm > largest_nm else torque_nm
         self._setpoint_nm = torque_nm
         if parameters.current_lag_s:
-            before_nm = self._current_a * parameters.torque_constant_nm_a
-            torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
+            torque_nm = self._lagged_nm(torque_nm, self._current_a * parameters.torque_constant_nm_a, now_s)
         self._current_a = torque_nm / parameters.torque_constant_nm_a
         return torque_nm
-
-    def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
-        """Sets the joint's true angle and velocity, from which the answers are made."""
-        parameters = self.parameters
-        self._turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
-        self._turns_s = parameters.sign * velocity_rad_s / TURN_RAD
-
-    def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
-        """Returns the answers that have arrived by now, where they are late; it sends nothing by itself."""
-        return self._answers.arrived(now_s, self.parameters.message_delay_s)

@@ -32,7 +32,7 @@ PURE_TORQUE = {  # what codec.encode_torque writes besides the torque
 
 
 def position_mode_nm(command: Mapping[Register, float], turns: float, turns_s: float, held_turns: float) -> float:
-    """Returns the torque in position mode; a position of NaN is the one that it held when it entered the mode."""
+    """Return the torque in position mode; a position of NaN is the one that it held when it entered the mode."""
     position_turn, kp_nm_turn = command[Register.COMMAND_POSITION], KP_NM_TURN * command[Register.KP_SCALE]
     torque_nm = command[Register.COMMAND_TORQUE]
     torque_nm += KD_NM_S_TURN * command[Register.KD_SCALE] * (command[Register.COMMAND_VELOCITY] - turns_s)
@@ -43,7 +43,7 @@ def position_mode_nm(command: Mapping[Register, float], turns: float, turns_s: f
 
 
 def timeout_nm(timeout_mode: float, kd_scale: float, turns: float, turns_s: float, held_turns: float) -> float:
-    """Returns the torque of the mode timeout. Zero velocity damps with the scale of kd of the last command."""
+    """Return the torque of the mode timeout. Zero velocity damps with the scale of kd of the last command."""
     match timeout_mode:
         case Mode.ZERO_VELOCITY:
             torque_nm = -KD_NM_S_TURN * kd_scale * turns_s

@@ -2,125 +2,101 @@
 
 It has the axis state machine (idle, closed loop), the error word with the disarm reason, the watchdog, torque mode with
 the velocity-limit clamp, the current limits and, where it is on, the overspeed trip, cyclic messages, and requests by
-remote frame.
-
-Between the drive and the joint lie imperfections that no drive reports, each off at 0. The motor's true torque constant
-differs from the drive's value, and an error of its commutation weakens or inverts the torque; current follows its
-command with a first-order lag; magnets pull towards detents at any current. The encoder has steps, noise and an offset,
-and may freeze; the current has noise. Messages arrive in order, late by uniformly drawn times, and some repeat their
-old values.
+remote frame. It can forge frames of its own, and from a firmware other than its type says (OLD_FIRMWARE).
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from math import exp, isfinite, pi
+from math import isfinite
 from random import Random
-from typing import NamedTuple
 
-from control.records import NEVER_S
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive.setup import SAVE
 from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.late_messages import LateMessages
-from simulation.devices.motor import encoder_turns, joint_torque_nm
-from simulation.devices.odrive import forgeries
-from simulation.devices.odrive.settings import OdriveSettings
+from simulation.devices.odrive.settings import ENABLE_WATCHDOG_ENDPOINT, OdriveSettings
+from simulation.devices.simulated_drive import SimulatedDrive
 
-TURN_RAD = 2.0 * pi
 REPEATED = (codec.GET_ENCODER_ESTIMATES, codec.GET_IQ)
 VERSION_FIELDS = (2, 0, 0, 0, 0, 6, 11, 0)  # protocol 2, no real board, firmware 0.6.11
 TORQUE_MODES = (codec.TORQUE_CONTROL, codec.PASSTHROUGH)
-BOOT_S = 1.0  # silence of a drive that restarts
 
-
-class Firmware(NamedTuple):
-    """The codes and messages that differ between firmwares."""
-
-    error_flags: Mapping[DriveError, int]
-    estop_flag: int
-    heartbeat: Message
-    slow_messages: tuple[Message, ...]
-
-
-FIRMWARE_06 = Firmware(
-    error_flags={
-        DriveError.OVERCURRENT: 0x400,
-        DriveError.WATCHDOG: codec.ERROR_WATCHDOG,
-        DriveError.OVERSPEED: 0x8000,
-    },
-    estop_flag=codec.ERROR_ESTOP,
-    heartbeat=codec.HEARTBEAT,
-    slow_messages=(codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT),
-)
+Forgeries = Mapping[Forgery, tuple[Message, tuple[int, ...], bytes]]  # message, values, and bytes after them
+COMMON_FORGERIES: Forgeries = {
+    Forgery.EMERGENCY_STOP: (codec.ESTOP, (), b""),
+    Forgery.CLOSE_LOOP: (codec.SET_AXIS_STATE, (AxisState.CLOSED_LOOP,), b""),
+}
 
 
 def finite(values: tuple[float, ...]) -> tuple[float, ...]:
-    """Raises MalformedMessageError for NaN and infinity."""
+    """Raise MalformedMessageError for NaN and infinity."""
     if not all(map(isfinite, values)):
         raise MalformedMessageError("not a finite number")
     return values
 
 
-class SimulatedOdrive:
-    """Owns one drive's state. Callers use the joint's angles and torques; turns and signs stay inside."""
+class SimulatedOdrive(SimulatedDrive):
+    """Owns one drive's state. The class attributes are the codes and messages that differ between firmwares."""
 
-    def __init__(self, parameters: SimulatedDriveParameters, random: Random, firmware: Firmware = FIRMWARE_06) -> None:
-        self.parameters = parameters
-        self._firmware = firmware
-        self._random = random
-        self._late = LateMessages(random)
+    boot_s = 1.0
+    error_flags: Mapping[DriveError, int] = {
+        DriveError.OVERCURRENT: 0x400,
+        DriveError.WATCHDOG: codec.ERROR_WATCHDOG,
+        DriveError.OVERSPEED: 0x8000,
+    }
+    estop_flag = codec.ERROR_ESTOP
+    heartbeat = codec.HEARTBEAT
+    slow_messages: tuple[Message, ...] = (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)
+    forgeries: Forgeries = {
+        **COMMON_FORGERIES,
+        Forgery.OLD_FIRMWARE: (codec.GET_VERSION, (2, 4, 4, 58, 0, 5, 6, 0), b""),
+        Forgery.STARTING: (codec.HEARTBEAT, (codec.ERROR_INITIALIZING, AxisState.IDLE, 0, 0), b""),
+        Forgery.WATCHDOG_OFF: (codec.TX_SDO, (0, ENABLE_WATCHDOG_ENDPOINT, 0), b"\0"),
+        Forgery.OTHER_DRIVE: (codec.ADDRESS, (0, 0xABCDEF, 0), b""),
+    }
+
+    def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         self._settings = OdriveSettings()
         self._payloads = self._payload_functions()
         self._ids = {message: arbitration_id(parameters.node_id, message) for message in self._payloads}
-        self.reset(0.0)
+        super().__init__(parameters, random)
 
     def reset(self, now_s: float) -> None:
-        """Restores the state after power-on."""
+        super().reset(now_s)
         self.axis_state = AxisState.IDLE
         self.errors = self.disarm_reason = 0
-        self._setpoint_nm = 0.0  # at the motor
+        self._initializing = False
+        self._setpoint_nm = self._setpoint_a = 0.0  # the command, and what the current follows after the limits
         self._modes = (0, 0)
         self._set_limits(2.0, 10.0)  # ODrive's defaults
         self._velocity_gain_nm_s_turn = self.parameters.velocity_gain_nm_s_turn
-        self._fed_s = now_s
-        self._current_a = self._setpoint_a = 0.0  # the motor's, and the one that it follows
-        self._stepped_s = now_s
-        self._turns = self._turns_s = self._reported_turns = 0.0
-        self._boots_until_s, self._initializing = NEVER_S, False
-        self._reported: dict[Message, Frame] = {}
-        self._late.reset()
         periods = self.parameters
         self._schedule: list[tuple[float, tuple[Message, ...]]] = [
             (periods.encoder_period_s, (codec.GET_ENCODER_ESTIMATES,)),
             (periods.current_period_s, (codec.GET_IQ,)),
-            (periods.heartbeat_period_s, (self._firmware.heartbeat,)),
-            (periods.slow_period_s, self._firmware.slow_messages),
+            (periods.heartbeat_period_s, (self.heartbeat,)),
+            (periods.slow_period_s, self.slow_messages),
         ]
         # Boards are switched on at different times, so their messages do not all come in the same tick.
         self._due_s = [now_s + period_s * self._random.random() for period_s, _ in self._schedule]
         self._next_due_s = min(self._due_s)
 
     def restart(self, now_s: float) -> None:
-        """Restarts as after a supply dip: ignores and sends nothing for BOOT_S, then reports its initialisation."""
-        turns, turns_s = self._turns, self._turns_s
+        """Restart and report the initialisation."""
         self.parameters = self._settings.restart(self.parameters)
-        self.reset(now_s + BOOT_S)
-        self._turns, self._turns_s = turns, turns_s
-        self._stepped_s = now_s
-        self._boots_until_s = now_s + BOOT_S
+        super().restart(now_s)
         self._initializing = True
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-        """Executes one frame of the bus and returns the answers to it."""
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & 0x1F
         if frame.is_extended or node_id != self.parameters.node_id or now_s < self._boots_until_s:
             return []
         if self.parameters.any_frame_feeds:
             self._fed_s = now_s
         if frame.is_remote:
-            return [self._frame(message) for message in self._payloads if message.command == command]
+            asked = [message for message in self._payloads if message.command == command]
+            return [Frame(self._ids[message], self._payloads[message]()) for message in asked]
         if command == codec.RX_SDO.command:
             return self._read_parameter(frame.data)
         with suppress(MalformedMessageError):  # a drive ignores malformed messages
@@ -142,14 +118,14 @@ class SimulatedOdrive:
         elif command == codec.CLEAR_ERRORS.command:
             self.errors = 0
         elif command == codec.ESTOP.command:
-            self._disarm(self._firmware.estop_flag)
+            self._disarm(self.estop_flag)
         elif command == codec.REBOOT.command:
             if codec.REBOOT.decode(data)[0] == SAVE:
                 self._settings.save()
             self.restart(now_s)
 
     def _read_parameter(self, data: bytes) -> list[Frame]:
-        """Executes a message that reads or writes a setting."""
+        """Execute a message that reads or writes a setting."""
         answer, self.parameters = self._settings.execute(data, self.parameters)
         return [Frame(arbitration_id(self.parameters.node_id, codec.TX_SDO), answer)] if answer else []
 
@@ -184,40 +160,37 @@ class SimulatedOdrive:
         return self.errors != 0
 
     def trip(self, error: DriveError) -> None:
-        self._disarm(self._firmware.error_flags[error])
+        self._disarm(self.error_flags[error])
+
+    def _named(self, message: Message, *values: float) -> Frame:
+        return Frame(arbitration_id(self.parameters.node_id, message), message.encode(*values))
 
     def forge(self, forgery: Forgery) -> Frame:
-        return forgeries.forged_frame(self.parameters.node_id, forgery)
+        message, values, value = self.forgeries[forgery]
+        frame = self._named(message, *values)
+        return frame._replace(data=frame.data + value)
 
     def forge_current(self, current_a: float) -> Frame:
-        return forgeries.forged_current(self.parameters.node_id, self._setpoint_a, current_a)
+        return self._named(codec.GET_IQ, self._setpoint_a, current_a)
 
     def forge_torque(self, torque_nm: float) -> Frame:
-        return forgeries.forged_torque(self.parameters.node_id, self.parameters.sign * torque_nm)
-
-    def torque_nm(self, now_s: float) -> float:
-        """Returns the torque that the motor exerts at the joint now."""
-        self._trip_if_due(now_s)
-        torque_nm = 0.0
-        if self.axis_state is AxisState.CLOSED_LOOP and self._modes == TORQUE_MODES:
-            torque_nm = self._computed_nm(now_s)
-        else:
-            self._current_a = self._setpoint_a = 0.0
-        self._stepped_s = now_s
-        return joint_torque_nm(self.parameters, torque_nm, self._turns)
+        return self._named(codec.SET_INPUT_TORQUE, self.parameters.sign * torque_nm)
 
     def _trip_if_due(self, now_s: float) -> None:
         if self.axis_state is AxisState.CLOSED_LOOP:
             fastest_turn_s = self.parameters.overspeed_fraction * self._velocity_limit_turn_s
             if 0.0 < self.parameters.watchdog_s < now_s - self._fed_s:
                 self.trip(DriveError.WATCHDOG)
-            elif 0.0 < fastest_turn_s < abs(self._turns_s):
+            elif 0.0 < fastest_turn_s < abs(self._speed):
                 self.trip(DriveError.OVERSPEED)
 
-    def _computed_nm(self, now_s: float) -> float:
-        """Returns the torque by the drive's own torque constant, after its clamps and the lag of the current."""
+    def _motor_nm(self, now_s: float) -> float:
+        self._trip_if_due(now_s)
+        if self.axis_state is not AxisState.CLOSED_LOOP or self._modes != TORQUE_MODES:
+            self._current_a = self._setpoint_a = 0.0
+            return 0.0
         parameters, largest_nm = self.parameters, self._largest_nm
-        gain, limit, turns_s = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s, self._turns_s
+        gain, limit, turns_s = self._velocity_gain_nm_s_turn, self._velocity_limit_turn_s, self._speed
         torque_nm, lowest_nm, highest_nm = self._setpoint_nm, (-limit - turns_s) * gain, (limit - turns_s) * gain
         torque_nm = lowest_nm if lowest_nm > torque_nm else torque_nm  # min and max cost ten times as much
         torque_nm = highest_nm if highest_nm < torque_nm else torque_nm
@@ -225,22 +198,9 @@ class SimulatedOdrive:
         torque_nm = largest_nm if largest_nm < torque_nm else torque_nm
         self._setpoint_a = torque_nm / parameters.torque_constant_nm_a
         if parameters.current_lag_s:
-            before_nm = self._current_a * parameters.torque_constant_nm_a
-            torque_nm += (before_nm - torque_nm) * exp((self._stepped_s - now_s) / parameters.current_lag_s)
+            torque_nm = self._lagged_nm(torque_nm, self._current_a * parameters.torque_constant_nm_a, now_s)
         self._current_a = torque_nm / parameters.torque_constant_nm_a
         return torque_nm
-
-    def measure(self, angle_rad: float, velocity_rad_s: float) -> None:
-        """Sets the joint's true angle and velocity, from which the encoder's messages are made."""
-        parameters = self.parameters
-        self._turns = parameters.sign * angle_rad / TURN_RAD + parameters.zero_turn
-        self._turns_s = parameters.sign * velocity_rad_s / TURN_RAD
-
-    def cyclic_frames(self, now_s: float) -> Iterable[Frame]:
-        """Returns the messages that have come due, or have arrived by now where they are delayed."""
-        frames = self._due_frames(now_s) if now_s >= self._next_due_s else ()
-        longest_s = self.parameters.message_delay_s
-        return self._late.update(frames, now_s, longest_s) if longest_s else frames
 
     def _due_frames(self, now_s: float) -> Iterator[Frame]:
         for index, (period_s, messages) in enumerate(self._schedule):
@@ -250,64 +210,40 @@ class SimulatedOdrive:
             if self._due_s[index] <= now_s:  # delayed by more than a period: lost messages are not sent later
                 self._due_s[index] = now_s + period_s
             for message in messages:
-                repeating = self.parameters.repeated_fraction and message in REPEATED
-                yield self._new_or_repeated_frame(message, now_s) if repeating else self._frame(message, now_s)
+                encode = self._payloads[message]
+                payload = self._new_or_repeated(message, encode) if message in REPEATED else encode()
+                yield Frame(self._ids[message], payload, stamp_s=now_s)
         self._next_due_s = min(self._due_s)
 
-    def _new_or_repeated_frame(self, message: Message, now_s: float) -> Frame:
-        reported = self._reported.get(message)
-        if reported is not None and self._random.random() < self.parameters.repeated_fraction:
-            return reported._replace(stamp_s=now_s)
-        self._reported[message] = frame = self._frame(message, now_s)
-        return frame
-
-    def _frame(self, message: Message, stamp_s: float = NEVER_S) -> Frame:
-        return Frame(self._ids[message], self._payloads[message](), stamp_s=stamp_s)
-
     def _encoder(self) -> bytes:
-        parameters = self.parameters
-        if parameters.encoder_frozen:
-            return codec.GET_ENCODER_ESTIMATES.encode(self._reported_turns, 0.0)
-        self._reported_turns = encoder_turns(parameters, self._turns, self._random)
-        turns_s = self._turns_s
-        if parameters.velocity_noise_rad_s:
-            turns_s += self._random.gauss(0.0, parameters.velocity_noise_rad_s) / TURN_RAD
-        return codec.GET_ENCODER_ESTIMATES.encode(self._reported_turns, turns_s)
+        return codec.GET_ENCODER_ESTIMATES.encode(self._measured_angle(), self._measured_speed())
 
     def _iq(self) -> bytes:
-        noise_a = self.parameters.current_noise_a
-        measured_a = self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
-        return codec.GET_IQ.encode(self._setpoint_a, measured_a)
+        return codec.GET_IQ.encode(self._setpoint_a, self._measured_a())
 
     def _heartbeat(self) -> bytes:
         errors = self.errors | codec.ERROR_INITIALIZING if self._initializing else self.errors
         self._initializing = False
         return codec.HEARTBEAT.encode(errors, self.axis_state, 0, 0)
 
-    def _error(self) -> bytes:
-        return codec.GET_ERROR.encode(self.errors, self.disarm_reason)
-
-    def _temperature(self) -> bytes:
-        return codec.GET_TEMPERATURE.encode(self.parameters.temperature_c, self.parameters.temperature_c)
-
     def _bus_voltage(self) -> bytes:
         return codec.GET_BUS_VOLTAGE_CURRENT.encode(self.parameters.bus_voltage_v, abs(self._current_a) * 0.1)
 
-    def _version(self) -> bytes:
-        return codec.GET_VERSION.encode(*VERSION_FIELDS)
+    def _temperature(self) -> bytes:
+        return codec.GET_TEMPERATURE.encode(self.parameters.temperature_c, self.parameters.temperature_c)
 
     def _address(self) -> bytes:
         return codec.encode_address(self.parameters.node_id, int(self.parameters.serial_number or "0", 16))
 
     def _payload_functions(self) -> dict[Message, Callable[[], bytes]]:
-        """Returns the encoder of each message that this firmware sends."""
+        """Return the encoder of each message that this firmware sends."""
         return {
             codec.GET_ENCODER_ESTIMATES: self._encoder,
             codec.GET_IQ: self._iq,
             codec.HEARTBEAT: self._heartbeat,
-            codec.GET_ERROR: self._error,
+            codec.GET_ERROR: lambda: codec.GET_ERROR.encode(self.errors, self.disarm_reason),
             codec.GET_TEMPERATURE: self._temperature,
             codec.GET_BUS_VOLTAGE_CURRENT: self._bus_voltage,
-            codec.GET_VERSION: self._version,
+            codec.GET_VERSION: lambda: codec.GET_VERSION.encode(*VERSION_FIELDS),
             codec.ADDRESS: self._address,
         }

@@ -12,8 +12,8 @@ from drivers.can.frames import MalformedMessageError
 from drivers.odrive import codec
 from drivers.odrive.setup import CAN, CONTROLLER, ENABLE, LAYOUTS, MOTOR, SDO_WRITE, TIMEOUT
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.odrive.forgeries import ENABLE_WATCHDOG_ENDPOINT, WATCHDOG_TIMEOUT_ENDPOINT
 
+WATCHDOG_TIMEOUT_ENDPOINT, ENABLE_WATCHDOG_ENDPOINT = 1, 2  # of hardware 0.0.0, which no real board has
 SLOW = ("error", "temperature", "bus_voltage")
 PERIODS = {
     f"{CAN}.encoder_msg_rate_ms": "encoder_period_s",
@@ -49,7 +49,7 @@ class OdriveSettings:
         self._delivered: SimulatedDriveParameters | None = None  # from the first writing on
 
     def execute(self, data: bytes, parameters: SimulatedDriveParameters) -> tuple[bytes, SimulatedDriveParameters]:
-        """Executes one message; returns the answer, empty for an unknown parameter, and the drive as it is then."""
+        """Execute one message; return the answer, empty for an unknown parameter, and the drive as it is then."""
         try:
             opcode, endpoint, _ = codec.RX_SDO.decode(data[: codec.SDO_HEAD_BYTES])
             key = KEYS[endpoint]
@@ -69,7 +69,7 @@ class OdriveSettings:
         self._stored = dict(self._written)
 
     def restart(self, parameters: SimulatedDriveParameters) -> SimulatedDriveParameters:
-        """Forgets what was not stored."""
+        """Forget what was not stored."""
         self._written = dict(self._stored)
         return self._applied() if self._delivered else parameters
 

@@ -7,58 +7,49 @@ request for its version nor one for a parameter. A request may also be an empty 
 axis.cpp, controller.cpp, motor.cpp and foc.cpp of odriverobotics/ODrive, tag fw-v0.5.6.
 """
 
-from collections.abc import Callable
-from random import Random
+from collections.abc import Callable, Mapping
 
 from drivers.can.frames import Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message
 from drivers.odrive05 import codec as codec05
-from simulation.devices.drive import DriveError, Forgery, SimulatedDriveParameters
-from simulation.devices.motor import encoder_turns
-from simulation.devices.odrive.device import Firmware, SimulatedOdrive
-from simulation.devices.odrive.forgeries import COMMON, Forgeries, forged_current, forged_frame
+from simulation.devices.drive import DriveError, Forgery
+from simulation.devices.odrive.device import COMMON_FORGERIES, Forgeries, SimulatedOdrive
 
 BUS_CURRENT_OUT_OF_RANGE = 0x400000  # of the motor
 OVERSPEED = 0x1  # of the controller
-FORGERIES: Forgeries = {  # firmware 0.5 reports no settings and no serial number
-    **COMMON,
-    Forgery.OLD_FIRMWARE: (codec.GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0), b""),
-    Forgery.STARTING: (codec05.HEARTBEAT, (0, AxisState.UNDEFINED, 0, 0, 0), b""),
-}
 
-FIRMWARE_05 = Firmware(
-    error_flags={
+
+class SimulatedOdrive05(SimulatedOdrive):
+    error_flags: Mapping[DriveError, int] = {
         DriveError.OVERCURRENT: codec05.ERROR_MOTOR,
         DriveError.WATCHDOG: codec05.ERROR_WATCHDOG,
         DriveError.OVERSPEED: codec05.ERROR_CONTROLLER,
-    },
-    estop_flag=codec05.ERROR_ESTOP,
-    heartbeat=codec05.HEARTBEAT,
-    slow_messages=(
+    }
+    estop_flag = codec05.ERROR_ESTOP
+    heartbeat = codec05.HEARTBEAT
+    slow_messages: tuple[Message, ...] = (
         codec05.GET_MOTOR_ERROR,
         codec05.GET_ENCODER_ERROR,
         codec05.GET_CONTROLLER_ERROR,
         codec.GET_BUS_VOLTAGE_CURRENT,
-    ),
-)
-
-
-class SimulatedOdrive05(SimulatedOdrive):
-    def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
-        super().__init__(parameters, random, FIRMWARE_05)
-        self._requests = frozenset(message.command for message in self._payloads)
+    )
+    forgeries: Forgeries = {  # firmware 0.5 reports no settings and no serial number
+        **COMMON_FORGERIES,
+        Forgery.OLD_FIRMWARE: (codec.GET_VERSION, (2, 4, 4, 58, 0, 6, 11, 0), b""),
+        Forgery.STARTING: (codec05.HEARTBEAT, (0, AxisState.UNDEFINED, 0, 0, 0), b""),
+    }
 
     def reset(self, now_s: float) -> None:
         super().reset(now_s)
         self._connected = False  # the estimates to the messages
-        self._measured_a = 0.0  # the newest one that was measured
+        self._last_a = 0.0  # the newest current that was measured
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & codec.LAST_COMMAND
         if node_id == self.parameters.node_id and not frame.is_extended:
             self._fed_s = max(self._fed_s, now_s)  # a drive that starts is fed at its end
-        if not frame.data and command in self._requests:
+        if not frame.data and command in {message.command for message in self._payloads}:
             frame = frame._replace(is_remote=True)
         return super().receive(frame, now_s)
 
@@ -79,46 +70,30 @@ class SimulatedOdrive05(SimulatedOdrive):
             self.trip(DriveError.WATCHDOG)
         super()._trip_if_due(now_s)
 
-    def forge(self, forgery: Forgery) -> Frame:
-        return forged_frame(self.parameters.node_id, forgery, FORGERIES)
-
     def forge_current(self, current_a: float) -> Frame:
         direction = self.parameters.encoder_direction
-        return forged_current(self.parameters.node_id, direction * self._setpoint_a, direction * current_a)
+        return self._named(codec.GET_IQ, direction * self._setpoint_a, direction * current_a)
 
     def _encoder(self) -> bytes:
         return super()._encoder() if self._connected else codec.GET_ENCODER_ESTIMATES.encode(0.0, 0.0)
 
     def _counts(self) -> bytes:
-        parameters = self.parameters
-        if not parameters.encoder_frozen:
-            self._reported_turns = encoder_turns(parameters, self._turns, self._random)
-        count = round(self._reported_turns * parameters.encoder_counts)
-        return codec05.GET_ENCODER_COUNT.encode(count, count % parameters.encoder_counts)
+        counts = self.parameters.encoder_counts
+        count = round(self._measured_angle() * counts)
+        return codec05.GET_ENCODER_COUNT.encode(count, count % counts)
 
     def _iq(self) -> bytes:
         parameters = self.parameters
         setpoint_a = self._setpoint_nm / parameters.torque_constant_nm_a
         if self.energised:
-            setpoint_a = self._setpoint_a
-            noise_a = parameters.current_noise_a
-            self._measured_a = self._current_a + (self._random.gauss(0.0, noise_a) if noise_a else 0.0)
+            setpoint_a, self._last_a = self._setpoint_a, self._measured_a()
         direction = parameters.encoder_direction
-        return codec.GET_IQ.encode(direction * setpoint_a, direction * self._measured_a)
+        return codec.GET_IQ.encode(direction * setpoint_a, direction * self._last_a)
 
     def _heartbeat(self) -> bytes:
         parts = (codec05.ERROR_MOTOR, codec05.ERROR_ENCODER, codec05.ERROR_CONTROLLER)
         motor, encoder, controller = (bool(self.errors & flag) for flag in parts)
         return codec05.HEARTBEAT.encode(self.errors, self.axis_state, motor, encoder, controller)
-
-    def _motor_error(self) -> bytes:
-        return codec05.GET_MOTOR_ERROR.encode(BUS_CURRENT_OUT_OF_RANGE if self.errors & codec05.ERROR_MOTOR else 0)
-
-    def _encoder_error(self) -> bytes:
-        return codec05.GET_ENCODER_ERROR.encode(0)
-
-    def _controller_error(self) -> bytes:
-        return codec05.GET_CONTROLLER_ERROR.encode(OVERSPEED if self.errors & codec05.ERROR_CONTROLLER else 0)
 
     def _payload_functions(self) -> dict[Message, Callable[[], bytes]]:
         return {
@@ -127,7 +102,11 @@ class SimulatedOdrive05(SimulatedOdrive):
             codec.GET_BUS_VOLTAGE_CURRENT: self._bus_voltage,
             codec05.HEARTBEAT: self._heartbeat,
             codec05.GET_ENCODER_COUNT: self._counts,
-            codec05.GET_MOTOR_ERROR: self._motor_error,
-            codec05.GET_ENCODER_ERROR: self._encoder_error,
-            codec05.GET_CONTROLLER_ERROR: self._controller_error,
+            codec05.GET_MOTOR_ERROR: lambda: codec05.GET_MOTOR_ERROR.encode(
+                BUS_CURRENT_OUT_OF_RANGE if self.errors & codec05.ERROR_MOTOR else 0
+            ),
+            codec05.GET_ENCODER_ERROR: lambda: codec05.GET_ENCODER_ERROR.encode(0),
+            codec05.GET_CONTROLLER_ERROR: lambda: codec05.GET_CONTROLLER_ERROR.encode(
+                OVERSPEED if self.errors & codec05.ERROR_CONTROLLER else 0
+            ),
         }

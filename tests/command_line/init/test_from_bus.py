@@ -12,7 +12,7 @@ from command_line.drives import opened_buses
 from control.records import JOINTS
 from firmware_host.buses import BusError
 from firmware_host.configuration.loading import load_configuration
-from simulation.devices.drive import SimulatedDrive
+from simulation.devices.simulated_drive import SimulatedDrive
 from tests.command_line.command_lines import run
 from tests.drivers.bench.simulated_bus import SimulatedBus, simulated
 

@@ -9,8 +9,9 @@ from typing import Any
 from drivers.bench.bench_port import BenchPort
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
-from simulation.devices.drive import SimulatedDrive, SimulatedDriveParameters
+from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive
+from simulation.devices.simulated_drive import SimulatedDrive
 
 STEP_S = 0.001
 

@@ -52,15 +52,6 @@ def test_positions_are_stamped_with_their_times_except_for_a_constant_delay(rail
     assert rail.encoder.line.clock.rate_hz == pytest.approx(100.0, rel=0.01)
 
 
-def test_malformed_counts_are_counted_and_give_no_position(tmp_path: Path) -> None:
-    rail = Rail(tmp_path, garbled_fraction=0.2, label="pos")
-    rail.counter.encoder = StageEncoderParameters(label="pos=")
-    positions = rail.run(3.0)
-    assert 20 < rail.encoder.counts.malformed < 110
-    assert all(before.position_m < after.position_m for before, after in zip(positions, positions[1:], strict=False))
-    rail.close()
-
-
 def test_an_encoder_that_was_unplugged_reports_that_its_zero_changed(rail: Rail) -> None:
     rail.run(1.0)
     rail.counter.unplug()

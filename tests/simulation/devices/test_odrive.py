@@ -33,7 +33,7 @@ from drivers.odrive.codec import (
     arbitration_id,
 )
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.odrive.device import BOOT_S, SimulatedOdrive
+from simulation.devices.odrive.device import SimulatedOdrive
 
 NODE = 3
 CONSTANT_NM_A = 0.083
@@ -110,10 +110,10 @@ def test_a_restarting_drive_is_silent_and_deaf_then_reports_its_initialisation_o
     assert torque_nm(drive, 0.25, now_s=5.0) == 0.25
     drive.restart(5.0)
     assert drive.torque_nm(5.001) == 0.0
-    assert not any(list(drive.cyclic_frames(5.0 + step / 1000.0)) for step in range(round(1000 * BOOT_S)))
+    assert not any(list(drive.cyclic_frames(5.0 + step / 1000.0)) for step in range(round(1000 * drive.boot_s)))
     assert drive.receive(Frame(arbitration_id(NODE, GET_VERSION), is_remote=True), 5.5) == []
     report(drive, SET_AXIS_STATE, AxisState.CLOSED_LOOP, now_s=5.9)
-    frames = [frame for step in range(400) for frame in drive.cyclic_frames(5.0 + BOOT_S + step / 1000.0)]
+    frames = [frame for step in range(400) for frame in drive.cyclic_frames(5.0 + drive.boot_s + step / 1000.0)]
     heartbeats = [HEARTBEAT.decode(frame.data)[:2] for frame in frames if frame.arbitration_id & 0x1F == 0x01]
     assert heartbeats == [(ERROR_INITIALIZING, AxisState.IDLE)] + [(0, AxisState.IDLE)] * (len(heartbeats) - 1)
     assert len(heartbeats) >= 3

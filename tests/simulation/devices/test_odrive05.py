@@ -10,7 +10,6 @@ from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive05 import codec as codec05
 from simulation.devices.drive import DriveError, Forgery
-from simulation.devices.odrive.device import BOOT_S
 from simulation.devices.odrive05.device import SimulatedOdrive05
 from tests.drivers.bench.simulated_bus import simulated
 
@@ -72,7 +71,7 @@ def test_the_position_is_zero_until_the_first_closed_loop_and_the_counts_are_tru
     assert in_turn == counts % 8192
     assert turns_s == pytest.approx(1.0 / pi)
     drive.restart(1.0)
-    assert ask(drive, codec.GET_ENCODER_ESTIMATES, 1.0 + BOOT_S) == (0.0, 0.0)
+    assert ask(drive, codec.GET_ENCODER_ESTIMATES, 1.0 + drive.boot_s) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("armed", [False, True])
@@ -130,5 +129,5 @@ def test_a_drive_that_restarts_is_not_fed_meanwhile() -> None:
     drive.restart(0.0)
     drive.receive(Frame(NODE << 5 | 0xA, is_remote=True), 0.5)
     for wait_s, failed in ((0.09, False), (0.11, True)):
-        drive.torque_nm(BOOT_S + wait_s)
+        drive.torque_nm(drive.boot_s + wait_s)
         assert drive.failed is failed
