@@ -20,9 +20,8 @@ class Rail(InstrumentBench):
     """A stage that moves evenly, its counter, and the encoder that reads it."""
 
     def __init__(self, folder: Path, **changes: float) -> None:
-        counter = EmulatedStageEncoder(
-            lambda at_s: SPEED_M_S * at_s, StageEncoderParameters(**changes), folder / "encoder"
-        )
+        parameters = StageEncoderParameters(**changes)  # type: ignore[arg-type]
+        counter = EmulatedStageEncoder(lambda at_s: SPEED_M_S * at_s, parameters, folder / "encoder")
         super().__init__(counter, StageEncoder(StageEncoderSettings(str(folder / "encoder"), 1e-5)))
 
 
