@@ -48,7 +48,6 @@ from firmware_host.buses import BusError, open_ports
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
-from firmware_host.operator.reports import check_item
 from firmware_host.pose_sources import open_pose
 from firmware_host.sockets.user_groups import load_rights
 from firmware_host.software_version import is_compiled, software_version
@@ -62,9 +61,14 @@ from operator_client.status_client import (
 
 ROOT = Path("/")
 MARKS = {Level.OK: ("ok  ", GREEN), Level.WARN: ("warn", YELLOW), Level.FAIL: ("FAIL", RED)}
-MAKE_CONFIGURATION = "'mudskipper install' makes it; or name another one with --config"
 LISTENING_S = 0.6  # six heartbeats
 START = "'systemctl start mudskipper', then 'systemctl status mudskipper'"
+UNANSWERED = {  # why the daemon does not say its status: how severe, and what to do
+    NotPermittedError: (Level.WARN, "or run this with sudo"),
+    DroppedError: (Level.WARN, "try again"),
+    NoDaemonError: (Level.WARN, f"{START}; until then drives and their watchdogs are not known"),
+    CallRefusedError: (Level.FAIL, START),
+}
 
 
 def _given_socket() -> Path | None:
@@ -85,14 +89,28 @@ def doctor(
         ),
     ] = None,
 ) -> int:
+    configuration, findings = examine_configuration(config)
+    if configuration is None:
+        findings += [*examine_this_python(), _examine_clock()]
+    else:
+        findings += examine_all(configuration, socket or Path(configuration.status.socket), read_links(ROOT))
+    if json:
+        print_value([each._asdict() for each in findings])
+    else:
+        for each in findings:
+            fix = f"\n       -> {each.fix}" if each.fix else ""
+            print(f"{coloured(*MARKS[each.level])} {each.id:22} {each.text}{fix}")
+    failed = any(each.level is Level.FAIL for each in findings)
+    return exit_codes.UNHEALTHY if failed else exit_codes.OK
+
+
+def examine_configuration(path: Path) -> tuple[Configuration | None, list[Finding]]:
+    """Return the configuration, None where it is wrong, with the findings about its file."""
     try:
-        configuration = load_configuration(config)
+        return load_configuration(path), [ok("configuration", str(path))]
     except ConfigurationError as problem:
-        fix = f"edit {config}" if config.exists() else MAKE_CONFIGURATION
-        failed = [fail("configuration", message, fix) for message in problem.problems]
-        return _show([*failed, *examine_this_python(), _examine_clock()], json)
-    findings = examine_all(configuration, socket or Path(configuration.status.socket), read_links(ROOT))
-    return _show([ok("configuration", str(config)), *findings], json)
+        fix = f"edit {path}" if path.exists() else "'mudskipper install' makes it; or name another one with --config"
+        return None, [fail("configuration", message, fix) for message in problem.problems]
 
 
 def examine_all(configuration: Configuration, socket: Path, links: dict[str, CanLink]) -> Iterator[Finding]:
@@ -124,14 +142,9 @@ def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, li
         with closing(client):
             pid = client.daemon_pid
             return pid, list(examine_daemon(client.call("status"), software_version(), longest_watchdog_s))
-    except NotPermittedError as problem:
-        return pid, [warn("daemon", str(problem), "or run this with sudo")]
-    except DroppedError as problem:
-        return pid, [warn("daemon", str(problem), "try again")]
-    except NoDaemonError as problem:
-        return pid, [warn("daemon", f"{problem}: drives and their watchdogs are not known", START)]
-    except CallRefusedError as problem:
-        return pid, [fail("daemon", str(problem), START)]
+    except tuple(UNANSWERED) as problem:
+        level, fix = UNANSWERED[type(problem)]
+        return pid, [Finding("daemon", level, str(problem), fix)]
 
 
 def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
@@ -190,73 +203,57 @@ def _group_name(gid: int) -> str:
     return str(gid)
 
 
-def _show(findings: list[Finding], as_json: bool) -> int:
-    if as_json:
-        print_value([each._asdict() for each in findings])
-    else:
-        print("\n".join(map(_line, findings)))
-    failed = any(finding.level is Level.FAIL for finding in findings)
-    return exit_codes.UNHEALTHY if failed else exit_codes.OK
-
-
-def _line(finding: Finding) -> str:
-    fix = f"\n       -> {finding.fix}" if finding.fix else ""
-    return f"{coloured(*MARKS[finding.level])} {finding.id:22} {finding.text}{fix}"
-
-
 def check_without_daemon(path: Path, why_no_daemon: str) -> list[dict[str, Any]]:
+    """Return the lines of `mudskipper check`. It listens whether the drives are heard, and transmits nothing."""
     fix = "start it ('systemctl start mudskipper'), name its socket with --socket, or join the group that owns it"
-    items = [check_item("daemon", False, why_no_daemon, fix)]
-    try:
-        configuration = load_configuration(path)
-    except ConfigurationError as problem:
-        fix = f"edit {path}" if path.exists() else MAKE_CONFIGURATION
-        return items + [check_item("configuration", False, message, fix) for message in problem.problems]
-    items.append(check_item("configuration", True, str(path), ""))
-    return items + _drive_items(configuration) + _pose_items(configuration) + _host_items(configuration)
+    configuration, findings = examine_configuration(path)
+    if configuration is not None:
+        findings += [*examine_drives(configuration), *examine_pose(configuration), *_examine_means(configuration)]
+    return [each.as_check_item for each in (fail("daemon", why_no_daemon, fix), *findings)]
 
 
-def _drive_items(configuration: Configuration) -> list[dict[str, Any]]:
+def examine_drives(configuration: Configuration) -> list[Finding]:
+    """Return which drives are heard."""
     try:
         ports = open_ports(configuration.bus)
     except BusError as problem:
-        return [check_item("bus", False, str(problem), "bring the interface up: docs/how-to/install.md")]
-    drives = make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
-    deadline_s = time.monotonic() + LISTENING_S
-    states = drives.read(time.monotonic())
-    while not drives.heard and time.monotonic() < deadline_s:
-        drives.poll()
-        time.sleep(0.01)
+        return [fail("bus", str(problem), "bring the interface up: docs/how-to/install.md")]
+    with closing(
+        make_drives(configuration.drive, ports, configuration.limits, configuration.watchdog_endpoints)
+    ) as drives:
+        deadline_s = time.monotonic() + LISTENING_S
         states = drives.read(time.monotonic())
+        while not drives.heard and time.monotonic() < deadline_s:
+            drives.poll()
+            time.sleep(0.01)
+            states = drives.read(time.monotonic())
     fix = "check its power, wiring, node id and cyclic message periods"
-    items = [
-        check_item(f"drive.{joint}", state.heard, "heard" if state.heard else "not heard", fix)
+    return [
+        ok_if(state.heard, f"drive.{joint}", "heard" if state.heard else "not heard", fix, Level.FAIL)
         for joint, state in zip(configuration.rig.joints, states, strict=True)
     ]
-    drives.close()
-    return items
 
 
-def _pose_items(configuration: Configuration) -> list[dict[str, Any]]:
-    """Checks a pose source. A robot walks without a pose, but its daemon requires the configured source to open."""
+def examine_pose(configuration: Configuration) -> list[Finding]:
+    """Check a pose source. A robot walks without a pose, but its daemon requires the configured source to open."""
     if configuration.pose.chosen not in ("natnet", "rail_encoder"):
         return []
     try:
         pose = open_pose(configuration.pose)
     except PoseSourceError as problem:
-        return [check_item("pose", False, str(problem), "plug it in, or correct [pose] in the configuration")]
+        return [fail("pose", str(problem), "plug it in, or correct [pose] in the configuration")]
     deadline_s = time.monotonic() + LISTENING_S
     while not isfinite(pose.read(time.monotonic()).x_m) and time.monotonic() < deadline_s:
         time.sleep(0.01)
     pose.close()
-    return [check_item("pose", True, pose.report().message, "")]
+    return [ok("pose", pose.report().message)]
 
 
-def _host_items(configuration: Configuration) -> list[dict[str, Any]]:
-    findings = []
+def _examine_means(configuration: Configuration) -> Iterator[Finding]:
+    """Yield what concerns a daemon that this user would start: folder of logs, limits, settings of the buses."""
     if configuration.log.enabled:
-        findings += [log_space(configuration.log), examine_folder(Path(configuration.log.directory), this_account())]
-    findings += examine_limits(configuration.loop, process_limits(Path("/"), None))
-    opened = [f"bus.{name}" for name in configuration.bus]  # _drive_items reported whether they open
-    findings += [finding for finding in examine_buses(configuration, read_links()) if finding.id not in opened]
-    return [finding.as_check_item for finding in findings]
+        yield log_space(configuration.log)
+        yield examine_folder(Path(configuration.log.directory), this_account())
+    yield from examine_limits(configuration.loop, process_limits(ROOT, None))
+    opened = [f"bus.{name}" for name in configuration.bus]  # examine_drives reported whether they open
+    yield from (each for each in examine_buses(configuration, read_links()) if each.id not in opened)

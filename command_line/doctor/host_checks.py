@@ -6,7 +6,7 @@ late or loses logs is a warning.
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from datetime import datetime
 from importlib.metadata import packages_distributions
@@ -30,7 +30,8 @@ from command_line.doctor.host_facts import (
 from experiments.reports.counted_nouns import counted
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
-from firmware_host.log.log_folder import FreeSpace, free_space, size_text, unfinished_files
+from firmware_host.log.log_folder import FreeSpace, free_space, unfinished_files
+from logs.files.stored_logs import size_text
 
 ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less memory
 WALK_BYTES_PER_MIN = 6e6  # of a log, measured: 5.3 to 5.6 MB in a minute with torque
@@ -42,9 +43,6 @@ VOLATILE = frozenset({"tmpfs", "ramfs", "overlay"})  # in memory, or likely so: 
 UNSAFE = frozenset({"vfat", "exfat", "msdos", "nfs", "nfs4", "cifs", "fuse"})  # without a journal
 OURS = "mudskipper"  # name of the service, its user, its group and this distribution
 STATE_FOLDER = ("var", "lib", OURS)  # StateDirectory= of the unit
-PACKAGES = (  # the top-level names that this distribution installs
-    "command_line", "control", "drivers", "estimation", "experiments", "firmware_host", "mudskipper", "simulation",
-)  # fmt: skip
 
 
 class Account(NamedTuple):
@@ -89,13 +87,8 @@ def examine_limits(loop: LoopParameters, limits: Limits | None) -> Iterator[Find
         enough = limits.rtprio >= loop.priority
         permitted = "permitted" if enough else "not permitted: the loop may be late"
         text = f"real-time priority {loop.priority} is {permitted} (limit {_limit_text(limits.rtprio)} {limits.whose})"
-        yield ok_if(
-            enough,
-            "realtime",
-            text,
-            f"raise the rtprio limit (LimitRTPRIO= in the unit; {SHELL_LIMITS})",
-            Level.FAIL,
-        )
+        fix = f"raise the rtprio limit (LimitRTPRIO= in the unit; {SHELL_LIMITS})"
+        yield ok_if(enough, "realtime", text, fix, Level.FAIL)
     if loop.lock_memory:
         text = f"{_limit_text(limits.memlock_bytes)} bytes may be locked in memory ({limits.whose})"
         fix = f"raise the memlock limit (LimitMEMLOCK=infinity in the unit; {SHELL_LIMITS})"
@@ -196,19 +189,16 @@ def examine_mount(mount: Mount) -> Finding:
 
 
 def examine_space(space: FreeSpace, least_fraction: float) -> Finding:
-    """Judges by the time that a walk can be logged, and by the fraction below which old logs are deleted."""
+    """Evaluates the time that a walk can be logged, and the fraction below which old logs are deleted."""
     minutes = space.free_bytes / WALK_BYTES_PER_MIN
-    text = f"{size_text(space.free_bytes)} free, {100.0 * space.free_fraction:.0f} %: {_time_text(minutes)} of walking"
-    if minutes < LEAST_MIN:
-        return fail("disk", text, "free some of it, or set log.directory to another disk")
-    if space.free_fraction < least_fraction:
+    time = f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.0f} h"
+    text = f"{size_text(space.free_bytes)} free, {100.0 * space.free_fraction:.0f} %: {time} of walking"
+    if minutes >= LEAST_MIN and space.free_fraction < least_fraction:
         fix = "free some of it, or lower log.min_free_fraction"
         return warn("disk", f"{text}; less than log.min_free_fraction is free, so old logs are deleted", fix)
-    return ok_if(minutes >= ENOUGH_MIN, "disk", text, "free some of it, or set log.directory to another disk")
-
-
-def _time_text(minutes: float) -> str:
-    return f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.0f} h"
+    level = Level.FAIL if minutes < LEAST_MIN else Level.WARN
+    fix = "free some of it, or set log.directory to another disk"
+    return ok_if(minutes >= ENOUGH_MIN, "disk", text, fix, level)
 
 
 def log_space(log: LogParameters, root: Path = Path("/")) -> Finding:
@@ -268,18 +258,16 @@ def examine_clock(now: datetime, synchronised: bool, chip: bool) -> Finding:
     return ok_if(synchronised and chip, "clock", text, fix)
 
 
-def examine_python(version: tuple[int, ...], owners: dict[str, list[str]]) -> Iterator[Finding]:
-    """Checks the interpreter and the import names; `owners` are the distributions of each top-level package."""
+def examine_python(version: tuple[int, ...], owners: Mapping[str, Collection[str]]) -> Iterator[Finding]:
+    """Checks the interpreter and our import names; `owners` are the distributions of each top-level package."""
     recent, text = version[:2] >= OLDEST_PYTHON, ".".join(map(str, version[:3]))
     fix = "install Python 3.11 or newer"
     yield ok_if(recent, "python", text if recent else f"{text} is too old", fix, Level.FAIL)
-    others = {name: sorted(set(owners.get(name, [])) - {OURS}) for name in PACKAGES}
-    found = [f"{name} of {', '.join(distributions)}" for name, distributions in others.items() if distributions]
-    conflict = f"other software brings packages of the same name: {'; '.join(found)}"
+    found = [f"{name} of {', '.join({*each} - {OURS})}" for name, each in owners.items() if {*each} > {OURS}]
+    text = f"{'; '.join(found) or 'no other software'} has packages of the same name"
     fix = "give the daemon an environment of its own: docs/how-to/install.md"
-    text = conflict if found else "no other software has packages of the same name"
     yield ok_if(not found, "packages", text, fix, Level.FAIL)
 
 
 def examine_this_python() -> Iterator[Finding]:
-    yield from examine_python(tuple(sys.version_info[:3]), {k: list(v) for k, v in packages_distributions().items()})
+    yield from examine_python(tuple(sys.version_info[:3]), packages_distributions())

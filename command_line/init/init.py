@@ -14,7 +14,7 @@ from command_line.errors import usage_error
 from command_line.init.bus_scan import scan, with_found, with_identities
 from command_line.init.key_reference import Key, configuration_keys
 from command_line.init.new_file import NewRobot, drive_keys, new_file
-from command_line.init.questions import Ask, ask, number, one_of, whole_number
+from command_line.init.questions import Ask, ask, one_of
 from control.geometry import FlipperGeometry
 from control.plate_outline import Corner
 from control.records import FLIPPERS, JOINTS, Rig
@@ -152,7 +152,7 @@ def _node_ids(given: Mapping[str, int], robot: NewRobot, read: Ask | None) -> di
     return {
         joint: given[joint]
         if joint in given
-        else ask(f"node id of {joint}", robot.node_id(joint), whole_number(*bounds), read)
+        else ask(f"node id of {joint}", robot.node_id(joint), Option("", *bounds).parse_whole_number, read)
         for joint in robot.rig.joints
     }
 
@@ -188,4 +188,5 @@ def _plate_answer(line: str) -> str:
 
 def _ask_value(key: Key, read: Ask | None) -> float:
     assert key.bounds is not None
-    return ask(f"{key.name}: {key.meaning} ({key.unit})", float(key.default), number(*key.bounds), read)
+    option = Option(key.meaning, *key.bounds)
+    return ask(f"{key.name}: {key.meaning} ({key.unit})", float(key.default), option.parse_number, read)

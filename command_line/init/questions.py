@@ -1,5 +1,6 @@
 """Asks the questions of a new configuration: a default in brackets, and again after an answer that does not fit."""
 
+from argparse import ArgumentTypeError
 from collections.abc import Callable, Collection
 from typing import TypeVar
 
@@ -15,7 +16,7 @@ def ask(prompt: str, default: T, parse: Callable[[str], T], read: Ask | None) ->
             break
         try:
             return parse(line)
-        except ValueError as problem:
+        except (ValueError, ArgumentTypeError) as problem:
             print(f"  {problem}")
     return default
 
@@ -29,27 +30,5 @@ def one_of(words: Collection[str]) -> Callable[[str], str]:
         if line not in words:
             raise ValueError(f"{line}: must be one of {', '.join(words)}")
         return line
-
-    return parse
-
-
-def number(least: float, most: float) -> Callable[[str], float]:
-    def parse(line: str) -> float:
-        try:
-            value = float(line)
-        except ValueError:
-            raise ValueError(f"{line}: must be a number") from None
-        if not least <= value <= most:
-            raise ValueError(f"{line}: must be from {least:.10g} to {most:.10g}")
-        return value
-
-    return parse
-
-
-def whole_number(least: float, most: float) -> Callable[[str], int]:
-    def parse(line: str) -> int:
-        if not line.isdecimal() or not least <= int(line) <= most:
-            raise ValueError(f"{line}: must be a whole number from {least:.10g} to {most:.10g}")
-        return int(line)
 
     return parse

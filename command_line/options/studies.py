@@ -17,9 +17,9 @@ from typing import Any, get_type_hints
 from command_line.function_options import add_function_options
 from command_line.options.shared import add_json, add_socket
 from experiments.study.catalogue import load_study, study_texts
-from experiments.study.option import declared_options
+from experiments.study.option import Option, declared_options
 from experiments.study.session import Session
-from experiments.study.values import folder, whole
+from experiments.study.values import folder
 
 
 def add_experiment(experiment: argparse.ArgumentParser) -> None:
@@ -44,7 +44,10 @@ def _add_options(name: str, command: argparse.ArgumentParser) -> None:
         if not takes_session(module.study):
             workers = command.add_mutually_exclusive_group()
             workers.add_argument(
-                "--workers", type=whole(1, 1000), metavar="N", help="processes here (default: one for each processor)"
+                "--workers",
+                type=Option("processes here", low=1, high=1000).parse_whole_number,
+                metavar="N",
+                help="processes here (default: one for each processor)",
             )
             workers.add_argument(
                 "--cluster", metavar="ADDRESS", help="of a Dask scheduler, whose workers run the trials instead"

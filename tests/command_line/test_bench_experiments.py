@@ -65,25 +65,6 @@ def test_a_walk_reads_the_flippers_summary_as_its_truth(
     assert summary["settings"]["truth"] == "file"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["experiment", "flipper"], "--mud 47.6"),
-        (["experiment", "walk"], "--mud 47.6=61"),
-        (["experiment", "flipper", "--simulated", "--mud", "clay"], "water in percent"),
-        (["experiment", "flipper", "--simulated", "--mud", "70"], "70 % of water"),
-        (["experiment", "walk", "--simulated", "--soft", "clay"], "water in percent"),
-        (["experiment", "walk", "--mud", "47.6", "--mud", "47.6=30"], "two muds have the same name"),
-    ],
-)
-def test_impossible_options_are_refused_before_anything_begins(
-    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([*arguments, "--out", str(tmp_path / "none")]) == exit_codes.USAGE
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "none").exists()
-
-
 def test_an_invalid_truth_file_is_refused_before_anything_begins(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

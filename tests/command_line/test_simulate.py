@@ -150,13 +150,6 @@ def test_a_second_simulated_robot_leaves_the_first_one_and_its_files_alone(
     assert "mudskipperd --config" in capsys.readouterr().out
 
 
-def test_the_peer_refuses_a_world_too(short_folder: Path, world: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    world.write_text("", encoding="utf-8")
-    setup = write_local_setup(short_folder, short_folder)
-    assert peer.main(["--config", str(setup), "--world", str(world)]) == exit_codes.CONFIGURATION
-    assert capsys.readouterr().err == "segment is missing\n"
-
-
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are another user's")
 def test_root_does_not_follow_what_another_user_prepared_among_the_temporary_files(
     tmp_path: Path, short_folder: Path, monkeypatch: pytest.MonkeyPatch

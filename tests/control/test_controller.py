@@ -69,13 +69,6 @@ def test_hold_keeps_the_pose_that_was_measured_when_it_began() -> None:
     assert wanted_pose(controller, Mode.HOLD, Joints(0.0, 0.0, 0.0, 0.0)) == pytest.approx(POSE)
 
 
-def test_arming_again_holds_the_new_pose() -> None:
-    controller = weightless()
-    wanted_pose(controller, Mode.HOLD, POSE)
-    wanted_pose(controller, Mode.IDLE, POSE)
-    assert wanted_pose(controller, Mode.HOLD, RAISED) == pytest.approx(RAISED)
-
-
 def test_the_torque_after_arming_is_a_ramp_from_nothing() -> None:
     controller = Controller(GAIT, GEOMETRY, JointGains(), ArmMass(), MotionParameters(fade_in_s=0.5), recovery())
     controller.step(PERIOD_S, Mode.ARMING, states_at(POSE))

@@ -67,12 +67,6 @@ def test_an_arm_at_its_target_gets_exactly_what_balances_gravity(mass: ArmMass, 
         assert torques[flipper + 1] + gravity[1] == 0.0
 
 
-def test_a_level_arm_is_held_up_by_its_weight_times_its_lever() -> None:
-    level = Joints(0.0, 0.0, 0.0, 0.0)
-    torques = joint_torques_nm(still(level), states_at(level), JointGains(), ArmMass(0.5, 0.1), 1.0)
-    assert torques == pytest.approx((0.0, 0.4905, 0.0, 0.4905))
-
-
 @pytest.mark.parametrize("joint", range(4))
 def test_each_joint_is_pushed_toward_its_own_target_with_its_own_gains(joint: int) -> None:
     gains = JointGains(8.0, 0.06, 10.0, 0.08)
@@ -89,11 +83,6 @@ def test_the_torque_opposes_the_error_in_angle_and_in_velocity() -> None:
     assert pd_torque_nm(target, DriveState(angle_rad=0.1, velocity_rad_s=0.0), 8.0, 0.06) == pytest.approx(-0.8)
     assert pd_torque_nm(target, DriveState(angle_rad=0.0, velocity_rad_s=2.0), 8.0, 0.06) == pytest.approx(-0.12)
     assert pd_torque_nm(target, DriveState(angle_rad=-0.1, velocity_rad_s=-2.0), 8.0, 0.06) == pytest.approx(0.92)
-
-
-@given(masses, poses, poses)
-def test_faded_out_there_is_no_torque_at_all(mass: ArmMass, target: JointAngles, pose: JointAngles) -> None:
-    assert joint_torques_nm(still(target), states_at(pose), JointGains(), mass, 0.0) == NO_TORQUE
 
 
 @given(poses, poses, st.floats(0.0, 1.0))

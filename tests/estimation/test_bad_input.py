@@ -87,15 +87,6 @@ def test_a_single_sample_closes_nothing(phase: Phase, method: Method) -> None:
     assert fed(new_estimator(method), [(0.0, phase, 0.1, -0.5, -5.0, -5.0)]) == []
 
 
-@pytest.mark.parametrize("current_a", [0.0, -10.0, 10.0])
-def test_constant_samples_give_no_coefficient(current_a: float, method: Method) -> None:
-    strides = fed(new_estimator(method), [(t, phase, 0.1, -0.5, current_a, current_a) for t, phase, *_ in walk()])
-    assert len(strides) == STRIDES
-    assert_all_consistent(strides)
-    for stride in strides:
-        assert not any(each.valid and not each.at_least for each in (stride.k_p, stride.k_s, stride.k_e))
-
-
 # one bad stroke in a good walk
 
 

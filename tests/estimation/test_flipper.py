@@ -10,7 +10,7 @@ deep. Tests that need the laws without this error state the surface beforehand.
 from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import pairwise
-from math import copysign, cos, inf, isfinite, nan, radians, sin, sqrt
+from math import copysign, cos, inf, isfinite, nan, radians, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -259,30 +259,11 @@ def test_without_noise_all_error_is_that_of_the_surface(depth_m: float, surface_
     assert left[2] == pytest.approx(1.0, abs=0.03)
 
 
-def test_softer_and_firmer_mud_are_read_alike() -> None:
-    """The tolerance is 0.5 %, because the zero may creep by the same 0.05 N in any mud."""
-    readings = [ratios(one(rows_of(motion(), MUD.times(factor))), MUD.times(factor)) for factor in (0.1, 1.0, 5.0)]
-    assert readings[0] == pytest.approx(readings[1], rel=5e-3)
-    assert readings[2] == pytest.approx(readings[1], rel=5e-3)
-
-
 @pytest.mark.parametrize("factor", [-1.0, 0.0])
 def test_mud_that_pushes_along_the_motion_has_no_coefficient(factor: float) -> None:
     for each in coefficients(one(noisy(rows_of(motion(), MUD.times(factor)), 1, 0.01))):
         assert not each.valid
         assert each.reason
-
-
-def test_gravity_inertia_and_friction_left_in_would_be_taken_for_mud() -> None:
-    """The tests above would therefore notice if one of them were not subtracted."""
-    whole = HEAVY.mass
-    for lacking in (
-        HEAVY._replace(mass=ArmMass(0.0, 0.0, whole.sweep_inertia_kg_m2, whole.adduction_inertia_kg_m2)),
-        HEAVY._replace(mass=ArmMass(whole.arm_mass_kg, whole.center_of_mass_m, 0.0, 0.0)),
-        HEAVY._replace(adduction_friction=JointFriction()),
-    ):
-        stride = one(rows_of(motion(), MUD, HEAVY), estimator(lacking, KNOWN_M))
-        assert abs(stride.k_e.value / MUD.k_e - 1.0) > 0.03
 
 
 @pytest.mark.parametrize("face_fraction", [-0.3, 0.15, 0.3])
@@ -298,19 +279,6 @@ def test_a_load_on_the_face_changes_nothing_but_the_surface_that_is_found(face_f
     late = [(each.surface_m / each.depth_m) for each in (plain, faced)]
     corrected = [each.k_p.value * (1.0 - fraction) ** 1.5 for each, fraction in zip((plain, faced), late, strict=True)]
     assert corrected[1] == pytest.approx(corrected[0], rel=0.01)  # the square of the surfaces' difference remains
-
-
-def test_a_load_on_the_face_adds_to_the_uncertainty() -> None:
-    """The uncertainty of k_e grows by an eighth of the correction of 7 %: 0.9 %, next to 3.2 % of the torque
-    constant.
-    """
-    plain, faced = (
-        one(rows_of(motion(), MUD._replace(face_fraction=fraction)), estimator(surface_error_m=KNOWN_M))
-        for fraction in (0.0, 0.3)
-    )
-    added = sqrt(uncertainties(faced)[2] ** 2 - uncertainties(plain)[2] ** 2)
-    assert uncertainties(plain)[2] < 0.035
-    assert added == pytest.approx(0.009, abs=0.002)
 
 
 def test_at_five_centimetres_and_thirty_degrees_the_upper_part_is_observed() -> None:

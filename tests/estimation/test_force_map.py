@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from control.geometry import FlipperGeometry
@@ -53,46 +53,3 @@ def test_the_smallest_force_is_the_pseudo_inverse_of_the_jacobians_transpose(
     force = np.linalg.pinv(jacobian.T) @ [sweep_nm, adduction_nm]
     found = smallest_force_n(geometry, sweep, adduction, sweep_nm, adduction_nm)
     assert found == pytest.approx((force[0], force[2]), rel=1e-9, abs=1e-9)
-
-
-@given(angles, angles, torques, torques)
-def test_no_other_force_with_the_same_torques_is_smaller(
-    sweep: float, adduction: float, sweep_nm: float, adduction_nm: float
-) -> None:
-    """The force has the given torques and no part along the normal of both columns of J, along which a force turns no
-    joint.
-    """
-    geometry = FlipperGeometry()
-    jacobian = np.reshape(geometry.jacobian(sweep, adduction), (3, 2))
-    unfelt = np.cross(jacobian[:, 0], jacobian[:, 1])
-    force_x_n, force_z_n = smallest_force_n(geometry, sweep, adduction, sweep_nm, adduction_nm)
-    assume(abs(unfelt[1]) > 1e-6)
-    force_y_n = -(force_x_n * unfelt[0] + force_z_n * unfelt[2]) / unfelt[1]
-    force = np.array([force_x_n, force_y_n, force_z_n])
-    assert jacobian.T @ force == pytest.approx([sweep_nm, adduction_nm], abs=1e-7)
-
-
-@given(st.floats(0.05, 0.5), angles, angles, torques)
-def test_without_drop_and_level_both_maps_agree(length_m: float, sweep: float, adduction: float, torque: float) -> None:
-    """The maps agree in the sweep column everywhere, and in the other where cos² α = 1: section 2.1 of the physics."""
-    geometry = FlipperGeometry(length_m, 0.0, 0.06)
-    truthful, paper = (
-        smallest_force_n(geometry, sweep, adduction, torque, 0.0),
-        paper_force_n(sweep, adduction, torque, 0.0, length_m),
-    )
-    assert truthful == pytest.approx(paper, abs=1e-12)
-    straight = smallest_force_n(geometry, 0.0, adduction, 0.0, torque)
-    assert straight == pytest.approx(paper_force_n(0.0, adduction, 0.0, torque, length_m), abs=1e-12)
-
-
-@given(angles, angles, torques, torques, st.floats(-5.0, 5.0))
-def test_both_maps_are_linear_in_the_torques(sweep: float, adduction: float, a: float, b: float, times: float) -> None:
-    geometry = FlipperGeometry()
-    for whole, part in (
-        (
-            smallest_force_n(geometry, sweep, adduction, times * a, times * b),
-            smallest_force_n(geometry, sweep, adduction, a, b),
-        ),
-        (paper_force_n(sweep, adduction, times * a, times * b, 0.12), paper_force_n(sweep, adduction, a, b, 0.12)),
-    ):
-        assert whole == pytest.approx(tuple(times * each for each in part), abs=1e-9)

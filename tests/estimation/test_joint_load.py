@@ -300,11 +300,6 @@ def test_a_load_is_found_under_torques_that_are_held_from_tick_to_tick() -> None
     assert np.sqrt(np.mean(errors_nm**2)) < 0.03
 
 
-def test_interpolated_currents_would_lose_half_of_that_load() -> None:
-    errors_nm = np.array(loads_of_a_driven_arm(0.002, known=False)) - MUD_NM
-    assert np.sqrt(np.mean(errors_nm**2)) > 0.5 * abs(MUD_NM)
-
-
 def test_two_samples_of_one_moment_give_no_acceleration() -> None:
     for motion in (motion_between, motion_at):
         assert motion(sample(0.1, 1.0, 2.0, 1.0), sample(0.3, 3.0, 4.0, 1.0)) == (0.3, 3.0, 0.0, 4.0)

@@ -133,10 +133,6 @@ class TestOneMud:
             assert merged.depth_m == pytest.approx(0.03)
             assert (merged.strides, merged.at_least, mud_estimate.boundary) == (len(rows), False, False)
 
-    def test_one_stride_is_uncertain_by_its_own_error_and_the_repeatability(self) -> None:
-        only = found(after(stride(k_s=reported(K_S, 0.06))).k_s)
-        assert only.std_error / only.value == pytest.approx(0.10)
-
     def test_on_one_mud_the_uncertainty_narrows_to_eight_strides_worth_and_no_further(self) -> None:
         knowledge = MudKnowledge()
         uncertainties = []
@@ -314,14 +310,6 @@ class TestBoundaries:
         assert not mud_estimate.boundary
         assert found(mud_estimate.k_s).strides == 10
         assert found(mud_estimate.k_s).value == pytest.approx(K_S, rel=0.035)
-
-    def test_every_stride_in_another_mud_is_a_boundary_of_its_own(self) -> None:
-        knowledge = MudKnowledge()
-        walked(knowledge, *[stride(k_s=reported(K_S))] * 5)
-        for k_s in (2e6, 0.2e6, 5e6):
-            mud_estimate = walked(knowledge, stride(k_s=reported(k_s)))
-            assert mud_estimate.boundary
-            assert found(mud_estimate.k_s).value == pytest.approx(k_s)
 
     @pytest.mark.parametrize(("changed", "also"), [("k_p", "k_s"), ("k_p", "k_e"), ("k_s", "k_p"), ("k_s", "k_e")])
     def test_a_coefficient_of_another_mud_clears_the_others(self, changed: str, also: str) -> None:

@@ -74,13 +74,6 @@ def test_each_flipper_gets_the_samples_that_it_would_get_alone(method: Method) -
         assert repr(reading.strides) == repr(tuple(stride for _, stride in reported if stride is not None))
 
 
-def test_both_strides_close_with_one_sample() -> None:
-    mud, sizes = estimator(), set[int]()
-    for a, b in zip(walk(1), walk(2), strict=True):
-        sizes.add(len(update(mud, a, b).strides))
-    assert sizes == {0, 2}
-
-
 @pytest.mark.parametrize("late", FLIPPERS)
 def test_a_flipper_that_leaves_the_mud_late_is_waited_for(late: str) -> None:
     """Its extraction ends in the mud: the other flipper's stride closes together with it, and the left one comes
@@ -153,19 +146,6 @@ def test_estimate_is_that_of_the_strides_so_far() -> None:
         assert flipper.k_p.strides == STRIDES
     assert mud.mud_estimate.k_p is not None
     assert mud.mud_estimate.k_p.value == pytest.approx(K_P, rel=0.1)  # 3 to 5 % by the surface, see test_flipper
-
-
-def test_the_estimate_of_both_is_between_those_of_each() -> None:
-    mud = estimator()
-    strides_of(mud, walk(1), walk(2))
-    assert (
-        mud.mud_estimate.k_p is not None
-        and mud.mud_estimate.left.k_p is not None
-        and mud.mud_estimate.right.k_p is not None
-    )
-    low, high = sorted((mud.mud_estimate.left.k_p.value, mud.mud_estimate.right.k_p.value))
-    assert low <= mud.mud_estimate.k_p.value <= high
-    assert mud.mud_estimate.k_p.std_error < mud.mud_estimate.left.k_p.std_error
 
 
 def test_the_map_contains_both_flippers_strides_at_the_body_position() -> None:
@@ -253,12 +233,6 @@ BOTH_OLD: tuple[Four, Four] = ((0.0, 0.002, 0.001, 0.0005), (0.002, 0.0005, 0.0,
 @pytest.mark.parametrize("ages", [(FRESH, FRESH), ANGLES_OLD, CURRENTS_OLD, BOTH_OLD])
 def test_messages_of_any_age_give_the_load_of_fresh_ones(ages: tuple[Four, Four]) -> None:
     assert max(load_of_a_free_arm_nm(*ages, reported=True)) < 1e-9 * LARGEST_NM
-
-
-@pytest.mark.parametrize("ages", [ANGLES_OLD, BOTH_OLD])
-def test_unknown_ages_would_be_taken_for_mud(ages: tuple[Four, Four]) -> None:
-    """A millisecond at 5 Hz is 3 % of the inertia."""
-    assert max(load_of_a_free_arm_nm(*ages, reported=False)) > 0.03 * LARGEST_NM
 
 
 def test_a_current_that_is_younger_than_the_command_which_it_answers_needs_no_age() -> None:

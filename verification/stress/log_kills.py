@@ -28,7 +28,7 @@ from verification.local_robot import LONGEST_WAIT_S, LocalRobot, kill_session, w
 from verification.stress.resources import children_of
 
 BAR_S = 1.0  # of rows at a log's end
-VICTIMS = ("daemon", "writer", "both", "all")  # all: the whole session, with a recovery that may be running
+VICTIMS = ("all", "writer", "daemon", "both")  # all: the whole session, with a recovery that may be running
 LATEST_KILL_S = 2.5  # after the start: in the first or the second segment
 SUMMED = ("missing_inside", "doubled", "recovered", "segments", "ticks")
 

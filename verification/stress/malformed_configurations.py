@@ -5,7 +5,6 @@ a refusal must name. A fraction of the files is valid field by field, so they ar
 contradict one another.
 """
 
-import json
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
@@ -13,6 +12,8 @@ from math import exp, inf, log, nan
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple, get_args, get_type_hints
+
+import tomlkit
 
 from control.bounds import Bounds
 from control.gait.gait import PROTOCOLS
@@ -28,9 +29,15 @@ from verification.example_robot import EXAMPLE
 WORLD = Path(world.__file__).with_name("example_world.toml").read_text(encoding="utf-8")
 CONFIGURATIONS = (EXAMPLE.read_text(encoding="utf-8"), configuration_text(Path("m"), Path("m/logs")))
 HOSTILE = ("", "\0", "x" * 100_000, "ü" * 200, "../..", "/dev/full", "\x1b[2J", "\n" * 50, "'; --", "root", "nobody")
-OTHER_TYPES: tuple[Any, ...] = (True, 1, 1.5, "1.0", [], [1, [2]], {}, {"a": {"b": 1}}, "", 10**30)
-UNREADABLE = ("9" * 5000, '"' + "9" * 2_000_000 + '"')  # for which the reader knows no key
+TABLES: tuple[Any, ...] = ([], [1, [2]], {}, {"a": {"b": 1}})
+WRONG: dict[type, tuple[Any, ...]] = {  # values of other types, and of none
+    float: (True, "1.0", "", nan, inf, -inf, *TABLES),
+    int: (True, "1.0", "", 1.5, *TABLES),
+    bool: (1, 1.5, "1.0", "", *TABLES),
+    str: (True, 1, 1.5, 10**30, *TABLES),
+}
 HUGE_NUMBERS = ("0x" + "f" * 6000, "9" * 400, "1e999", "-" + "9" * 400, "0o" + "7" * 9000, '"' + "9" * 900_000 + '"')
+UNREADABLE = ("9" * 5000, '"' + "9" * 2_000_000 + '"')  # for which the reader knows no key
 NESTED: tuple[Callable[[int], str], ...] = (
     lambda depth: f"x = {'[' * depth}{']' * depth}",
     lambda depth: f"x = {'{a=' * depth}1{'}' * depth}",
@@ -60,11 +67,6 @@ class Parameter(NamedTuple):
     value: Any
 
 
-def key_of(path: KeyPath) -> str:
-    """Return the name of a value in a refusal."""
-    return "".join(f" {part + 1}" if isinstance(part, int) else f".{part}" for part in path)[1:]
-
-
 def parameters_of(value: Any, path: KeyPath = (), hint: Any = None) -> Iterator[Parameter]:
     """Yield all parameters of a record, of those in it, and of those in its tables and arrays."""
     if is_dataclass(value):
@@ -92,7 +94,7 @@ def parameters_in(text: str) -> list[Parameter]:
 
 
 class Draft:
-    """Owns one file in the making. Each public method makes a kind of file and returns its content."""
+    """Owns one file in the making. Each method that KINDS lists makes a kind of file and returns its content."""
 
     parameters = {text: parameters_in(text) for text in (WORLD, *CONFIGURATIONS)}
 
@@ -102,148 +104,107 @@ class Draft:
         self._text = WORLD if self.is_world else chance.choice(CONFIGURATIONS)
         self._document = tomllib.loads(self._text)
         self._parameters = self.parameters[self._text]
+        self._bounded = [each for each in self._parameters if each.bounds is not None]
         if "protocol" in self._document.get("gait", {}):
             self._document["gait"]["protocol"] = chance.choice(tuple(PROTOCOLS))
         self.wrong_key = self.bound = ""
 
-    def _set(self, path: KeyPath, value: Any) -> str:
-        """Change one value and return the whole file."""
+    def _set(self, path: KeyPath, value: Any, is_wrong: bool = True) -> str:
+        """Change one value, which a refusal must name if it is wrong, and return the whole file."""
+        if is_wrong:
+            self.wrong_key = "".join(f" {part + 1}" if isinstance(part, int) else f".{part}" for part in path)[1:]
         table: Any = self._document
         for part in path[:-1]:
             table = table.setdefault(part, {}) if isinstance(table, dict) else table[part]
         table[path[-1]] = value
-        return "".join(f"{json.dumps(key)} = {toml_of(value)}\n" for key, value in self._document.items())
+        return tomlkit.dumps(self._document)
 
-    def _choose(self, wanted: Callable[[Parameter], bool] = lambda parameter: True) -> Parameter:
-        """Choose the parameter that the refusal must name."""
-        parameter = self._chance.choice([each for each in self._parameters if wanted(each)])
-        self.wrong_key = key_of(parameter.path)
-        return parameter
-
-    def near(self) -> str:
-        """Change a few values to nearby ones, so each is valid by itself."""
-        return self._change_some(8, self._near_value)
-
-    def within(self) -> str:
-        """Change a few values to any within their bounds, so each is valid by itself."""
-        return self._change_some(3, self._value_within)
-
-    def _change_some(self, most: int, value_of: Callable[[Parameter], Any]) -> str:
-        text = ""
-        for parameter in self._chance.sample(self._parameters, self._chance.randint(1, most)):
-            text = self._set(parameter.path, value_of(parameter))
+    def valid(self) -> str:
+        """Change a few values to nearby ones, or to any within their bounds: each is valid by itself."""
+        is_near, text = self._chance.random() < 0.7, ""
+        for parameter in self._chance.sample(self._parameters, self._chance.randint(1, 8 if is_near else 3)):
+            text = self._set(parameter.path, self._valid_value(parameter, is_near), is_wrong=False)
         return text
 
-    def _near_value(self, parameter: Parameter) -> Any:
-        if parameter.bounds is None or parameter.value is None:
-            return self._value_within(parameter)
-        near = parameter.value * self._chance.uniform(0.7, 1.4) + self._chance.choice((0.0, 0.0, 0.001))
-        return parameter.kind(min(max(near, parameter.bounds.minimum), parameter.bounds.maximum))
-
-    def _value_within(self, parameter: Parameter) -> Any:
+    def _valid_value(self, parameter: Parameter, is_near: bool) -> Any:
+        chance = self._chance
         if parameter.bounds is None:
             usual = (False, True) if parameter.kind is bool else (parameter.value,)
-            return self._chance.choice(WORDS.get(str(parameter.path[-1]), usual))
+            return chance.choice(WORDS.get(str(parameter.path[-1]), usual))
         low, high = parameter.bounds.minimum, min(parameter.bounds.maximum, 1e12)
-        number = self._chance.choice((low, high, self._chance.uniform(low, high)))
-        if low >= 0.0 and self._chance.random() < 0.5:
-            number = exp(self._chance.uniform(log(max(low, 1e-6)), log(high)))
+        if is_near and parameter.value is not None:
+            number = parameter.value * chance.uniform(0.7, 1.4) + chance.choice((0.0, 0.0, 0.001))
+        elif low >= 0.0 and chance.random() < 0.5:
+            number = exp(chance.uniform(log(max(low, 1e-6)), log(high)))
+        else:
+            number = chance.choice((low, high, chance.uniform(low, high)))
         return parameter.kind(min(max(number, low), high))
 
     def out_of_bounds(self) -> str:
-        parameter = self._choose(lambda parameter: parameter.bounds is not None)
+        parameter = self._chance.choice(self._bounded)
         assert parameter.bounds is not None
         low, high = parameter.bounds
         beyond = self._chance.choice((1e-6 if parameter.kind is float else 1, 1, 1000, 10**12))
-        if high == inf or self._chance.random() < 0.5:
-            self.bound = f"{low}"
-            return self._set(parameter.path, parameter.kind(low - beyond * max(1.0, abs(low))))
-        self.bound = f"{high}"
-        return self._set(parameter.path, parameter.kind(high + beyond * max(1.0, abs(high))))
+        side, bound = (-1, low) if high == inf or self._chance.random() < 0.5 else (1, high)
+        self.bound = f"{bound}"
+        return self._set(parameter.path, parameter.kind(bound + side * beyond * max(1.0, abs(bound))))
 
-    def no_number(self) -> str:
-        return self._set(self._choose(lambda each: each.kind is float).path, self._chance.choice((nan, inf, -inf)))
-
-    def other_type(self) -> str:
-        parameter = self._choose()
-        fitting = (int, float) if parameter.kind is float else (parameter.kind,)
-        others = [other for other in OTHER_TYPES if type(other) not in fitting]
-        return self._set(parameter.path, self._chance.choice(others))
+    def wrong_type(self) -> str:
+        parameter = self._chance.choice(self._parameters)
+        return self._set(parameter.path, self._chance.choice(WRONG[parameter.kind]))
 
     def huge(self) -> str:
-        text = self._set(self._choose(lambda parameter: parameter.bounds is not None).path, "HUGE")
         number = self._chance.choice(HUGE_NUMBERS + UNREADABLE)
-        self.wrong_key = "" if number in UNREADABLE else self.wrong_key
+        text = self._set(self._chance.choice(self._bounded).path, "HUGE", is_wrong=number not in UNREADABLE)
         return text.replace('"HUGE"', number)
 
     def unknown_key(self) -> str:
         name = self._chance.choice(("nam", "x" * 500, "", "a b", "ü", "text"))
-        path = (*self._choose().path[:-1], name)
-        self.wrong_key = key_of(path)
+        path = (*self._chance.choice(self._parameters).path[:-1], name)
         return self._set(path, self._chance.choice((1, "", [], {"a": {}})))
 
     def hostile_text(self) -> str:
         """Set a hostile text. Some of these are valid: a bus may have any name."""
         texts = [parameter for parameter in self._parameters if parameter.kind is str] or self._parameters
-        return self._set(self._chance.choice(texts).path, self._chance.choice(HOSTILE))
+        return self._set(self._chance.choice(texts).path, self._chance.choice(HOSTILE), is_wrong=False)
 
-    def missing(self) -> str:
-        """Remove lines: keys, heads of sections, or parts of both."""
-        lines = self._lines()
-        first = self._chance.randrange(len(lines))
-        return "".join([*lines[:first], *lines[first + self._chance.randint(1, 5) :]])
-
-    def _lines(self) -> list[str]:
-        return [line for line in self._text.splitlines(keepends=True) if "=" in line or line.startswith("[")]
-
-    def twice(self) -> str:
-        lines = self._lines()
-        at = self._chance.randrange(len(lines))
-        return "".join([*lines[:at], lines[at], *lines[at:]])
-
-    def shuffled(self) -> str:
-        lines = self._lines()
-        return "".join(self._chance.sample(lines, len(lines)))
-
-    def truncated(self) -> str:
-        return self._text[: self._chance.randrange(len(self._text))]
+    def other_lines(self) -> str:
+        """Remove, repeat or shuffle lines: keys, heads of sections, or parts of both."""
+        lines = [line for line in self._text.splitlines(keepends=True) if "=" in line or line.startswith("[")]
+        first, count = self._chance.randrange(len(lines)), self._chance.randint(1, 5)
+        shuffled = self._chance.sample(lines, len(lines))
+        removed, repeated = lines[:first] + lines[first + count :], lines[: first + 1] + lines[first:]
+        return "".join(self._chance.choice((removed, removed, repeated, repeated, shuffled)))
 
     def nested(self) -> str:
         deep = self._chance.choice(NESTED)(self._chance.choice((50, 900, 3000)))
         name = self._chance.choice(("x", "robot", "gait", "segment", "bus"))
         return deep.replace("x", name, 1) + "\n" + self._chance.choice(("", self._text))
 
-    def corrupted(self) -> bytes:
+    def other_bytes(self) -> bytes:
+        """Flip bits of the file, cut it off, or replace it by random bytes."""
         data = bytearray(self._text.encode())
         for _ in range(self._chance.randint(1, 8)):
             data[self._chance.randrange(len(data))] ^= 1 << self._chance.randrange(8)
-        return bytes(data)
-
-    def binary(self) -> bytes:
-        return self._chance.randbytes(self._chance.choice((0, 1, 50, 5000, 100_000)))
+        cut = self._text.encode()[: self._chance.randrange(len(data))]
+        return self._chance.choice((bytes(data), cut, self._chance.randbytes(self._chance.choice((0, 1, 50, 100_000)))))
 
 
-KINDS: tuple[tuple[Callable[[Draft], str | bytes], int], ...] = (  # with their relative frequencies
-    *((Draft.near, 30), (Draft.within, 14), (Draft.out_of_bounds, 12), (Draft.other_type, 8), (Draft.no_number, 6)),
-    *((Draft.unknown_key, 6), (Draft.hostile_text, 6), (Draft.missing, 5), (Draft.corrupted, 5), (Draft.twice, 4)),
-    *((Draft.truncated, 4), (Draft.nested, 3), (Draft.huge, 3), (Draft.binary, 2), (Draft.shuffled, 2)),
-)
+KINDS: dict[Callable[[Draft], str | bytes], int] = {  # with their relative frequencies
+    Draft.valid: 44,
+    Draft.out_of_bounds: 12,
+    Draft.wrong_type: 14,
+    Draft.huge: 3,
+    Draft.unknown_key: 6,
+    Draft.hostile_text: 6,
+    Draft.other_lines: 11,
+    Draft.nested: 3,
+    Draft.other_bytes: 11,
+}
 
 
 def next_file(chance: Random) -> CandidateFile:
-    makers, weights = zip(*KINDS, strict=True)
-    draft, make = Draft(chance), chance.choices(makers, weights)[0]
+    draft, (make,) = Draft(chance), chance.choices(list(KINDS), list(KINDS.values()))
     content = make(draft)
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return CandidateFile(make.__name__, draft.is_world, data, draft.wrong_key, draft.bound)
-
-
-def toml_of(value: Any) -> str:
-    """Write a value as TOML, with inline tables only."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{toml_of(str(key))} = {toml_of(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(toml_of, value))}]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

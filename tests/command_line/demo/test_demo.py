@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from command_line.main import main
 from logs.files.log_reader import read_log
 from tests.waiting import LONGEST_S
 
@@ -102,23 +101,3 @@ def test_a_signal_before_the_walk_leaves_no_process(tmp_path: Path, number: sign
         _, complaints = interrupt(demo, number, line)
     assert "stopped" in complaints
     assert children_of(tmp_path / "out") == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "status"),
-    [
-        (("--depth", "nan"), exit_codes.USAGE),
-        (("--depth", "-1"), exit_codes.USAGE),
-    ],
-)
-def test_impossible_options_are_refused_before_anything_starts(
-    tmp_path: Path, arguments: tuple[str, str], status: int, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    monkeypatch.setattr("command_line.demo.demo._end_on_signals", lambda: None)
-    try:
-        ended: object = main(["demo", "--out", str(tmp_path / "out"), *arguments])
-    except SystemExit as problem:
-        ended = problem.code
-    printed = capsys.readouterr()
-    assert ended == status and printed.out == "" and printed.err

@@ -9,7 +9,8 @@ from dataclasses import replace
 import pytest
 
 from command_line.doctor import doctor
-from command_line.doctor.doctor import _pose_items
+from command_line.doctor.doctor import examine_pose
+from command_line.doctor.findings import Level
 from drivers.pose.natnet_sockets import NatNetParameters
 from drivers.pose.rail_encoder import RailEncoderParameters
 from firmware_host.configuration.configuration import Configuration, PoseParameters
@@ -22,22 +23,22 @@ def with_pose(configuration: Configuration, pose: PoseParameters) -> Configurati
 
 
 def test_a_robot_without_a_pose_source_has_no_line_for_it(configuration: Configuration) -> None:
-    assert _pose_items(configuration) == []
+    assert examine_pose(configuration) == []
 
 
 def test_a_source_that_does_not_open_fails(configuration: Configuration) -> None:
     pytest.importorskip("serial", reason="pyserial is not installed")
     encoder = RailEncoderParameters(device="/dev/nothing", metres_per_count=1e-5)
-    (item,) = _pose_items(with_pose(configuration, PoseParameters("rail_encoder", rail_encoder=encoder)))
-    assert not item["ok"] and "/dev/nothing does not open" in item["text"] and item["fix"]
+    (item,) = examine_pose(with_pose(configuration, PoseParameters("rail_encoder", rail_encoder=encoder)))
+    assert item.level is Level.FAIL and "/dev/nothing" in item.text and item.fix
 
 
 def test_motion_capture_is_received(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
     with NatNetServer() as server:
         natnet = NatNetParameters(server=LOOPBACK, group="", command_port=server.address[1])
         looked_at = with_pose(configuration, PoseParameters("natnet", natnet=natnet))
-        (item,) = _pose_items(looked_at)
-        assert item["ok"] and item["text"].startswith("warning: no NatNet frame arrives from 127.0.0.1.")
+        (item,) = examine_pose(looked_at)
+        assert item.level is Level.OK and item.text.startswith("warning: ")
         ended = threading.Event()
 
         def stream() -> None:
@@ -49,7 +50,7 @@ def test_motion_capture_is_received(configuration: Configuration, monkeypatch: p
         streaming = threading.Thread(target=stream)
         streaming.start()
         monkeypatch.setattr(doctor, "LISTENING_S", LONGEST_S)  # a pose ends it
-        (item,) = _pose_items(looked_at)
+        (item,) = examine_pose(looked_at)
         ended.set()
         streaming.join()
-    assert item["ok"] and item["text"].startswith("NatNet 4.1 from 127.0.0.1: ")
+    assert item.level is Level.OK and item.text.startswith("NatNet 4.1 from 127.0.0.1: ")

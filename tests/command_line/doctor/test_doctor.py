@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,6 @@ from control.records import JOINTS
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.local_setup import write_local_setup
 from tests.running_bench import Bench
-from tests.waiting import LONGEST_S
 
 LINES = {"configuration", "kernel", "governor", "processors", "interrupts", "disk", "log", "clock", "daemon"}
 
@@ -77,8 +74,3 @@ def test_a_running_daemon_reports_its_process_its_drives_and_its_limits(bench: B
     assert found["loop.priority"].text.startswith("the running loop has real-time priority ")
     assert "of the daemon" in found["realtime"].text
     assert found["socket"].level is Level.OK
-
-
-def test_the_command_starts_without_the_libraries_of_other_commands() -> None:
-    code = "import sys, command_line.main; assert not {'can', 'pydantic', 'numpy'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=LONGEST_S)

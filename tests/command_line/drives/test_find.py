@@ -8,10 +8,7 @@ from pathlib import Path
 import pytest
 
 from command_line import exit_codes
-from drivers.can.bus_lock import BusRole
 from drivers.drive_types import DRIVE_BENCHES
-from firmware_host.buses import lock_buses
-from firmware_host.configuration.loading import load_configuration
 from tests.command_line.command_lines import run
 from tests.command_line.drives.bench_setup import Bench
 
@@ -42,30 +39,6 @@ def test_one_bus_can_be_searched_alone(short_folder: Path, monkeypatch: pytest.M
     bench = Bench(short_folder, "odrive", monkeypatch)
     run("drives", "find", "--config", str(bench.config), "--bus", "right")
     assert bench.buses["right"].sent and not bench.buses["left"].sent
-
-
-def test_a_bus_that_the_daemon_commands_is_refused(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(short_folder, "odrive", monkeypatch)
-    with lock_buses(load_configuration(bench.config).bus, BusRole.COMMANDS):
-        ended = run("drives", "find", "--config", str(bench.config))
-    assert ended.returncode == exit_codes.UNHEALTHY
-    assert "systemctl stop mudskipper" in ended.stderr and not any(bus.sent for bus in bench.buses.values())
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--bus", "middle"), "left, right"),
-        (("--interface", "socketcan"), "--channel"),
-        (("--config", "/none.toml"), "/none.toml"),
-    ],
-)
-def test_a_bus_that_is_not_there_is_refused(
-    short_folder: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], words: str
-) -> None:
-    bench = Bench(short_folder, "odrive", monkeypatch)
-    ended = run("drives", "find", "--config", str(bench.config), *arguments)
-    assert ended.returncode == exit_codes.CONFIGURATION and words in ended.stderr and "Traceback" not in ended.stderr
 
 
 def test_an_interface_without_can_fd_is_refused_by_name(short_folder: Path) -> None:

@@ -120,24 +120,29 @@ def test_a_file_of_another_drive_is_not_restored(folder: Path, monkeypatch: pyte
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "named"),
     [
-        (("tail",), "left_sweep"),
-        (("--restore", "none.toml"), "none.toml"),
-        (("--endpoints", "none.json"), "none.json"),
-        (("--endpoints", "bad.json"), "no JSON"),
-        (("--endpoints", "other.json"), "no flat_endpoints.json"),
-        (("--restore", "other.json"), "is no file of"),
+        ("setup tail", "left_sweep"),
+        ("setup --restore none.toml", "none.toml"),
+        ("setup --endpoints none.json", "none.json"),
+        ("setup --endpoints bad.json", "no JSON"),
+        ("setup --endpoints other.json", "no flat_endpoints.json"),
+        ("setup --restore other.json", "other.json"),
+        ("zero tail", "left_sweep"),
+        ("find --bus middle", "left, right"),
+        ("find --interface socketcan", "--channel"),
+        ("find --config /none.toml", "/none.toml"),
     ],
 )
 def test_a_wrong_argument_is_refused_before_anything_is_written(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], words: str
+    folder: Path, monkeypatch: pytest.MonkeyPatch, arguments: str, named: str
 ) -> None:
     bench = make_bench(folder, monkeypatch, "odrive")
     (folder / "bad.json").write_text("{", encoding="utf-8")
     (folder / "other.json").write_text('{"a": 1}', encoding="utf-8")
-    ended = run("drives", "setup", "--config", str(bench.config), *arguments)
-    assert ended.returncode == exit_codes.CONFIGURATION and words in ended.stderr and "Traceback" not in ended.stderr
+    command, *others = arguments.split()
+    ended = run("drives", command, "--config", str(bench.config), *others)
+    assert ended.returncode == exit_codes.CONFIGURATION and named in ended.stderr and "Traceback" not in ended.stderr
 
 
 def test_without_the_numbers_of_the_build_the_watchdog_of_the_configuration_is_read(
@@ -150,10 +155,11 @@ def test_without_the_numbers_of_the_build_the_watchdog_of_the_configuration_is_r
     assert "flat_endpoints.json of firmware 0.6.11, hardware 0.0.0" in ended.stdout
 
 
-def test_a_bus_that_the_daemon_commands_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("command", ["find", "setup --write", "zero left_sweep --yes"])
+def test_a_bus_that_the_daemon_commands_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
     bench = make_bench(folder, monkeypatch, "odrive")
     with lock_buses(load_configuration(bench.config).bus, BusRole.COMMANDS):
-        ended = run("drives", "setup", "--config", str(bench.config), "--write")
+        ended = run("drives", *command.split(), "--config", str(bench.config))
     assert ended.returncode == exit_codes.UNHEALTHY and "systemctl stop mudskipper" in ended.stderr
     assert not any(bus.sent for bus in bench.buses.values())
 

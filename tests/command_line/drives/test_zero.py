@@ -93,9 +93,3 @@ def test_a_position_that_cannot_be_used_is_refused(
     words = {"moves": "moved by", "silent": "readings of its position", "torque": "follows torque"}
     assert ended.returncode == exit_codes.UNHEALTHY and words[case] in ended.stderr
     assert bench.config.read_text(encoding="utf-8") == before
-
-
-def test_an_unknown_joint_is_refused(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = make_bench(short_folder, monkeypatch)
-    ended = run("drives", "zero", "tail", "--config", str(bench.config))
-    assert ended.returncode == exit_codes.CONFIGURATION and "left_sweep" in ended.stderr

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import duckdb
@@ -16,7 +14,6 @@ from firmware_host.log.log_folder import DONE
 from logs.catalogue.catalogue import VERSION, VERSION_KEY, catalogue_path
 from tests.command_line.command_lines import failure
 from tests.folders import ROOT
-from tests.waiting import LONGEST_S
 
 
 @pytest.fixture
@@ -49,29 +46,3 @@ def test_a_newer_catalogue_stops_a_query_and_no_listing(folder: Path, capsys: py
     assert main(["log", "list", str(folder)]) == exit_codes.OK
     printed = capsys.readouterr()
     assert "walk.mcap" in printed.out and "update mudskipper" in printed.err
-
-
-def test_a_listing_of_known_logs_loads_no_library_that_reads_logs(folder: Path) -> None:
-    """Loading these libraries takes longer than listing a thousand entries."""
-    assert main(["log", "index", str(folder)]) == exit_codes.OK
-    program = (
-        f"import sys; from command_line.main import main; main(['log', 'list', {str(folder)!r}]);"
-        "print([name for name in ('numpy', 'can', 'pydantic', 'matplotlib') if name in sys.modules])"
-    )
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True, cwd=ROOT
-    )
-    assert ended.stdout.splitlines()[-1] == "[]"
-
-
-def test_without_the_extra_logs_are_listed_all_the_same(folder: Path) -> None:
-    program = (
-        "import sys; sys.modules['duckdb'] = None; from command_line.main import main\n"
-        f"print(main(['log', 'list', {str(folder)!r}])); print(main(['log', 'query', 'select 1', {str(folder)!r}]))"
-    )
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True, cwd=ROOT
-    )
-    lines = ended.stdout.splitlines()
-    assert "walk.mcap" in ended.stdout and lines[-2:] == [str(exit_codes.OK), str(exit_codes.UNHEALTHY)]
-    assert "extra 'data'" in ended.stderr

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,6 @@ from logs.files.scanned_log import ScannedLog, scan_logs
 from tests.command_line.command_lines import failure, refusal
 from tests.folders import ROOT
 from tests.logs.test_parquet import files_of_at_most
-from tests.waiting import LONGEST_S
 
 LOG = str(ROOT / "tests/fixtures/walk_0_1.mcap")
 FORMS = {"--csv": "walk.csv", "--parquet": "tables"}
@@ -45,19 +42,6 @@ def test_parquet_into_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     (tmp_path / "file").touch()
     message = refusal(capsys, "log", "export", "--parquet", LOG, "--out", str(tmp_path / "file"))
     assert "name a folder" in message
-
-
-def test_without_the_extra_a_message_says_what_to_install(tmp_path: Path) -> None:
-    program = (
-        "import sys; sys.modules['pyarrow'] = None; from command_line.main import main\n"
-        f"print(main(['log', 'export', '--parquet', {LOG!r}]))"
-    )
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True, cwd=tmp_path,
-        env={"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    assert ended.stdout == f"{exit_codes.UNHEALTHY}\n"
-    assert "extra 'data'" in ended.stderr and "Traceback" not in ended.stderr
 
 
 def rows_of(form: str, out: Path) -> int:

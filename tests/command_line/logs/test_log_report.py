@@ -20,7 +20,7 @@ from simulation.harness.file_recorder import FileRecorder
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
-from tests.command_line.command_lines import failure, refusal
+from tests.command_line.command_lines import failure
 from tests.folders import SHARED_DATA
 from tests.recorded_walks import record_walks
 
@@ -184,13 +184,6 @@ def test_a_log_given_twice_and_an_unwritable_folder_are_refused(log: Path, capsy
     assert f"{log}: given twice" in failure(capsys, "log", "report", str(log), str(log))
     (log.parent / "file").write_text("", encoding="utf-8")
     assert "Not a directory" in failure(capsys, "log", "report", str(log), "--out", str(log.parent / "file" / "out"))
-
-
-@pytest.mark.parametrize("words", [("--mud", "pond=1"), ("--mud", "=40"), ("--mud", "a", "--world", "b.toml")])
-def test_wrong_names_of_muds_are_wrong_usage(
-    words: tuple[str, ...], log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert "--mud" in refusal(capsys, "log", "report", str(log), *words)
 
 
 @pytest.mark.skipif(not LAB_LOGS.exists(), reason="the authors' logs are not next to the project")

@@ -89,20 +89,6 @@ def test_programs_read_one_object_at_the_end_of_an_attended_walk(
     assert capsys.readouterr().out == ""
 
 
-def test_an_attended_walk_does_not_arm(bench: Bench) -> None:
-    ended = bench.run("walk", "--attended")
-    assert ended.returncode == exit_codes.REFUSED and "mudskipper arm" in ended.stderr
-
-
-def test_a_refused_walk_leaves_no_lease(bench: Bench) -> None:
-    bench.run("arm")
-    refused = bench.run("walk", "--attended", "--depth", "6")
-    assert refused.returncode == exit_codes.REFUSED
-    client = StatusClient(bench.socket)
-    assert client.call("lease", for_s=1.0) == client.call("release") == "accepted"
-    client.close()
-
-
 def test_the_command_ends_when_its_walk_ends(bench: Bench) -> None:
     bench.run("arm")
     ended = bench.run("walk", "--attended", "--strides", "2")
@@ -146,12 +132,3 @@ def test_a_second_attended_walk_is_refused_and_names_the_first(bench: Bench) -> 
         assert second.returncode == exit_codes.REFUSED
         assert f"(process {first.pid}) operates the robot" in second.stderr
         assert bench.wait_for(lambda report: True)["mode"] == "walking"
-
-
-def test_a_refused_take_over_leaves_the_lease_with_its_holder(bench: Bench) -> None:
-    holder = StatusClient(bench.socket)
-    holder.call("lease", for_s=10.0)
-    for arguments in ((), ("--depth", "6")):
-        assert bench.run("walk", "--attended", "--take-over", *arguments).returncode == exit_codes.REFUSED
-    assert holder.call("lease", for_s=10.0) == "accepted"
-    holder.close()

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -20,7 +17,7 @@ from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Status
 from logs.files.log_reader import read_log
 from logs.replay import replay_files
 from simulation.harness.peer import WATCHDOG_S
-from tests.command_line.command_lines import refusal, run
+from tests.command_line.command_lines import run
 from tests.running_bench import Bench
 from tests.waiting import LONGEST_S
 
@@ -99,17 +96,6 @@ def test_a_robot_that_disappears_is_a_fault_and_its_drives_fail_the_check(own_be
     }
 
 
-def test_ctrl_c_ends_a_watch_without_a_message(bench: Bench) -> None:
-    command = [sys.executable, "-m", "command_line.main", "watch", "--socket", str(bench.socket)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as watch:
-        assert watch.stdout is not None and watch.stderr is not None
-        watch.stdout.readline()
-        time.sleep(0.1)
-        watch.send_signal(signal.SIGINT)
-        assert watch.wait(LONGEST_S) == exit_codes.INTERRUPTED
-        assert watch.stderr.read() == ""
-
-
 def test_without_a_daemon_every_command_says_so(
     short_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -133,39 +119,6 @@ def test_check_without_a_daemon_checks_what_it_can(
     assert not items["daemon"]["ok"] and items["configuration"]["ok"]
     assert "nocan0" in items["bus"]["text"] and items["bus"]["fix"]
     assert "of walking" in items["disk"]["text"]
-
-
-def test_status_loads_no_large_library() -> None:
-    """Half a second of imports would look like a hang in an emergency."""
-    program = (
-        "import sys; from command_line.main import main; main(['status', '--socket', '/none']);"
-        "large = ('numpy', 'can', 'pydantic', 'matplotlib', 'mcap', 'shtab', 'inspect', 'shutil', 'json', 'tempfile');"
-        "print([name for name in large if name in sys.modules])"
-    )
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LONGEST_S, check=True
-    )
-    assert ended.stdout == "[]\n"
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        (),
-        ("dance",),
-        ("log",),
-        ("walk", "--depth", "3", "--adaptive"),
-        ("walk", "--strides", "0"),  # would walk without end
-        ("arm", "--f"),  # would overrule failed checks
-        ("status", "--js"),
-        ("experiment", "walk", "--mu", "47.6"),
-        ("move", "tail=10"),
-        ("simulate", "--world", "world.toml", "--mud", "48.5"),
-        *(("move", text) for text in ("left_sweep", "left_sweep=", "left_sweep=far", "left_sweep=nan", "=3")),
-    ],
-)
-def test_a_wrong_command_line_is_a_usage_error(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    assert "error: " in refusal(capsys, *arguments)
 
 
 def test_the_version_and_a_completion_script_are_printed() -> None:

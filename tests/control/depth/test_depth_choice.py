@@ -21,9 +21,7 @@ from tests.control.synthetic_muds import (
     LIFTING_NM,
     MOTOR_FORCE_N,
     PARAMETERS,
-    apart,
     both,
-    bound,
     choose_now,
     estimated,
     lift_m4,
@@ -101,18 +99,6 @@ class TestTheFastestDepth:
             next(speed for z, speed in out.items() if abs(z - choice.depth_m) < 1e-9)
         )
 
-    def test_it_slips_where_less_than_half_an_arm_is_predicted(self) -> None:
-        """Half an arm is 6 cm. The depth is 5 cm in muds that grow firmer by 1 %, which changes the step by at most 3
-        mm.
-        """
-        slipping, walking = list[float](), list[float]()
-        for k_s in 0.06e6 * 1.01 ** np.arange(60):
-            mud_estimate = estimated(reported(k_s), LOOSE)
-            choice, predicted = chosen(mud_estimate), steps_m(forecast(mud_estimate, both()))[DEPTHS_M[-1]]
-            assert choice.depth_m == same_depth(0.05)
-            (slipping if choice.slips else walking).append(predicted)
-        assert 0.057 < max(slipping) < 0.06 <= min(walking) < 0.063
-
     @given(shears, suctions, synthetic_strides)
     def test_it_slips_by_what_is_predicted_of_the_chosen_depth(
         self, k_s: float, k_e: float, strides: list[StrideEstimate]
@@ -128,18 +114,6 @@ class TestTheFastestDepth:
         assert firm.depth_m < PARAMETERS.initial_depth_m < soft.depth_m
         assert not firm.slips and not soft.slips
         assert firm.reason == soft.reason == "fastest"
-
-    def test_mud_that_grows_sticky_is_walked_shallower(self) -> None:
-        adaptation = adapted()
-        before, after = (
-            choose_now(adaptation, estimated(reported(0.1e6), k_e), both(nan), 0.03) for k_e in (LOOSE, STICKY)
-        )
-        assert after.depth_m < before.depth_m
-
-    @pytest.mark.parametrize("k_e", [1.1e6, 1.3e6, 1.6e6])
-    def test_where_deeper_is_faster_it_goes_as_deep_as_it_comes_out_of(self, k_e: float) -> None:
-        depth_m = chosen(estimated(reported(0.1e6), reported(k_e)), both(nan)).depth_m
-        assert k_e * lift_m4(depth_m) < ALLOWED_NM <= k_e * lift_m4(depth_m + GRID_M)
 
     def test_where_nothing_comes_out_the_shallowest_is_taken(self) -> None:
         soft, firm = chosen(estimated(SOFT, reported(20e6))), chosen(estimated(reported(1.5e6), reported(20e6)))
@@ -187,14 +161,6 @@ class TestUnknownMud:
     def test_the_first_depth_is_the_configured_one(self) -> None:
         assert adapted(AdaptationParameters(initial_depth_m=0.04)).choice.depth_m == 0.04
 
-    def test_the_insertion_alone_is_enough_to_choose(self) -> None:
-        """The thrust uses a k_s of 0.55 times k_p, less a fifth."""
-        reported_by_insertion = chosen(estimated(None, LOOSE, reported(0.3e6 / 0.44)))
-        assert reported_by_insertion == chosen(estimated(SOFT, LOOSE))
-
-    def test_an_extraction_without_any_k_e_allows_one_step_deeper_than_it_was(self) -> None:
-        assert chosen(estimated(BOTTOMLESS), both(0.03)).depth_m == same_depth(0.0325)
-
     def test_a_stride_of_which_nothing_is_known_is_survived(self) -> None:
         lost = stride(depth_m=nan, surface_m=nan)
         assert chosen(estimated(FIRM), [lost, stride("right")]).depth_m == 0.015
@@ -229,23 +195,6 @@ class TestUncertainty:
         )
         assert uncertain.depth_m <= sure.depth_m
 
-    @given(shears, suctions, exponents, st.tuples(*[st.floats(0.0, 1.0)] * 2), st.floats(0.01, 0.015))
-    def test_suction_at_another_depth_is_as_uncertain_as_its_depth_law(
-        self, k_s: float, k_e: float, exponent: float, pair: tuple[float, float], depth_m: float
-    ) -> None:
-        """The law is known above all candidates, so the deeper one is the less certain one."""
-        sure, uncertain = (
-            chosen(estimated(reported(k_s), reported(k_e, 0.0, depth_m, exponent, m))) for m in sorted(pair)
-        )
-        assert uncertain.depth_m <= sure.depth_m
-
-    def test_one_standard_error_of_thrust_and_two_of_suction_count(self) -> None:
-        assert chosen(estimated(reported(0.4e6, 0.1e6), LOOSE)) == chosen(estimated(SOFT, LOOSE))
-        assert chosen(estimated(reported(0.1e6), reported(0.5e6, 0.4e6))) == chosen(
-            estimated(reported(0.1e6), reported(1.3e6))
-        )
-        assert chosen(estimated(SOFT, LOOSE)).depth_m > chosen(estimated(reported(0.4e6), LOOSE)).depth_m
-
     def test_mud_that_reads_softer_in_deeper_strides_is_walked_deeper(self) -> None:
         depths_m = [chosen(estimated(reported(0.25e6, exponent=m), LOOSE)).depth_m for m in (0.0, -0.4, -0.8)]
         assert depths_m == sorted(depths_m)
@@ -267,10 +216,6 @@ class TestStuck:
         strides = [stride(flipper, 0.04, released=flipper != stuck) for flipper in ("left", "right")]
         assert chosen(self.SINKING, strides, 0.04).depth_m == same_depth(0.0375)
 
-    def test_it_goes_no_shallower_than_the_torque_asks_for(self) -> None:
-        """The torque is in proportion to depth: 95 % of it pull out of 4.66 cm where a flipper stuck at 4.9 cm."""
-        assert chosen(self.SINKING, both(0.049, released=False), 0.049).depth_m == same_depth(0.045)
-
     def test_without_any_thrust_known_it_takes_the_deepest_that_comes_out(self) -> None:
         assert chosen(estimated(None, LOOSE), both(0.04, released=False), 0.04).depth_m == same_depth(0.0375)
 
@@ -281,51 +226,6 @@ class TestStuck:
     @pytest.mark.parametrize("reached_m", [nan, inf, -inf])
     def test_a_stride_stuck_at_an_unknown_depth_leads_to_the_shallowest(self, reached_m: float) -> None:
         assert chosen(self.SINKING, both(reached_m, released=False)).depth_m == 0.015
-
-    def test_a_depth_that_stuck_is_excluded_for_any_estimate(self) -> None:
-        adaptation = adapted()
-        assert choose_now(adaptation, self.SINKING, both(), adaptation.choice.depth_m).depth_m == same_depth(0.05)
-        for strides in (both(0.04, released=False), both(0.025), both(0.03), both(0.0375)):
-            assert choose_now(adaptation, self.SINKING, strides, adaptation.choice.depth_m).depth_m <= 0.0375 + 1e-9
-
-    def test_a_flipper_that_comes_out_of_where_it_stuck_may_go_deeper_again(self) -> None:
-        adaptation = adapted()
-        adaptation.reset(0.04)
-        choose_now(adaptation, self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
-        assert choose_now(adaptation, self.SINKING, both(0.04), adaptation.choice.depth_m).depth_m == same_depth(0.05)
-
-    def test_where_a_flipper_stuck_is_forgotten_in_another_mud_and_in_another_walk(self) -> None:
-        other_mud, other_walk = adapted(), adapted()
-        for adaptation in (other_mud, other_walk):
-            choose_now(adaptation, self.SINKING, both(0.04, released=False), adaptation.choice.depth_m)
-        other_walk.reset(0.03)
-        assert choose_now(
-            other_mud, self.SINKING._replace(boundary=True), both(), other_mud.choice.depth_m
-        ).depth_m == same_depth(0.05)
-        assert choose_now(other_walk, self.SINKING, both(), other_walk.choice.depth_m).depth_m == same_depth(0.05)
-
-    def test_a_lower_bound_of_suction_never_proves_that_a_flipper_comes_out(self) -> None:
-        unknown, at_least = (chosen(estimated(BOTTOMLESS, k_e), both(0.03)) for k_e in (None, bound(0.1e6)))
-        assert at_least == unknown
-
-
-class TestTwoMuds:
-    """The two flippers stand in muds that differ in suction or in thrust."""
-
-    @given(shears, suctions, suctions)
-    def test_the_flipper_that_the_mud_holds_harder_decides(self, k_s: float, one: float, other: float) -> None:
-        flippers = [FlipperEstimate(None, reported(k_s), reported(k_e)) for k_e in (one, other)]
-        alone = [chosen(apart(flipper, flipper)).depth_m for flipper in flippers]
-        together = {chosen(apart(*flippers)).depth_m, chosen(apart(*flippers[::-1])).depth_m}
-        assert together == {min(alone)}
-
-    @given(st.floats(0.05e6, 0.3e6), st.floats(0.05e6, 0.3e6))
-    def test_their_thrusts_add_up(self, one: float, other: float) -> None:
-        """The thrust is below the motors' limit at every depth: at 5 cm, 6.25 N shear mud of 0.15 N/cm³."""
-        one, other = one / 2.0, other / 2.0
-        mean = estimated(reported((one + other) / 2.0), LOOSE)
-        two = apart(FlipperEstimate(None, reported(one), LOOSE), FlipperEstimate(None, reported(other), LOOSE))
-        assert chosen(two).depth_m == chosen(mean).depth_m
 
 
 class Clay(NamedTuple):
@@ -387,11 +287,6 @@ class TestMuds:
                 speeds[z] = predicted_m(thrust_n, clay.k_s(0.02), z) / duration_s(z) if comes_out else 0.0
             taken = next(speed for z, speed in speeds.items() if abs(z - choice.depth_m) < 1e-9)
             assert taken > 0.94 * max(speeds.values())
-
-    def test_only_bottomless_clay_slips(self) -> None:
-        slipping = [clay.strength_pa for clay in self.CLAYS if chosen(clay.mud_estimate()).slips]
-        assert slipping == [clay.strength_pa for clay in self.CLAYS[: len(slipping)]]
-        assert 300.0 <= slipping[-1] < 700.0
 
     @pytest.mark.parametrize("strength_pa", [500.0, 1500.0, 3000.0])
     def test_the_choice_settles_where_the_strides_confirm_the_estimate(self, strength_pa: float) -> None:

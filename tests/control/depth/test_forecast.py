@@ -168,11 +168,6 @@ class TestFeltFraction:
         assert self.reported_by(*fractions).felt_fraction == pytest.approx(mean, rel=PIECES)
         assert self.reported_by(*fractions, 0.6).felt_fraction == pytest.approx(mean**0.75 * 0.6**0.25, rel=PIECES)
 
-    @pytest.mark.parametrize("truth", [0.4, 0.7, 1.2])
-    def test_it_comes_to_the_truth_from_both_sides(self, truth: float) -> None:
-        for start in (0.3, 1.4):
-            assert self.reported_by(start, *[truth] * 30).felt_fraction == pytest.approx(truth, rel=2.0 * PIECES)
-
     @pytest.mark.parametrize(("fraction", "nearest"), [(9.0, 1.5), (0.01, 0.2)])
     def test_nonsense_is_trusted_only_so_far(self, fraction: float, nearest: float) -> None:
         assert self.reported_by(fraction).felt_fraction == nearest

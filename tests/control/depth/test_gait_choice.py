@@ -215,13 +215,6 @@ class TestStuck:
         choice = choose_now(adaptation, FIRM, strides(depth_m=0.03), adaptation.choice.depth_m)
         assert (choice.depth_m, sweep_deg(choice)) > (0.015, 30.0)
 
-    def test_the_reason_names_it(self) -> None:
-        adaptation, _ = self.walked()
-        assert (
-            choose_now(adaptation, FIRM, strides(released=False), adaptation.choice.depth_m).reason
-            == "a flipper was stuck"
-        )
-
     @pytest.mark.parametrize("forgotten", ["another mud", "another walk"])
     def test_it_is_forgotten_in_another_mud_and_in_another_walk(self, forgotten: str) -> None:
         adaptation, stuck = self.walked()
@@ -239,14 +232,6 @@ class TestStuck:
             adaptation, NOTHING_KNOWN, strides(released=False, depth_m=stuck.depth_m), adaptation.choice.depth_m
         )
         assert choice.depth_m < stuck.depth_m or sweep_deg(choice) < sweep_deg(stuck)
-
-
-def test_where_nothing_is_known_of_the_thrust_depth_and_gait_stay() -> None:
-    adaptation = adapted()
-    before = choose_now(adaptation, FIRM, strides(), adaptation.choice.depth_m)
-    after = choose_now(adaptation, NOTHING_KNOWN, strides(), adaptation.choice.depth_m)
-    assert (after.depth_m, after.gait) == (before.depth_m, before.gait)
-    assert "nothing known" in after.reason
 
 
 def test_where_no_pair_comes_out_the_shallowest_and_narrowest_is_taken() -> None:

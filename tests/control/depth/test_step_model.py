@@ -108,19 +108,6 @@ class TestAgainstFineSteps:
         off_m = np.abs(coarsely_m(gait) - finely_m(gait))
         assert off_m.max() < 2.0 * step_model.STEP_S * top_speed_m_s(gait)
 
-    @pytest.mark.parametrize("gait", [WALKING, CAREFUL])
-    def test_what_differs_is_the_size_of_the_steps_alone(
-        self, gait: GaitParameters, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(step_model, "STEP_S", 0.001)
-        monkeypatch.setattr(step_model, "motion_of", step_model.motion_of.__wrapped__)  # its cache has the coarse steps
-        off_m = np.abs(coarsely_m(gait) - finely_m(gait))
-        assert off_m.max() < 2.0 * 0.001 * top_speed_m_s(gait)
-
-    def test_the_cases_hold_steps_of_every_length(self) -> None:
-        fractions = finely_m(WALKING) / LENGTH_M
-        assert np.histogram(fractions, [0.0, 0.01, 0.25, 0.5, 0.75, 1.0, 2.0])[0].min() > 5
-
 
 class TestLimits:
     @given(st.floats(0.01, 12.5), st.floats(0.0, 1.0), st.floats(0.0, 50.0), st.floats(20.0, 5000.0))

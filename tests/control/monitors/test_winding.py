@@ -77,12 +77,6 @@ def test_copper_that_is_hotter_heats_more() -> None:
     assert watts(85.0) / watts(25.0) == pytest.approx(1.0 + 0.0039 * 60.0, rel=1e-3)
 
 
-@pytest.mark.parametrize("dt_s", [PERIOD_S / 4.0, 3.0 * PERIOD_S, 40.0 * PERIOD_S])
-def test_the_step_makes_no_difference(dt_s: float) -> None:
-    by_ticks = heated(6.0, round(30.0 / PERIOD_S)).temperature_c
-    assert heated(6.0, round(30.0 / dt_s), dt_s).temperature_c == pytest.approx(by_ticks, abs=0.1)
-
-
 def test_it_cools_to_the_rooms_temperature_with_its_time_constant() -> None:
     winding = heated(9.0, 40000)
     rise_k = winding.temperature_c - PARAMETERS.room_c

@@ -9,7 +9,6 @@ from drivers.bench.search import expectation_problems, id_problems, search
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.drive_types import DRIVE_BENCHES, DRIVE_TYPES
-from drivers.mit import codec as mit
 from drivers.odrive import codec as odrive
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import TransmitGate
@@ -62,22 +61,11 @@ def test_firmware_0_5_is_found_by_its_heartbeat_and_the_counts_of_its_encoder() 
 
 
 def test_an_unknown_sender_of_heartbeats_is_a_problem() -> None:
-    class Old:
-        """Sends heartbeats and answers nothing."""
-
-        energised = False
-        parameters = None
-
-        def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-            return []
-
-        def torque_nm(self, now_s: float) -> float:
-            return 0.0
-
-        def cyclic_frames(self, now_s: float) -> list[Frame]:
-            return [Frame(odrive.arbitration_id(7, odrive.HEARTBEAT), odrive.HEARTBEAT.encode(0, 1, 0, 0))]
-
-    (drive,) = search(SimulatedBus(Old()).bench_port(), DRIVE_BENCHES, False).found  # type: ignore[arg-type]
+    old = simulated("odrive", 7)
+    heartbeat = Frame(odrive.arbitration_id(7, odrive.HEARTBEAT), odrive.HEARTBEAT.encode(0, 1, 0, 0))
+    old.receive = lambda frame, now_s: []  # type: ignore[method-assign]
+    old.cyclic_frames = lambda now_s: [heartbeat]  # type: ignore[method-assign]
+    (drive,) = search(SimulatedBus(old).bench_port(), DRIVE_BENCHES, False).found
     assert (drive.type, drive.node_id) == ("odrive05", 7) and "heartbeat" in drive.problem
 
 
@@ -173,25 +161,8 @@ def test_a_damiao_as_delivered_is_found_by_its_answers_on_id_0() -> None:
 
 
 def test_old_registers_of_a_moteus_are_a_problem() -> None:
-    class Old:
-        energised = False
-
-        def receive(self, frame: Frame, now_s: float) -> list[Frame]:
-            asked = frame.arbitration_id & 0xFF == 4
-            return [moteus.forge(Forgery.OLD_FIRMWARE)] if asked else []
-
-        def torque_nm(self, now_s: float) -> float:
-            return 0.0
-
-        def cyclic_frames(self, now_s: float) -> list[Frame]:
-            return []
-
-    moteus = simulated("moteus", 4)
-    (drive,) = search(SimulatedBus(Old()).bench_port(), DRIVE_BENCHES, True).found  # type: ignore[arg-type]
+    old = simulated("moteus", 4)
+    answer = [old.forge(Forgery.OLD_FIRMWARE)]
+    old.receive = lambda frame, now_s: answer if frame.arbitration_id & 0xFF == 4 else []  # type: ignore[method-assign]
+    (drive,) = search(SimulatedBus(old).bench_port(), DRIVE_BENCHES, True).found
     assert "register map 4" in drive.problem
-
-
-def test_the_questions_of_mit_mode_are_those_that_leave_it() -> None:
-    bus = SimulatedBus()
-    search(bus.bench_port(), DRIVE_BENCHES, False, ("mit",))
-    assert {frame.data for frame in bus.sent} == {mit.LEAVE}

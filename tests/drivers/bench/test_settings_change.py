@@ -177,16 +177,14 @@ def test_an_odrive_without_the_numbers_of_its_build_says_which_file_is_missing()
         drive.read("axis0.config.watchdog_timeout")
 
 
-def test_firmware_0_5_reports_that_its_settings_cannot_be_changed() -> None:
-    parameters = DRIVE_TYPES["odrive05"].parameters(bus="can", node_id=ID, type="odrive05")
-    drive = DRIVE_BENCHES["odrive05"].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
-    assert "odrivetool" in drive.cannot and not drive.settings()
-
-
-def test_a_cubemars_reports_that_its_settings_cannot_be_changed() -> None:
-    parameters = DRIVE_TYPES["mit"].parameters(bus="can", node_id=ID, type="mit", model="AK80-9")  # type: ignore[call-arg]
-    drive = DRIVE_BENCHES["mit"].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
-    assert "neither read nor written" in drive.cannot and not drive.settings()
+@pytest.mark.parametrize(
+    ("name", "settings", "text"),
+    [("odrive05", {}, "odrivetool"), ("mit", {"model": "AK80-9"}, "neither read nor written")],
+)
+def test_a_drive_whose_settings_cannot_be_changed_says_so(name: str, settings: dict[str, Any], text: str) -> None:
+    parameters = DRIVE_TYPES[name].parameters(bus="can", node_id=ID, type=name, **settings)
+    drive = DRIVE_BENCHES[name].open_setup(SimulatedBus().bench_port(), SetupFacts(parameters, LONGEST_S))
+    assert text in drive.cannot and not drive.settings()
 
 
 @pytest.mark.parametrize(

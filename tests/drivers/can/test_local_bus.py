@@ -92,14 +92,6 @@ def test_frames_arrive_in_order_and_no_node_receives_its_own(open_bus: Open) -> 
     assert drain(sender) == []
 
 
-def test_a_node_that_only_sends_notices_a_late_joiner(open_bus: Open) -> None:
-    sender = open_bus()
-    sender.send(make_message(1))
-    late = open_bus()
-    sender.send(make_message(2))
-    assert drain(late) == [2]
-
-
 def test_nodes_that_join_at_once_are_all_connected(short_folder: Path) -> None:
     buses: list[LocalBus] = []
     threads = [threading.Thread(target=lambda: buses.append(LocalBus(short_folder))) for _ in range(12)]
@@ -124,16 +116,6 @@ def test_frames_that_a_node_sent_before_it_left_still_arrive(open_bus: Open) -> 
     assert stayer.lost_frames == 0
 
 
-def test_a_node_may_leave_and_come_back(open_bus: Open, short_folder: Path) -> None:
-    stayer = open_bus()
-    for number in range(20):
-        with LocalBus(short_folder) as visitor:
-            stayer.send(make_message(number))
-            assert drain(visitor) == [number]
-    assert drain(stayer) == []
-    assert len(list(short_folder.glob("*.node"))) == 1
-
-
 def test_a_killed_node_does_no_harm_and_its_socket_is_cleaned(
     open_bus: Open, start_node: Start, short_folder: Path
 ) -> None:
@@ -156,20 +138,6 @@ def test_a_file_that_is_no_socket_is_left_alone(open_bus: Open, short_folder: Pa
     (short_folder / "notes.node").write_text("mine")
     open_bus()
     assert (short_folder / "notes.node").read_text() == "mine"
-
-
-def test_a_stopped_node_never_blocks_the_sender(open_bus: Open, start_node: Start) -> None:
-    sender, receiver = open_bus(), open_bus()
-    process = start_node(IDLE_NODE)
-    process.send_signal(signal.SIGSTOP)
-    heard = 0
-    for number in range(20_000):
-        sender.send(make_message(number))  # would wait for ever
-        heard += len(drain(receiver))
-        if sender.lost_frames == 100:
-            break
-    assert sender.lost_frames == 100
-    assert heard == number + 1
 
 
 def test_a_node_that_never_reads_loses_the_newest_frames_only(open_bus: Open) -> None:
@@ -215,18 +183,9 @@ def test_garbage_is_reported_as_a_can_error(open_bus: Open, short_folder: Path) 
     link.close()
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        can.Message(arbitration_id=0x18FEF100, data=b"\x01\x02", is_extended_id=True),
-        can.Message(arbitration_id=0x029, is_remote_frame=True, is_extended_id=False),
-        can.Message(arbitration_id=0x044, data=bytes(8), is_error_frame=True, is_extended_id=False),
-        can.Message(arbitration_id=0x7FF, is_extended_id=False),
-        can.Message(arbitration_id=0x18FF0205, data=bytes(range(64)), is_fd=True, bitrate_switch=True),
-    ],
-)
-def test_every_kind_of_frame_survives(open_bus: Open, message: can.Message) -> None:
+def test_a_frame_arrives_whole_with_the_time_of_its_reading(open_bus: Open) -> None:
     sender, receiver = open_bus(), open_bus()
+    message = can.Message(arbitration_id=0x18FF0205, data=bytes(range(64)), is_fd=True, bitrate_switch=True)
     before_s = time.time()
     sender.send(message)
     received = receiver.recv(0)

@@ -96,13 +96,6 @@ def test_frames_pass_in_both_directions(bench: Bench) -> None:
     assert bench.port.error_frames == 0
 
 
-def test_answers_between_frames_do_not_keep_any_of_them_back(bench: Bench) -> None:
-    for _ in range(20):
-        bench.send(FRAMES[0])
-        bench.report(FRAMES[1])
-    assert bench.receive() == [FRAMES[1]] * 20
-
-
 def test_a_line_that_arrives_in_pieces_is_one_frame(bench: Bench) -> None:
     bench.write(LINES[0][:7])
     assert bench.receive() == []

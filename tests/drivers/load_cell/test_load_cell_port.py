@@ -9,34 +9,21 @@ import pytest
 
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
-from drivers.load_cell.load_cell_port import LoadCellPort, Sample
+from drivers.load_cell.load_cell_port import LoadCellPort
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
+from tests.drivers.load_cell.instrument_bench import InstrumentBench
 
 FORCE_N = 1.5
 COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
 
 
-class Cable:
-    """An amplifier under a constant load, a port, and the time of both."""
+class Cable(InstrumentBench):
+    """An amplifier under a constant load."""
 
     def __init__(self, folder: Path, baud: int = 115200, name: str = "number", **changes: float | str) -> None:
         parameters = AmplifierParameters(**{"noise_n": 0.0, **changes})  # type: ignore[arg-type]
-        self.amplifier = EmulatedAmplifier(lambda _: FORCE_N, parameters, folder / "cell")
-        self.path = str(folder / "cell")
-        self.port = LoadCellPort(self.path, baud, LineFormat(name), COUNTS)
-        self.now_s = 0.0
-
-    def run(self, duration_s: float) -> list[Sample]:
-        samples, end_s = list[Sample](), self.now_s + duration_s
-        while self.now_s < end_s:
-            self.now_s += 0.01
-            self.amplifier.step(self.now_s)
-            samples += self.port.read(self.now_s)
-        return samples
-
-    def close(self) -> None:
-        self.port.close()
-        self.amplifier.close()
+        amplifier = EmulatedAmplifier(lambda _: FORCE_N, parameters, folder / "cell")
+        super().__init__(amplifier, LoadCellPort(str(folder / "cell"), baud, LineFormat(name), COUNTS))
 
 
 @pytest.fixture
@@ -62,14 +49,6 @@ def test_malformed_lines_are_counted_and_the_last_one_is_stored(tmp_path: Path) 
     assert len(samples) == port.lines - port.malformed_lines
     assert {round(sample.force_n, 4) for sample in samples} == {FORCE_N}
     assert "\\x" in port.last_malformed
-    cable.close()
-
-
-def test_a_drop_out_is_a_gap_in_the_stamps(tmp_path: Path) -> None:
-    cable = Cable(tmp_path, drop_out_rate_hz=1.0, drop_out_s=0.3)
-    stamps_s = [sample.stamp_s for sample in cable.run(10.0)]
-    gaps = [after - before for before, after in zip(stamps_s, stamps_s[1:], strict=False) if after - before > 0.2]
-    assert 2 < len(gaps) - 1 <= cable.port.line.clock.drop_outs <= len(gaps)  # the first comes before the rate is known
     cable.close()
 
 

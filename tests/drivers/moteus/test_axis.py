@@ -72,13 +72,6 @@ class Bench:
         return self.drives.health[0]
 
 
-def test_idle_drives_are_asked_and_never_commanded() -> None:
-    bench = Bench()
-    bench.run(1.0, NO_TORQUE, settings=True)
-    assert all(device.mode is Mode.STOPPED for device in bench.devices)
-    assert (bench.drives.gate.refused, bench.drives.malformed_frames, bench.drives.unknown_frames) == (0, 0, 0)
-
-
 def test_a_drive_that_restarts_under_torque_is_not_commanded_back_into_it() -> None:
     bench = Bench()
     bench.arm()
@@ -87,14 +80,6 @@ def test_a_drive_that_restarts_under_torque_is_not_commanded_back_into_it() -> N
     bench.devices[0].mode = Mode.STOPPED
     bench.run(0.05, NO_TORQUE)
     assert bench.devices[0].mode is Mode.STOPPED and bench.devices[1].mode is Mode.POSITION
-
-
-def test_a_drive_that_another_program_energises_is_stopped_at_once() -> None:
-    bench = Bench()
-    bench.run(0.05, NO_TORQUE)
-    bench.other_program.send(command_frame(1, codec.encode_torque(0.2)))
-    bench.run(0.02, NO_TORQUE)
-    assert bench.devices[0].mode is Mode.STOPPED and bench.health.foreign_commands == 1
 
 
 @pytest.mark.parametrize("every", [1, 2, 3])
@@ -158,14 +143,6 @@ def test_questions_and_stops_of_others_are_no_foreign_commands(data: bytes) -> N
     assert bench.health.foreign_commands == 0 and not bench.health.duplicate_id
 
 
-def test_two_drives_with_one_id_are_noticed_and_one_is_not() -> None:
-    for duplicate in (False, True):
-        bench = Bench(duplicate=duplicate)
-        bench.run(0.2, NO_TORQUE, settings=True)
-        assert bench.health.duplicate_id is duplicate
-        assert not bench.drives.health[1].duplicate_id
-
-
 def test_an_expired_watchdog_is_an_error_until_it_is_cleared() -> None:
     bench = Bench()
     bench.arm()
@@ -182,19 +159,6 @@ def test_an_expired_watchdog_is_an_error_until_it_is_cleared() -> None:
     bench.drives.clear_errors()
     bench.run(0.02, NO_TORQUE)
     assert bench.health.errors == "" and not bench.health.watchdog_expired
-
-
-def test_a_silence_is_a_restart_and_a_pause_of_this_program_is_none() -> None:
-    bench = Bench()
-    bench.run(0.1)
-    bench.now_s += 2.0
-    bench.run(0.1)
-    assert bench.health.restarts == 0
-    bench.silent = True
-    bench.run(0.5)
-    bench.silent = False
-    bench.run(0.1)
-    assert bench.health.restarts == 1
 
 
 def test_settings_are_read_back_and_again_after_a_change() -> None:

@@ -171,14 +171,6 @@ def test_random_replies_of_any_resolution_are_read_as_by_the_package() -> None:
         assert all(same(value, package[register]) for register, value in ours.items())
 
 
-@pytest.mark.parametrize("count", [1, 3, 4, 20])
-def test_any_number_of_registers_returns_as_it_was_encoded(count: int) -> None:
-    values = [0.25 * index for index in range(count)]
-    data = registers.encode_values(registers.REPLY, Resolution.FLOAT, Register.COMMAND_POSITION, values)
-    (subframe,) = registers.decode_frame(data)
-    assert subframe.values == tuple(values) and encoded(subframe) == data
-
-
 def test_random_bytes_are_malformed_or_subframes() -> None:
     random = Random(5)
     for _ in range(20_000):

@@ -1,6 +1,6 @@
 """R² and residuals of a fit: by hand, against statsmodels, and for the samples that the estimator itself fitted."""
 
-from math import isnan, sqrt
+from math import isnan
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +10,6 @@ import statsmodels.api as sm
 from estimation.strokes.fit_samples import FitSamples
 from experiments.reports.error_table import COEFFICIENTS
 from logs.replay import replay_files
-
-
-def test_three_points_by_hand() -> None:
-    """τ = 2, 3, 7 at Φ = 1, 2, 3 with k = 2: residuals 0, -1, 1; Σr² = 2, Στ² = 62, Σ(τ - 4)² = 14."""
-    samples = FitSamples([1.0, 2.0, 3.0], [2.0, 3.0, 7.0], [0.001] * 3, 2.0)
-    assert samples.residuals_nm == [0.0, -1.0, 1.0]
-    assert samples.rms_residual_nm == pytest.approx(sqrt(2.0 / 3.0))
-    assert samples.r_squared == pytest.approx(1.0 - 2.0 / 62.0)
-    assert samples.r_squared_about_mean == pytest.approx(1.0 - 2.0 / 14.0)
 
 
 def test_a_batch_counts_by_its_travel_as_in_weighted_least_squares() -> None:

@@ -20,7 +20,6 @@ from estimation.strokes.shear import (
     MOBILISED_M,
     QUICK_UNCERTAINTY,
     SLIPPING,
-    STANDS,
     Base,
     Shear,
     find_shear,
@@ -207,16 +206,6 @@ def test_a_bound_becomes_a_value_once_a_fit_has_enough_pieces() -> None:
 
 
 # without a pose
-
-
-def test_below_the_bodys_drag_the_body_cannot_have_moved() -> None:
-    """The thrust of both flippers, 2 cos α τ / l, is below 2 N everywhere, since the mud's strength is a third of
-    that.
-    """
-    weak = 0.33 * STANDS * DRAG_N * LENGTH_M / moment_m4(poses()[COUNT // 2])
-    shear = found(without_pose(sheared(poses(), weak)))
-    assert (shear.case, shear.at_least, shear.reason) == ("yield", False, "")
-    assert k_of(shear) == pytest.approx(weak, rel=EXACT)
 
 
 def test_above_the_bodys_drag_it_may_have_moved() -> None:

@@ -114,11 +114,6 @@ def test_a_stroke_that_keeps_the_law_gives_its_coefficient(k: float, surface_m: 
     assert extracted.value == pytest.approx(k, rel=EXACT)
 
 
-def test_a_face_load_that_was_left_in_would_be_taken_for_mud() -> None:
-    unfelt = [batch._replace(sweep_nm=0.0) for batch in down(face_nm=0.3)]
-    assert abs(insertion(unfelt).value / K - 1.0) > 0.1
-
-
 def test_only_batches_in_the_mud_count() -> None:
     """Forces and samples above the surface change nothing, nor does the first quarter of the rise."""
     batches, rising = down(), up()
@@ -196,13 +191,6 @@ def test_the_slope_per_surface_is_the_numeric_derivative(law: Law) -> None:
     numeric = (plain_slope(1e-6, law) - plain_slope(-1e-6, law)) / 2e-6
     reported = _slope_per_surface(OriginFit(plain_slope(0.0, law), 0.0), *pieces(0.0, law=law))
     assert reported == pytest.approx(numeric, rel=0.05)
-
-
-def test_the_slope_per_surface_is_three_halves_of_slope_over_depth() -> None:
-    """The plate is upright, so Φ is in proportion to z, and the pieces are many and small: Σz/Σz² = 3/(2 z)."""
-    depths_m = [1e-5 * (i + 0.5) for i in range(3000)]
-    reported = _slope_per_surface(OriginFit(K, 0.0), depths_m, [K * depth_m for depth_m in depths_m], depths_m)
-    assert reported == pytest.approx(1.5 * K / 0.03, rel=1e-3)
 
 
 def systematic(estimate: Estimate) -> float:

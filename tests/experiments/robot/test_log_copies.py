@@ -16,9 +16,10 @@ from experiments.robot.log_copies import copy_since
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_file import LogFile
-from firmware_host.log.log_folder import ACTIVE, first_path, run_files, segment_path
+from firmware_host.log.log_folder import ACTIVE, first_path, segment_path
 from firmware_host.log.recorder import Recorder
 from logs.files.log_reader import read_log, read_logs
+from logs.files.stored_logs import run_files
 from logs.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track

@@ -2,9 +2,8 @@
 
 import pytest
 
-from simulation.body.rail_body import DRAG_STIFFNESS_N_M, BodyMotion, DragPad, DryDrag, RailBody
+from simulation.body.rail_body import DRAG_STIFFNESS_N_M, DragPad, DryDrag
 from simulation.mud.clay import MUDS
-from simulation.mud.track import Track
 
 DT_S = 0.0001
 
@@ -27,10 +26,3 @@ def test_the_pad_resists_as_deep_as_it_is_and_only_in_the_mud() -> None:
     assert pad.yield_n(clay) == clay.lateral_n(0.02, 0.015)
     assert pad.yield_n(clay, 0.01) == pytest.approx(clay.lateral_n(0.03, 0.015))
     assert pad.yield_n(clay, -0.02) == DragPad(0.0, 0.02).yield_n(clay) == 0.0
-
-
-def test_it_reports_its_speed_and_a_level_attitude() -> None:
-    body = RailBody(1.0, 2.5, 0.0, DragPad(0.0, 0.0), Track([(1.0, MUDS["48.5"])]))
-    body.forward_m_s = 0.3
-    assert body.motion == BodyMotion((0.3, 0.0, 0.0))
-    assert body.carriages == (None, None)

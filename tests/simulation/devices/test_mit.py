@@ -194,13 +194,6 @@ def test_torque_that_is_missing_for_a_while_is_no_other_programs_command() -> No
 # ids
 
 
-def test_more_answers_than_questions_are_a_second_drive() -> None:
-    drives = DrivenDrives(DAMIAO)
-    drives.devices.append(simulated("mit", 1))
-    drives.tick(count=20)
-    assert [axis.health.duplicate_id for axis in drives.drives.axes] == [True, False, False, False]
-
-
 def test_old_cubemars_that_all_answer_under_id_0_are_distinguished_by_their_first_byte() -> None:
     drives = DrivenDrives(CUBEMARS)
     for index in range(4):

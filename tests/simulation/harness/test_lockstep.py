@@ -89,17 +89,6 @@ def test_nothing_is_transmitted_before_every_drive_was_heard(configuration: Conf
     assert lockstep.loop.mode is Mode.IDLE and not any(drive.energised for drive in lockstep.robot.drives)
 
 
-def test_an_order_of_two_strides_walks_two_and_holds_with_flippers_raised(holding: Lockstep) -> None:
-    holding.walk(WalkOrder(0.03, adaptive=False, strides=2))
-    assert holding.run_until(lambda: holding.loop.mode is Mode.WALKING, 1.0)
-    assert holding.run_until(lambda: holding.loop.mode is Mode.HOLD, 15.0)
-    left = [stride.estimate.index for stride in holding.loop.learning.strides if stride.estimate.flipper == "left"]
-    assert left == [0, 1]
-    holding.run_for(0.5)
-    geometry = holding.loop.configuration.geometry
-    assert geometry.depth_m(*holding.robot.plant.angles_rad[:2]) < -0.005
-
-
 def test_power_is_cut_when_the_loop_stops_ticking(holding: Lockstep) -> None:
     stopped_s, watchdog_s = holding.now_s, holding.robot.drives[0].parameters.watchdog_s
     for fraction, energised in ((0.9, True), (1.1, False)):

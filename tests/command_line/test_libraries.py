@@ -1,0 +1,63 @@
+"""Commands load no library that they do without, and name the extra that brings a missing one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from command_line import exit_codes
+from command_line.main import main
+from firmware_host.log.log_folder import DONE
+from tests.folders import ROOT
+from tests.waiting import LONGEST_S
+
+LARGE = ("numpy", "can", "pydantic", "matplotlib", "mcap", "shtab", "inspect", "shutil", "json", "tempfile")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / DONE).mkdir()
+    (tmp_path / DONE / "walk.mcap").write_bytes((ROOT / "tests/fixtures/walk_0_1.mcap").read_bytes())
+    return tmp_path
+
+
+def ended(program: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    text = f"import sys; from command_line.main import main; {program}"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", text]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=LONGEST_S, check=True, cwd=folder, env=environment
+    )
+
+
+@pytest.mark.parametrize(("words", "count"), [("status --socket /none", len(LARGE)), ("log list .", 4)])
+def test_a_quick_command_loads_no_large_library(folder: Path, words: str, count: int) -> None:
+    """Half a second of imports would look like a hang in an emergency, and is longer than a listing takes."""
+    assert main(["log", "index", str(folder)]) == exit_codes.OK
+    program = f"main({words.split()}); print([name for name in {LARGE[:count]} if name in sys.modules])"
+    assert ended(program, folder).stdout.splitlines()[-1] == "[]"
+
+
+def test_without_a_library_the_extra_is_named_that_brings_it(folder: Path) -> None:
+    log = str(folder / DONE / "walk.mcap")
+    needed = {
+        ("plot", log): "plots",
+        ("film", log): "plots",
+        ("film", log, "--out", "x.gif"): "plots",
+        ("log", "export", "--parquet", log): "data",
+        ("log", "query", "select 1", "."): "data",
+        ("log", "list", "."): "",
+    }
+    program = (
+        "sys.modules.update(dict.fromkeys(('matplotlib', 'pyarrow', 'duckdb')))\n"
+        f"print([main(command) for command in {[*needed]}])"
+    )
+    found = ended(program, folder)
+    statuses = [exit_codes.UNHEALTHY if extra else exit_codes.OK for extra in needed.values()]
+    assert "walk.mcap" in found.stdout and found.stdout.splitlines()[-1] == str(statuses)
+    assert [found.stderr.count(f"extra '{extra}'") for extra in ("plots", "data")] == [3, 2]
+    assert "Traceback" not in found.stderr
