@@ -142,8 +142,8 @@ def dense_wrench(
 def test_strips_give_the_wrench_of_a_dense_sum(attitude: Attitude, clay: Clay, velocity_m_s: Velocity) -> None:
     """They agree to 4 % of the total force, and of its moment at half of the plate's height.
 
-    Up to 2 % comes from the bend of the law at 9, 2 % from the begin of the suction's fade. At the first contact the dense
-    sum itself is uncertain by 4 mN, and the rate factor raises that.
+    Up to 2 % comes from the bend of the law at 9, 2 % from the begin of the suction's fade. At the first contact the
+    dense sum itself is uncertain by 4 mN, and the rate factor raises that.
     """
     wrench = yielded(SIZE, velocity_m_s, attitude, clay)
     dense = dense_wrench(SIZE, attitude, clay, velocity_m_s, 200, 200)
