@@ -171,7 +171,7 @@ def test_without_a_pose_there_are_no_panels_of_position(two_walks: Path, tmp_pat
 
 @pytest.mark.filterwarnings("error")
 def test_strides_without_usable_estimates_are_drawn(two_walks: Path, tmp_path: Path) -> None:
-    """Estimate may be NaN, infinite, negative, or missing in a walk without duration."""
+    """Estimates may be NaN, infinite, negative, or missing in a walk without duration."""
     walk = read_walk(two_walks, 1)
     values = ((np.nan, np.nan), (np.inf, 1.0), (1e6, np.inf), (-1e6, 1.0))
     wild = [
