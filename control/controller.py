@@ -166,7 +166,10 @@ class Controller:
     def fault(self) -> Fault | None:
         """The fault of flippers that every attempt of the recovery left stuck."""
         held = self.recovery.given_up
-        return _held_by_the_mud(held, self.recovery.parameters.attempts) if held else None
+        if not held:
+            return None
+        flipper = held[0] if len(held) == 1 else ""  # no single one if several are stuck
+        return FaultKind.FLIPPER_STUCK.fault(flipper, attempts=self.recovery.parameters.attempts)
 
     def is_up(self, states: DriveStates) -> bool:
         return all(abs(adduction.angle_rad) < UP_RAD for _, adduction in states.flippers)
@@ -280,8 +283,3 @@ class Controller:
         )
         adduction = JointTarget(angle_rad, velocity_rad_s)
         return Joints(*(sweep, adduction) * self._flippers)
-
-
-def _held_by_the_mud(flippers: Sequence[str], attempts: int) -> Fault:
-    """The fault of flippers that a recovery has given up; its subject is empty if several are stuck."""
-    return FaultKind.FLIPPER_STUCK.fault(flippers[0] if len(flippers) == 1 else "", attempts=attempts)

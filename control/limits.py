@@ -42,10 +42,10 @@ def limited_torque_nm(
     elif velocity_rad_s < -fade_rad_s:
         downward_nm *= _slow_fraction(-velocity_rad_s, limits.velocity_rad_s)
     slew_nm = limits.torque_rate_nm_s * dt_s
-    return _clip(_clip(wanted_nm, -downward_nm, upward_nm), previous_nm - slew_nm, previous_nm + slew_nm)
+    return clip(clip(wanted_nm, -downward_nm, upward_nm), previous_nm - slew_nm, previous_nm + slew_nm)
 
 
-def _clip(value: float, low: float, high: float) -> float:
+def clip(value: float, low: float, high: float) -> float:
     """Return the value, or the bound that it exceeds; in half the time of `min` and `max`."""
     if value < low:
         return low

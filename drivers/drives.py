@@ -7,6 +7,7 @@ caller asks for it. Frames of unknown ids and malformed frames are counted and i
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from itertools import chain
 
 from control.records import NEVER_S, DriveStates, Joints, Torques
@@ -45,19 +46,15 @@ class Drives:
             own: dict[int, Callable[[bytes, float], None]] = {}
             for key, receive in chain.from_iterable(tables):
                 own[key] = _both(own[key], receive) if key in own else receive
-            strange = {key: self._note(*other) for key, other in (others or {}).get(name, {}).items()}
+            strange = {key: partial(self._on_other, *other) for key, other in (others or {}).get(name, {}).items()}
             self._receivers.append((port, strange | own))
             port.listen_to(key & EXTENDED_MASK for key in self._receivers[-1][1])
         self.reset()
 
-    def _note(self, joint: str, protocol: str) -> Callable[[bytes, float], None]:
-        """Make the handler of frames that only a drive of another type sends."""
-
-        def note(data: bytes, now_s: float) -> None:
-            self._other_protocols[joint] = protocol
-            self.unknown_frames += 1
-
-        return note
+    def _on_other(self, joint: str, protocol: str, data: bytes, now_s: float) -> None:
+        """Handle a frame that only a drive of another type sends."""
+        self._other_protocols[joint] = protocol
+        self.unknown_frames += 1
 
     def reset(self) -> None:
         self._other_protocols.clear()

@@ -22,7 +22,6 @@ from control.rate import RATE_HZ
 from drivers.can.bus_lock import BusRole
 from drivers.can.reopening_port import ReopeningPort
 from drivers.drive_types import make_drives
-from drivers.drives import Drives
 from drivers.fault_injection.failing_port import failing_ports
 from drivers.fault_injection.failing_pose import FailingPose
 from drivers.fault_injection.failures import Failures
@@ -37,7 +36,7 @@ from firmware_host.configuration.loading import load_configuration
 from firmware_host.fault_injection.failing_host import FailingClock, FailingRecorder, FailingTicker
 from firmware_host.fault_injection.failure_calls import failures_of, with_failures
 from firmware_host.log.log_folder import first_path, new_run_id
-from firmware_host.log.recorder import NullRecorder, Recorder, Recording, StreamSettings
+from firmware_host.log.recorder import NullRecorder, Recorder, Recording
 from firmware_host.log.row_stream import stream_path
 from firmware_host.loop import Loop
 from firmware_host.operator.operator_calls import OperatorCalls
@@ -114,7 +113,7 @@ def open_recorder(configuration: Configuration, rights: Rights) -> Recorder | Nu
         raise PermissionError(errno.EACCES, "is not writable", str(folder))
     run_id = new_run_id(robot)
     metadata = {"robot": robot, "run_id": run_id} | build_metadata()
-    stream = StreamSettings(str(stream_path(Path(configuration.status.socket))), rights)
+    stream = {"path": str(stream_path(Path(configuration.status.socket))), "rights": rights}
     return Recorder(
         first_path(folder, run_id), configuration.text, metadata, configuration.log, stream, configuration.rig
     )
@@ -138,10 +137,13 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         pose = open_pose(configuration.pose)
         stack.callback(pose.close)
         recorder: Recording = open_recorder(configuration, rights)
+        seen_pose: PoseSource = pose
+        wall_clock: Callable[[], float] = time.time
         if failures is not None:
             recorder = FailingRecorder(recorder, failures)
+            seen_pose, wall_clock = FailingPose(pose, failures), FailingClock(time.time, failures)
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
-        loop = _make_loop(configuration, drives, pose, recorder, failures)
+        loop = Loop(configuration, drives, seen_pose, recorder, wall_clock=wall_clock)
         warnings = status.warnings
         calls = OperatorCalls(loop, warnings, time.monotonic)
         status.methods = with_failures(calls.methods, failures, loop.events.report, time.monotonic)
@@ -156,16 +158,6 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         warnings += prepare_loop(configuration.loop.priority, configuration.loop.cpu, configuration.loop.lock_memory)
         _print_warnings("", warnings)
         return _run_loop(loop, buses, pose, failures, status, notifier, processors, shutdown)
-
-
-def _make_loop(
-    configuration: Configuration, drives: Drives, pose: PoseSource, recorder: Recording, failures: Failures | None
-) -> Loop:
-    if failures is None:
-        return Loop(configuration, drives, pose, recorder)
-    return Loop(
-        configuration, drives, FailingPose(pose, failures), recorder, wall_clock=FailingClock(time.time, failures)
-    )
 
 
 def _print_warnings(program: str, warnings: Iterable[str]) -> None:
@@ -256,7 +248,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.check_config:
         return 0
     shutdown = Shutdown()
-    _on_signals(shutdown.request)
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, shutdown.request)
     try:
         return run(configuration, rights, shutdown)
     except (BusError, PoseSourceError, AlreadyServedError) as problem:
@@ -264,11 +257,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as problem:
         path = f" {problem.filename}" if problem.filename else ""
         return _refuse([f"mudskipperd: cannot start:{path} {problem.strerror or problem}"], EXIT_FAILED)
-
-
-def _on_signals(handler: Callable[[int, object], None]) -> None:
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, handler)
 
 
 def _refuse(messages: Sequence[str], status: int) -> int:

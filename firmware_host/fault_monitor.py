@@ -96,11 +96,6 @@ class FaultMonitor:
         self._broken: set[str] = set()  # joints with an invalid encoder, until torque is off
         self.trusted: Joints[bool] = self._all_trusted  # of the joints' encoders
 
-    @property
-    def winding_temperatures_c(self) -> Joints[float]:
-        """Return the temperature of each motor, measured or estimated."""
-        return Joints(*(joint.winding.temperature_c for joint in self.joints))
-
     def with_winding_heat(self, states: DriveStates) -> DriveStates:
         """Return the states with the estimated winding temperatures, if one is warm enough to matter for the limits."""
         warm_c = self._warm_c

@@ -22,43 +22,33 @@ class Lease:
 
     def reset(self) -> None:
         """Free the lease; programs that were overruled stay refused."""
-        self._holder: Hashable | None = None
-        self._until_s = inf
+        self.holder: Hashable | None = None  # also after it has lost the lease
+        self.until_s = inf  # unless it is renewed; infinite if no program has taken the lease
         self._lost = False
-
-    @property
-    def holder(self) -> Hashable | None:
-        """Return the holder, also after it has lost the lease."""
-        return self._holder
-
-    @property
-    def until_s(self) -> float:
-        """Return the time until which it is held unless it is renewed; infinite if no program has taken it."""
-        return self._until_s
 
     @property
     def held(self) -> bool:
         """Return whether the lease is held, as of the last `update`."""
-        return self._holder is not None and not self._lost
+        return self.holder is not None and not self._lost
 
     def update(self, now_s: float) -> None:
         """Let a lease that was not renewed in time be lost."""
         self._lost = self.lost(now_s)
 
     def lost(self, now_s: float) -> bool:
-        return self._lost or now_s > self._until_s
+        return self._lost or now_s > self.until_s
 
     def refusal(self, caller: Hashable, now_s: float, take_over: bool = False) -> str | None:
         """Return why `caller` may not move the robot now, or None."""
         if caller in self._ousted:
             return f"{TAKEN_OVER}{self._ousted[caller]} wanted the robot; begin again when it is free"
         if self.lost(now_s):
-            return f"{self._holder} has lost the lease: the robot stops; then arm again"
-        if self._holder in (None, caller) or take_over:
+            return f"{self.holder} has lost the lease: the robot stops; then arm again"
+        if self.holder in (None, caller) or take_over:
             return None
-        left_s = self._until_s - now_s
+        left_s = self.until_s - now_s
         return (
-            f"{self._holder} operates the robot: wait until that program has ended, or has been silent for"
+            f"{self.holder} operates the robot: wait until that program has ended, or has been silent for"
             f" {left_s:.1f} s, or overrule it with --take-over; 'mudskipper stop' and 'disarm' are always allowed"
         )
 
@@ -67,13 +57,13 @@ class Lease:
         self.update(now_s)
         refused = self.refusal(holder, now_s)
         if refused is None:
-            self._holder, self._until_s = holder, now_s + for_s
+            self.holder, self.until_s = holder, now_s + for_s
         return refused
 
     def oust(self, by: Hashable) -> None:
         """Take the lease away from its holder, which stays refused until it connects again."""
-        if self.held and by != self._holder:
-            self._ousted[self._holder] = str(by)
+        if self.held and by != self.holder:
+            self._ousted[self.holder] = str(by)
             self.reset()
 
     def release(self, holder: Hashable) -> str | None:
@@ -81,12 +71,12 @@ class Lease:
 
         No other program frees a lost lease: the loop would then not see that it was lost, and the robot would move on.
         """
-        if self._holder not in (None, holder):
-            return f"{self._holder} {'has lost' if self._lost else 'holds'} the lease"
+        if self.holder not in (None, holder):
+            return f"{self.holder} {'has lost' if self._lost else 'holds'} the lease"
         self.reset()
         return None
 
     def hang_up(self, holder: Hashable) -> None:
         """Handle the end of a connection."""
-        self._lost = self._lost or holder == self._holder
+        self._lost = self._lost or holder == self.holder
         self._ousted.pop(holder, None)

@@ -30,7 +30,8 @@ from command_line.doctor.host_facts import (
 from experiments.reports.counted_nouns import counted
 from firmware_host.configuration.configuration import LoopParameters
 from firmware_host.configuration.log_parameters import LogParameters
-from firmware_host.log.log_folder import FreeSpace, free_space, size_text, unfinished_files
+from firmware_host.log.log_folder import FreeSpace, free_space, unfinished_files
+from logs.files.stored_logs import size_text
 
 ENOUGH_MEMLOCK_BYTES = 2**30  # the loop's process maps less memory
 WALK_BYTES_PER_MIN = 6e6  # of a log, measured: 5.3 to 5.6 MB in a minute with torque

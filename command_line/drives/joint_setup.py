@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 from command_line.drives.opened_buses import OpenedBus
 from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.drive_bench import SetupFacts
-from drivers.bench.drive_setup import CannotReadError, DriveSetup, Setting
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import CannotReadError, DriveSetup, FoundDrive, Setting
 from drivers.bench.search import expectation_problems, id_problems
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from command_line.drives.opened_buses import FD_RATE_KBIT_S, opened_buses
 from command_line.init.new_file import NewRobot
 from command_line.screen import watched
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import FoundDrive
 from drivers.bench.search import id_problems
 from drivers.drive_types import DRIVE_BENCHES
 from firmware_host.configuration.configuration import BusParameters

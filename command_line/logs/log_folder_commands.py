@@ -15,7 +15,6 @@ from command_line.screen import complain, watched
 from command_line.shared_options import Json
 from experiments.reports.text_tables import number, table
 from experiments.study.option import Option
-from firmware_host.log.log_file import is_being_written
 from firmware_host.log.log_folder import (
     BROKEN,
     DONE,
@@ -24,14 +23,12 @@ from firmware_host.log.log_folder import (
     PRESERVED,
     free_space,
     log_files,
-    preserve,
-    size_text,
     stored_files,
     unfinished_files,
-    why_not_moved,
 )
 from logs.catalogue.entry import LogEntry
 from logs.files.log_error import DAMAGE, LogError
+from logs.files.stored_logs import is_being_written, preserve, size_text, why_not_moved
 
 BEING_WRITTEN = "being written"
 SOUND = ("whole", "export", BEING_WRITTEN)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from command_line.screen import complain
-from firmware_host.log.log_file import is_being_written
+from logs.files.stored_logs import is_being_written
 
 
 def complain_of_end(files: Sequence[Path], complete: bool) -> None:

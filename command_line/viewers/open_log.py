@@ -16,9 +16,8 @@ from mcap.reader import make_reader
 from command_line import exit_codes
 from command_line.screen import complain
 from experiments.study.option import Option
-from firmware_host.log.log_file import is_being_written
-from firmware_host.log.log_folder import why_not_read
 from logs.files.log_error import DAMAGE, LogError
+from logs.files.stored_logs import is_being_written, why_not_read
 
 LAYOUTS = Path(__file__).parent / "layouts"
 FOXGLOVE_PROGRAMS = ("lichtblick", "foxglove-studio", "foxglove")  # the first one that is installed

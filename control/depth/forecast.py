@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from math import exp, fsum, inf, isfinite, log, radians
 
 from control.geometry import FlipperGeometry
+from control.limits import clip
 from control.mud_estimate import NOTHING_KNOWN, Coefficient, MudEstimate
 from control.parameters.gait_parameters import GaitParameters
 from control.plate_integrals import stroke_moment_m4, submerged_plate
@@ -33,10 +34,8 @@ SUCTION_RATIO = 1.0  # peak extraction torque over k_p Φ, without k_e
 LEARNING = 0.25  # weight of a new stride
 FRACTIONS = (0.2, 1.5)  # bounds of the learned values
 RATIOS = (0.2, 1.5)
-THRUST_UNCERTAINTY, SUCTION_UNCERTAINTY = (
-    1.0,
-    2.0,
-)  # standard errors: a slip costs half a step, a stuck flipper the walk
+# Standard errors: a slip costs half a step, a stuck flipper the walk.
+THRUST_UNCERTAINTY, SUCTION_UNCERTAINTY = 1.0, 2.0
 SAG_FRACTION = 0.25  # of the deepest sag, on average over the stance
 GRID_M = 0.0025  # resolution of depths; the joints do not follow more finely in mud
 
@@ -98,7 +97,7 @@ class DepthForecast:
             self._fractions_learned += 1
             weight = max(LEARNING, 1.0 / self._fractions_learned)
             fraction = stride.extraction_torque_nm / whole_nm
-            self.felt_fraction = _within(self.felt_fraction * (fraction / self.felt_fraction) ** weight, FRACTIONS)
+            self.felt_fraction = clip(self.felt_fraction * (fraction / self.felt_fraction) ** weight, *FRACTIONS)
 
     def _learn_ratio(self, mud_estimate: MudEstimate) -> None:
         k_s, k_p = mud_estimate.k_s, mud_estimate.k_p
@@ -107,7 +106,7 @@ class DepthForecast:
         pressed = k_p.at(k_s.depth_m)[0]
         ratio = k_s.value / pressed if pressed > 0.0 else 0.0
         if ratio > 0.0 and isfinite(ratio):
-            self.shear_ratio = _within(exp(log(self.shear_ratio) + LEARNING * log(ratio / self.shear_ratio)), RATIOS)
+            self.shear_ratio = clip(exp(log(self.shear_ratio) + LEARNING * log(ratio / self.shear_ratio)), *RATIOS)
 
     def reached_m(self, commanded_m: float) -> float:
         """Return the depth reached under load, which is more than commanded, within the flipper's reach."""
@@ -206,10 +205,6 @@ def _shifted(k: Coefficient, depth_m: float, std_errors: float) -> float:
 def _more(k: Coefficient, depth_m: float) -> float:
     value, std_error = k.at(depth_m)
     return max(0.0, value) + SUCTION_UNCERTAINTY * std_error
-
-
-def _within(value: float, bounds: tuple[float, float]) -> float:
-    return min(max(value, bounds[0]), bounds[1])
 
 
 def _known(length_m: float) -> float:

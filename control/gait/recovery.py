@@ -30,7 +30,7 @@ from typing import NamedTuple
 from control.gait.gait import RAMP_S, swing_duration_s
 from control.gait.joint_path import still
 from control.geometry import FlipperGeometry
-from control.limits import JointRange
+from control.limits import JointRange, clip
 from control.parameters.gait_parameters import GaitParameters
 from control.parameters.recovery_parameters import RecoveryParameters
 from control.records import (
@@ -164,14 +164,14 @@ class Recovery:
 
     def _ahead(self, direction: float, here_rad: float) -> JointTarget:
         """Return a target far enough ahead for full torque, within the joint's limits."""
-        return JointTarget(_within(here_rad + direction * radians(self.parameters.lead_deg), *self._sweep_range), 0.0)
+        return JointTarget(clip(here_rad + direction * radians(self.parameters.lead_deg), *self._sweep_range), 0.0)
 
     def _raised(self, step_rad: float, dt_s: float, target: JointTarget, here_rad: float) -> JointTarget:
         """Return the next target towards a level arm, close to the joint's angle and within its limits."""
         lead_rad = radians(self.parameters.lead_deg)
-        angle_rad = _within(0.0, target.angle_rad - step_rad, target.angle_rad + step_rad)
-        angle_rad = _within(_within(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._adduction_range)
-        return JointTarget(angle_rad, _within((angle_rad - target.angle_rad) / dt_s, -step_rad / dt_s, step_rad / dt_s))
+        angle_rad = clip(0.0, target.angle_rad - step_rad, target.angle_rad + step_rad)
+        angle_rad = clip(clip(angle_rad, here_rad - lead_rad, here_rad + lead_rad), *self._adduction_range)
+        return JointTarget(angle_rad, clip((angle_rad - target.angle_rad) / dt_s, -step_rad / dt_s, step_rad / dt_s))
 
     def _end(self, wanted: JointTargets) -> None:
         """End the recovery: all flippers are out."""
@@ -191,14 +191,10 @@ class Recovery:
             self._gaps = ()
         return Joints(
             *(
-                JointTarget(_within(gait.angle_rad + rest.angle_rad, *span), gait.velocity_rad_s + rest.velocity_rad_s)
+                JointTarget(clip(gait.angle_rad + rest.angle_rad, *span), gait.velocity_rad_s + rest.velocity_rad_s)
                 for gait, rest, span in zip(wanted, rests, self._ranges, strict=True)
             )
         )
-
-
-def _within(value: float, low: float, high: float) -> float:
-    return min(max(value, low), high)
 
 
 def _are_stuck(flippers: Sequence[str]) -> str:

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_setup import DriveSetup
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import DriveSetup, FoundDrive
 from drivers.can.frames import Frame
 from drivers.drive import WatchdogEndpoints
 

@@ -6,11 +6,24 @@ storing makes it last. A type of drive that can do neither says so in `cannot`.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.bench_port import BenchPort
 
+WATCHDOG_S = 0.1  # the time-out that is wanted, where the configuration allows it
 SAME_FRACTION = 1e-4  # of a number that a drive keeps as binary32, or prints with six digits
+
+
+class FoundDrive(NamedTuple):
+    """One drive that answers on a bus. Empty texts are not known."""
+
+    type: str
+    node_id: int
+    hardware: str = ""  # or what is known of the motor's model
+    firmware: str = ""
+    serial_number: str = ""
+    problem: str = ""  # why this program cannot use it as it is
+    model: str = ""  # of the motor, as the configuration names it: one whose ranges the drive has
 
 
 class CannotReadError(Exception):
@@ -36,6 +49,17 @@ def exactly(key: str, wanted: float, source: str, read_only: str = "", fraction:
     margin = fraction * abs(wanted)
     return Setting(
         key=key, wanted=wanted, least=wanted - margin, most=wanted + margin, source=source, read_only=read_only
+    )
+
+
+def watchdog(key: str, longest_s: float) -> Setting:
+    """Return the setting of a time-out in seconds."""
+    return Setting(
+        key=key,
+        wanted=min(WATCHDOG_S, longest_s),
+        least=0.001,
+        most=longest_s,
+        source="faults.longest_watchdog_s",
     )
 
 
@@ -76,6 +100,15 @@ class DriveSetup(ABC):
     def save(self) -> None:
         """Store all settings, and return once the drive answers again."""
         raise CannotReadError(self.cannot)
+
+
+class AskedSetup(DriveSetup):
+    """A drive that is asked over one bus; `parameters` are those of its type."""
+
+    def __init__(self, port: BenchPort, parameters: Any, longest_watchdog_s: float) -> None:
+        self._port = port
+        self._parameters = parameters
+        self._longest_watchdog_s = longest_watchdog_s
 
 
 class NoSetup(DriveSetup):

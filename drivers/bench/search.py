@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from drivers.bench.bench_port import BenchPort
 from drivers.bench.drive_bench import DriveBench
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import FoundDrive
 from drivers.drive import DriveParameters
 
 LISTENING_S = 1.1  # heartbeats may be a second apart

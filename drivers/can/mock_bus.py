@@ -42,10 +42,6 @@ class MockPort(PortHealth):
             if port is not self:
                 port.queue.append(frame)
 
-    def open_peer(self) -> MockPort:
-        """Open another node on the same bus."""
-        return self._bus.open()
-
     def close(self) -> None:
         if self in self._bus.ports:
             self._bus.ports.remove(self)

@@ -53,13 +53,10 @@ class LineClock:
         if lines:
             self._lines += lines
             self._reads.append((now_s, self._lines))
-            self._measure_period()
+            first_s, first = self._reads[0]
+            if self._lines - first >= MEASURED_LINES and now_s - first_s >= MEASURED_S:
+                self.period_s, self._is_measured = (now_s - first_s) / (self._lines - first), True
         return stamps_s
-
-    def _measure_period(self) -> None:
-        (first_s, first), (last_s, last) = self._reads[0], self._reads[-1]
-        if last - first >= MEASURED_LINES and last_s - first_s >= MEASURED_S:
-            self.period_s, self._is_measured = (last_s - first_s) / (last - first), True
 
     def _next_stamp_s(self, now_s: float, later_lines: int) -> float:
         period_s, before_s = self.period_s, self._stamp_s

@@ -6,18 +6,17 @@ tick commands a drive that is to be idle to leave the mode; a lost command is re
 
 A Damiao's answer says whether it follows torque. A CubeMars's does not: it counts as following from its first answer
 without a fault after the command to enter, until a command to leave, also another program's, or a restart.
-drivers/answer_counter.py finds restarts and a second drive with this id. A command that arrives here comes from another
+drivers/answering_axis.py finds restarts and a second drive with this id. A command that arrives here comes from another
 program; one that does not, such as a command on the drive's serial line, shows in the torque that the answers measure.
 """
 
 from collections.abc import Callable
-from math import isfinite, pi
+from math import pi
 
 from control.records import NEVER_S
-from drivers.answer_counter import AnswerCounter
+from drivers.answering_axis import AnsweringAxis
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import DriveHealth, Outlet
-from drivers.drive_signals import DriveSignals
 from drivers.mit import codec
 from drivers.mit.parameters import MitParameters
 from drivers.mit.settings import MitSettings
@@ -28,10 +27,11 @@ TURN_RAD = 2.0 * pi
 HARMLESS = frozenset({codec.LEAVE, codec.CLEAR})  # commands that any program may send
 
 
-class MitAxis(DriveSignals):
-    """Owns everything that is known about one drive, and whether it is to follow torque."""
+class MitAxis(AnsweringAxis):
+    """Owns everything that is known about one drive."""
 
     parameters: MitParameters
+    settings: MitSettings
 
     def __init__(self, joint: str, parameters: MitParameters, outlet: Outlet) -> None:
         tolerance_nm = TOLERANCE_NM + parameters.ranges.torque_step_nm
@@ -42,15 +42,11 @@ class MitAxis(DriveSignals):
         self._zero_rad = TURN_RAD * parameters.zero_turn
         self._amperes_per_nm = self._sign / parameters.reported_constant_nm_a
         self.settings = MitSettings(parameters)
-        self._answers = AnswerCounter()
         self.reset()
 
     def reset(self) -> None:
         super().reset()
         self._status = 0
-        self._following = False  # commanded by this program
-        self._answers.reset()
-        self.settings.reset()
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -87,7 +83,7 @@ class MitAxis(DriveSignals):
         answer = codec.decode_answer(data, self._ranges)
         if answer.node_id != self.parameters.node_id:
             raise MalformedMessageError(f"an answer of node {answer.node_id}")
-        self._count_answer()
+        self._on_answer()
         asked_s = self._read_before_s  # every tick asks after it has read
         stamp_s = asked_s if NEVER_S < asked_s < now_s else now_s
         self._angle_stamp_s = self._current_stamp_s = self._heartbeat_stamp_s = stamp_s
@@ -118,7 +114,7 @@ class MitAxis(DriveSignals):
 
     def _receive_foreign(self, data: bytes, now_s: float) -> None:
         """Count commands of another program, which the drive answers too. It may have left the mode by one."""
-        self._answers.on_question(self._read_s)
+        self._on_question()
         if data == codec.LEAVE:
             self._following = False
         if data not in HARMLESS:
@@ -129,32 +125,22 @@ class MitAxis(DriveSignals):
         if node_id == self.parameters.node_id and kind in (codec.WRITE, codec.STORE):
             self._count_foreign_command()
 
-    def _count_answer(self) -> None:
-        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._heartbeat_stamp_s):
-            self.restarts += 1
-            self._following = False
-            self.settings.forget()
-            self._health = None
-
-    @property
-    def duplicates(self) -> bool:
-        return self._answers.duplicates(self._read_s)
+    def _on_restart(self) -> None:
+        super()._on_restart()
+        self._following = False
 
     def _build_health(self) -> DriveHealth:
-        settings = self.settings
-        common = super()._build_health()
-        return common._replace(
-            firmware=settings.firmware,
-            supported_firmware="one that answers the reading of register 14",
-            firmware_supported=settings.supported,
-            watchdog_s=settings.watchdog_s,
-            watchdog_advice=settings.watchdog_advice,
-            watchdog_expired=self._error_flags == codec.LOST_COMMANDS,
-            setting_problem=settings.problem,
-            serial_number=settings.serial_number,
-            expected_serial_number=self.parameters.serial_number,
-            active_errors=codec.error_text(self._error_flags),
-            errors=codec.error_text(self._error_flags),
+        errors = codec.error_text(self._error_flags)
+        return (
+            super()
+            ._build_health()
+            ._replace(
+                supported_firmware="one that answers the reading of register 14",
+                watchdog_advice=self.settings.watchdog_advice,
+                watchdog_expired=self._error_flags == codec.LOST_COMMANDS,
+                active_errors=errors,
+                errors=errors,
+            )
         )
 
     def poll(self) -> None:
@@ -191,5 +177,5 @@ class MitAxis(DriveSignals):
             self._outlet.send(Frame(codec.REGISTER_ID, request))
 
     def _transmit(self, data: bytes) -> None:
-        self._answers.on_question(self._read_s)
+        self._on_question()
         self._outlet.send(Frame(self.parameters.node_id, data))

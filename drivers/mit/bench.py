@@ -11,8 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from drivers.bench.bench_port import BenchPort
 from drivers.bench.drive_bench import DriveBench, SetupFacts
-from drivers.bench.drive_setup import DriveSetup, NoSetup
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import DriveSetup, FoundDrive, NoSetup
 from drivers.can.frames import Frame
 from drivers.mit import codec
 from drivers.mit.parameters import LARGEST_ID

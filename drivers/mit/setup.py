@@ -8,9 +8,7 @@ on. Source: damiao-motor 1.0.6 (REGISTER_TABLE and store_parameters of core/moto
 from collections.abc import Mapping, Sequence
 from struct import Struct
 
-from drivers.bench.bench_port import BenchPort
-from drivers.bench.drive_setup import DriveSetup, Setting, exactly
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import WATCHDOG_S, AskedSetup, FoundDrive, Setting, exactly
 from drivers.can.frames import Frame
 from drivers.mit import codec
 from drivers.mit.models import MODELS
@@ -41,31 +39,9 @@ NAMES = {
     "VMAX": VMAX,
     "TMAX": TMAX,
 }
-WATCHDOG_S = 0.1
 STORING_S = 2.0
 GUIDE = "docs/how-to/mit.md"
 NOTHING = "in MIT mode it can be neither read nor written: use the makers' tool, and see docs/how-to/mit.md"
-
-
-def wanted_settings(drive: MitParameters, longest_watchdog_s: float) -> Sequence[Setting]:
-    ranges, units = drive.ranges, 1.0 / TIMEOUT_UNIT_S
-    torque_key = "torque_range_nm" if drive.torque_range_nm else "model"
-    watchdog = round(min(WATCHDOG_S, longest_watchdog_s) * units)
-    return (
-        exactly("ESC_ID", drive.node_id, "node_id", "it answers under this id"),
-        exactly("MST_ID", drive.node_id + 16, GUIDE),
-        exactly("CTRL_MODE", MIT_MODE, GUIDE),
-        exactly("PMAX", ranges.position_rad, "model", fraction=SAME_FRACTION),
-        exactly("VMAX", ranges.velocity_rad_s, "model", fraction=SAME_FRACTION),
-        exactly("TMAX", ranges.torque_nm, torque_key, fraction=SAME_FRACTION),
-        Setting(
-            key="TIMEOUT",
-            wanted=watchdog,
-            least=1.0,
-            most=round(longest_watchdog_s * units),
-            source="faults.longest_watchdog_s, in 50 µs",
-        ),
-    )
 
 
 def number_of(register: int, value: bytes) -> float:
@@ -100,13 +76,10 @@ def models_of(values: Mapping[int, float]) -> list[str]:
     ]
 
 
-class DamiaoSetup(DriveSetup):
+class DamiaoSetup(AskedSetup):
     stored = "it has acknowledged the storing; switch its supply off and on, and compare again"
 
-    def __init__(self, port: BenchPort, parameters: MitParameters, longest_watchdog_s: float) -> None:
-        self._port = port
-        self._parameters = parameters
-        self._longest_watchdog_s = longest_watchdog_s
+    _parameters: MitParameters
 
     def identify(self) -> FoundDrive:
         values = {register: self._read(register, "its identity") for register in (SOFTWARE, SERIAL, PMAX, VMAX, TMAX)}
@@ -131,7 +104,23 @@ class DamiaoSetup(DriveSetup):
         return "" if status == codec.DISABLED else f"status {status:X}"
 
     def settings(self) -> Sequence[Setting]:
-        return wanted_settings(self._parameters, self._longest_watchdog_s)
+        drive, longest_s = self._parameters, self._longest_watchdog_s
+        ranges, torque_key = drive.ranges, "torque_range_nm" if drive.torque_range_nm else "model"
+        return (
+            exactly("ESC_ID", drive.node_id, "node_id", "it answers under this id"),
+            exactly("MST_ID", drive.node_id + 16, GUIDE),
+            exactly("CTRL_MODE", MIT_MODE, GUIDE),
+            exactly("PMAX", ranges.position_rad, "model", fraction=SAME_FRACTION),
+            exactly("VMAX", ranges.velocity_rad_s, "model", fraction=SAME_FRACTION),
+            exactly("TMAX", ranges.torque_nm, torque_key, fraction=SAME_FRACTION),
+            Setting(
+                key="TIMEOUT",
+                wanted=round(min(WATCHDOG_S, longest_s) / TIMEOUT_UNIT_S),
+                least=1.0,
+                most=round(longest_s / TIMEOUT_UNIT_S),
+                source="faults.longest_watchdog_s, in 50 µs",
+            ),
+        )
 
     def read(self, key: str) -> float:
         return self._read(NAMES[key], key)

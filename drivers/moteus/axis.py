@@ -6,19 +6,18 @@ the command before, so it has the time of the question as its stamp. While the d
 only ask, because a torque command of zero would let it follow torque. A joint's sign inverts angle, velocity, current
 and torque of a mirrored motor alike.
 
-drivers/answer_counter.py finds restarts and a second drive with this id. A command for this drive that arrives here
+drivers/answering_axis.py finds restarts and a second drive with this id. A command for this drive that arrives here
 comes from another program, because a port does not receive its own frames. Stops and questions are no such commands:
 any program may send them.
 """
 
 from collections.abc import Callable
-from math import isfinite, nan, pi
+from math import nan, pi
 
 from control.records import NEVER_S, UNKNOWN
-from drivers.answer_counter import AnswerCounter
+from drivers.answering_axis import AnsweringAxis
 from drivers.can.frames import Frame
 from drivers.drive import FD, DriveHealth, Outlet
-from drivers.drive_signals import DriveSignals
 from drivers.moteus import codec, registers
 from drivers.moteus.codec import Mode
 from drivers.moteus.parameters import MoteusParameters
@@ -32,10 +31,11 @@ STOPPING_S = 0.1  # for which a drive that another program commanded is stopped 
 QUIET_MODES = (Mode.STOPPED, Mode.FAULT, Mode.POSITION, Mode.TIMEOUT)  # in which nothing runs by itself
 
 
-class MoteusAxis(DriveSignals):
-    """Owns everything that is known about one drive, and whether it is to follow torque."""
+class MoteusAxis(AnsweringAxis):
+    """Owns everything that is known about one drive."""
 
     parameters: MoteusParameters
+    settings: MoteusSettings
 
     def __init__(self, joint: str, parameters: MoteusParameters, outlet: Outlet) -> None:
         super().__init__(joint, parameters.sign, outlet, SetpointMonitor(parameters.command_delay_s))
@@ -43,18 +43,14 @@ class MoteusAxis(DriveSignals):
         self._id = codec.command_id(parameters.node_id)
         self._rad_per_turn = self._sign * TURN_RAD
         self.settings = MoteusSettings(parameters)
-        self._answers = AnswerCounter()
         self.reset()
 
     def reset(self) -> None:
         super().reset()
         self._mode = int(Mode.STOPPED)
         self._reason = 0  # the last error, which a stop clears in the drive
-        self._following = False  # commanded by this program
         self._followed_s = UNKNOWN  # the last read with an answer that said so
         self._disturbed_s = NEVER_S  # the last read of such an answer, or of a foreign command
-        self._answers.reset()
-        self.settings.reset()
 
     @property
     def receivers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -73,7 +69,7 @@ class MoteusAxis(DriveSignals):
 
     def _receive_signals(self, data: bytes, now_s: float) -> None:
         mode, turns, turns_s, current_a, temperature_c, voltage_v, fault, control_nm, _ = codec.decode_reply(data)
-        self._count_answer()
+        self._on_answer()
         if turns - turns == 0.0 == turns_s - turns_s:  # finite
             self._angle_rad = (turns - self.parameters.zero_turn) * self._rad_per_turn
             self._velocity_rad_s = turns_s * self._rad_per_turn
@@ -130,40 +126,25 @@ class MoteusAxis(DriveSignals):
         """Count commands of another program; its questions get answers too."""
         subframes = list(registers.decode_frame(data))
         if any(each.kind == registers.READ and each.register == Register.MODE for each in subframes):
-            self._answers.on_question(self._read_s)
+            self._on_question()
         stops = [each for each in subframes if each.register == Register.MODE and each.values == (Mode.STOPPED,)]
         commands = [each for each in subframes if each.kind in (registers.WRITE, registers.CONSOLE_INPUT)]
         if len(commands) > len(stops):
             self._count_foreign_command()
             self._disturbed_s = self._read_s
 
-    def _count_answer(self) -> None:
-        if self._answers.on_answer(self._read_s, self._read_before_s) and isfinite(self._heartbeat_stamp_s):
-            self.restarts += 1
-            self.settings.forget()
-            self._health = None
-
-    @property
-    def duplicates(self) -> bool:
-        """Return whether two drives seem to share this id."""
-        return self._answers.duplicates(self._read_s)
-
     def _build_health(self) -> DriveHealth:
-        settings = self.settings
-        common = super()._build_health()
-        return common._replace(
-            firmware=settings.firmware,
-            supported_firmware=f"one with register map {REGISTER_MAP}",
-            firmware_supported=settings.supported,
-            watchdog_s=settings.watchdog_s,
-            watchdog_advice="the drive did not answer on its console: is another program connected to it?",
-            watchdog_expired=self._reason == codec.TIMEOUT_FLAG,
-            setting_problem=settings.problem,
-            serial_number=settings.serial_number,
-            expected_serial_number=self.parameters.serial_number,
-            busy_state="" if self._mode in QUIET_MODES else f"mode {self._mode}",
-            active_errors=codec.error_text(self._error_flags),
-            errors=codec.error_text(self._reason),
+        return (
+            super()
+            ._build_health()
+            ._replace(
+                supported_firmware=f"one with register map {REGISTER_MAP}",
+                watchdog_advice="the drive did not answer on its console: is another program connected to it?",
+                watchdog_expired=self._reason == codec.TIMEOUT_FLAG,
+                busy_state="" if self._mode in QUIET_MODES else f"mode {self._mode}",
+                active_errors=codec.error_text(self._error_flags),
+                errors=codec.error_text(self._reason),
+            )
         )
 
     def poll(self) -> None:
@@ -210,5 +191,5 @@ class MoteusAxis(DriveSignals):
             self._outlet.send(codec.command_frame(self.parameters.node_id, request))
 
     def _transmit(self, data: bytes) -> None:
-        self._answers.on_question(self._read_s)
+        self._on_question()
         self._outlet.send(Frame(self._id, data, is_extended=True, is_fd=True, bit_rate_switch=True))

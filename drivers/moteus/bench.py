@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from drivers.bench.bench_port import BenchPort
 from drivers.bench.drive_bench import DriveBench, SetupFacts
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import FoundDrive
 from drivers.moteus.codec import command_frame
 from drivers.moteus.parameters import LARGEST_ID, SMALLEST_ID
 from drivers.moteus.settings import IDENTITY

@@ -7,9 +7,8 @@ back what is stored: after it, the memory shows what will last. Source: docs/pro
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from drivers.bench.bench_port import BenchPort, NoAnswerError
-from drivers.bench.drive_setup import CannotReadError, DriveSetup, Setting, exactly
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.bench_port import NoAnswerError
+from drivers.bench.drive_setup import AskedSetup, CannotReadError, FoundDrive, Setting, exactly, watchdog
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.moteus import codec, registers
 from drivers.moteus.codec import Mode
@@ -33,31 +32,11 @@ from drivers.moteus.settings import (
 
 ID = "id.id"
 BRAKES = 15.0  # the timeout mode that the set-up page asks for
-WATCHDOG_S = 0.1
 LONGEST_LINE_S, STORING_S = 0.5, 3.0
 MOST_POLLS = 20
 MODE = registers.padded(registers.encode_read(Resolution.INT8, Register.MODE))
 GUIDE = "docs/how-to/moteus.md"
 MEASURED = "a property of the motor, which moteus_tool --calibrate measures: correct torque_constant_nm_a"
-
-
-def wanted_settings(drive: MoteusParameters, longest_watchdog_s: float) -> Sequence[Setting]:
-    kv = TORQUE_FACTOR / drive.torque_constant_nm_a
-    watchdog_s = min(WATCHDOG_S, longest_watchdog_s)
-    return (
-        exactly(ID, drive.node_id, "node_id", "it answers under this id"),
-        exactly(MAX_CURRENT, drive.current_limit_a, "current_limit_a", fraction=SAME_FRACTION),
-        exactly(KV, kv, "torque_constant_nm_a", MEASURED, SAME_TORQUE_FRACTION),
-        exactly(RATIO, 1.0, GUIDE),
-        exactly(TIMEOUT_MODE, BRAKES, GUIDE),
-        Setting(
-            key=WATCHDOG,
-            wanted=watchdog_s,
-            least=0.001,
-            most=longest_watchdog_s,
-            source="faults.longest_watchdog_s",
-        ),
-    )
 
 
 def is_reply(frame: Frame) -> bool:
@@ -84,13 +63,10 @@ def found_drive(frame: Frame) -> FoundDrive | None:
     )
 
 
-class MoteusSetup(DriveSetup):
+class MoteusSetup(AskedSetup):
     stored = "it has read them back from its store"
 
-    def __init__(self, port: BenchPort, parameters: MoteusParameters, longest_watchdog_s: float) -> None:
-        self._port = port
-        self._parameters = parameters
-        self._longest_watchdog_s = longest_watchdog_s
+    _parameters: MoteusParameters
 
     def identify(self) -> FoundDrive:
         answer = self._ask(IDENTITY, "its identity", lambda frame: found_drive(frame) is not None)
@@ -104,7 +80,16 @@ class MoteusSetup(DriveSetup):
         return "" if mode == Mode.STOPPED else f"mode {mode}"
 
     def settings(self) -> Sequence[Setting]:
-        return wanted_settings(self._parameters, self._longest_watchdog_s)
+        drive = self._parameters
+        kv = TORQUE_FACTOR / drive.torque_constant_nm_a
+        return (
+            exactly(ID, drive.node_id, "node_id", "it answers under this id"),
+            exactly(MAX_CURRENT, drive.current_limit_a, "current_limit_a", fraction=SAME_FRACTION),
+            exactly(KV, kv, "torque_constant_nm_a", MEASURED, SAME_TORQUE_FRACTION),
+            exactly(RATIO, 1.0, GUIDE),
+            exactly(TIMEOUT_MODE, BRAKES, GUIDE),
+            watchdog(WATCHDOG, self._longest_watchdog_s),
+        )
 
     def read(self, key: str) -> float:
         line = self._command(f"conf get {key}")

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 from drivers.bench.bench_port import BenchPort
 from drivers.bench.drive_bench import DriveBench, SetupFacts
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import FoundDrive
 from drivers.can.frames import DATA_MAX_BYTES, Frame
 from drivers.odrive import codec
 from drivers.odrive.codec import Message, arbitration_id

@@ -7,7 +7,6 @@ numbers of this very build the watchdog stays unknown, because a number of anoth
 
 from collections.abc import Iterator, Sequence
 from math import isfinite, nan
-from typing import NamedTuple
 
 from control.records import NEVER_S, UNKNOWN
 from drivers.can.frames import Frame, MalformedMessageError
@@ -19,12 +18,6 @@ SUPPORTED = (0, 6)  # major and minor version of the firmware whose messages the
 REPEAT_UNKNOWN_S = 0.5  # between two requests for a setting that is still unknown
 REFRESH_S = 2.0  # between two requests for a known setting, which may be changed over USB
 LONGEST_WATCHDOG_S = 3600.0  # a larger number is no time-out
-
-
-class Version(NamedTuple):
-    major: int
-    minor: int
-    revision: int
 
 
 class DriveSettings:
@@ -40,7 +33,7 @@ class DriveSettings:
         self.forget()
 
     def forget(self) -> None:
-        self.version: Version | None = None
+        self.version: tuple[int, int, int] | None = None
         self.hardware = ""
         self.serial_number = ""  # empty until the drive has reported it
         self._watchdog_enabled: bool | None = None
@@ -48,7 +41,7 @@ class DriveSettings:
 
     def on_version(self, data: bytes) -> None:
         fields = codec.GET_VERSION.decode(data)
-        self.version = Version(*fields[4:7])
+        self.version = fields[4:7]
         self.hardware = ".".join(str(field) for field in fields[1:4])
 
     def on_address(self, data: bytes) -> None:

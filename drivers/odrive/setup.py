@@ -12,8 +12,7 @@ from struct import Struct, error
 from typing import Any, NamedTuple
 
 from drivers.bench.bench_port import BenchPort, NoAnswerError
-from drivers.bench.drive_setup import CannotReadError, DriveSetup, Setting, exactly
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import AskedSetup, CannotReadError, FoundDrive, Setting, exactly, watchdog
 from drivers.can.frames import Frame, MalformedMessageError
 from drivers.drive import WatchdogEndpoints
 from drivers.odrive import codec
@@ -35,7 +34,6 @@ LAYOUTS = {  # by the name of a type in flat_endpoints.json; longer ones do not 
 }
 SDO_WRITE, SAVE = 1, 1  # opcode; action of the reboot message
 RESTART_S, SILENT_S = 10.0, 2.0  # until it answers again; until it must have fallen silent
-WATCHDOG_S = 0.1
 GUIDE = "docs/how-to/odrive.md"
 
 
@@ -73,29 +71,6 @@ def build_of_watchdog(endpoints: WatchdogEndpoints) -> Build:
     return Build(endpoints.firmware, endpoints.hardware, numbers)
 
 
-def wanted_settings(drive: OdriveParameters, longest_watchdog_s: float) -> Sequence[Setting]:
-    heartbeat_ms = 1e3 * drive.heartbeat_period_s
-    watchdog_s = min(WATCHDOG_S, longest_watchdog_s)
-    return (
-        exactly(f"{CAN}.node_id", drive.node_id, "node_id", "it answers under this id"),
-        *(_period(name, 2.0) for name in ("encoder", "iq")),
-        exactly(f"{CAN}.heartbeat_msg_rate_ms", heartbeat_ms, "heartbeat_period_s"),
-        *(_period(name, 100.0) for name in ("error", "temperature", "bus_voltage")),
-        Setting(
-            key=TIMEOUT,
-            wanted=watchdog_s,
-            least=0.001,
-            most=longest_watchdog_s,
-            source="faults.longest_watchdog_s",
-        ),
-        exactly(ENABLE, 1.0, GUIDE),
-        exactly(f"{MOTOR}.torque_constant", drive.torque_constant_nm_a, "torque_constant_nm_a"),
-        exactly(f"{MOTOR}.current_soft_max", drive.current_limit_a, "current_limit_a"),
-        exactly(f"{CONTROLLER}.vel_limit", drive.velocity_limit_turn_s, "velocity_limit_turn_s"),
-        exactly(f"{CONTROLLER}.vel_gain", drive.velocity_gain_nm_s_turn, "velocity_gain_nm_s_turn"),
-    )
-
-
 def _period(message: str, longest_ms: float) -> Setting:
     key = f"{CAN}.{message}_msg_rate_ms"
     return Setting(key=key, wanted=longest_ms, least=1.0, most=longest_ms, source=GUIDE)
@@ -115,17 +90,16 @@ def found_drive(node_id: int, version: Sequence[int], serial_number: str = "") -
     )
 
 
-class OdriveSetup(DriveSetup):
+class OdriveSetup(AskedSetup):
     """Owns the numbers of the drive's build, once it is identified."""
 
+    _parameters: OdriveParameters
     stored = "it has restarted with them"
 
     def __init__(
         self, port: BenchPort, parameters: OdriveParameters, longest_watchdog_s: float, builds: Sequence[Build]
     ) -> None:
-        self._port = port
-        self._parameters = parameters
-        self._longest_watchdog_s = longest_watchdog_s
+        super().__init__(port, parameters, longest_watchdog_s)
         self._builds = builds
         self._numbers: dict[str, Number] = {}
         self._build = ""
@@ -148,7 +122,19 @@ class OdriveSetup(DriveSetup):
         return "" if state == AxisState.IDLE else f"axis state {state}"
 
     def settings(self) -> Sequence[Setting]:
-        return wanted_settings(self._parameters, self._longest_watchdog_s)
+        drive = self._parameters
+        return (
+            exactly(f"{CAN}.node_id", drive.node_id, "node_id", "it answers under this id"),
+            *(_period(name, 2.0) for name in ("encoder", "iq")),
+            exactly(f"{CAN}.heartbeat_msg_rate_ms", 1e3 * drive.heartbeat_period_s, "heartbeat_period_s"),
+            *(_period(name, 100.0) for name in ("error", "temperature", "bus_voltage")),
+            watchdog(TIMEOUT, self._longest_watchdog_s),
+            exactly(ENABLE, 1.0, GUIDE),
+            exactly(f"{MOTOR}.torque_constant", drive.torque_constant_nm_a, "torque_constant_nm_a"),
+            exactly(f"{MOTOR}.current_soft_max", drive.current_limit_a, "current_limit_a"),
+            exactly(f"{CONTROLLER}.vel_limit", drive.velocity_limit_turn_s, "velocity_limit_turn_s"),
+            exactly(f"{CONTROLLER}.vel_gain", drive.velocity_gain_nm_s_turn, "velocity_gain_nm_s_turn"),
+        )
 
     def read(self, key: str) -> float:
         number = self._number(key)

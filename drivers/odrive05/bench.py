@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 from drivers.bench.bench_port import BenchPort
 from drivers.bench.drive_bench import SetupFacts
-from drivers.bench.drive_setup import NoSetup
-from drivers.bench.found_drive import FoundDrive
+from drivers.bench.drive_setup import FoundDrive, NoSetup
 from drivers.odrive.bench import CanSimpleBench, ask
 from drivers.odrive.codec import GET_VERSION
 from drivers.odrive05.codec import GET_ENCODER_COUNT

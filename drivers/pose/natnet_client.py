@@ -74,7 +74,11 @@ class NatNetClient:
         self._now_s = now_s
         if self.parameters.server and now_s - self._asked_s >= REQUEST_S:
             self._asked_s = now_s
-            self._send_requests(now_s)
+            silent = now_s - self._heard_s > REQUEST_S
+            self.sockets.request(CONNECT if self._version is None or silent else KEEP_ALIVE)
+            if self.parameters.body and (self._models_changed or not self._id_known):
+                self._models_changed = False
+                self.sockets.request(REQUEST_MODEL)
         for packet, sender in self.sockets.packets():
             if self.parameters.server and sender != self.parameters.server:
                 self.malformed += 1
@@ -84,13 +88,6 @@ class NatNetClient:
                 yield from self._on_message(packet, now_s)
             except MalformedPacketError:
                 self.malformed += 1
-
-    def _send_requests(self, now_s: float) -> None:
-        silent = now_s - self._heard_s > REQUEST_S
-        self.sockets.request(CONNECT if self._version is None or silent else KEEP_ALIVE)
-        if self.parameters.body and (self._models_changed or not self._id_known):
-            self._models_changed = False
-            self.sockets.request(REQUEST_MODEL)
 
     def _on_message(self, packet: bytes, now_s: float) -> Iterator[tuple[float, float]]:
         """Handle a packet of the server; raises MalformedPacketError."""

@@ -32,6 +32,7 @@ No library is used: natnet_bridge.py says why.
 
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from math import isfinite
 from struct import Struct
 from typing import NamedTuple
@@ -75,12 +76,10 @@ class RigidBody(NamedTuple):
     identity: int  # its streaming id
     position_m: tuple[float, float, float]
     quaternion: tuple[float, float, float, float]  # x, y, z, w
-    mean_error_m: float  # of its markers
     tracked: bool
 
 
 class MotionFrame(NamedTuple):
-    number: int
     body: RigidBody | None  # the requested one, where the frame contains it
     software_s: float
     exposed_ticks: int  # 0 where the version has none
@@ -92,12 +91,18 @@ class MalformedPacketError(ValueError):
     """The packet is no NatNet message, or is truncated."""
 
 
-DECODING_ERRORS = (struct.error, ValueError, OverflowError)
+@contextmanager
+def _decoding() -> Iterator[None]:
+    """Raise MalformedPacketError for any error in decoding, also as a decorator."""
+    try:
+        yield
+    except (struct.error, ValueError, OverflowError) as problem:
+        raise MalformedPacketError(str(problem)) from None
 
 
-def encode_request(message: int, text: bytes = b"") -> bytes:
+def encode_request(message: int) -> bytes:
     """Encode CONNECT, REQUEST_MODEL or KEEP_ALIVE. A server answers CONNECT by its information."""
-    payload = b"Ping\0" if message == CONNECT else text
+    payload = b"Ping\0" if message == CONNECT else b""
     return HEADER.pack(message, len(payload)) + payload
 
 
@@ -111,16 +116,13 @@ def message_of(packet: bytes) -> int:
     return int(message)
 
 
+@_decoding()
 def decode_server_info(packet: bytes) -> ServerInfo:
     """Decode a server's information; raises MalformedPacketError."""
-    try:
-        name = packet[HEADER.size : HEADER.size + NAME_BYTES].partition(b"\0")[0].decode(errors="replace")
-        major, minor = SERVER_VERSIONS.unpack_from(packet, HEADER.size + NAME_BYTES)[4:6]
-        ticks_per_s = 0
-        if major >= 3:
-            ticks_per_s = SERVER_CLOCK.unpack_from(packet, HEADER.size + NAME_BYTES + SERVER_VERSIONS.size)[0]
-    except DECODING_ERRORS as problem:
-        raise MalformedPacketError(str(problem)) from None
+    end = HEADER.size + NAME_BYTES
+    name = packet[HEADER.size : end].partition(b"\0")[0].decode(errors="replace")
+    major, minor = SERVER_VERSIONS.unpack_from(packet, end)[4:6]
+    ticks_per_s = SERVER_CLOCK.unpack_from(packet, end + SERVER_VERSIONS.size)[0] if major >= 3 else 0
     return ServerInfo(name, NatNetVersion(major, minor), ticks_per_s)
 
 
@@ -141,22 +143,15 @@ class FrameLayout:
         self.has_devices = version >= (2, 11)
         self.has_ticks = version >= (3, 0)
         self.bodies_have_markers = not self.has_ticks
-        self.body_bytes = POSE.size + QUALITY.size  # without markers
         self.labelled_bytes = 26 if version >= (3, 0) else 22
         software = "d" if version >= (2, 7) else "f"
         ticks = "QQQ" if self.has_ticks else ""
         precision = "II" if self.has_sizes else ""
         self.end = Struct(f"<II{software}{ticks}{precision}H")
 
+    @_decoding()
     def decode_frame(self, packet: bytes, identity: int) -> MotionFrame:
         """Decode a frame with the rigid body of that streaming id; 0: the first. Raises MalformedPacketError."""
-        try:
-            return self._frame(packet, identity)
-        except DECODING_ERRORS as problem:
-            raise MalformedPacketError(str(problem)) from None
-
-    def _frame(self, packet: bytes, identity: int) -> MotionFrame:
-        (number,) = INTEGER.unpack_from(packet, HEADER.size)
         offset = self._skip_marker_sets(packet, HEADER.size + INTEGER.size)
         count, offset = self._begin_section(packet, offset)
         body, offset = self._find_body(packet, offset + VECTOR_BYTES * count, identity)
@@ -165,7 +160,6 @@ class FrameLayout:
             raise MalformedPacketError("a time that is not finite")
         exposed, sent = (end[3], end[5]) if self.has_ticks else (0, 0)
         return MotionFrame(
-            number=number,
             body=body,
             software_s=end[2],
             exposed_ticks=exposed,
@@ -202,8 +196,10 @@ class FrameLayout:
         for _ in range(count):
             numbers = POSE.unpack_from(packet, offset)  # every item, so that a wrong count ends with the packet
             offset = self._skip_markers(packet, offset + POSE.size)
+            _, flags = QUALITY.unpack_from(packet, offset)
             if found is None and identity in (0, numbers[0]):
-                found = _rigid_body(numbers, *QUALITY.unpack_from(packet, offset))
+                tracked = bool(flags & TRACKED) and isfinite(sum(numbers[1:4]))
+                found = RigidBody(numbers[0], numbers[1:4], numbers[4:], tracked)
             offset += QUALITY.size
         return found, offset
 
@@ -234,7 +230,7 @@ class FrameLayout:
                 for _ in range(bones):
                     offset = self._skip_markers(packet, offset + POSE.size) + QUALITY.size
             else:
-                offset += self.body_bytes * bones
+                offset += (POSE.size + QUALITY.size) * bones
         return offset
 
     def _skip_channels(self, packet: bytes, offset: int) -> int:
@@ -248,28 +244,10 @@ class FrameLayout:
         return offset
 
 
-def _rigid_body(numbers: tuple[float, ...], mean_error_m: float, flags: int) -> RigidBody:
-    identity, x_m, y_m, z_m, qx, qy, qz, qw = numbers
-    tracked = bool(flags & TRACKED) and isfinite(x_m + y_m + z_m)
-    return RigidBody(
-        identity=int(identity),
-        position_m=(x_m, y_m, z_m),
-        quaternion=(qx, qy, qz, qw),
-        mean_error_m=mean_error_m,
-        tracked=tracked,
-    )
-
-
+@_decoding()
 def decode_bodies(packet: bytes, version: NatNetVersion) -> dict[str, int]:
     """Return the streaming ids of rigid bodies by name. Raises MalformedPacketError."""
-    try:
-        return dict(_bodies(packet, version))
-    except DECODING_ERRORS as problem:
-        raise MalformedPacketError(str(problem)) from None
-
-
-def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
-    has_sizes = version >= (4, 1)
+    has_sizes, bodies = version >= (4, 1), dict[str, int]()
     count, offset = _read_count(packet, HEADER.size)
     for _ in range(count):
         (kind,) = INTEGER.unpack_from(packet, offset)
@@ -277,10 +255,11 @@ def _bodies(packet: bytes, version: NatNetVersion) -> Iterator[tuple[str, int]]:
         size, offset = _read_count(packet, offset) if has_sizes else (0, offset)
         if kind == RIGID_BODY:
             end = packet.index(0, offset)
-            yield packet[offset:end].decode(errors="replace"), INTEGER.unpack_from(packet, end + 1)[0]
+            bodies[packet[offset:end].decode(errors="replace")] = INTEGER.unpack_from(packet, end + 1)[0]
         elif not has_sizes and kind != MARKER_SET:
-            return
+            break
         offset = offset + size if has_sizes else _end_of(packet, offset, kind, version)
+    return bodies
 
 
 def _end_of(packet: bytes, offset: int, kind: int, version: NatNetVersion) -> int:

@@ -70,19 +70,17 @@ class NatNetSockets:
         """Open the sockets; raises OSError."""
         self._server = (parameters.server, parameters.command_port)
         self.opened: list[socket.socket] = []
+        address = parameters.interface if is_address(parameters.interface) else ANY_ADDRESS
         try:
-            self._open(parameters)
+            if parameters.group:
+                self.opened.append(_udp_socket(parameters.interface))
+                _join(self.opened[0], parameters, address)
+            if parameters.server:
+                self.opened.append(_udp_socket(parameters.interface))
+                self.opened[-1].bind((address, 0))
         except OSError:
             self.close()
             raise
-
-    def _open(self, parameters: NatNetParameters) -> None:
-        if parameters.group:
-            self.opened.append(_join(parameters))
-        if parameters.server:
-            asking = _udp_socket(parameters.interface)
-            self.opened.append(asking)
-            asking.bind((_address_of(parameters.interface), 0))
 
     def packets(self) -> Iterator[tuple[bytes, str]]:
         """Yield the packets that have arrived, and the address of each sender."""
@@ -113,26 +111,14 @@ def _udp_socket(interface: str) -> socket.socket:
     return opened
 
 
-def _join(parameters: NatNetParameters) -> socket.socket:
-    """Open a socket bound to the group's address, so it receives nothing else. Raises OSError."""
-    opened = _udp_socket(parameters.interface)
-    try:
-        # Other programs on this computer may receive as well.
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        opened.bind((parameters.group, parameters.port))
-        address = socket.inet_aton(_address_of(parameters.interface))
-        named = parameters.interface and not is_address(parameters.interface)
-        index = socket.if_nametoindex(parameters.interface) if named else 0
-        membership = pack("4s4si", socket.inet_aton(parameters.group), address, index)
-        opened.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-    except OSError:
-        opened.close()
-        raise
-    return opened
-
-
-def _address_of(interface: str) -> str:
-    return interface if is_address(interface) else ANY_ADDRESS
+def _join(opened: socket.socket, parameters: NatNetParameters, address: str) -> None:
+    """Bind a socket to the group's address, so it receives nothing else. Raises OSError."""
+    opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # other programs of this computer may receive as well
+    opened.bind((parameters.group, parameters.port))
+    named = parameters.interface and not is_address(parameters.interface)
+    index = socket.if_nametoindex(parameters.interface) if named else 0
+    membership = pack("4s4si", socket.inet_aton(parameters.group), socket.inet_aton(address), index)
+    opened.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
 
 
 def is_address(text: str) -> bool:

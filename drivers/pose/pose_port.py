@@ -95,21 +95,18 @@ class PosePort:
 
     def read(self, now_s: float) -> BodyPose:
         self._now_s = now_s
-        self._drain(now_s)
-        return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
-
-    def _drain(self, now_s: float) -> None:
         for _ in range(MOST_MESSAGES_PER_READ):
             try:
                 data = self._socket.recv(64)
             except BlockingIOError:
-                return
+                break
             x_m = POSE.unpack(data)[1] if len(data) == POSE.size else float("nan")
             if isfinite(x_m):
                 self._pose = BodyPose(now_s, x_m)
                 self.poses += 1
             else:
                 self.malformed_messages += 1
+        return self._pose if now_s - self._pose.stamp_s <= STALE_S else BodyPose()
 
     def report(self) -> PoseReport:
         report = PoseReport(f"socket {self._path}", self.poses, self.malformed_messages)

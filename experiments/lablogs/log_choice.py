@@ -10,7 +10,6 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
-from experiments.lablogs.lab_trial import LabTrial
 from experiments.study.option import OptionError
 
 ENDINGS = (".csv", ".csv.gz", ".mcap")
@@ -79,12 +78,3 @@ def group_key(group: str) -> tuple[bool, bool, float, str]:
     """Return a key that sorts groups: labels before names, single flippers before walks, stronger mud first."""
     label = re.fullmatch(r"(walk )?(\d+(?:\.\d+)?)N", group)
     return label is None, bool(label and label[1]), -float(label[2]) if label else 0.0, group
-
-
-def group_trials(trials: Sequence[tuple[LabTrial, str | None]]) -> dict[str, list[LabTrial]]:
-    """Return the trials in mud by group, the groups in order."""
-    names = {group for trial, group in trials if group is not None and trial.in_mud}
-    return {
-        name: [trial for trial, group in trials if group == name and trial.in_mud]
-        for name in sorted(names, key=group_key)
-    }

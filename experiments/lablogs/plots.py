@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
+from pandas import DataFrame
 
-from experiments.lablogs.consistency import FlipperPair, flipper_pairs
-from experiments.lablogs.lab_trial import DELAY_S, METHODS, MISSING_ROWS, LabTrial, Strides
+from experiments.lablogs.comparisons import disturbed_values, flipper_pairs
+from experiments.lablogs.estimates import DELAY_S, EARLY, LATE, METHODS, MISSING, MISSING_ROWS, RECORDED, strokes_of
 from experiments.lablogs.repeatability import Scatter, scatter_between_strokes, scatter_between_trials
-from experiments.lablogs.report import Groups, strokes_of
-from experiments.lablogs.sensitivity import Change, early_changes, late_changes, missing_changes
+from experiments.lablogs.report import members_of
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_styles import GREY, INK, LABELS, MARKS
 
@@ -25,14 +25,15 @@ DODGE = 0.08  # between the trials of one stroke
 SMALL: dict[str, Any] = {"fontsize": "small"}
 
 
-def draw_strokes(members: Groups) -> Figure:
+def draw_strokes(estimates: DataFrame) -> Figure:
     """Draw k_s by stroke and trial, a panel for each group on a fixed base."""
-    groups = {name: [each for each in trials if each.fixed_base] for name, trials in members.items()}
-    groups = {name: trials for name, trials in groups.items() if trials}
+    strokes = {method: _strokes_by_group(estimates, method) for method in METHODS}
+    groups = [name for name, own in strokes[METHODS[0]].items() if len(own)]
     figure, panels = _panels(max(len(groups), 1), sharey="row")
     for row, method in zip(panels, METHODS, strict=True):
-        for panel, (name, trials) in zip(row, groups.items(), strict=False):
-            _draw_trials(panel, [strokes for trial in trials for strokes in trial.strokes(method)])
+        for panel, name in zip(row, groups, strict=False):
+            own = strokes[method][name]
+            _draw_trials(panel, own[own["coefficient"] == "k_s"])
             panel.set_title(f"{name}, method {method}", **SMALL)
             panel.set_xlabel("stroke")
         row[0].set_ylabel("$k_s$ (N/cm³)")
@@ -40,23 +41,32 @@ def draw_strokes(members: Groups) -> Figure:
     return figure
 
 
-def _draw_trials(panel: Axes, trials: Sequence[Strides]) -> None:
-    for number, strides in enumerate(trials):
+def _strokes_by_group(estimates: DataFrame, method: str) -> dict[str, DataFrame]:
+    return {name: strokes_of(own) for name, own in members_of(_recorded(estimates, method)).items()}
+
+
+def _recorded(estimates: DataFrame, method: str) -> DataFrame:
+    return estimates[(estimates["method"] == method) & (estimates["disturbance"] == RECORDED)]
+
+
+def _draw_trials(panel: Axes, strokes: DataFrame) -> None:
+    trials = strokes["trial"].nunique()
+    for number, (_, trial) in enumerate(strokes.groupby("trial")):
         style: dict[str, Any] = {"fmt": MARKS[number % len(MARKS)], "color": f"C{number}", "markersize": 5}
-        strokes = [(i, stride.k_s) for i, stride in enumerate(strides, 1) if stride.k_s.valid]
-        x = np.array([i for i, _ in strokes]) + DODGE * (number - (len(trials) - 1) / 2.0)
-        values, errors = ([getattr(k_s, name) / PER_CM3 for _, k_s in strokes] for name in ("value", "std_error"))
-        bounds = [k_s.at_least for _, k_s in strokes]  # an arrow upward
+        drawn = trial[trial["kind"] != "invalid"]
+        x = drawn["stroke"] + 1 + DODGE * (number - (trials - 1) / 2.0)
+        bounds = drawn["kind"] == "bound"  # an arrow upward
+        values, errors = drawn["value"] / PER_CM3, drawn["std_error"] / PER_CM3
         panel.errorbar(x, values, errors, lolims=bounds, linewidth=1, capsize=2, **style)
 
 
-def draw_scatter(trials_by_group: Groups) -> Figure:
+def draw_scatter(estimates: DataFrame) -> Figure:
     """Draw histograms of the deviations in claimed errors, over the groups on a fixed base."""
     figure, panels = _panels(len(COEFFICIENTS))
-    groups = list(trials_by_group.values())
     for row, method in zip(panels, METHODS, strict=True):
+        groups = _strokes_by_group(estimates, method).values()
         for panel, name in zip(row, COEFFICIENTS, strict=True):
-            strokes = [strokes_of(trials, method, name) for trials in groups]
+            strokes = [own[own["coefficient"] == name] for own in groups]
             between_trials = [scatter_between_trials(each) for each in strokes]
             between_strokes = [scatter_between_strokes(each) for each in strokes]
             _draw_histogram(panel, [_standardized(between_trials), _standardized(between_strokes)])
@@ -69,9 +79,7 @@ def draw_scatter(trials_by_group: Groups) -> Figure:
 def _standardized(scatters: Sequence[Scatter]) -> NDArray[np.float64]:
     """Return the deviations, enlarged by what the fitted means took from them."""
     enlarged = [
-        np.array(scatter.deviations) * np.sqrt(len(scatter.deviations) / scatter.dof)
-        for scatter in scatters
-        if scatter.dof > 0
+        scatter.deviations * np.sqrt(len(scatter.deviations) / scatter.dof) for scatter in scatters if scatter.dof > 0
     ]
     joined: NDArray[np.float64] = np.concatenate([np.empty(0), *enlarged])
     return joined.clip(-WIDEST, WIDEST)
@@ -84,27 +92,29 @@ def _draw_histogram(panel: Axes, deviations: Sequence[NDArray[np.float64]]) -> N
     panel.plot(x, expected * np.exp(-x * x / 2.0) / np.sqrt(2.0 * pi), color=INK, label="normal")
 
 
-def draw_left_right(mud: Sequence[LabTrial]) -> Figure:
+def draw_left_right(estimates: DataFrame) -> Figure:
     """Draw the left flipper's values over the right one's."""
     figure, panels = _panels(len(COEFFICIENTS))
     for row, method in zip(panels, METHODS, strict=True):
-        pairs = flipper_pairs(mud, method)
+        recorded = _recorded(estimates, method)
+        pairs = flipper_pairs(recorded[recorded["in_mud"].astype(bool)])
         for panel, name in zip(row, COEFFICIENTS, strict=True):
-            _draw_pairs(panel, [pair for pair in pairs if pair.coefficient == name], COLOURS[name])
+            _draw_pairs(panel, pairs[pairs["coefficient"] == name], COLOURS[name])
             panel.set_title(f"{LABELS[name]}, method {method}", **SMALL)
             panel.set_xlabel("left (N/cm³)")
         row[0].set_ylabel("right (N/cm³)")
     return figure
 
 
-def _draw_pairs(panel: Axes, pairs: Sequence[FlipperPair], colour: str) -> None:
-    drawn = [pair for pair in pairs if min(pair.left.value, pair.right.value) > 0.0]
-    if not drawn:
+def _draw_pairs(panel: Axes, pairs: DataFrame, colour: str) -> None:
+    drawn = pairs[(pairs["value_left"] > 0.0) & (pairs["value_right"] > 0.0)]
+    if drawn.empty:
         return
-    left, left_error = ([getattr(pair.left, name) / PER_CM3 for pair in drawn] for name in ("value", "std_error"))
-    right, right_error = ([getattr(pair.right, name) / PER_CM3 for pair in drawn] for name in ("value", "std_error"))
+    left, right, left_error, right_error = (
+        drawn[name] / PER_CM3 for name in ("value_left", "value_right", "std_error_left", "std_error_right")
+    )
     panel.errorbar(left, right, right_error, left_error, fmt="o", color=colour, markersize=4, linewidth=1)
-    ends = [0.8 * min(*left, *right), 1.25 * max(*left, *right)]
+    ends = [0.8 * min(left.min(), right.min()), 1.25 * max(left.max(), right.max())]
     panel.plot(ends, ends, color=GREY, linewidth=1)
     panel.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     for axis in (panel.xaxis, panel.yaxis):
@@ -113,27 +123,30 @@ def _draw_pairs(panel: Axes, pairs: Sequence[FlipperPair], colour: str) -> None:
         axis.set_minor_formatter("")
 
 
-def draw_sensitivity(mud: Sequence[LabTrial]) -> Figure:
+def draw_sensitivity(estimates: DataFrame) -> Figure:
     """Draw disturbed over recorded values, a panel for each disturbance."""
     disturbances = {
-        f"current {1000.0 * DELAY_S:g} ms late": late_changes,
-        f"current {1000.0 * DELAY_S:g} ms early": early_changes,
-        f"{100.0 * MISSING_ROWS:g} % of the rows missing": missing_changes,
+        LATE: f"current {1000.0 * DELAY_S:g} ms late",
+        EARLY: f"current {1000.0 * DELAY_S:g} ms early",
+        MISSING: f"{100.0 * MISSING_ROWS:g} % of the rows missing",
     }
     figure, panels = _panels(len(disturbances), sharey=True)
+    mud = estimates[estimates["in_mud"].astype(bool)]
     for row, method in zip(panels, METHODS, strict=True):
-        for panel, (name, find) in zip(row, disturbances.items(), strict=True):
-            _draw_changes(panel, find(mud, method))
-            panel.set_title(f"{name}, method {method}", **SMALL)
+        changes = disturbed_values(mud[mud["method"] == method])
+        for panel, (disturbance, title) in zip(row, disturbances.items(), strict=True):
+            _draw_ratios(panel, changes[changes["disturbance"] == disturbance])
+            panel.set_title(f"{title}, method {method}", **SMALL)
         row[0].set_ylabel("disturbed / recorded")
     return figure
 
 
-def _draw_changes(panel: Axes, changes: Sequence[Change]) -> None:
+def _draw_ratios(panel: Axes, changes: DataFrame) -> None:
+    drawn = changes[changes["ratio"] > 0.0]
     for number, name in enumerate(COEFFICIENTS):
-        ratios = [c.ratio for c in changes if c.coefficient == name and c.ratio is not None and c.ratio > 0.0]
+        ratios = drawn.loc[drawn["coefficient"] == name, "ratio"].sort_values()
         x = number + np.linspace(-0.3, 0.3, len(ratios))
-        panel.plot(x, sorted(ratios), ".", color=COLOURS[name], markersize=4)
+        panel.plot(x, ratios, ".", color=COLOURS[name], markersize=4)
     panel.axhline(1.0, color=GREY, linewidth=1)
     panel.set_yscale("log")
     panel.set_xticks(range(len(COEFFICIENTS)), [LABELS[name] for name in COEFFICIENTS], **SMALL)

@@ -1,129 +1,132 @@
 """How well trials in one mud repeat, and whether their scatter agrees with the errors that they claim.
 
-Each trial is a list of one coefficient's estimates: the first stroke in fresh mud, then the later ones in its hole. A
-hole weakens with every stroke, so later strokes are compared after their trial's mean and the mean of their number are
-removed from ln k: that decline is mud, not error.
+The rows are one coefficient's estimates with their trial and stroke: the first stroke in fresh mud, then the later ones
+in its hole. A hole weakens with every stroke, so later strokes are compared after their trial's mean and the mean of
+their number are removed from ln k: that decline is mud, not error.
 
 chi is sqrt(chi² / degrees of freedom) of the scatter in claimed errors: 1 where the claimed errors are right, 2 where
 they are half of the true ones.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from math import fsum, sqrt
-from typing import NamedTuple
+from math import sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pandas import DataFrame, Series, get_dummies
 
-from control.records import Estimate
-from experiments.lablogs.lab_trial import claims_error, is_value
+from experiments.lablogs.estimates import has_error
 
 Floats = NDArray[np.float64]
-Strokes = Sequence[Estimate]  # one coefficient's estimates of one trial, in their order
 
 
 class Scatter(NamedTuple):
     """Deviations in units of their claimed errors."""
 
-    deviations: tuple[float, ...] = ()
+    deviations: Floats = np.empty(0)
     dof: int = 0
 
     @property
     def chi(self) -> float | None:
-        return sqrt(fsum(deviation**2 for deviation in self.deviations) / self.dof) if self.dof > 0 else None
-
-    def joined(self, other: Scatter) -> Scatter:
-        return Scatter(self.deviations + other.deviations, self.dof + other.dof)
+        return sqrt(float(np.sum(self.deviations**2)) / self.dof) if self.dof > 0 else None
 
 
 class Additive(NamedTuple):
-    """A table of trials and stroke numbers, fitted by one mean for each of both."""
+    """Logarithms of values, fitted by one mean for each trial and one for each stroke number."""
 
-    trial_effects: Floats
-    residuals: Floats  # of the known cells
+    levels: Floats  # of the trials
+    residuals: Floats
     dof: int
     connected: bool  # the trials can be compared with each other through strokes that they share
 
 
-def first_values(trials: Sequence[Strokes]) -> list[Estimate]:
+def repeatability(strokes: DataFrame) -> dict[str, Any]:
+    """Return the variation and the scatter of one coefficient; None where the trials are too few."""
+    first, later = first_values(strokes)["value"], later_levels(strokes)
+    trials, later_strokes = scatter_between_trials(strokes), scatter_between_strokes(strokes)
+    both = Scatter(np.concatenate([trials.deviations, later_strokes.deviations]), trials.dof + later_strokes.dof)
+    found = {
+        "first_cv": coefficient_of_variation(first),
+        "later_cv": coefficient_of_variation(later),
+        "chi": both.chi,
+        "chi_between_trials": trials.chi,
+        "chi_between_strokes": later_strokes.chi,
+    }
+    return {name: None if value is None else round(value, 4) for name, value in found.items()} | {
+        "n": len(first),  # trials with a first value
+        "n_later": len(later),
+        "first_mean": round(float(first.mean())) if len(first) else None,  # N/m³
+    }
+
+
+def first_values(strokes: DataFrame) -> DataFrame:
     """Return the first stroke of each trial that has a value there."""
-    return [strokes[0] for strokes in trials if strokes and is_value(strokes[0])]
+    return strokes[(strokes["stroke"] == 0) & (strokes["kind"] == "value")]
 
 
-def coefficient_of_variation(values: Sequence[float]) -> float | None:
+def coefficient_of_variation(values: "Series[float]") -> float | None:
     """Return the sample standard deviation over the mean; None for fewer than two values."""
-    mean = float(np.mean(values)) if len(values) > 1 else 0.0
-    return float(np.std(values, ddof=1)) / mean if mean > 0.0 else None
+    mean = float(values.mean()) if len(values) > 1 else 0.0
+    return float(values.std()) / mean if mean > 0.0 else None
 
 
-def later_levels(trials: Sequence[Strokes]) -> list[float]:
+def later_levels(strokes: DataFrame) -> "Series[float]":
     """Return each trial's geometric mean over its later strokes, the same number of them in every trial.
 
     Where values are missing, the mean is that of a complete trial with the same decline. Empty where trials share no
     stroke number.
     """
-    later = [strokes[1:] for strokes in trials if len(strokes) > 1]
-    common = min((len(strokes) for strokes in later), default=0)
-    logs, _ = _log_table([strokes[:common] for strokes in later])
-    logs = logs[np.isfinite(logs).any(axis=1)]
-    if len(logs) < 2:
-        return []
-    fit = _fit_additive(logs, np.ones_like(logs))
-    return [float(level) for level in np.exp(fit.trial_effects)] if fit.connected else []
+    later = strokes[strokes["stroke"] > 0]
+    common = later.groupby("trial")["stroke"].max().min()
+    known = _with_logarithm(later[later["stroke"] <= common])
+    if known["trial"].nunique() < 2:
+        return Series(dtype=float)
+    fit = _fit_additive(known.assign(error=1.0))
+    return Series(np.exp(fit.levels) if fit.connected else [], dtype=float)
 
 
-def scatter_between_trials(trials: Sequence[Strokes]) -> Scatter:
+def scatter_between_trials(strokes: DataFrame) -> Scatter:
     """Compare first strokes with their weighted mean."""
-    first = list(filter(claims_error, first_values(trials)))
+    first = first_values(strokes)
+    first = first[has_error(first)]
     if len(first) < 2:
         return Scatter()
-    values, errors = (np.array([getattr(each, name) for each in first]) for name in ("value", "std_error"))
-    mean = np.average(values, weights=errors**-2.0)
-    return Scatter(tuple(((values - mean) / errors).tolist()), len(first) - 1)
+    values, errors = first["value"].to_numpy(), first["std_error"].to_numpy()
+    return Scatter((values - np.average(values, weights=errors**-2.0)) / errors, len(first) - 1)
 
 
-def scatter_between_strokes(trials: Sequence[Strokes]) -> Scatter:
+def scatter_between_strokes(strokes: DataFrame) -> Scatter:
     """Compare later strokes, without the decline that the trials have in common."""
-    logs, errors = _log_table([strokes[1:] for strokes in trials])
-    if not np.isfinite(logs).any():
-        return Scatter()
-    fit = _fit_additive(logs, errors)
-    return Scatter(tuple(fit.residuals.tolist()), fit.dof) if fit.dof > 0 else Scatter()
+    known = _with_logarithm(strokes[strokes["stroke"] > 0])
+    fit = _fit_additive(known) if len(known) else None
+    return Scatter(fit.residuals, fit.dof) if fit and fit.dof > 0 else Scatter()
 
 
-def separation(one: Sequence[float], other: Sequence[float]) -> float | None:
+def separation(one: "Series[float]", other: "Series[float]") -> float | None:
     """Return the difference of two means in pooled standard deviations; None where a group has fewer than two."""
     if min(len(one), len(other)) < 2:
         return None
-    squares = fsum(float(np.var(values, ddof=1)) * (len(values) - 1) for values in (one, other))
+    squares = sum(float(values.var()) * (len(values) - 1) for values in (one, other))
     pooled = sqrt(squares / (len(one) + len(other) - 2))
-    return float(np.mean(one) - np.mean(other)) / pooled if pooled > 0.0 else None
+    return float(one.mean() - other.mean()) / pooled if pooled > 0.0 else None
 
 
-def _log_table(trials: Sequence[Strokes]) -> tuple[Floats, Floats]:
-    """Return ln k of trials (rows) and stroke numbers (columns) with its claimed errors; NaN without a value."""
-    logs = np.full((len(trials), max((len(strokes) for strokes in trials), default=0)), np.nan)
-    errors = np.ones_like(logs)
-    for row, strokes in enumerate(trials):
-        for column, estimate in enumerate(strokes):
-            if claims_error(estimate) and estimate.value > 0.0:
-                logs[row, column] = np.log(estimate.value)
-                errors[row, column] = estimate.std_error / estimate.value
-    return logs, errors
+def _with_logarithm(strokes: DataFrame) -> DataFrame:
+    """Return the values that claim an error, with ln k and its error."""
+    known = strokes[has_error(strokes) & (strokes["value"] > 0.0)]
+    return known.assign(logarithm=np.log(known["value"]), error=known["std_error"] / known["value"])
 
 
-def _fit_additive(table: Floats, errors: Floats) -> Additive:
-    """Fit a mean for each row and one for each column to the known cells, weighted by their errors."""
-    rows, columns = np.nonzero(np.isfinite(table))
-    known, height = table[rows, columns], len(table)
-    design = np.zeros((len(known), height + table.shape[1]))
-    design[np.arange(len(known)), rows] = design[np.arange(len(known)), height + columns] = 1.0
-    weights = 1.0 / errors[rows, columns]
-    solution, _, rank, _ = np.linalg.lstsq(design * weights[:, None], known * weights, rcond=None)
-    residuals = (known - design @ solution) * weights
-    used = np.unique(columns)
-    connected = rank == len(np.unique(rows)) + len(used) - 1
-    level = solution[:height] + np.mean(solution[height + used])
-    return Additive(level, residuals, len(known) - int(rank), bool(connected))
+def _fit_additive(known: DataFrame) -> Additive:
+    """Fit a mean for each trial and one for each stroke number, weighted by the errors."""
+    trials, strokes = get_dummies(known["trial"]), get_dummies(known["stroke"])
+    design = np.hstack([trials, strokes]).astype(float)
+    logarithms, weights = known["logarithm"].to_numpy(), 1.0 / known["error"].to_numpy()
+    solution, _, rank, _ = np.linalg.lstsq(design * weights[:, None], logarithms * weights, rcond=None)
+    count = trials.shape[1]
+    return Additive(
+        levels=solution[:count] + np.mean(solution[count:]),
+        residuals=(logarithms - design @ solution) * weights,
+        dof=len(known) - int(rank),
+        connected=bool(rank == design.shape[1] - 1),
+    )

@@ -1,198 +1,169 @@
-"""The report of `experiment lablogs`. Its fields are the keys of the summary in JSON; None where logs are too few."""
+"""The summary of `experiment lablogs`, and its tables. Values are None where logs are too few."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import combinations
+from typing import Any
 
-import numpy as np
+from pandas import DataFrame
 
-from estimation.estimation_parameters import Method
-from experiments.lablogs.consistency import (
-    Agreement,
-    Contradictions,
-    Counts,
+from experiments.lablogs.comparisons import (
+    MOVED,
     agreements,
     contradictions,
-    count_estimates,
-    estimates_of,
+    count_kinds,
+    disturbed_values,
     flipper_pairs,
+    sensitivity,
 )
-from experiments.lablogs.lab_trial import METHODS, LabTrial, Refusal
-from experiments.lablogs.repeatability import (
-    Strokes,
-    coefficient_of_variation,
-    first_values,
-    later_levels,
-    scatter_between_strokes,
-    scatter_between_trials,
-    separation,
+from experiments.lablogs.estimates import (
+    DELAY_S,
+    DISTURBED,
+    METHODS,
+    MISSING_ROWS,
+    RECORDED,
+    SEEDS,
+    EvaluatedLog,
+    Refusal,
+    strokes_of,
 )
-from experiments.lablogs.sensitivity import SensitivityReport, sensitivity
+from experiments.lablogs.log_choice import group_key
+from experiments.lablogs.repeatability import first_values, repeatability, separation
 from experiments.reports.error_table import COEFFICIENTS
+from experiments.study.result import Table
 
-FLAT = {"flat": True}  # metadata of a field whose entries stand next to those of its record
-Groups = Mapping[str, Sequence[LabTrial]]  # by name, without logs in air
-
-
-@dataclass(frozen=True)
-class Repeatability(Counts):
-    """One coefficient in one group. Counts are over all strides; the rest is over trials on a fixed base."""
-
-    first_cv: float | None
-    later_cv: float | None
-    chi: float | None  # of both
-    chi_between_trials: float | None
-    chi_between_strokes: float | None
-    n: int  # trials with a first value
-    n_later: int
-    first_mean: float | None  # N/m³
+DEFINITIONS = (
+    "first CV: coefficient of variation over trials of the first stroke's value. later CV: the same of each trial's "
+    "geometric mean over its later strokes. chi: scatter over claimed error, between trials (first strokes) and "
+    "between strokes (later ones, without the decline that the trials have in common); 1 is expected. Only trials of "
+    "one flipper on a fixed base repeat a stroke.\n\n"
+    "Left against right: median of the difference over its claimed error in the strides of walks; 0.67 is expected. "
+    "In air every value and every bound is wrong. Lost: values that became invalid or a bound."
+)
+Summary = dict[str, Any]
+HEADS = {"first_cv": "first CV", "later_cv": "later CV", "chi_between_trials": "chi trials",
+            "chi_between_strokes": "chi strokes", "with_neighbour": "with a neighbour"}  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Separation:
-    """The difference of two groups' mean first strokes, the first group minus the second."""
-
-    groups: tuple[str, str]
-    coefficient: str
-    pooled_sd: float  # the difference in pooled standard deviations
-    n: tuple[int, int]
-
-
-@dataclass(frozen=True)
-class StrideCounts:
-    logs: Sequence[str]
-    strides: int
-    coefficients: Mapping[str, Counts] = field(metadata=FLAT)
-
-
-@dataclass(frozen=True)
-class MethodReport:
-    groups: Mapping[str, Mapping[str, Repeatability]]
-    separation: Sequence[Separation]
-    left_right: Mapping[str, Agreement]
-    air: StrideCounts
-    mud: StrideCounts
-    contradictions: Mapping[str, Contradictions]
-    sensitivity: SensitivityReport
+def summary_of(
+    logs: Sequence[EvaluatedLog], groups: Sequence[str | None], estimates: DataFrame, refused: Sequence[Refusal]
+) -> Summary:
+    """Return the figures of the default method at the top, and those of the other methods by name."""
+    default, *others = (_method_summary(logs, estimates[estimates["method"] == method]) for method in METHODS)
+    recorded = estimates[(estimates["method"] == METHODS[0]) & (estimates["disturbance"] == RECORDED)]
+    strides = recorded["log"].value_counts() // len(COEFFICIENTS)
+    evaluated = [
+        {key: value for key, value in log._asdict().items() if key != "estimates"}
+        | {"group": group, "strides": int(strides.get(number, 0))}
+        for number, (log, group) in enumerate(zip(logs, groups, strict=True))
+    ]
+    methods = dict(zip(METHODS[1:], others, strict=True))
+    return {"experiment": "lablogs", **default, "methods": methods, "logs": evaluated, "refused": refused}
 
 
-@dataclass(frozen=True)
-class EvaluatedLog:
-    name: str
-    group: str | None
-    flippers: Sequence[str]
-    fixed_base: bool
-    in_mud: bool
-    strides: int
-    findings: Sequence[str]  # peculiarities of the file
+def members_of(estimates: DataFrame) -> dict[str, DataFrame]:
+    """Return the estimates in mud by group, the groups in order."""
+    mud = estimates[estimates["in_mud"].astype(bool)]
+    return {name: mud[mud["group"] == name] for name in sorted(mud["group"].dropna().unique(), key=group_key)}
 
 
-@dataclass(frozen=True, kw_only=True)
-class LablogsReport:
-    """The default method's figures at the top, those of the other methods by name."""
-
-    experiment: str = "lablogs"
-    default: MethodReport = field(metadata=FLAT)
-    methods: Mapping[str, MethodReport]
-    logs: Sequence[EvaluatedLog]
-    refused: Sequence[Refusal]
-
-    def of(self, method: str) -> MethodReport:
-        return self.default if method == METHODS[0] else self.methods[method]
-
-
-def report_of(
-    trials: Sequence[tuple[LabTrial, str | None]], groups: Groups, refused: Sequence[Refusal]
-) -> LablogsReport:
-    """`trials` are all with the name of their group."""
-    default, *others = METHODS
-    every = [trial for trial, _ in trials]
-    return LablogsReport(
-        default=method_report(every, groups, default),
-        methods={method: method_report(every, groups, method) for method in others},
-        logs=[_evaluated_log(trial, group) for trial, group in trials],
-        refused=refused,
-    )
-
-
-def method_report(trials: Sequence[LabTrial], groups: Groups, method: Method) -> MethodReport:
-    mud, air = ([trial for trial in trials if trial.in_mud is wanted] for wanted in (True, False))
-    whole = sensitivity(mud, method)
-    return MethodReport(
-        groups={
-            name: {each: repeatability(members, method, each) for each in COEFFICIENTS}
-            for name, members in groups.items()
+def _method_summary(logs: Sequence[EvaluatedLog], estimates: DataFrame) -> Summary:
+    recorded = estimates[estimates["disturbance"] == RECORDED]
+    in_mud = recorded["in_mud"].astype(bool)
+    mud, groups = recorded[in_mud], members_of(recorded)
+    changes = disturbed_values(estimates[estimates["in_mud"].astype(bool)])
+    by_group = {name: sensitivity(changes[changes["group"] == name]) for name in groups}
+    settings = {"delay_s": DELAY_S, "missing_fraction": MISSING_ROWS, "seeds": SEEDS}
+    return {
+        "groups": {
+            group: {name: _repeatability(own[own["coefficient"] == name]) for name in COEFFICIENTS}
+            for group, own in groups.items()
         },
-        separation=separations(groups, method),
-        left_right=agreements(flipper_pairs(mud, method)),
-        air=_stride_counts(air, method),
-        mud=_stride_counts(mud, method),
-        contradictions={"k_e": contradictions(mud, method)},
-        sensitivity=SensitivityReport(
-            whole.current_late,
-            whole.current_early,
-            whole.rows_missing,
-            {name: sensitivity(members, method) for name, members in groups.items()},
-        ),
-    )
+        "separation": _separations(groups),
+        "left_right": agreements(flipper_pairs(mud)),
+        "air": _stride_counts([log.name for log in logs if not log.in_mud], recorded[~in_mud]),
+        "mud": _stride_counts([log.name for log in logs if log.in_mud], mud),
+        "contradictions": {"k_e": contradictions(mud)},
+        "sensitivity": sensitivity(changes) | {"groups": by_group} | settings,
+    }
 
 
-def strokes_of(trials: Sequence[LabTrial], method: Method, name: str) -> list[Strokes]:
-    """Return one coefficient's estimates of each trial on a fixed base."""
-    return [estimates_of(strokes, name) for trial in trials if trial.fixed_base for strokes in trial.strokes(method)]
+def _repeatability(own: DataFrame) -> dict[str, Any]:
+    """Return the counts over all strides, and the rest over trials on a fixed base."""
+    return repeatability(strokes_of(own)) | count_kinds(own)
 
 
-def repeatability(trials: Sequence[LabTrial], method: Method, name: str) -> Repeatability:
-    strokes = strokes_of(trials, method, name)
-    counts = count_estimates(each for trial in trials for each in estimates_of(trial.replays[method].recorded, name))
-    first, later = [each.value for each in first_values(strokes)], later_levels(strokes)
-    between_trials, between_strokes = scatter_between_trials(strokes), scatter_between_strokes(strokes)
-    return Repeatability(
-        values=counts.values,
-        bounds=counts.bounds,
-        invalid=counts.invalid,
-        first_cv=_rounded(coefficient_of_variation(first)),
-        later_cv=_rounded(coefficient_of_variation(later)),
-        chi=_rounded(between_trials.joined(between_strokes).chi),
-        chi_between_trials=_rounded(between_trials.chi),
-        chi_between_strokes=_rounded(between_strokes.chi),
-        n=len(first),
-        n_later=len(later),
-        first_mean=round(float(np.mean(first))) if first else None,
-    )
-
-
-def separations(groups: Groups, method: Method) -> list[Separation]:
+def _separations(groups: Mapping[str, DataFrame]) -> list[dict[str, Any]]:
+    """Compare the first strokes of each two groups, the first group minus the second."""
+    firsts = {name: first_values(strokes_of(own)) for name, own in groups.items()}
     found = []
-    for one, other in combinations(groups, 2):
+    for one, other in combinations(firsts, 2):
         for name in COEFFICIENTS:
-            values = [
-                [e.value for e in first_values(strokes_of(groups[group], method, name))] for group in (one, other)
-            ]
+            values = [firsts[group].loc[firsts[group]["coefficient"] == name, "value"] for group in (one, other)]
             distance = separation(*values)
             if distance is not None:
-                counts = (len(values[0]), len(values[1]))
-                found.append(Separation((one, other), name, round(distance, 4), counts))
+                counts = [len(each) for each in values]
+                found.append(
+                    {"groups": [one, other], "coefficient": name, "pooled_sd": round(distance, 4), "n": counts}
+                )
     return found
 
 
-def _stride_counts(trials: Sequence[LabTrial], method: Method) -> StrideCounts:
-    strides = [stride for trial in trials for stride in trial.replays[method].recorded]
-    counts = {name: count_estimates(estimates_of(strides, name)) for name in COEFFICIENTS}
-    return StrideCounts([trial.name for trial in trials], len(strides), counts)
+def _stride_counts(names: Sequence[str], recorded: DataFrame) -> dict[str, Any]:
+    counts = {name: count_kinds(recorded[recorded["coefficient"] == name]) for name in COEFFICIENTS}
+    return {"logs": names, "strides": len(recorded) // len(COEFFICIENTS), **counts}
 
 
-def _evaluated_log(trial: LabTrial, group: str | None) -> EvaluatedLog:
-    return EvaluatedLog(
-        name=trial.name,
-        group=group,
-        flippers=trial.flippers,
-        fixed_base=trial.fixed_base,
-        in_mud=trial.in_mud,
-        strides=len(trial.replays[METHODS[0]].recorded),
-        findings=trial.findings,
+# tables for people
+
+
+def tables_of(summary: Summary) -> list[Table]:
+    """Return the tables of every method, and those of the logs."""
+    methods = {METHODS[0]: summary} | summary["methods"]
+    tables = [table for method, own in methods.items() if summary["logs"] for table in _method_tables(method, own)]
+    refused = [each._asdict() for each in summary["refused"]]
+    findings = [{"log": log["name"], "finding": each} for log in summary["logs"] for each in log["findings"]]
+    logs = [log | {"findings": len(log["findings"])} for log in summary["logs"]]
+    about_logs = {"Logs": logs, "Findings": findings, "Not evaluated": refused}
+    return tables + [
+        Table(title.lower(), title, {}, DataFrame(rows), "Logs") for title, rows in about_logs.items() if rows
+    ]
+
+
+def _method_tables(method: str, summary: Summary) -> list[Table]:
+    groups = DataFrame(
+        [{"group": group, "": name} | row for group, own in summary["groups"].items() for name, row in own.items()]
     )
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 4)
+    counts = [
+        {"": f"in {where}", "logs": len(own["logs"]), "strides": own["strides"], "coefficient": name} | own[name]
+        for where in ("mud", "air")
+        for own in (summary[where],)
+        for name in COEFFICIENTS
+    ]
+    agreement = [{"": name, "median of |difference| / error": row["median"], "strides": row["n"]}
+                 for name, row in summary["left_right"].items()]  # fmt: skip
+    effects = {"all in mud": summary["sensitivity"]} | summary["sensitivity"]["groups"]
+    disturbed = [
+        {"group": group, "": name, "disturbance": run.replace("_", " ")} | own[run][name]
+        for group, own in effects.items()
+        for run in dict(DISTURBED)
+        for name in COEFFICIENTS
+        if own[run][name]["n"] + own[run][name]["lost"]
+    ]
+    disturbed_title = (
+        f"Disturbed over recorded values (currents {1000.0 * DELAY_S:g} ms late or early), and the fraction that moved "
+        f"by more than {MOVED:g} claimed errors with {100.0 * MISSING_ROWS:g} % of the rows missing"
+    )
+    tables = {
+        "Repeatability": groups.drop(columns=["n_later"], errors="ignore"),
+        "Separation of first strokes, in pooled standard deviations": DataFrame(summary["separation"]),
+        "Left against right": DataFrame(agreement),
+        "Values and bounds": DataFrame(counts),
+        disturbed_title: DataFrame(disturbed),
+        "Bounds on k_e that contradict a neighbouring stride": DataFrame([summary["contradictions"]["k_e"]]),
+    }
+    section = f"Method {method}"
+    return [
+        Table(f"{method} {title}", f"{section}: {title}", {"first_mean": "N/m³"}, rows.rename(columns=HEADS), section)
+        for title, rows in tables.items()
+        if len(rows)
+    ]

@@ -19,9 +19,9 @@ from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.lease import TAKEN_OVER
-from firmware_host.log.log_folder import run_files
 from logs.files.log_error import LogError
 from logs.files.log_reader import Log, read_logs
+from logs.files.stored_logs import run_files
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 LEASE_S = 2.0  # while torque may be on

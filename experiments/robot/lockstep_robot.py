@@ -62,7 +62,7 @@ class LockstepRobot:
 
     def record(self, from_s: float, to_s: float) -> Log:
         assert self._log is not None
-        if self._recorder.writer_alive:
+        if self._recorder.is_open:
             self._recorder.flush()
         return cut_log(read_log(self._log), from_s, to_s)
 
@@ -76,7 +76,7 @@ class LockstepRobot:
         return [copy]
 
     def close(self) -> None:
-        if self._recorder.writer_alive:
+        if self._recorder.is_open:
             self._methods["disarm"]({}, CALLER)
             self.lockstep.run_for(0.1)
             self._recorder.close()

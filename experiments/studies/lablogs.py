@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Annotated
 
 from experiments.lablogs import plots
-from experiments.lablogs.lab_trial import LabTrial, Refusal, read_trial
-from experiments.lablogs.log_choice import GroupRule, Paths, find_logs, group_of, group_trials, matches, parse_rule
-from experiments.lablogs.report import report_of
-from experiments.lablogs.tables import DEFINITIONS, FIGURES, tables_of
+from experiments.lablogs.estimates import EvaluatedLog, Refusal, join_estimates, read_log
+from experiments.lablogs.log_choice import GroupRule, Paths, find_logs, group_of, matches, parse_rule
+from experiments.lablogs.report import DEFINITIONS, summary_of, tables_of
 from experiments.study.option import Option, OptionError
 from experiments.study.result import Figure, Result
 from experiments.study.session import Ending
@@ -21,8 +20,12 @@ from experiments.study.trials import Trials
 from firmware_host.configuration.configuration import CaptureAxis
 from logs.lab.body_track import VERTICAL_AXIS
 
-TITLE = "Estimates from real logs"
-FIGURE_SECTION = "Figures"
+FIGURES = {
+    plots.draw_strokes: "k_s by stroke and trial, with claimed errors.",
+    plots.draw_scatter: "Scatter over claimed error of first and of later strokes, next to the normal distribution.",
+    plots.draw_left_right: "The left against the right flipper in walks, with claimed errors.",
+    plots.draw_sensitivity: "Disturbed over recorded values.",
+}
 
 
 def study(
@@ -53,29 +56,24 @@ def study(
     Sensitivity: the same logs with currents 5 ms late or early, and with 30 percent of the rows missing.
     """
     logs = _logs_in(folders, [*(rule.pattern for rule in group), *air])
-    read = trials.compute([partial(read_trial, paths, vertical=vertical) for paths in logs])
+    read = trials.compute([partial(read_log, paths, vertical=vertical) for paths in logs])
     refused = [each for each in read if isinstance(each, Refusal)]
-    measured = [each for each in read if isinstance(each, LabTrial)]
+    measured = [each for each in read if isinstance(each, EvaluatedLog)]
     if air:
-        in_air = [any(matches(each.name, pattern) for pattern in air) for each in measured]
-        measured = [each._replace(in_mud=not dry) for each, dry in zip(measured, in_air, strict=True)]
-    grouped = [(each, group_of(each.name, group)) for each in measured]
-    groups = group_trials(grouped)
-    report = report_of(grouped, groups, refused)
-    mud = [each for each in measured if each.in_mud]
-    draw = {
-        "strokes": partial(plots.draw_strokes, groups),
-        "scatter": partial(plots.draw_scatter, groups),
-        "left_right": partial(plots.draw_left_right, mud),
-        "sensitivity": partial(plots.draw_sensitivity, mud),
-    }
+        measured = [log._replace(in_mud=not any(matches(log.name, each) for each in air)) for log in measured]
+    groups = [group_of(log.name, group) for log in measured]
+    estimates = join_estimates(measured, groups)
+    summary = summary_of(measured, groups, estimates, refused)
     return Result(
-        tables=tables_of(report),
-        figures=[Figure(name, caption, draw[name], FIGURE_SECTION) for name, caption in FIGURES.items()],
-        summary=report,
-        title=TITLE,
+        tables=tables_of(summary),
+        figures=[
+            Figure(draw.__name__.removeprefix("draw_"), caption, partial(draw, estimates), "Figures")
+            for draw, caption in FIGURES.items()
+        ],
+        summary=summary,
+        title="Estimates from real logs",
         texts={"Definitions": DEFINITIONS},
-        ending=Ending.DONE if report.logs else Ending.UNHEALTHY,
+        ending=Ending.DONE if measured else Ending.UNHEALTHY,
     )
 
 

@@ -82,7 +82,8 @@ class DeclaredOption(NamedTuple):
 def declared_options(function: Callable[..., Any]) -> Iterator[DeclaredOption]:
     """Yield the options of a function: its annotated parameters, in their order.
 
-    They are read without `inspect`, which takes longer to import than `mudskipper status` to run.
+    They are read without `inspect`, which takes longer to import than `mudskipper status` to run. Raises TypeError
+    where annotations are text.
     """
     while hasattr(function, "__wrapped__"):
         function = function.__wrapped__
@@ -92,6 +93,11 @@ def declared_options(function: Callable[..., Any]) -> Iterator[DeclaredOption]:
     defaults = dict(zip(names[first:], positional, strict=False)) | (function.__kwdefaults__ or {})
     for index, name in enumerate(names):
         annotation: Any = function.__annotations__.get(name)
+        if isinstance(annotation, str):
+            raise TypeError(
+                f"{function.__module__}: its annotations are text and declare no options: remove 'from __future__ "
+                "import annotations'"
+            )
         if get_origin(annotation) is Annotated:
             kind, option = get_args(annotation)
             yield _declared(name, kind, option, defaults.get(name, REQUIRED), index >= code.co_argcount)

@@ -10,9 +10,10 @@ from experiments.robot.log_copies import cut_log
 from experiments.study.prompt import Operator
 from experiments.study.result import Figure
 from experiments.trackway.bench import LoggedTime
-from firmware_host.log.log_folder import first_path, run_files
+from firmware_host.log.log_folder import first_path
 from logs.files.log_error import LogError
 from logs.files.log_reader import read_log, read_logs
+from logs.files.stored_logs import run_files
 
 SECTION = "Walks against time"
 AGAINST_TIME = (

@@ -7,21 +7,16 @@ reports the rows that it refused.
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 from drivers.fault_injection.failure_table import FailureKind
 from drivers.fault_injection.failures import Failure, Failures, end_text
 from firmware_host.log.recorder import STAMP, LogReport, Recording
 from firmware_host.log.rows import EVENT, EVENT_KIND
-from firmware_host.ticker import Tick
+from firmware_host.ticker import Tick, Ticker
 
 STALL_S = 0.03  # eleven ticks: longer than a drive may be silent
 SLOW_TICK_S = 0.004  # one and a half ticks
 CLOCK_STEP_S = 3600.0
-
-
-class TickSource(Protocol):
-    def wait(self) -> Tick: ...
 
 
 class Stalls:
@@ -47,7 +42,7 @@ class FailingTicker:
 
     def __init__(
         self,
-        ticker: TickSource,
+        ticker: Ticker,
         failures: Failures,
         report: Callable[[float, str], None],
         sleep: Callable[[float], None] = time.sleep,
@@ -95,12 +90,6 @@ class FailingRecorder:
         self._failures = failures
         self._refused = self._unreported = 0
         self._loss_stamp_s = 0.0  # of the last refused row
-        self._count()
-
-    def _count(self) -> None:
-        failure = self._failures.of("log")
-        self.dropped = self._recorder.dropped + self._refused
-        self.writer_alive = self._recorder.writer_alive and (failure is None or failure.kind is not FailureKind.OFF)
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         failure = self._failures.of("log")
@@ -108,12 +97,9 @@ class FailingRecorder:
             self._refused += 1
             self._unreported += 1
             (self._loss_stamp_s,) = STAMP.unpack_from(payload)
-            taken = False
-        else:
-            self._report_loss()
-            taken = self._recorder.put(kind_index, payload)
-        self._count()
-        return taken
+            return False
+        self._report_loss()
+        return self._recorder.put(kind_index, payload)
 
     @property
     def path(self) -> Path | None:
@@ -121,11 +107,11 @@ class FailingRecorder:
 
     def report(self) -> LogReport:
         report, failure = self._recorder.report(), self._failures.of("log")
-        self._count()
+        report = report._replace(dropped=report.dropped + self._refused)
         if failure is None:
-            return report._replace(dropped=self.dropped)
-        problem = f"the log is failing on purpose: {failure.kind}"
-        return report._replace(alive=self.writer_alive, dropped=self.dropped, problem=problem)
+            return report
+        alive = report.alive and failure.kind is not FailureKind.OFF
+        return report._replace(alive=alive, problem=f"the log is failing on purpose: {failure.kind}")
 
     def _report_loss(self) -> None:
         """Report missing rows before the first row after them, or at the end, as the recorder itself does."""

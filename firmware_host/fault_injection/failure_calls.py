@@ -19,7 +19,6 @@ FORBIDDEN = "nothing may fail on purpose here: set failures.allowed = true in th
 OK, ALL = "ok", "all"
 
 Report = Callable[[float, str], None]
-Method = Callable[[dict[str, Any], Caller], Any]
 
 
 def failures_of(configuration: Configuration) -> Failures | None:
@@ -63,20 +62,17 @@ class FailureCalls:
 
     def fail(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """Make `component` fail as `kind` says for `for_s`; kind "ok" ends it. Returns the active failures."""
-        component, kind = params["component"], params["kind"]
+        component, kind, for_s = params["component"], params["kind"], float(params["for_s"])
         if kind == OK:
             self.end(component)
-        else:
-            self._begin(component, kind, float(params["for_s"]), str(caller))
-        return self.failing()
-
-    def _begin(self, component: str, kind: str, for_s: float, who: str) -> None:
+            return self.failing()
         refused = self._failures.refusal(component, kind, for_s)
         if refused:
             raise RefusedError(refused)
         now_s = self._clock()
-        self._report(now_s, begin_text(component, kind, for_s, who))  # first: it may be the log that fails
+        self._report(now_s, begin_text(component, kind, for_s, str(caller)))  # first: it may be the log that fails
         self._failures.begin(component, kind, now_s, for_s)
+        return self.failing()
 
     def end(self, component: str) -> None:
         if component != ALL and component not in self._failures.families:

@@ -14,7 +14,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from fcntl import LOCK_EX, LOCK_NB, LOCK_SH, flock
+from fcntl import LOCK_EX, LOCK_NB, flock
 from pathlib import Path
 from typing import Any
 
@@ -189,18 +189,6 @@ def lock_file(descriptor: int, path: Path) -> None:
     flock(descriptor, LOCK_EX | LOCK_NB)
     if not _is_at(path, descriptor):
         raise FileNotFoundError(errno.ENOENT, "was moved away", str(path))
-
-
-def is_being_written(path: Path) -> bool:
-    """Return whether a living process holds the lock of this log; False where this user cannot open it."""
-    try:
-        with path.open("rb") as file:
-            flock(file.fileno(), LOCK_SH | LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False
 
 
 def _is_at(path: Path, descriptor: int) -> bool:

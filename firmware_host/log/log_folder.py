@@ -28,11 +28,6 @@ class FreeSpace(NamedTuple):
     free_bytes: int
 
 
-def size_text(size: float) -> str:
-    """Format a number of bytes."""
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
-
-
 class DeletedLog(NamedTuple):
     name: str
     size: int  # bytes
@@ -71,16 +66,6 @@ def log_files(folder: Path, *subfolders: str) -> list[Path]:
     """Return the logs in these subfolders, the oldest first; a missing subfolder is empty."""
     found = [path for subfolder in subfolders for path in (folder / subfolder).glob(f"*{ENDING}")]
     return sorted(found, key=lambda path: path.name)
-
-
-def run_files(path: Path) -> list[Path]:
-    """Return all segments of the run that a log belongs to, wherever they are now, in their order."""
-    folder = path.parent.parent if path.parent.name in (ACTIVE, DONE, PRESERVED) else path.parent
-    run = re.sub(r"-\d{4,}$", "", path.stem)
-    segments = re.compile(re.escape(run) + r"-(\d{4,})")
-    files = log_files(folder, TOP, ACTIVE, DONE, PRESERVED)
-    found = {file.name: file for file in files if segments.fullmatch(file.stem)}
-    return [found[name] for name in sorted(found, key=lambda name: int(name.removesuffix(ENDING).rpartition("-")[2]))]
 
 
 def unfinished_files(folder: Path) -> list[Path]:
@@ -146,24 +131,6 @@ def _size(path: Path) -> int:
     return 0
 
 
-def preserve(path: Path, undo: bool = False) -> Path:
-    """Move a log to kept/, or back to done/. Raises OSError, and ValueError for a log that is elsewhere."""
-    source, target = (PRESERVED, DONE) if undo else (DONE, PRESERVED)
-    path = path.absolute()
-    if path.parent.name == target:
-        return path
-    at_the_top = not undo and path.suffix == ENDING and (path.parent / DONE).is_dir()  # as older versions left it
-    if path.parent.name != source and not at_the_top:
-        raise ValueError(f"{path}: only a log in {source}/ can be moved to {target}/")
-    moved = (path.parent if at_the_top else path.parent.parent) / target / path.name
-    if not path.exists():
-        raise FileNotFoundError(2, "No such file or directory", str(path))
-    if moved.exists():
-        raise ValueError(f"{moved} exists already")
-    move_file(path, moved)
-    return moved
-
-
 def move_file(path: Path, target: Path) -> None:
     """Rename a file and synchronises both folders."""
     make_folder(target.parent)
@@ -201,18 +168,3 @@ def synchronise_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def why_not_read(path: Path, problem: OSError) -> str:
-    """Say why a file cannot be read and, where permission is missing, what to do."""
-    if not isinstance(problem, PermissionError):
-        return f"{path}: {problem.strerror or problem}"
-    visible = next((parent for parent in (path, *path.absolute().parents) if os.path.exists(parent)), path)
-    group = f"the group of {visible}, then log in again"
-    return f"{path}: you may not read it: have root add you to {group}, or do this as root"
-
-
-def why_not_moved(path: Path, problem: OSError) -> str:
-    if not isinstance(problem, PermissionError):
-        return f"{path}: {problem.strerror or problem}"
-    return f"{path}: only the daemon's own user and root may move logs: do this as root"

@@ -16,7 +16,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from fcntl import F_SETPIPE_SZ, fcntl
@@ -55,18 +55,8 @@ HEALTHY = LogReport(  # until the writer reports
 )
 
 
-class StreamSettings(NamedTuple):
-    """What the writer needs to serve rows to subscribers."""
-
-    path: str  # of the socket
-    rights: Sequence[Any]  # those of the status socket, as JSON carries them
-
-
 class Recording(Protocol):
     """Takes the rows of a loop."""
-
-    dropped: int
-    writer_alive: bool
 
     @property
     def path(self) -> Path | None: ...
@@ -82,8 +72,6 @@ class NullRecorder:
     """Drops every row."""
 
     path: Path | None = None
-    dropped = 0
-    writer_alive = True
 
     def put(self, number: int, row: bytes) -> bool:
         return True
@@ -104,9 +92,10 @@ class Recorder:
         configuration_text: str,
         metadata: dict[str, str],
         parameters: LogParameters = ONE_FILE,
-        stream: StreamSettings | None = None,
+        stream: Mapping[str, Any] | None = None,
         rig: Rig = TWO_FLIPPERS,
     ) -> None:
+        """`stream` has the path and the rights of the socket on which the writer serves rows to subscribers."""
         self.path = path  # the file that is being written, or was written last
         self.dropped = 0
         self.writer_alive = True
@@ -127,8 +116,9 @@ class Recorder:
             "metadata": metadata,
             "parameters": asdict(parameters),
             "flippers": rig.flippers,
+            "stream": stream,
         }
-        self._send_opening(opening if stream is None else opening | {"stream": stream._asdict()})
+        self._send_opening(opening)
         os.set_blocking(self._pipe, False)
 
     def _send_opening(self, opening: dict[str, Any]) -> None:

@@ -54,7 +54,7 @@ class Subscriber:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
 
     def send(self, packet: bytes, rows: int) -> bool:
-        """Send a packet of so many rows, or count them as lost; return whether the subscriber is still there."""
+        """Send a packet of so many rows, or count them as lost; return false, and close, if the subscriber is gone."""
         report = pack_record(LOST, json.dumps({"rows": self._lost}).encode()) if self._lost else b""
         try:
             self._connection.send(report + packet)
@@ -62,6 +62,7 @@ class Subscriber:
             self._lost += rows
             return True
         except OSError:
+            self.close()
             return False
         self._lost = 0
         return True
@@ -103,13 +104,7 @@ class RowStream:
         if not self._subscribers:
             return
         for packet, count in packets(rows):
-            self._subscribers = [each for each in self._subscribers if self._send(each, packet, count)]
-
-    def _send(self, subscriber: Subscriber, packet: bytes, count: int) -> bool:
-        if subscriber.send(packet, count):
-            return True
-        subscriber.close()
-        return False
+            self._subscribers = [each for each in self._subscribers if each.send(packet, count)]
 
     def _accept(self) -> None:
         while self._file is not None and len(self._subscribers) < MOST_SUBSCRIBERS:

@@ -81,7 +81,7 @@ class RowKind:
         self._stamp_offset = stamps[0] if stamps else None
 
     def _align(self) -> tuple[list[str], list[int]]:
-        """Format of `struct` with padding, and each field's position in the row."""
+        """Return the formats of `struct` with padding, and each field's position in the row."""
         formats, offsets, end = [], [], 0
         for field in self.numbers:
             size = struct.calcsize(f"<{FORMAT_OF[field.kind]}")

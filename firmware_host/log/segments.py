@@ -122,10 +122,9 @@ class LogSegments:
             self._deleted.clear()
 
     def _opening_of(self, segment: int) -> dict[str, Any]:
-        text = self._opening["configuration_text"]
         metadata = {
             "segment": str(segment),
-            "configuration_sha256": sha256(text.encode()).hexdigest(),
+            "configuration_sha256": sha256(self._opening["configuration_text"].encode()).hexdigest(),
             "host": platform.node(),
             "kernel": f"{platform.release()} {platform.version()}",
             "started": datetime.now(UTC).isoformat(),
@@ -133,7 +132,6 @@ class LogSegments:
             "rest_full_s": f"{self._parameters.rest_full_s:g}",
         }
         return self._opening | {
-            "configuration_text": text,
             "metadata": self._opening["metadata"] | metadata,
             "wall_minus_monotonic_ns": time.time_ns() - time.monotonic_ns(),
         }

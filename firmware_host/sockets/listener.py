@@ -6,18 +6,10 @@ holder of the lease keeps its own.
 
 from collections import Counter
 from collections.abc import Callable
-from typing import NamedTuple
 
 from firmware_host.sockets.connection import Caller, Client
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.socket_file import SocketFile
-
-
-class Victim(NamedTuple):
-    """The client that makes room for a newcomer."""
-
-    descriptor: int
-    is_only: bool  # the only connection of its user
 
 
 class Listener:
@@ -47,8 +39,8 @@ class Listener:
     def is_full(self) -> bool:
         return len(self.clients) >= self.most_clients
 
-    def choose_victim(self, newcomer: Peer, is_protected: Callable[[Caller], bool]) -> Victim:
-        """Choose the longest silent client of the user with the most connections.
+    def choose_victim(self, newcomer: Peer, is_protected: Callable[[Caller], bool]) -> tuple[int, bool]:
+        """Return the longest silent client of the user with the most connections, and whether it is the only one.
 
         Of users with equally many, the less privileged one loses.
         """
@@ -58,7 +50,7 @@ class Listener:
             claim = (self._connections[uid] + (uid == newcomer.uid), -level, descriptor not in self.waiting)
             if claim > most and not is_protected(client.caller):
                 chosen, most = descriptor, claim
-        return Victim(chosen, is_only=most[0] == 1)
+        return chosen, most[0] == 1
 
     def next_to_answer(self, now_s: float) -> int | None:
         """Remove and return the first client in turn whose request rate permits an answer."""

@@ -143,10 +143,10 @@ class StatusSocket:
 
     def _make_room(self, listener: Listener, newcomer: Peer) -> bool:
         """Drop a client for a newcomer; returns whether its user has others."""
-        victim = listener.choose_victim(newcomer, self.is_protected)
+        descriptor, is_only = listener.choose_victim(newcomer, self.is_protected)
         self._made_room += 1
-        self._drop(victim.descriptor)
-        return not victim.is_only
+        self._drop(descriptor)
+        return not is_only
 
     def _handle_events(self, listener: Listener, descriptor: int, events: int) -> None:
         """Read from a client, unless an earlier request of it still waits; further data stays in the kernel."""

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 
 from control.records import FLIPPERS
 from firmware_host.log.log_file import ATTACHMENT, METADATA
-from firmware_host.log.log_folder import present_path, why_not_read
+from firmware_host.log.log_folder import present_path
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from logs.files.chunks import RECORD_HEAD, Record, Row, open_chunk, record_at, run_of_rows
 from logs.files.log_error import DAMAGE, LogError, Watch, unwatched
+from logs.files.stored_logs import why_not_read
 
 ADVICE = "'mudskipper log recover' saves its readable rows"
 OTHER_VERSION = "read it with the version of mudskipper that wrote it"

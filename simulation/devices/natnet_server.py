@@ -44,10 +44,10 @@ def encode_message(kind: int, payload: bytes) -> bytes:
     return pack("<HH", kind, len(payload)) + payload
 
 
-def encode_server_info(version: NatNetVersion, name: str = "Motive", group: str = "0.0.0.0", port: int = 1511) -> bytes:
-    payload = name.encode().ljust(256, b"\0") + pack("<4B4B", 3, 1, 0, 0, version.major, version.minor, 0, 0)
+def encode_server_info(version: NatNetVersion) -> bytes:
+    payload = b"Motive".ljust(256, b"\0") + pack("<4B4B", 3, 1, 0, 0, version.major, version.minor, 0, 0)
     if version >= (3, 0):
-        payload += pack("<QHB4s", TICKS_PER_S, port, group != "0.0.0.0", socket.inet_aton(group))
+        payload += pack("<QHB4s", TICKS_PER_S, 1511, False, bytes(4))  # not to a multicast group
     return encode_message(SERVER_INFO, payload)
 
 

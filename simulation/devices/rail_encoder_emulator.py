@@ -6,21 +6,19 @@ from simulation.devices.pseudo_terminal import PseudoTerminal
 
 
 class EmulatedRailEncoder:
-    """Owns the pseudo-terminal that the link `device` points to, and the zero of the count."""
+    """Owns the pseudo-terminal that the link `device` points to."""
 
-    def __init__(self, device: Path, metres_per_count: float, label: str = "", line_end: str = "\r\n") -> None:
+    def __init__(self, device: Path, metres_per_count: float, label: str = "") -> None:
         self.device = device
-        self.metres_per_count, self.label, self.line_end = metres_per_count, label, line_end
+        self.metres_per_count, self.label = metres_per_count, label
         self.lost_lines = 0  # that found the computer's buffer full
         self.plug_in()
 
-    def plug_in(self, position_m: float = 0.0) -> None:
-        """The counter starts at zero wherever it is."""
-        self._zero_m = position_m
+    def plug_in(self) -> None:
         self._terminal = PseudoTerminal(self.device)
 
     def send(self, position_m: float) -> None:
-        self.write(f"{self.label}{round((position_m - self._zero_m) / self.metres_per_count)}{self.line_end}".encode())
+        self.write(f"{self.label}{round(position_m / self.metres_per_count)}\r\n".encode())
 
     def write(self, data: bytes) -> None:
         """Write raw bytes, malformed lines included."""

@@ -61,13 +61,13 @@ class SimulatedDrive(ABC):
         self._boots_until_s = now_s + self.boot_s
 
     @property
-    @abstractmethod
     def energised(self) -> bool:
         """Whether it follows torque commands; may be set, as if another program had commanded it."""
+        raise NotImplementedError  # mypyc knows no abstract setter
 
     @energised.setter
-    @abstractmethod
-    def energised(self, energised: bool) -> None: ...
+    def energised(self, energised: bool) -> None:
+        raise NotImplementedError
 
     @property
     @abstractmethod

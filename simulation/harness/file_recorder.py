@@ -26,6 +26,7 @@ class FileRecorder(NullRecorder):
             "flippers": configuration.rig.flippers,
         }
         self.path = path
+        self.is_open = True
         self._file = LogFile(path, opening)
         self._rows: list[tuple[int, bytes]] = []
 
@@ -46,8 +47,8 @@ class FileRecorder(NullRecorder):
 
     def close(self, timeout_s: float = 0.0) -> bool:
         """Finish the file, however long that takes."""
-        if self.writer_alive:
+        if self.is_open:
             self._write()
             self.path = self._file.finish()
-            self.writer_alive = False
+            self.is_open = False
         return True

@@ -95,11 +95,11 @@ class Lockstep:
         wires = failing_ports({name: bus.open() for name, bus in self.buses.items()}, configuration.drive, failures)
         ports = make_drives(configuration.drive, wires, configuration.limits, configuration.watchdog_endpoints)
         pose: PoseSource = SimulatedPose(self.robot.plant, motion_capture, seed + 1)
-        rows, wall_clock = recorder or NullRecorder(), lambda: self.now_s + self.wall_offset_s
+        rows, wall_clock = recorder or NullRecorder(), self._wall_s
         if failures is not None:
             pose, rows = FailingPose(pose, failures), FailingRecorder(rows, failures)
             wall_clock = FailingClock(wall_clock, failures)
-        self.loop = Loop(configuration, ports, pose, rows, lambda: self.now_s, wall_clock, period_s)
+        self.loop = Loop(configuration, ports, pose, rows, self._now_s, wall_clock, period_s)
         self._can_fail = failures is not None
         self.failures = failures or Failures(configuration.bus)
         self._stalls = Stalls(self.failures)
@@ -109,6 +109,12 @@ class Lockstep:
     @property
     def now_s(self) -> float:
         return self.tick_number * self.period_s
+
+    def _now_s(self) -> float:  # a method, which a copy of the robot rebinds, unlike a lambda
+        return self.now_s
+
+    def _wall_s(self) -> float:
+        return self.now_s + self.wall_offset_s
 
     def step(self) -> None:
         missed = int(self._stalls.next_s() / self.period_s) + self.late_ticks

@@ -75,9 +75,9 @@ class Peer:
         self._locks.close()
 
 
-def track_of(waters: Sequence[str], length_m: float = COMPARTMENT_M) -> Track:
+def track_of(waters: Sequence[str]) -> Track:
     """Return compartments of the named water contents, one after the other."""
-    return Track([(length_m, MUDS[water]) for water in waters])
+    return Track([(COMPARTMENT_M, MUDS[water]) for water in waters])
 
 
 def end_with_parent() -> None:
@@ -122,11 +122,7 @@ def take_precedence() -> None:
             os.nice(NICENESS)
 
 
-def nothing() -> None:
-    """Announce nothing."""
-
-
-def simulate(configuration: Configuration, ground: Ground, seed: int, announce: Callable[[], None] = nothing) -> int:
+def simulate(configuration: Configuration, ground: Ground, seed: int, announce: Callable[[], object] = bool) -> int:
     """Simulate the robot until a signal ends the process; return the exit status.
 
     `announce` is called once the robot has its buses: another one that is simulated on them is left alone.

@@ -49,9 +49,6 @@ class Stone:
             return depth_m - self.top_m
         return position_m - self.start_m if face is Face.REAR else self.end_m - position_m
 
-    def nearest_face(self, position_m: float, depth_m: float) -> Face:
-        return min(Face, key=lambda face: self.penetration_m(face, position_m, depth_m))
-
 
 class Push(NamedTuple):
     """The force of a stone on a plate's lower edge."""
@@ -115,4 +112,5 @@ class StoneContact:
             return
         for stone in self.stones:
             if stone.contains(position_m, depth_m):
-                self._touched = (stone, stone.nearest_face(position_m, depth_m))
+                nearest = min(Face, key=lambda face: stone.penetration_m(face, position_m, depth_m))
+                self._touched = (stone, nearest)

@@ -11,10 +11,11 @@ and its height along
     n = (cos α, -sin α cos β, -sin α sin β)    r = (sin α, cos α cos β, cos α sin β)    s = (0, -sin β, cos β)
 """
 
-from math import ceil, cos, fsum, sin
+from math import ceil, cos, fsum
 from typing import NamedTuple
 
 from control.geometry import FlipperGeometry
+from simulation.mud.carriage import plate_directions
 from simulation.mud.clay import Clay, rate_factor
 from simulation.mud.flipper_contact import plate_size
 from simulation.mud.mud_springs import SIDEWAYS_YIELD_M
@@ -22,8 +23,6 @@ from simulation.mud.plate_contact import PlateContact
 from simulation.mud.rigid_plate import Attitude, Twist, lowest_point_m
 
 STEP_S = 0.0005
-
-Vector = tuple[float, float, float]
 
 
 class LoadCurve(NamedTuple):
@@ -45,11 +44,10 @@ class LoadCell:
     def __init__(
         self, clay: Clay, geometry: FlipperGeometry, sweep_rad: float, adduction_rad: float, relaxation: float = 0.0
     ) -> None:
-        sa, ca, sb, cb = sin(sweep_rad), cos(sweep_rad), sin(adduction_rad), cos(adduction_rad)
-        self.axes: tuple[Vector, Vector, Vector] = ((ca, -sa * cb, -sa * sb), (sa, ca * cb, ca * sb), (0.0, -sb, cb))
+        self.axes = plate_directions(sweep_rad, adduction_rad)
         self.clay = clay
         self.plate = PlateContact(plate_size(geometry), relaxation)
-        self._upright = Attitude(0.0, -ca * sb, cb)
+        self._upright = Attitude(0.0, -self.axes[1][2], self.axes[2][2])
         self.clear_m = -lowest_point_m(self._upright, self.plate.size)  # depth at which the plate is just out
         self.reset()
 

@@ -89,14 +89,14 @@ class World(NamedTuple):
 def restore_lease(lease: Lease, memory: LeaseMemory) -> None:
     lease.reset()
     if memory.holder is not None:
-        lease._holder, lease._until_s = CALLERS[memory.holder], NOW_S + memory.remaining_s
+        lease.holder, lease.until_s = CALLERS[memory.holder], NOW_S + memory.remaining_s
     lease._lost = memory.lost
     lease._ousted = {CALLERS[each]: by for each, by in memory.ousted}
 
 
 def lease_memory(lease: Lease, now_s: float) -> LeaseMemory:
     holder = None if lease.holder is None else OPERATORS[str(lease.holder)]
-    remaining_s = max(lease._until_s - now_s, 0.0) if holder is not None and not lease._lost else 0.0
+    remaining_s = max(lease.until_s - now_s, 0.0) if holder is not None and not lease._lost else 0.0
     ousted = tuple(sorted((OPERATORS[str(each)], by) for each, by in lease._ousted.items()))
     return LeaseMemory(holder, remaining_s, lease._lost, ousted)
 

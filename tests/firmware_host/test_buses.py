@@ -16,7 +16,6 @@ import pytest
 
 from control.modes import Mode, Request
 from drivers.can.bus_lock import BusRole
-from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockPort
 from drivers.can.port_health import BusState
 from drivers.can.reopening_port import RETRY_S, NotOpenError, ReopeningPort
@@ -37,9 +36,23 @@ CAN0 = BusParameters("socketcan", "can0")
 TICKS_A_SECOND = 380
 
 
+def refuse_with(problem: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no port open."""
+
+    def refuse(*arguments: object, **options: object) -> None:
+        raise problem
+
+    monkeypatch.setattr(buses, "open_port", refuse)
+
+
+IN_A_LIBRARY = can.CanInitializationError("could not create serial device")
+IN_A_LIBRARY.__cause__ = FileNotFoundError(errno.ENOENT, "No such file or directory")
+
+
 @pytest.mark.parametrize(
     ("problem", "words"),
     [
+        (IN_A_LIBRARY, "there is no such device"),
         (OSError(errno.ENODEV, "No such device"), "there is no such interface"),
         (OSError(errno.ENOENT, "could not open port /dev/ttyACM0"), "there is no such device"),
         (PermissionError(errno.EACCES, "could not open port"), "this user may not use it"),
@@ -51,26 +64,11 @@ TICKS_A_SECOND = 380
 def test_the_error_of_a_bus_that_does_not_open_names_bus_and_cause(
     problem: Exception, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*arguments: object, **options: object) -> None:
-        raise problem
-
-    monkeypatch.setattr(buses, "open_port", refuse)
+    refuse_with(problem, monkeypatch)
     with pytest.raises(BusError) as caught:
         open_bus("left", CAN0)
     assert str(caught.value).startswith(f"bus.left (socketcan can0) does not open: {words}")
     assert "\n" not in str(caught.value)
-
-
-def test_the_operating_system_s_error_is_found_in_that_of_a_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object, **options: object) -> None:
-        try:
-            raise FileNotFoundError(errno.ENOENT, "No such file or directory")
-        except FileNotFoundError as problem:
-            raise can.CanInitializationError("could not create serial device") from problem
-
-    monkeypatch.setattr(buses, "open_port", refuse)
-    with pytest.raises(BusError, match="there is no such device"):
-        open_bus("left", CAN0)
 
 
 class Opened:
@@ -96,10 +94,7 @@ def test_when_one_bus_does_not_open_the_others_are_closed(monkeypatch: pytest.Mo
 
 
 def test_a_missing_bus_that_is_waited_for_is_off_and_reports_its_cause(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object, **options: object) -> None:
-        raise OSError(errno.ENODEV, "No such device")
-
-    monkeypatch.setattr(buses, "open_port", refuse)
+    refuse_with(OSError(errno.ENODEV, "No such device"), monkeypatch)
     ports = reopening_ports({"left": CAN0}, wait=True)
     assert ports["left"].state is BusState.OFF
     assert "no such interface" in ports["left"].last_error
@@ -191,15 +186,6 @@ def test_no_bus_is_opened_while_torque_is_on(robot: Lockstep) -> None:
     plug.run(robot, 0.5)
     assert robot.loop.mode is Mode.HOLD
     assert tried == []
-
-
-def test_a_frame_that_was_never_sent_is_counted(robot: Lockstep) -> None:
-    plug = Plug(robot)
-    plug.pull()
-    plug.run(robot, 2.0)
-    before = plug.port.failed_sends
-    plug.port.send(Frame(1, b""))
-    assert plug.port.failed_sends == before + 1
 
 
 @pytest.mark.parametrize("wait", [True, False])

@@ -55,12 +55,6 @@ def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lo
     assert robot.loop.events.notice == ""  # a notice would report flippers in the mud
 
 
-def test_without_a_request_the_shutdown_does_nothing(robot: Lockstep) -> None:
-    assert not Shutdown().step(robot.loop, robot.now_s)
-    robot.run_for(0.1)
-    assert robot.loop.mode is Mode.HOLD
-
-
 def test_a_shutdown_waits_for_the_last_drive_to_be_idle(robot: Lockstep) -> None:
     lose_first_idle_requests(robot, ["left", "right"], lost=3)
     shutdown = Shutdown()

@@ -173,10 +173,6 @@ def test_an_event_is_reported_once(bench: Bench, happen: Callable[[Bench], None]
     assert bench.tick() == []
 
 
-def test_a_torque_that_is_not_finite_is_a_fault(bench: Bench) -> None:
-    assert reported(bench.tick(sent=LimitedTorques(NO_TORQUE, True, False))) == [("torque_not_finite", "")]
-
-
 def test_a_drive_that_does_not_arm_within_two_seconds_is_a_fault_while_arming(bench: Bench) -> None:
     ticks = 0
     while not (found := bench.tick(Mode.ARMING, bench.states(2, closed_loop=False))):
@@ -225,10 +221,6 @@ def test_a_duplicate_node_id_is_reported_while_it_lasts(bench: Bench) -> None:
 
 
 # pose
-
-
-def test_a_pose_that_was_never_measured_is_no_fault(bench: Bench) -> None:
-    assert not any(bench.tick() for _ in range(100))
 
 
 def test_a_lost_pose_is_reported_until_it_returns_or_is_forgotten(bench: Bench) -> None:

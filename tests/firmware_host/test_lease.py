@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import pytest
+
 from firmware_host.lease import Lease
 
 HALF_S = 0.5
+
+
+@pytest.fixture
+def lease() -> Lease:
+    """Return a lease that Anna holds from 10.0 s to 10.5 s."""
+    lease = Lease()
+    lease.renew("anna", 10.0, HALF_S)
+    return lease
 
 
 def test_without_a_lease_nothing_is_lost() -> None:
@@ -30,17 +40,13 @@ def test_a_renewal_replaces_the_earlier_deadline() -> None:
     assert not lease.lost(11.5) and lease.lost(11.51)
 
 
-def test_a_late_renewal_does_not_restore_the_lease() -> None:
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
+def test_a_late_renewal_does_not_restore_the_lease(lease: Lease) -> None:
     refused = lease.renew("anna", 10.6, HALF_S)
     assert refused is not None and "anna has lost the lease" in refused
     assert lease.lost(10.7) and lease.lost(0.0) and not lease.held
 
 
-def test_a_holder_that_disconnects_loses_the_lease_at_once() -> None:
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
+def test_a_holder_that_disconnects_loses_the_lease_at_once(lease: Lease) -> None:
     lease.hang_up("ben")
     assert not lease.lost(10.1)
     lease.hang_up("anna")
@@ -56,18 +62,14 @@ def test_a_holder_may_disconnect_after_its_release() -> None:
     assert not lease.lost(1e9) and not lease.held
 
 
-def test_a_refused_program_neither_renews_nor_frees_the_lease() -> None:
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
+def test_a_refused_program_neither_renews_nor_frees_the_lease(lease: Lease) -> None:
     assert "0.4 s" in (lease.renew("ben", 10.1, HALF_S) or "")  # until it is free
     assert lease.release("ben") is not None
     assert lease.held and lease.lost(10.51)
 
 
-def test_a_lost_lease_is_freed_only_by_its_holder() -> None:
+def test_a_lost_lease_is_freed_only_by_its_holder(lease: Lease) -> None:
     """Otherwise a robot would move on after its program has died. The holder's release may be read after its end."""
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
     lease.hang_up("anna")
     assert lease.renew("ben", 10.1, HALF_S) is not None
     assert lease.release("ben") is not None
@@ -77,9 +79,7 @@ def test_a_lost_lease_is_freed_only_by_its_holder() -> None:
     assert lease.renew("ben", 10.2, HALF_S) is None
 
 
-def test_a_lease_that_runs_out_is_lost_from_the_update_on() -> None:
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
+def test_a_lease_that_runs_out_is_lost_from_the_update_on(lease: Lease) -> None:
     lease.update(10.5)
     assert lease.held and not lease.lost(10.5)
     lease.update(10.51)
@@ -97,9 +97,7 @@ def test_only_the_holder_moves_the_robot_if_there_is_one() -> None:
     assert lease.refusal("ben", 10.7) is None
 
 
-def test_an_ousted_program_is_refused_until_it_connects_again() -> None:
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
+def test_an_ousted_program_is_refused_until_it_connects_again(lease: Lease) -> None:
     assert lease.refusal("ben", 10.1, take_over=True) is None
     lease.oust("ben")
     assert not lease.held and not lease.lost(99.0)
@@ -114,8 +112,6 @@ def test_an_ousted_program_is_refused_until_it_connects_again() -> None:
     assert not lease.lost(99.0) and lease.renew("anna", 99.0, 1.0) is None
 
 
-def test_a_holder_cannot_oust_itself() -> None:
-    lease = Lease()
-    lease.renew("anna", 10.0, HALF_S)
+def test_a_holder_cannot_oust_itself(lease: Lease) -> None:
     lease.oust("anna")
     assert lease.held and lease.refusal("anna", 10.1) is None

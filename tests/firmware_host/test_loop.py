@@ -153,28 +153,6 @@ def test_clear_transmits_nothing_before_all_are_heard(configuration: Configurati
     assert [listener.receive() for listener in listeners] == [[], []]
 
 
-def test_nothing_undoes_a_disarm_of_the_same_tick(robot: Lockstep) -> None:
-    robot.loop.request(Request.DISARM, robot.now_s)
-    robot.loop.request(Request.WALK, robot.now_s, WalkOrder(0.03))
-    robot.step()
-    assert robot.loop.mode is Mode.IDLE
-
-
-def test_arming_counts_only_heartbeats_newer_than_the_request(robot: Lockstep) -> None:
-    robot.loop.request(Request.DISARM, robot.now_s)
-    robot.step()
-    robot.loop.request(Request.ARM, robot.now_s)
-    modes = []
-    for _ in range(5):
-        robot.step()
-        modes.append(robot.loop.mode)
-    assert modes == [Mode.ARMING] * 5  # the last heartbeats still report closed loop
-    assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 1.0)
-    assert len(energised_drives(robot)) == 4
-    robot.run_for(0.5)
-    assert robot.loop.mode is Mode.HOLD
-
-
 def test_a_stalled_loop_idles_the_drives(walked: dict[float, Lockstep]) -> None:
     robot = copy_of(walked[1.7])
     robot.tick_number += 200
@@ -233,16 +211,6 @@ def test_requests_that_do_not_fit_the_mode_are_refused_with_advice(configuration
     robot.walk(WalkOrder(0.03))
     robot.run_for(1.0)
     assert "stop" in (robot.loop.request(Request.WALK, robot.now_s, WalkOrder(0.03)) or "")
-
-
-def test_clearing_does_not_help_while_the_cause_lasts(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, FIRM)
-    robot.arm()
-    robot.robot.drives = same_for_all(robot.robot.drives[0])  # three drives are gone
-    assert robot.run_until(lambda: robot.loop.mode is Mode.FAULT, 0.2)
-    robot.loop.request(Request.CLEAR, robot.now_s)
-    robot.run_for(1.0)
-    assert robot.loop.mode is Mode.FAULT
 
 
 def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:

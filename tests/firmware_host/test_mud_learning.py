@@ -85,12 +85,6 @@ def test_a_fixed_depth_does_not_depend_on_the_mud(learning: MudLearning) -> None
     assert controller.gait.next_depth_m == 0.045
 
 
-def test_without_a_stride_nothing_is_learned(learning: MudLearning) -> None:
-    controller = FakeController(WalkOrder(0.03))
-    assert step(learning, controller) == ([], [])
-    assert learning.pop_faults() == []
-
-
 def test_only_the_latest_strides_are_stored_but_all_are_counted(learning: MudLearning) -> None:
     controller = FakeController(WalkOrder(0.03, adaptive=False))
     for index in range(STORED_STRIDES + 50):

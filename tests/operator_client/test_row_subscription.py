@@ -10,13 +10,11 @@ import pytest
 
 from firmware_host.log.row_stream import RowStream
 from firmware_host.log.rows import TICK, TICK_KIND
-from firmware_host.sockets.rights import Group, Peer, Rights
+from firmware_host.sockets.rights import Group, Rights
 from operator_client.live_rows import OPENING_S
 from operator_client.row_subscription import RETRY_S, RowSubscription
-from operator_client.status_client import NotPermittedError
 
 OWN = Rights(Group("own", os.getegid()), Group("own", os.getegid()), os.geteuid())
-READERS = Rights(Group("readers", 77777), Group("operators", 77778), 77779)
 
 
 @pytest.fixture
@@ -70,13 +68,3 @@ def test_a_daemon_with_too_many_subscribers_is_not_waited_for(path: Path) -> Non
         assert first.read(0.0, 0.0) == [] and first.problem == ""  # it waits in the queue
         assert second.read(0.0, 0.0) == [] and "no more subscribers" in second.problem
         assert first.read(0.0, OPENING_S + 1.0) == [] and "no more subscribers" in first.problem
-
-
-def test_a_user_without_the_right_to_read_is_refused_with_the_reason(path: Path) -> None:
-    stream = RowStream(path, READERS, {}, peer_of=lambda connection: Peer(1, 1, frozenset()))
-    rows = RowSubscription(path)
-    rows.read(0.0, 0.0)
-    publish(stream, 1)
-    with pytest.raises(NotPermittedError, match="readers"):
-        rows.read(0.0, 0.0)
-    stream.close()

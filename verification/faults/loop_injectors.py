@@ -41,7 +41,7 @@ def writer_reports(bench: FaultBench, joint: str, changes: Mapping[str, Any]) ->
 
 @once
 def writer_lost_rows(bench: FaultBench, joint: str) -> None:
-    bench.rows.dropped += 3
+    bench.rows.reported = bench.rows.reported._replace(dropped=bench.rows.reported.dropped + 3)
 
 
 @once

@@ -46,7 +46,7 @@ def record_walk(duration_s: float) -> list[Record]:
     return recorder.rows
 
 
-def repeated(rows: list[Record], times: int) -> Iterator[list[Record]]:
+def repeated(rows: list[Record], times: int) -> Iterator[Record]:
     """Yield the rows again and again, with continued tick numbers and times."""
     decoded = [(ROW_KINDS[number], number, ROW_KINDS[number].decode(row)) for number, row in rows]
     first, *_, last = (values for _, number, values in decoded if number == TICK_KIND)
@@ -54,11 +54,9 @@ def repeated(rows: list[Record], times: int) -> Iterator[list[Record]]:
     length_s = (last["stamp_s"] - first["stamp_s"]) * ticks / (ticks - 1)
     for turn in range(times):
         shifts = {"tick": turn * ticks, "stamp_s": turn * length_s, "t_start_s": turn * length_s}
-        yield [(number, kind.encode_named(**_shifted(values, shifts))) for kind, number, values in decoded]
-
-
-def _shifted(values: dict[str, Any], shifts: dict[str, float]) -> dict[str, Any]:
-    return values | {name: values[name] + shift for name, shift in shifts.items() if name in values}
+        for kind, number, values in decoded:
+            shifted = {name: values[name] + shift for name, shift in shifts.items() if name in values}
+            yield number, kind.encode_named(**values | shifted)
 
 
 def write_log(path: Path, rows: list[Record], times: int) -> int:
@@ -69,8 +67,8 @@ def write_log(path: Path, rows: list[Record], times: int) -> int:
         "metadata": {"robot": "repeated walk"},
     }
     log = LogFile(path, opening)
-    for part in repeated(rows, times):
-        log.write(part)
+    for row in repeated(rows, times):
+        log.write([row])
     log.finish()
     return log.rows
 

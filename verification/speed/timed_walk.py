@@ -110,7 +110,7 @@ class BareSockets:
 class TimedWalk:
     """Owns the walk, the bare sockets that carry as many frames, and the measured durations in seconds."""
 
-    def __init__(self, configuration: Configuration, wiring: dict[str, PortPair], recorder: Recording) -> None:
+    def __init__(self, configuration: Configuration, wiring: dict[str, PortPair], recorder: Recorder) -> None:
         self.walk = Lockstep(configuration, paper_track())
         self.recorder = recorder
         robot_ports = {name: robot for name, (robot, _) in wiring.items()}

@@ -15,7 +15,6 @@ from struct import pack
 
 from control.modes import Mode
 from drivers.can.frames import DATA_MAX_BYTES, Frame
-from drivers.can.mock_bus import MockPort
 from drivers.drive import FD, DriveParameters
 from drivers.drive_types import DEFAULT, type_of
 from firmware_host.computer.realtime import freeze_garbage
@@ -45,7 +44,7 @@ class ObservedRobot:
 
     def __init__(self, walk: Lockstep) -> None:
         self.walk = walk
-        self.nodes = [_open_third_node(walk, bus) for bus in walk.loop.configuration.bus]
+        self.nodes = [bus.open() for bus in walk.buses.values()]
 
     def step(self, with_drives: bool = True) -> tuple[list[Frame], list[Frame]]:
         """Step as the lockstep does; return the frames of the drives and those of the loop."""
@@ -169,13 +168,6 @@ def fuzz_in_mode(mode: Mode, frames: int, seed: int, drive: str = DEFAULT) -> Re
         "frames_sent": fuzzing.sent,
         "refused_by_the_gate": fuzzing.loop.drives.refused_commands,
     }
-
-
-def _open_third_node(walk: Lockstep, bus: str) -> MockPort:
-    """Open a third node on a bus of the loop."""
-    port = walk.loop.drives.ports[bus]
-    assert isinstance(port, MockPort)
-    return port.open_peer()
 
 
 def measure(folder: Path, *, frames: int = 1_000_000, seed: int = 1, drive: str = DEFAULT) -> Report:

@@ -90,30 +90,26 @@ class RandomOperator:
             return Call("clear", {})
         if mode == "idle":
             return Call("arm", {})
-        if mode == "hold":
-            return Call("disarm", {}) if draw < 0.05 else self._walk()
-        if mode == "walking" and draw < 0.05:
-            return Call("stop" if draw < 0.03 else "disarm", {})
-        return self.question()
-
-    def _walk(self) -> Call:
-        walk: dict[str, Any] = {"strides": self.chance.choice((0, 0, 0, 1, 5))}
-        if self.chance.random() < 0.3:
-            walk["depth_m"] = self.chance.choice(DEPTHS_M)
-        return Call("walk", walk)
+        if mode in ("hold", "walking") and draw < 0.05:
+            return Call("stop" if mode == "walking" and draw < 0.03 else "disarm", {})
+        if mode != "hold":
+            return self.question()
+        depth = {"depth_m": self.chance.choice(DEPTHS_M)} if self.chance.random() < 0.3 else {}
+        return Call("walk", {"strides": self.chance.choice((0, 0, 0, 1, 5))} | depth)
 
 
 class PatientRecorder(Recorder):
-    """Wait for room, since a loop without a clock is faster than any writer."""
+    """Waits for room, since a loop without a clock is faster than any writer."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._room = select.poll()
+        self._room.register(self._pipe, select.POLLOUT)
 
     def put(self, kind_index: int, payload: bytes) -> bool:
         if not self._room.poll(ROOM_MS):
             raise RuntimeError("the log's writer takes no row any more")
         return super().put(kind_index, payload)
-
-    def watch(self) -> None:
-        self._room = select.poll()
-        self._room.register(self._pipe, select.POLLOUT)
 
     def report(self) -> LogReport:
         """Omit the age of the writer's reports, which has another clock."""
@@ -131,7 +127,6 @@ class SoakedLoop:
         run = new_run_id("soak")
         metadata = {"robot": "soak", "run_id": run}
         self.recorder = PatientRecorder(first_path(self.logs, run), configuration.text, metadata, LOG)
-        self.recorder.watch()
         failures = Failures(configuration.bus, seed)
         self.robot = Lockstep(configuration, self._track(), seed, self.recorder, failures=failures)
         calls = OperatorCalls(self.robot.loop, [], self._now_s)

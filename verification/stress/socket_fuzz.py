@@ -2,8 +2,7 @@
 
 Each stream has a Unix connection of its own, of an operator, a reader, an unauthorised user or root, fifteen at a time;
 some arrive in pieces, some hang up at once. A stream starts with valid requests, which must be answered, and continues
-with bytes from verification.stress.fuzz_loop import fuzz
-from verification.stress.malformed_streams. A reference client next to them asks repeatedly and must be
+with what a hostile, broken or hasty client may send. A reference client next to them asks repeatedly and must be
 answered within one more tick than there are clients. Memory is that of the whole process with garbage collection off,
 as in the daemon.
 """
@@ -11,9 +10,10 @@ as in the daemon.
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgpack
 
@@ -30,7 +30,6 @@ from simulation.mud.track import Track
 from verification.benchmark import Report, evaluated, run_benchmark
 from verification.example_robot import load_example
 from verification.stress.fuzz_loop import fuzz
-from verification.stress.malformed_streams import Stream, next_stream
 from verification.stress.stream_client import StreamClient
 
 BAR_KIB = 1024.0
@@ -46,6 +45,76 @@ PEERS = (
     Peer(502, 1002, frozenset({1002})),
     Peer(503, 0, frozenset({0})),
 )
+
+METHODS = ("hello", "status", "strides", "map", "check", "arm", "walk", "stop", "disarm", "clear", "lease", "release")
+PARAMS = ("since", "strides", "depth_m", "for_s", "what")
+VALUES: tuple[Any, ...] = (
+    *(None, True, False, 0, 1, -1, 2**63, 2**64 - 1, -(2**63), 0.0, 0.02, 1e308, float("nan"), float("inf")),
+    *("", "x" * 900, "\ud800".encode("utf-8", "surrogatepass"), b"\x00\xff", [], [[]], {}, {"a": {"b": []}}),
+    *(msgpack.ExtType(7, b"abc"), msgpack.Timestamp(1, 2)),
+)
+HEADERS: tuple[bytes, ...] = (
+    *(b"\xdc\x20\x00", b"\xdd\x00\x00\x20\x00", b"\xde\x20\x00", b"\xdf\xff\xff\xff\xff", b"\x81\xa1a", b"\x94"),
+    *(b"\xdb\x00\x00\x10\x00", b"\xc9\x00\x00\x10\x00\x05", b"\xc6\xff\xff\xff\xff", b"\x94\x00\x01", b"\xc1"),
+)
+
+
+class Stream(NamedTuple):
+    kind: str
+    valid: int  # requests at its beginning, numbered from 1
+    pieces: list[bytes]  # as they may arrive
+
+
+def request(chance: Random) -> list[Any]:
+    names = chance.sample(PARAMS, chance.randint(0, 2))
+    params = {name: chance.choice((0, 1, 5, 0.02, 0.5, None)) for name in names}
+    return [0, chance.randrange(100, 2**32), chance.choice(METHODS), params]
+
+
+def requests(chance: Random, fewest: int, most: int) -> bytes:
+    return b"".join(msgpack.packb(request(chance)) for _ in range(chance.randint(fewest, most)))
+
+
+def malformed_values(chance: Random) -> bytes:
+    message = request(chance)
+    message[3] = {name: chance.choice(VALUES) for name in PARAMS}
+    if chance.random() < 0.3:
+        message[chance.randrange(4)] = chance.choice(VALUES)
+    if chance.random() < 0.1:
+        message.insert(chance.randrange(5), chance.choice(VALUES))
+    return bytes(msgpack.packb(message))
+
+
+def mutated(chance: Random) -> bytes:
+    """Replace, insert and remove bytes of requests."""
+    data = bytearray(requests(chance, 1, 8))
+    for _ in range(chance.randint(1, 5)):
+        index, removed, inserted = chance.randrange(len(data) + 1), *chance.choice(((1, 1), (0, 3), (3, 0)))
+        data[index : index + removed] = chance.randbytes(inserted)
+    return bytes(data)
+
+
+def truncated(chance: Random) -> bytes:
+    data = requests(chance, 1, 3)
+    return data[: chance.randrange(len(data))]
+
+
+KINDS: dict[str, Callable[[Random], bytes]] = {
+    "random": lambda chance: chance.randbytes(chance.randrange(300)),
+    "mutated": mutated,
+    "truncated": truncated,
+    "nested": lambda chance: (chance.choice(HEADERS) * chance.randint(1, 1500))[:6000] + requests(chance, 0, 1),
+    "malformed values": malformed_values,
+    "valid": lambda chance: b"",
+}
+
+
+def next_stream(chance: Random) -> Stream:
+    kind, valid = chance.choice(list(KINDS)), chance.choice((0, 0, 1, 1, 2, 4))
+    prefix = b"".join(msgpack.packb([0, number + 1, "hello", {}]) for number in range(valid))
+    data = prefix + KINDS[kind](chance)
+    cuts = sorted(chance.randrange(len(data) + 1) for _ in range(chance.choice((0, 0, 0, 0, 1, 2, 3))))
+    return Stream(kind, valid, [data[low:high] for low, high in zip([0, *cuts], [*cuts, len(data)], strict=True)])
 
 
 class Bench:
@@ -104,11 +173,20 @@ class Bench:
         for _ in range(LONGEST_BATCH_TICKS):
             for client in clients:
                 client.step()
-            if all(map(_is_done, clients, streams)):
+            if all(
+                client.closed or not (client.pieces or _unanswered(client, stream))
+                for client, stream in zip(clients, streams, strict=True)
+            ):
                 break
             self.tick()
         for client, stream in zip(clients, streams, strict=True):
-            self._count(client, stream)
+            self.kinds[stream.kind] += 1
+            self.answers += len(client.answers)
+            if not client.hurried:
+                self.valid += stream.valid
+                unanswered = _unanswered(client, stream)
+                self.bugs += [f"request {each} of a {stream.kind} stream is not answered" for each in unanswered]
+            client.close()
         while self.socket.counters["clients"] > 1:
             self.tick()
         return self.bugs[known:]
@@ -127,16 +205,6 @@ class Bench:
             self.tick()
         raise RuntimeError("the reference client is not answered any more")
 
-    def _count(self, client: StreamClient, stream: Stream) -> None:
-        self.kinds[stream.kind] += 1
-        self.answers += len(client.answers)
-        if not client.hurried:
-            self.valid += stream.valid
-            self.bugs += [
-                f"request {each} of a {stream.kind} stream is not answered" for each in _unanswered(client, stream)
-            ]
-        client.close()
-
     def close(self) -> None:
         self.reference.close()
         self.socket.close()
@@ -144,11 +212,6 @@ class Bench:
 
 def _unanswered(client: StreamClient, stream: Stream) -> set[int]:
     return set(range(1, stream.valid + 1)) - client.answers.keys()
-
-
-def _is_done(client: StreamClient, stream: Stream) -> bool:
-    """Return whether all is sent and answered, or the connection closed."""
-    return client.closed or not (client.pieces or _unanswered(client, stream))
 
 
 def measure(folder: Path, *, streams: int = 200_000, seed: int = 1) -> Report:

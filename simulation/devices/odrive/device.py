@@ -226,6 +226,9 @@ class SimulatedOdrive(SimulatedDrive):
         self._initializing = False
         return codec.HEARTBEAT.encode(errors, self.axis_state, 0, 0)
 
+    def _error(self) -> bytes:
+        return codec.GET_ERROR.encode(self.errors, self.disarm_reason)
+
     def _bus_voltage(self) -> bytes:
         return codec.GET_BUS_VOLTAGE_CURRENT.encode(self.parameters.bus_voltage_v, abs(self._current_a) * 0.1)
 
@@ -236,12 +239,12 @@ class SimulatedOdrive(SimulatedDrive):
         return codec.encode_address(self.parameters.node_id, int(self.parameters.serial_number or "0", 16))
 
     def _payload_functions(self) -> dict[Message, Callable[[], bytes]]:
-        """Return the encoder of each message that this firmware sends."""
+        """Return the encoder of each message that this firmware sends: methods, which a copy of the drive rebinds."""
         return {
             codec.GET_ENCODER_ESTIMATES: self._encoder,
             codec.GET_IQ: self._iq,
             codec.HEARTBEAT: self._heartbeat,
-            codec.GET_ERROR: lambda: codec.GET_ERROR.encode(self.errors, self.disarm_reason),
+            codec.GET_ERROR: self._error,
             codec.GET_TEMPERATURE: self._temperature,
             codec.GET_BUS_VOLTAGE_CURRENT: self._bus_voltage,
             codec.GET_VERSION: lambda: codec.GET_VERSION.encode(*VERSION_FIELDS),

@@ -95,6 +95,13 @@ class SimulatedOdrive05(SimulatedOdrive):
         motor, encoder, controller = (bool(self.errors & flag) for flag in parts)
         return codec05.HEARTBEAT.encode(self.errors, self.axis_state, motor, encoder, controller)
 
+    def _motor_error(self) -> bytes:
+        error = BUS_CURRENT_OUT_OF_RANGE if self.errors & codec05.ERROR_MOTOR else 0
+        return codec05.GET_MOTOR_ERROR.encode(error)
+
+    def _controller_error(self) -> bytes:
+        return codec05.GET_CONTROLLER_ERROR.encode(OVERSPEED if self.errors & codec05.ERROR_CONTROLLER else 0)
+
     def _payload_functions(self) -> dict[Message, Callable[[], bytes]]:
         return {
             codec.GET_ENCODER_ESTIMATES: self._encoder,
@@ -102,11 +109,7 @@ class SimulatedOdrive05(SimulatedOdrive):
             codec.GET_BUS_VOLTAGE_CURRENT: self._bus_voltage,
             codec05.HEARTBEAT: self._heartbeat,
             codec05.GET_ENCODER_COUNT: self._counts,
-            codec05.GET_MOTOR_ERROR: lambda: codec05.GET_MOTOR_ERROR.encode(
-                BUS_CURRENT_OUT_OF_RANGE if self.errors & codec05.ERROR_MOTOR else 0
-            ),
+            codec05.GET_MOTOR_ERROR: self._motor_error,
             codec05.GET_ENCODER_ERROR: lambda: codec05.GET_ENCODER_ERROR.encode(0),
-            codec05.GET_CONTROLLER_ERROR: lambda: codec05.GET_CONTROLLER_ERROR.encode(
-                OVERSPEED if self.errors & codec05.ERROR_CONTROLLER else 0
-            ),
+            codec05.GET_CONTROLLER_ERROR: self._controller_error,
         }

@@ -10,7 +10,7 @@ import pytest
 
 import mudskipper
 from command_line import exit_codes
-from experiments.lablogs.lab_trial import LabTrial, read_trial
+from experiments.lablogs.estimates import EvaluatedLog, read_log
 from firmware_host.configuration.loading import parse_configuration
 from logs.lab.lab_csv import read_lab_csv
 from logs.replay import Replay
@@ -103,8 +103,8 @@ def test_a_log_without_a_capture_has_no_vertical_axis(command: tuple[str, ...], 
 
 
 def test_lablogs_takes_the_vertical_axis_of_its_logs(z_up: Path) -> None:
-    trial = read_trial((z_up,), vertical="z")
-    assert isinstance(trial, LabTrial) and any("sinks by 61 mm" in finding for finding in trial.findings)
+    log = read_log((z_up,), vertical="z")
+    assert isinstance(log, EvaluatedLog) and any("sinks by 61 mm" in finding for finding in log.findings)
 
 
 def test_a_replay_takes_the_vertical_axis_of_its_configuration(z_up: Path, example_text: str) -> None:

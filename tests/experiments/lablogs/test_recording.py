@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from control.records import Phase
-from experiments.lablogs.lab_trial import LabTrial, read_trial
+from experiments.lablogs.estimates import DISTURBED, RECORDED, EvaluatedLog, read_log
 from experiments.lablogs.recording import LabRecording, OwnRecording, read_recording
 from firmware_host.configuration.configuration import Configuration
 from logs.lab.columns import PAPER_CONSTANT_NM_A
@@ -83,8 +83,13 @@ def test_a_log_of_this_project_is_replayed_and_can_be_disturbed(tmp_path: Path, 
     assert isinstance(recording, OwnRecording)
     assert recording.has_evidence_of_mud() and not recording.fixed_base
     assert repr(recording.estimate_strides("default")) == repr(strides)
-    trial = read_trial([path])
-    assert isinstance(trial, LabTrial)
-    disturbed = trial.replays["default"]
-    assert len(disturbed.current_late) == len(disturbed.rows_missing[0]) == len(strides)
-    assert repr(disturbed.current_late) != repr(strides) != repr(disturbed.rows_missing[0])
+    log = read_log([path])
+    assert isinstance(log, EvaluatedLog)
+    starts_s = {
+        run: rows["t_start_s"].tolist()
+        for run, rows in log.estimates[log.estimates["method"] == "default"].groupby(["disturbance", "seed"])
+    }
+    assert set(starts_s) == {(RECORDED, 0), *DISTURBED}
+    assert {len(each) for each in starts_s.values()} == {3 * len(strides)}
+    values = log.estimates.groupby("disturbance")["value"].sum()
+    assert len(set(values)) == 4  # each disturbance moves some

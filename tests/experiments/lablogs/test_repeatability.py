@@ -1,20 +1,20 @@
 """Known variations, scatters and separations are recovered from synthetic trials."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+from pandas import Series
 
 from control.records import Estimate
 from experiments.lablogs.repeatability import (
     coefficient_of_variation,
     first_values,
     later_levels,
+    repeatability,
     scatter_between_strokes,
     scatter_between_trials,
     separation,
 )
-from tests.experiments.lablogs.synthetic_trials import INVALID, make_bound, make_value
+from tests.experiments.lablogs.synthetic_trials import INVALID, k_s_strokes, make_bound, make_value
 
 LEVELS = (0.9, 1.0, 1.1)  # of three trials: a variation of exactly 10 %
 DECLINE = (1.0, 0.8, 0.7, 0.65, 0.6)  # of the strokes in one hole
@@ -38,66 +38,64 @@ def scattered_trials(claimed: float, trials: int = 60, strokes: int = 6) -> list
 
 
 def test_the_variation_of_first_strokes_is_the_sample_deviation_over_the_mean() -> None:
-    first = [each.value for each in first_values(declining_trials())]
+    first = first_values(k_s_strokes(declining_trials()))["value"]
     assert coefficient_of_variation(first) == pytest.approx(0.1)
     assert coefficient_of_variation(first[:1]) is None
 
 
 def test_bounds_and_invalid_first_strokes_are_no_values() -> None:
     trials = [[make_bound(9.0), make_value(1.0)], [INVALID], [], [make_value(2.0)]]
-    assert [each.value for each in first_values(trials)] == [2.0]
+    assert first_values(k_s_strokes(trials))["value"].tolist() == [2.0]
 
 
 def test_the_variation_of_later_strokes_is_free_of_their_decline() -> None:
-    levels = later_levels(declining_trials())
+    levels = later_levels(k_s_strokes(declining_trials()))
     assert coefficient_of_variation(levels) == pytest.approx(0.1)
     geometric_mean = np.prod(DECLINE[1:]) ** 0.25
-    assert levels == pytest.approx([level * geometric_mean for level in LEVELS])
+    assert levels.tolist() == pytest.approx([level * geometric_mean for level in LEVELS])
 
 
 def test_trials_of_different_lengths_are_compared_over_the_same_number_of_strokes() -> None:
-    levels = later_levels(declining_trials((5, 3, 4)))
-    assert levels == pytest.approx([level * (DECLINE[1] * DECLINE[2]) ** 0.5 for level in LEVELS])
+    levels = later_levels(k_s_strokes(declining_trials((5, 3, 4))))
+    assert levels.tolist() == pytest.approx([level * (DECLINE[1] * DECLINE[2]) ** 0.5 for level in LEVELS])
 
 
 def test_a_missing_later_stroke_does_not_lift_its_trial() -> None:
     trials = declining_trials()
     trials[0][4] = INVALID  # the weakest stroke of its hole
     trials[2][2] = make_bound(0.1)
-    assert coefficient_of_variation(later_levels(trials)) == pytest.approx(0.1)
+    assert coefficient_of_variation(later_levels(k_s_strokes(trials))) == pytest.approx(0.1)
 
 
 def test_trials_without_a_common_stroke_are_not_compared() -> None:
     trials = [[make_value(1.0), make_value(0.8), INVALID], [make_value(1.0), INVALID, make_value(0.6)]]
-    assert later_levels(trials) == []
-    assert later_levels([[make_value(1.0)], [make_value(1.1)]]) == []
+    assert later_levels(k_s_strokes(trials)).empty
+    assert later_levels(k_s_strokes([[make_value(1.0)], [make_value(1.1)]])).empty
 
 
 @pytest.mark.parametrize(("claimed", "chi"), [(0.05, 1.0), (0.025, 2.0), (0.1, 0.5)])
 def test_chi_is_the_true_scatter_over_the_claimed_one(claimed: float, chi: float) -> None:
-    trials = scattered_trials(claimed)
+    trials = k_s_strokes(scattered_trials(claimed))
     between_trials, between_strokes = scatter_between_trials(trials), scatter_between_strokes(trials)
     assert between_trials.chi == pytest.approx(chi, rel=0.2)  # 59 degrees of freedom: 9 % is one standard deviation
     assert between_strokes.chi == pytest.approx(chi, rel=0.1)
     assert between_trials.dof == 59
     assert between_strokes.dof == 60 * 6 - 60 - 6 + 1
-    joined = between_trials.joined(between_strokes)
-    assert joined.dof == between_trials.dof + between_strokes.dof
-    assert joined.chi == pytest.approx(chi, rel=0.1)
+    assert repeatability(trials)["chi"] == pytest.approx(chi, rel=0.1)
 
 
 def test_a_common_decline_is_no_scatter_between_strokes() -> None:
-    assert scatter_between_strokes(declining_trials()).chi == pytest.approx(0.0, abs=1e-9)
+    assert scatter_between_strokes(k_s_strokes(declining_trials())).chi == pytest.approx(0.0, abs=1e-9)
 
 
 def test_chi_is_unknown_without_repetitions() -> None:
-    assert scatter_between_trials([[make_value(1.0)]]).chi is None
-    assert scatter_between_strokes([[make_value(1.0), make_value(0.8), make_value(0.7)]]).chi is None
-    assert scatter_between_strokes([]).chi is None
+    assert scatter_between_trials(k_s_strokes([[make_value(1.0)]])).chi is None
+    assert scatter_between_strokes(k_s_strokes([[make_value(1.0), make_value(0.8), make_value(0.7)]])).chi is None
+    assert scatter_between_strokes(k_s_strokes([])).chi is None
 
 
 def test_separation_is_the_difference_in_pooled_deviations() -> None:
-    soft, firm = [0.9, 1.0, 1.1], [1.7, 2.0, 2.3]  # deviations 0.1 and 0.3
+    soft, firm = Series([0.9, 1.0, 1.1]), Series([1.7, 2.0, 2.3])  # deviations 0.1 and 0.3
     pooled = ((0.1**2 + 0.3**2) / 2.0) ** 0.5
     assert separation(firm, soft) == pytest.approx(1.0 / pooled)
     assert separation(soft, firm) == pytest.approx(-1.0 / pooled)

@@ -16,9 +16,10 @@ from experiments.robot.log_copies import copy_since
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_file import LogFile
-from firmware_host.log.log_folder import ACTIVE, first_path, run_files, segment_path
+from firmware_host.log.log_folder import ACTIVE, first_path, segment_path
 from firmware_host.log.recorder import Recorder
 from logs.files.log_reader import read_log, read_logs
+from logs.files.stored_logs import run_files
 from logs.replay import replay_files
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.track import paper_track
@@ -53,18 +54,6 @@ def test_a_segment_that_ends_before_the_experiment_began_is_left_out(
     assert all(read_log(copy).complete for copy in copies)
     if copies:
         assert len(read_logs(copies).ticks) == kept * SEGMENT_TICKS
-
-
-def test_of_a_run_that_ended_before_the_experiment_began_nothing_is_copied(
-    segments: list[Path], tmp_path: Path
-) -> None:
-    assert copy_since(segments[:4], 4.0, tmp_path) == []
-
-
-def test_a_segment_that_has_only_just_begun_hides_none_before_it(segments: list[Path], tmp_path: Path) -> None:
-    LogFile(segment_path(segments[0].parent.parent / ACTIVE / segments[0].name, 5), OPENING).flush()
-    logs = run_files(segments[-1])
-    assert [log.name for log in copy_since(logs, 3.5, tmp_path)] == [log.name for log in logs[3:]]
 
 
 def test_a_full_disk_leaves_no_copy_that_is_cut(

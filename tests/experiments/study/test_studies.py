@@ -91,3 +91,11 @@ def test_an_unknown_study_is_refused_with_those_that_exist(folder: Path, capsys:
         main(["experiment", "stroke-lenght"])
     assert ended.value.code == exit_codes.USAGE
     assert NAME in capsys.readouterr().err
+
+
+def test_a_study_whose_annotations_are_text_is_refused(folder: Path) -> None:
+    """Its options would vanish without a word."""
+    path = folder / "experiments" / "studies" / "stroke_length.py"
+    path.write_text(f"from __future__ import annotations\n{STUDY}", encoding="utf-8")
+    with pytest.raises(TypeError, match="from __future__ import annotations"):
+        main(COMMAND)

@@ -96,10 +96,6 @@ def test_each_problem_is_reported_with_key_value_and_bound(text: str, reported: 
     assert caught.value.problems == [reported]
 
 
-def test_a_right_document_has_no_problems() -> None:
-    assert READER.problems(parse_document("[[rail]]\nheight_m = 1.0\n")) == []
-
-
 def test_a_number_of_thousands_of_digits_is_refused_by_its_key() -> None:
     """Python reads such a number in hexadecimal, but refuses to print it in decimal."""
     document = parse_document(f"rail = []\n[beam.left]\nlength_m = 1.0\nnails = 0x{'f' * 6000}\n")

@@ -87,11 +87,6 @@ def test_one_or_all_failures_can_be_ended_and_each_end_is_reported(bench: Bench)
     ]
 
 
-def test_ending_an_inactive_failure_is_accepted_and_not_reported(bench: Bench) -> None:
-    assert bench.fail("pose", "ok") == [] and bench.fail("all", "ok") == []
-    assert bench.reported == []
-
-
 def test_a_disarm_ends_every_failure_before_it_is_done(bench: Bench) -> None:
     bench.fail("left_sweep.command", "off")
     assert bench.methods["disarm"]({}, MIA) == "accepted"

@@ -16,14 +16,11 @@ from firmware_host.log.log_folder import (
     TOP,
     copy_owner,
     delete_by_quota,
-    finished_path,
     first_path,
     free_space,
     log_files,
     make_folder,
     new_run_id,
-    present_path,
-    preserve,
     segment_path,
     stored_files,
     unfinished_files,
@@ -49,72 +46,33 @@ def test_names_sort_by_time_and_then_by_segment(tmp_path: Path) -> None:
     assert all("mud_skipper_" in name for name in names)
 
 
-def test_only_a_log_in_active_has_somewhere_to_go(tmp_path: Path) -> None:
-    assert finished_path(tmp_path / ACTIVE / "a.mcap") == tmp_path / DONE / "a.mcap"
-    for path in (tmp_path / "a.mcap", tmp_path / ACTIVE / "a.mcap.part", tmp_path / DONE / "a.mcap"):
-        assert finished_path(path) == path
-
-
-def test_a_log_is_found_where_it_has_gone(tmp_path: Path) -> None:
-    (done,) = make_files(tmp_path, DONE, "a")
-    assert present_path(tmp_path / ACTIVE / "a.mcap") == done
-    assert present_path(tmp_path / ACTIVE / "b.mcap") == tmp_path / ACTIVE / "b.mcap"
-
-
-def test_the_oldest_goes_first_and_only_as_many_as_must(tmp_path: Path) -> None:
-    make_files(tmp_path, DONE, "3", "1", "2")
-    assert [freed.name for freed in delete_by_quota(tmp_path, 250, 0.0)] == ["1.mcap"]
-    assert [freed.name for freed in delete_by_quota(tmp_path, 250, 0.0)] == []
-    assert [path.name for path in log_files(tmp_path, DONE)] == ["2.mcap", "3.mcap"]
-
-
-def test_what_is_being_written_or_preserved_is_never_freed(tmp_path: Path) -> None:
-    active, kept = make_files(tmp_path, ACTIVE, "0"), make_files(tmp_path, PRESERVED, "1")
-    make_files(tmp_path, DONE, "2", "3")
-    assert [(freed.name, freed.size) for freed in delete_by_quota(tmp_path, 1, 0.0)] == [("2.mcap", 100)]
-    assert all(path.exists() for path in (*active, *kept))
-
-
-def test_a_disk_without_room_frees_too(tmp_path: Path) -> None:
-    make_files(tmp_path, DONE, "1", "2")
-    assert list(delete_by_quota(tmp_path, 0, 0.0)) == []
-    assert [freed.name for freed in delete_by_quota(tmp_path, 0, 1.1)] == ["1.mcap"]
-    assert list(delete_by_quota(tmp_path, 1, 1.1)) == []  # the newest log is never deleted
-
-
-def test_a_preserved_log_comes_back(tmp_path: Path) -> None:
-    (path,) = make_files(tmp_path, DONE, "1")
-    kept = preserve(path)
-    assert kept == tmp_path / PRESERVED / "1.mcap" and kept.exists() and not path.exists()
-    assert preserve(kept) == kept
-    assert preserve(kept, undo=True) == path and path.exists()
-
-
-def test_what_is_not_whole_cannot_be_preserved(tmp_path: Path) -> None:
-    (path,) = make_files(tmp_path, ACTIVE, "1")
-    with pytest.raises(ValueError, match="only a log in done/"):
-        preserve(path)
-    with pytest.raises(FileNotFoundError):
-        preserve(tmp_path / DONE / "none.mcap")
-
-
-def test_a_log_of_the_same_name_is_not_replaced(tmp_path: Path) -> None:
-    (path,), _ = make_files(tmp_path, DONE, "1"), make_files(tmp_path, PRESERVED, "1")
-    with pytest.raises(ValueError, match="exists already"):
-        preserve(path)
+@pytest.mark.parametrize(
+    ("logs", "quota_bytes", "min_free_fraction", "deleted"),
+    [
+        ({DONE: "312"}, 250, 0.0, ["1"]),  # only as many as must, the oldest first
+        ({DONE: "312"}, 300, 0.0, []),
+        ({DONE: "12"}, 0, 0.0, []),  # no quota
+        ({DONE: "12"}, 0, 1.1, ["1"]),  # a disk without room, but never the newest
+        ({ACTIVE: "0", PRESERVED: "1", DONE: "23"}, 1, 0.0, ["2"]),
+        ({PRESERVED: "12", DONE: "34"}, 250, 0.0, []),  # preserved logs do not count
+        ({PRESERVED: "12", DONE: "34"}, 150, 0.0, ["3"]),
+    ],
+)
+def test_the_quota_frees_old_finished_logs(
+    tmp_path: Path, logs: dict[str, str], quota_bytes: int, min_free_fraction: float, deleted: list[str]
+) -> None:
+    for subfolder, names in logs.items():
+        make_files(tmp_path, subfolder, *names)
+    freed = list(delete_by_quota(tmp_path, quota_bytes, min_free_fraction))
+    assert freed == [(f"{name}.mcap", 100) for name in deleted]
+    left = {path.stem for path in log_files(tmp_path, ACTIVE, DONE, PRESERVED)}
+    assert left == set("".join(logs.values())) - set(deleted)
 
 
 def test_free_space_is_known_before_the_folder_is_made(tmp_path: Path) -> None:
     assert free_space(tmp_path / "none" / "yet").free_fraction == pytest.approx(
         free_space(tmp_path).free_fraction, abs=0.05
     )
-
-
-def test_preserved_logs_do_not_use_up_the_quota(tmp_path: Path) -> None:
-    make_files(tmp_path, DONE, "3", "4")
-    make_files(tmp_path, PRESERVED, "1", "2")
-    assert list(delete_by_quota(tmp_path, 250, 0.0)) == []
-    assert [freed.name for freed in delete_by_quota(tmp_path, 150, 0.0)] == ["3.mcap"]
 
 
 def test_every_file_in_active_counts_as_a_log(tmp_path: Path) -> None:
@@ -136,20 +94,14 @@ def test_logs_of_the_older_layout_are_seen(tmp_path: Path) -> None:
     assert [freed.name for freed in delete_by_quota(tmp_path, 1, 0.0)] == ["1.mcap"]  # a cut log is not deleted
 
 
-def test_a_log_of_the_older_layout_can_be_preserved(tmp_path: Path) -> None:
-    (path,) = make_files(tmp_path, TOP, "1")
-    (tmp_path / DONE).mkdir()
-    assert preserve(path) == tmp_path / PRESERVED / "1.mcap"
-
-
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root makes files that are somebody else's")
 def test_what_root_makes_belongs_to_the_owner_of_the_folder(tmp_path: Path) -> None:
     folder = tmp_path / "logs"
     folder.mkdir()
     os.chown(folder, 12345, 23456)
     log = LogFile(first_path(folder, "run"), OPENING)
-    kept = preserve(log.finish())
-    for path in (folder / ACTIVE, folder / DONE, kept.parent, kept):
+    done = log.finish()
+    for path in (folder / ACTIVE, done.parent, done):
         assert (path.stat().st_uid, path.stat().st_gid) == (12345, 23456), path
 
 

@@ -68,9 +68,3 @@ def test_events_are_never_thinned() -> None:
 def test_a_rate_of_zero_writes_everything() -> None:
     rows = make_ticks(0, 2000, Mode.IDLE)
     assert RestThinning(0.0, FULL_S).thin(rows) == (rows, "")
-
-
-def test_what_is_held_back_is_bounded() -> None:
-    thinning = make_thinning()
-    thinning.thin(make_ticks(0, 20_000, Mode.IDLE))
-    assert len(thinning.release()) == 380

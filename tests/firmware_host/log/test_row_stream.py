@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.log.row_stream import PACKET_BYTES, RowStream, packets, stream_path
+from firmware_host.log.row_stream import PACKET_BYTES, RowStream, packets
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 from firmware_host.sockets.rights import Group, Peer, Rights
 from operator_client.live_rows import LiveRows
-from operator_client.status_client import NoDaemonError, NotPermittedError
+from operator_client.status_client import NotPermittedError
 
 OWN = Rights(Group("own", os.getegid()), Group("own", os.getegid()), os.geteuid())
 RIGHTS_OF_OTHERS = Rights(Group("readers", 77777), Group("operators", 77778), 77779)
@@ -91,18 +91,6 @@ def test_a_user_without_the_right_to_read_is_refused_with_the_reason(path: Path)
     stream.close()
 
 
-def test_without_a_daemon_the_error_says_what_is_missing(path: Path) -> None:
-    with pytest.raises(NoDaemonError, match="serves rows"):
-        LiveRows(path)
-
-
-def test_the_end_of_the_daemon_is_reported(stream: RowStream, path: Path) -> None:
-    rows = subscribe(stream, path)
-    stream.close()
-    with pytest.raises(NoDaemonError, match="ended"):
-        rows.read(1.0)
-
-
 def test_a_stale_socket_is_replaced_and_a_live_one_is_not(path: Path, stream: RowStream) -> None:
     assert "already" in RowStream(path, OWN, {}).problem
     stream.close()
@@ -115,7 +103,3 @@ def test_a_packet_is_never_longer_than_its_bound() -> None:
     made = packets(rows)
     assert all(len(packet) <= PACKET_BYTES for packet, _ in made)
     assert sum(count for _, count in made) == 200
-
-
-def test_the_rows_have_a_socket_next_to_that_of_operators() -> None:
-    assert stream_path(Path("/run/mudskipper/mudskipper.sock")) == Path("/run/mudskipper/mudskipper-rows.sock")

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from control.faults import FaultKind
-from control.modes import Mode
 from control.rate import PERIOD_S
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.operator_calls import OperatorCalls
@@ -114,15 +113,6 @@ def test_answers_have_the_keys_of_the_table(armed: Robot) -> None:
     assert set(armed.ask("check")[0]) == set(METHODS["check"].answer_keys)
 
 
-def test_a_lease_prevents_arming_by_other_programs(robot: Robot) -> None:
-    robot.steps.run_for(1.0)
-    robot.ask("lease", for_s=0.5)
-    with pytest.raises(
-        RefusedError, match=r"^uid 1000 \(process 77\) operates the robot: .* has been silent for 0.5 s"
-    ):
-        robot.ask("arm", BEN)
-
-
 @pytest.mark.parametrize("end", ["hang_up", "silence"])
 def test_a_lease_that_ends_with_torque_off_does_not_block_arming(robot: Robot, end: str) -> None:
     robot.steps.run_for(1.0)
@@ -135,19 +125,6 @@ def test_a_lease_that_ends_with_torque_off_does_not_block_arming(robot: Robot, e
     assert robot.ask("arm", BEN) == "accepted"
     robot.steps.run_for(0.5)
     assert robot.ask("status")["mode"] == "hold"
-
-
-@pytest.mark.parametrize("method", ["hang_up", "silence"])
-def test_a_program_that_dies_before_its_arming_takes_effect_arms_nothing(robot: Robot, method: str) -> None:
-    robot.steps.run_for(1.0)
-    robot.ask("lease", for_s=0.1)
-    robot.steps.run_for(0.1 if method == "silence" else 0.0)
-    robot.ask("arm")
-    if method == "hang_up":
-        robot.lease.hang_up(ANNA)
-    robot.steps.run_for(1.0)
-    assert robot.ask("status")["mode"] == "idle" and robot.steps.loop.sent.torques_nm == (0.0, 0.0, 0.0, 0.0)
-    assert "mode idle to arming" not in robot.events.texts
 
 
 MOTIONS: list[tuple[str, dict[str, Any]]] = [("walk", {"strides": 1}), ("move", {"left_sweep_rad": 0.1})]
@@ -242,16 +219,6 @@ def test_another_connection_of_the_same_user_is_another_holder(armed: Robot) -> 
         armed.ask("lease", ANNA._replace(connection=3), for_s=0.5)
 
 
-def test_a_lost_lease_ends_with_the_torque(armed: Robot) -> None:
-    armed.ask("lease", for_s=0.5)
-    armed.lease.hang_up(ANNA)
-    with pytest.raises(RefusedError, match="has lost the lease: the robot stops; then arm again"):
-        armed.ask("lease", BEN, for_s=0.5)
-    assert armed.steps.run_until(lambda: armed.steps.loop.mode is Mode.IDLE, 5.0)
-    armed.steps.arm()
-    assert armed.ask("lease", BEN, for_s=0.5) == "accepted"
-
-
 def test_a_clear_is_refused_in_hold(armed: Robot) -> None:
     with pytest.raises(RefusedError, match="^nothing to clear"):
         armed.ask("clear")
@@ -320,9 +287,3 @@ def test_a_walk_with_a_null_depth_adapts_its_depth(armed: Robot) -> None:
     assert armed.steps.loop.controller.order.adaptive
     with pytest.raises(RefusedError, match="strides = None: must be a whole number"):
         armed.ask("walk", strides=None)
-
-
-def test_nothing_moves_before_the_robot_holds_its_pose(robot: Robot) -> None:
-    robot.steps.run_for(1.0)
-    with pytest.raises(RefusedError, match="only in hold, so arm first"):
-        robot.ask("move", left_sweep_rad=0.1)

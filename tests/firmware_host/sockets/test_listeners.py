@@ -137,23 +137,23 @@ def test_the_longest_configured_path_leaves_room_for_the_operators_socket() -> N
     assert len(str(operators_path(longest))) == LONGEST_SOCKET_PATH
 
 
-def test_a_group_that_the_daemon_may_not_use_is_a_warning(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def no_chown(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(errno.EPERM, "Operation not permitted")
 
     monkeypatch.setattr("os.chown", refuse)
+
+
+@pytest.mark.usefixtures("no_chown")
+def test_a_group_that_the_daemon_may_not_use_is_a_warning(short_folder: Path) -> None:
     made = Served(short_folder / "run")
     assert len(made.warnings) == 1 and "pilots" in made.warnings[0]
     made.close()
 
 
-def test_the_daemon_s_own_group_needs_no_system_call_that_the_unit_forbids(
-    short_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_: object, **__: object) -> None:
-        raise PermissionError(errno.EPERM, "Operation not permitted")
-
-    monkeypatch.setattr("os.chown", refuse)
+@pytest.mark.usefixtures("no_chown")
+def test_the_daemon_s_own_group_needs_no_system_call_that_the_unit_forbids(short_folder: Path) -> None:
     (short_folder / "run").mkdir()
     group = (short_folder / "run").stat().st_gid
     file = SocketFile(short_folder / "run" / "operators.sock", 1, group)

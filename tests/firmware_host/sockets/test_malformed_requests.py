@@ -113,16 +113,6 @@ def tree(depth: int) -> Any:
     return {str(index): tree(depth - 1) for index in range(MOST_PARAMS)} if depth else "x" * 20
 
 
-@pytest.mark.parametrize("depth", [2, 3])
-def test_a_long_request_of_many_short_parts_is_refused(served: Served, depth: int) -> None:
-    data = msgpack.packb([0, 1, "echo", tree(depth)])
-    assert len(data) > LONGEST_REQUEST
-    client = connect(served)
-    ((_, number, error, _),) = ask(served, client, data)
-    assert number is None and error == f"a request has at most {LONGEST_REQUEST} bytes"
-    assert not is_open(client)
-
-
 def test_the_longest_request_is_answered_and_one_byte_more_is_not(served: Served) -> None:
     spare = LONGEST_REQUEST - len(msgpack.packb([0, 1, "echo", {"a": "x" * 1000}])) + 1000
     client = connect(served)

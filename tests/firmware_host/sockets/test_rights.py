@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.sockets.rights import Peer, read_peer
 from firmware_host.sockets.socket_methods import Level
 from firmware_host.sockets.user_groups import load_rights
@@ -80,33 +79,6 @@ def test_without_names_the_daemon_s_own_group_may_do_everything() -> None:
     assert own.level(Peer(1, 77777, frozenset({77777}))) is Level.ANYONE
 
 
-def test_root_and_the_daemon_s_own_user_may_do_everything() -> None:
-    own = load_rights(StatusParameters())._replace(own_uid=77777)
-    assert own.level(Peer(1, 0, frozenset())) is own.level(Peer(1, 77777, frozenset())) is Level.DRIVE
-
-
-def test_a_reader_does_not_drive_and_a_driver_reads() -> None:
-    named = load_rights(StatusParameters(read_group=ANY_GROUP.gr_name))._replace(own_uid=1)
-    reader, driver = (Peer(1, 77777, frozenset({gid})) for gid in (ANY_GROUP.gr_gid, os.getegid()))
-    assert named.level(reader) is Level.READ
-    assert named.level(driver) is Level.DRIVE
-    assert named.refusal("status", Level.DRIVE) is None
-
-
-def test_an_unknown_method_is_reserved_for_operators() -> None:
-    own = load_rights(StatusParameters())
-    assert own.refusal("dance", Level.READ) is not None
-    assert own.refusal("dance", Level.DRIVE) is None
-
-
-def test_unknown_groups_are_all_refused_with_key_and_value() -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        load_rights(StatusParameters(read_group="no such", drive_group="nor this"))
-    reading, driving = caught.value.problems
-    assert reading.startswith("status.read_group = 'no such': there is no such group")
-    assert driving.startswith("status.drive_group = 'nor this': there is no such group")
-
-
 def test_no_group_name_is_looked_up_after_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
     own = load_rights(StatusParameters(read_group=ANY_GROUP.gr_name))
 
@@ -120,11 +92,3 @@ def test_no_group_name_is_looked_up_after_the_start(monkeypatch: pytest.MonkeyPa
     with one, other:
         assert own.level(read_peer(one)) is Level.DRIVE
     assert own.refusal("arm", Level.READ) is not None
-
-
-def test_only_users_who_may_not_even_stop_are_refused_a_connection() -> None:
-    wide, strict = load_rights(StatusParameters()), load_rights(StatusParameters(anyone_may_stop=False))
-    assert [wide.refusal_to_connect(level) for level in Level] == [None, None, None]
-    refused, *others = (strict.refusal_to_connect(level) for level in Level)
-    assert refused is not None and f"for members of the group {strict.readers.name}. Have root run" in refused
-    assert others == [None, None]

@@ -95,17 +95,6 @@ def test_requests_beyond_the_rate_wait_and_none_is_lost(served: Served) -> None:
     assert ask(served, other, msgpack.packb([0, 1, "status", {}]))
 
 
-def test_each_client_has_its_own_rate(served: Served) -> None:
-    fast, other = connect(served), connect(served)
-    serve(served, 4)
-    fast.sendall(ECHO * 300)
-    serve(served, 200)  # its burst is spent
-    other.sendall(ECHO)
-    serve(served, 3)
-    other.setblocking(False)
-    assert len(list(unpacked(other.recv(4096)))) == 1
-
-
 def test_a_client_that_does_not_complete_a_request_is_dropped(served: Served) -> None:
     slow, idle = connect(served), connect(served)
     serve(served, 4)

@@ -10,11 +10,12 @@ import duckdb
 import pytest
 
 from firmware_host.log.log_file import LogFile
-from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED, preserve
+from firmware_host.log.log_folder import ACTIVE, DONE, PRESERVED
 from logs.catalogue import catalogue as catalogue_module
 from logs.catalogue.catalogue import VERSION, VERSION_KEY, Catalogue, CatalogueError, catalogue_path
 from logs.catalogue.entry import LogEntry
 from logs.files.log_error import unwatched
+from logs.files.stored_logs import preserve
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 from tests.folders import ROOT
 from tests.logs.test_parquet import files_of_at_most

@@ -1,0 +1,145 @@
+"""The estimates of one log by each method, as recorded and with each disturbance: a data frame with a row for each
+coefficient of each stride.
+
+A CSV of the authors is one trial. A log of this project has a trial for each of its walks: the count of strides begins
+again there.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+import pandas
+from pandas import DataFrame
+
+from control.records import Estimate, StrideEstimate
+from estimation.estimation_parameters import Method
+from experiments.lablogs.recording import Recording, read_recording
+from experiments.reports.error_table import COEFFICIENTS
+from firmware_host.configuration.configuration import CaptureAxis
+from logs.files.log_error import LogError
+from logs.lab.body_track import VERTICAL_AXIS
+
+METHODS: tuple[Method, ...] = ("default", "paper")
+DELAY_S = 0.005  # between current and position: the authors' drives sent a new state every 5 to 20 ms
+MISSING_ROWS = 0.3
+SEEDS = (1, 2, 3)  # of the random choice of missing rows: one draw can spare the few rows that matter
+RECORDED, LATE, EARLY, MISSING = "recorded", "current_late", "current_early", "rows_missing"
+DISTURBED = ((LATE, 0), (EARLY, 0), *((MISSING, seed) for seed in SEEDS))
+COLUMNS = {
+    "flipper": "object",
+    "index": "int64",
+    "t_start_s": "float64",
+    "coefficient": "object",
+    "value": "float64",
+    "std_error": "float64",
+    "kind": "object",  # value, bound or invalid
+}
+
+
+class EvaluatedLog(NamedTuple):
+    name: str  # of its file
+    flippers: tuple[str, ...]
+    fixed_base: bool
+    in_mud: bool
+    estimates: DataFrame
+    findings: tuple[str, ...] = ()  # peculiarities of the file
+
+
+class Refusal(NamedTuple):
+    """A log that is not evaluated."""
+
+    name: str
+    reason: str
+
+
+def read_log(paths: Sequence[Path], vertical: CaptureAxis = VERTICAL_AXIS) -> EvaluatedLog | Refusal:
+    """Read one log and replay it by every method. Without mud there is nothing to disturb."""
+    name = paths[0].name
+    try:
+        recording = read_recording(paths, vertical)
+        in_mud = recording.has_evidence_of_mud()
+        frames = [
+            estimate_rows(run.estimate_strides(method), method=method, disturbance=disturbance, seed=seed)
+            for disturbance, seed, run in _runs(name, recording, in_mud)
+            for method in METHODS
+        ]
+    except LogError as problem:
+        return Refusal(name, str(problem))
+    except (ValueError, ArithmeticError, LookupError) as defect:  # of this program; the other logs are still evaluated
+        return Refusal(name, f"{paths[0]}: cannot be evaluated: {type(defect).__name__}: {defect}")
+    estimates = pandas.concat(frames, ignore_index=True)
+    return EvaluatedLog(name, recording.flippers, recording.fixed_base, in_mud, estimates, recording.findings)
+
+
+def _runs(name: str, recording: Recording, disturbed: bool) -> Iterator[tuple[str, int, Recording]]:
+    """Yield the recorded run and the disturbed ones. A log loses the same rows in any folder."""
+    yield RECORDED, 0, recording
+    if disturbed:
+        yield LATE, 0, recording.delay_current(DELAY_S)
+        yield EARLY, 0, recording.delay_current(-DELAY_S)
+        key = crc32(name.encode(errors="surrogateescape"))
+        for seed in SEEDS:
+            yield MISSING, seed, recording.remove_rows(MISSING_ROWS, np.random.default_rng((seed, key)))
+
+
+def estimate_rows(strides: Iterable[StrideEstimate], **shared: Any) -> DataFrame:
+    """Return the estimates in the order of the strides, with the number of the walk that each belongs to."""
+    rows = [
+        {
+            "flipper": stride.flipper,
+            "index": stride.index,
+            "t_start_s": stride.t_start_s,
+            "coefficient": name,
+            "value": estimate.value,
+            "std_error": estimate.std_error,
+            "kind": _kind_of(estimate),
+        }
+        for stride in strides
+        for name in COEFFICIENTS
+        for estimate in (getattr(stride, name),)
+    ]
+    frame = DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
+    keys = [frame["flipper"], frame["coefficient"]]
+    restarts = frame["index"].groupby(keys).diff() <= 0.0
+    return frame.assign(walk=restarts.groupby(keys).cumsum(), **shared)
+
+
+def _kind_of(estimate: Estimate) -> str:
+    if estimate.valid and estimate.at_least:
+        return "bound"
+    return "value" if estimate.valid and isfinite(estimate.value) else "invalid"
+
+
+def join_estimates(logs: Sequence[EvaluatedLog], groups: Sequence[str | None]) -> DataFrame:
+    """Return the estimates of all logs, with the number, the group and the conditions of each log."""
+    frames = [
+        log.estimates.assign(log=number, group=group, fixed_base=log.fixed_base, in_mud=log.in_mud)
+        for number, (log, group) in enumerate(zip(logs, groups, strict=True))
+    ]
+    none = estimate_rows([], method="", disturbance="", seed=0, log=0, group="", fixed_base=False, in_mud=False)
+    return pandas.concat(frames or [none], ignore_index=True)
+
+
+def has_error(estimates: DataFrame) -> "pandas.Series[bool]":
+    """Return which rows are values with an error to compare their scatter with."""
+    errors = estimates["std_error"]
+    return (estimates["kind"] == "value") & np.isfinite(errors) & (errors > 0.0)
+
+
+def strokes_of(estimates: DataFrame) -> DataFrame:
+    """Return the strides of one method on a fixed base, of the flipper in the mud: the one with the most values.
+
+    `trial` names the walk of the log, and `stroke` counts from 0 in it.
+    """
+    own = estimates[estimates["fixed_base"].astype(bool)]
+    values = (own["kind"] == "value").groupby([own["log"], own["flipper"]], sort=False).sum()
+    in_mud = values.groupby("log").transform("idxmax").drop_duplicates()
+    own = own[own.set_index(["log", "flipper"]).index.isin(in_mud)]
+    return own.assign(
+        trial=own.groupby(["log", "walk"], sort=False).ngroup(),
+        stroke=own.groupby(["log", "walk", "coefficient"]).cumcount(),
+    )
