@@ -226,6 +226,6 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def stop_robot(status_socket: Path) -> tuple[HTTPStatus, bytes]:
-    """Waits until every drive has confirmed the stop, as `mudskipper stop` does."""
+    """Wait until every drive has confirmed the stop, as `mudskipper stop` does."""
     answer = end_motion(status_socket, "stop")
     return HTTPStatus.OK if answer.confirmed else HTTPStatus.CONFLICT, answer.text.encode()
