@@ -62,13 +62,13 @@ class BenchPort:
                 return frame
         raise NoAnswerError(f"no answer to {what}" + (f" ({self.send_problem})" if self.send_problem else ""))
 
-    def ask_all(self, questions: Iterable[Frame], longest_s: float = ANSWER_S) -> list[Frame]:
-        """Return all frames that arrive from the first question until `longest_s` after the last one."""
+    def ask_all(self, questions: Iterable[Frame]) -> list[Frame]:
+        """Return all frames that arrive from the first question until ANSWER_S after the last one."""
         frames = list(self._port.receive())
         for question in questions:
             self._port.send(question)
             frames += self.listen(PACE_S)
-        return frames + self.listen(longest_s)
+        return frames + self.listen(ANSWER_S)
 
     def _receive(self, done: Callable[[list[Frame]], bool], longest_s: float) -> list[Frame]:
         """Return the frames that arrive until `done` with them, or for `longest_s`."""

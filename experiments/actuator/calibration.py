@@ -17,7 +17,7 @@ from experiments.actuator.fit import current_per_nm
 from experiments.actuator.friction import Loop, swing_arm
 from experiments.actuator.mismatch import find_mismatch
 from experiments.actuator.plan import COOL_K, READING_S, Plan, Step, largest_current_a, stays_cool, steps_of
-from experiments.actuator.reading import HeldJoint, MovedError, Reading, WarmError
+from experiments.actuator.reading import HeldJoint, MovedError, WarmError
 from experiments.actuator.weight_handling import WeightHandler
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, arm, ask_to_clear_faults, require_hold
@@ -109,15 +109,11 @@ class Calibration:
             self._cool(step)
 
     def _is_cool(self, step: Step) -> bool:
-        hangs_s = READING_S + self.weights.handling_s
-        return stays_cool(self.robot.configuration, self._expected_a(step), self._winding_c(), hangs_s)
-
-    def _expected_a(self, step: Step) -> float:
-        """Return the current by the readings so far."""
-        per_nm = current_per_nm(self.plan, self.notebook.entries)
-        if per_nm is None:
-            return largest_current_a(self.plan, self.robot.configuration, self.joint, step.weight_g)
-        return per_nm * self.plan.torque_nm(step.weight_g)
+        per_nm, hangs_s = current_per_nm(self.plan, self.notebook.entries), READING_S + self.weights.handling_s
+        expected_a = largest_current_a(self.plan, self.robot.configuration, self.joint, step.weight_g)
+        if per_nm is not None:
+            expected_a = per_nm * self.plan.torque_nm(step.weight_g)
+        return stays_cool(self.robot.configuration, expected_a, self._winding_c(), hangs_s)
 
     def _cool(self, step: Step) -> None:
         if self._is_cool(step):
@@ -180,9 +176,9 @@ class Calibration:
         self.operator.report(f"{step.name} of trial {step.reported_trial} is left out: {trouble}.")
         return {"skipped": trouble}
 
-    def _checked(self, step: Step, reading: Reading) -> Entry | None:
+    def _checked(self, step: Step, reading: Entry) -> Entry | None:
         """Ask about a reading of another weight at most MOST_REPEATS times; then keep it as doubtful."""
-        mismatch = find_mismatch(self.plan, self.notebook.entries, step, reading.current_a, self.constant_nm_a)
+        mismatch = find_mismatch(self.plan, self.notebook.entries, step, reading["current_a"], self.constant_nm_a)
         if mismatch is None:
             return self._entry(step, reading, loops=() if step.weight_g else self._measure_friction())
         answers = {GO_ON: "read it again", KEEP: "keep it, marked as doubtful"}
@@ -192,16 +188,14 @@ class Calibration:
         question = f"{step.name}: {mismatch.message}"
         answer = self.operator.ask(question, answers, self._attend)  # the reading counts even if the robot lets go
         if answer == OTHER and mismatch.other_g is not None:
-            self._keep_other(replace(step, weight_g=mismatch.other_g), reading)
+            other = replace(step, weight_g=mismatch.other_g)
+            if other.key in self.notebook.entries:
+                self.operator.report(f"{other.name} of trial {other.trial} was read already and is not replaced.")
+            else:
+                self.notebook.write(other.key, self._entry(other, reading))
         elif answer == KEEP or self.mismatches[step.key] >= MOST_REPEATS:
             return self._entry(step, reading, mismatch.message)
         return None
-
-    def _keep_other(self, other: Step, reading: Reading) -> None:
-        if other.key in self.notebook.entries:
-            self.operator.report(f"{other.name} of trial {other.trial} was read already and is not replaced.")
-        else:
-            self.notebook.write(other.key, self._entry(other, reading))
 
     def _measure_friction(self) -> Sequence[Loop]:
         """Return no loops where the arm does not swing freely: only friction is missing then."""
@@ -212,21 +206,12 @@ class Calibration:
             self.operator.report(f"friction was not measured this time: {problem}")
             return ()
 
-    def _entry(self, step: Step, reading: Reading, doubt: str = "", loops: Sequence[Loop] = ()) -> Entry:
+    def _entry(self, step: Step, reading: Entry, doubt: str = "", loops: Sequence[Loop] = ()) -> Entry:
         """Return the notebook's entry; loops are those of the empty arm."""
-        held_nm = self.constant_nm_a * reading.current_a
+        held_nm = self.constant_nm_a * reading["current_a"]
         self.operator.report(
-            f"{self.joint}, trial {step.reported_trial}, {step.name}: {reading.current_a:+.3f} A,"
-            f" {held_nm:+.4f} N·m by the configured constant, at {degrees(reading.angle_rad):+.2f} degrees"
+            f"{self.joint}, trial {step.reported_trial}, {step.name}: {reading['current_a']:+.3f} A,"
+            f" {held_nm:+.4f} N·m by the configured constant, at {degrees(reading['angle_rad']):+.2f} degrees"
         )
-        entry = {
-            "current_a": reading.current_a,
-            "rest_friction_a": reading.rest_friction_a,
-            "angle_rad": reading.angle_rad,
-            "winding_c": reading.winding_c,
-            "at_s": reading.at_s,
-            "below": reading.below._asdict(),
-            "above": reading.above._asdict(),
-        }
-        entry |= {"loops": [loop._asdict() for loop in loops]} if loops else {}
-        return entry | ({"doubt": doubt} if doubt else {})
+        more = {"loops": [loop._asdict() for loop in loops]} if loops else {}
+        return reading | more | ({"doubt": doubt} if doubt else {})

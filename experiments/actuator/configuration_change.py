@@ -4,21 +4,20 @@ The operator sees the difference first. See experiments.actuator.file_change.py 
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import unified_diff
 from pathlib import Path
+from typing import Any
 
 from experiments.actuator.file_change import FileChangeError, changed_text, replace_file
 from experiments.actuator.fit import JointFit
 from experiments.robot.bench_errors import BenchError
-from experiments.study.prompt import Operator
 from experiments.study.session import Ending, Session
 from firmware_host.configuration.toml_records import read_text
 
 COPY = "mudskipper.toml"  # of a simulated robot's configuration
 LARGEST_UNCERTAINTY = 0.02  # relative, of a torque constant that is written
 WRITE, LEAVE = "y", ""
-SAVED = "the measurements are saved"
 
 
 def find_target(path: Path, text: str, session: Session) -> Path:
@@ -36,46 +35,41 @@ def find_target(path: Path, text: str, session: Session) -> Path:
 
 def apply_fits(path: Path, fits: Sequence[JointFit], session: Session) -> tuple[str, Ending]:
     """Write the constants if the operator agrees; return a message. A failure does not cost the report."""
-    try:
-        return _apply(path, fits, session.operator), Ending.DONE
-    except BenchError as problem:
-        return f"nothing was applied: {problem}", Ending.REFUSED
-
-
-def _apply(path: Path, fits: Sequence[JointFit], operator: Operator) -> str:
-    before = read_text(path)
-    changes = {key: value for fit in fits for key, value in changes_of(fit).items()}
+    operator, before = session.operator, read_text(path)
+    changes: dict[tuple[str, ...], float] = {}
     for fit in fits:
-        if not changes_of(fit):
-            uncertainty = 100.0 * fit.constant_error_nm_a / fit.constant_nm_a
-            operator.report(f"{fit.joint}: the standard error of k_t is {uncertainty:.1f} %; k_t is not written.")
+        changes |= (found := changes_of(fit.numbers))
+        if not found:
+            uncertainty = fit.numbers["torque_constant_error_nm_a"] / fit.numbers["torque_constant_nm_a"]
+            name = f"{fit.numbers['joint']}: the standard error of k_t"
+            operator.report(f"{name} is {100.0 * uncertainty:.1f} %; k_t is not written.")
     try:
         after = changed_text(before, changes)
-    except FileChangeError as problem:
-        raise BenchError(f"{problem}: {SAVED}") from problem
-    if after == before:
-        return f"{path} needs no change"
-    changes_shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")
-    operator.report("\n".join(changes_shown))
-    if operator.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
-        return f"{path} was left as it is"
-    try:
+        if after == before:
+            return f"{path} needs no change", Ending.DONE
+        shown = unified_diff(before.splitlines(), after.splitlines(), str(path), f"{path}, changed", lineterm="")
+        operator.report("\n".join(shown))
+        if operator.ask(f"Write this to {path}?", {WRITE: "write it", LEAVE: "leave it"}, lambda: None) != WRITE:
+            return f"{path} was left as it is", Ending.DONE
         backup = replace_file(path, before, after)
     except FileChangeError as problem:
-        raise BenchError(f"{problem}: {SAVED}") from problem
+        return f"nothing was applied: {problem}: the measurements are saved", Ending.REFUSED
     return (
         f"{path} is changed; the old file is {backup.name}. Set odrv0.axis0.config.motor.torque_constant of the drives"
         " to the same values, then 'systemctl restart mudskipper'"
-    )
+    ), Ending.DONE
 
 
-def changes_of(fit: JointFit) -> dict[tuple[str, ...], float]:
+def changes_of(numbers: Mapping[str, Any]) -> dict[tuple[str, ...], float]:
     """Return new values by configuration key; none where the constant is too uncertain."""
-    constant_nm_a, error_nm_a = fit.constant_nm_a, fit.constant_error_nm_a
-    if not 0.0 < error_nm_a <= LARGEST_UNCERTAINTY * constant_nm_a:
+    joint, constant_nm_a = numbers["joint"], numbers["torque_constant_nm_a"]
+    if not 0.0 < numbers["torque_constant_error_nm_a"] <= LARGEST_UNCERTAINTY * constant_nm_a:
         return {}
-    changes: dict[tuple[str, ...], float] = {("drive", fit.joint, "torque_constant_nm_a"): round(constant_nm_a, 5)}
-    for name, (value, error) in (("coulomb_nm", fit.friction_nm), ("viscous_nm_s", fit.viscous_nm_s)):
-        if value > 2.0 * error:  # only a value that was measured
-            changes["friction", fit.joint, name] = round(value, 4)
+    changes: dict[tuple[str, ...], float] = {("drive", joint, "torque_constant_nm_a"): round(constant_nm_a, 5)}
+    for key, name, error in (
+        ("coulomb_nm", "friction_nm", "friction_error_nm"),
+        ("viscous_nm_s", "viscous_nm_s", "viscous_error_nm_s"),
+    ):
+        if numbers[name] > 2.0 * numbers[error]:  # only a value that was measured
+            changes["friction", joint, key] = round(numbers[name], 4)
     return changes

@@ -23,23 +23,25 @@ every trial is evaluated by the constant of the other trials. Repeatability is t
 one weight, relative to its mean, averaged over the weights.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import cos, fsum, hypot, nan, sqrt
 from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
 import numpy as np
+from pandas import DataFrame, Series
 
 from estimation.strokes.origin_fit import student_factor
-from experiments.actuator.friction import Friction, Loop, friction_of
+from experiments.actuator.friction import Loop, friction_of
 from experiments.actuator.plan import Plan, Step, steps_of
+from experiments.study.notebook import Entry
 
 PAPER_RMSE_NM = {"adduction": 0.0134, "sweep": 0.0127}
 PAPER_REPEATABILITY = 0.032
 PAPER_CONSTANT_NM_A = 0.083
 LIGHT_NM = 0.15  # a lighter load shows friction more than the constant
 FEWEST = 3  # readings of a line
-Entry = Mapping[str, Any]
+LOAD = ("trial", "weight_g", "torque_nm", "current_a", "rest_friction_a")  # columns; without the tare
 
 
 class Line(NamedTuple):
@@ -49,7 +51,6 @@ class Line(NamedTuple):
     intercept_a: float
     slope_error: float
     intercept_error: float
-    readings: int
 
     @property
     def constant_nm_a(self) -> float:
@@ -61,131 +62,34 @@ class Line(NamedTuple):
         return self.slope_error / self.slope_a_nm**2
 
 
-def fit_line(x: Sequence[float], y: Sequence[float]) -> Line:
-    """Needs FEWEST points with at least two values of x."""
-    columns = np.column_stack([x, np.ones(len(x))])
+def fit_line(loads: DataFrame) -> Line:
+    """Fit current over torque. Needs what `can_fit` checks."""
+    torques_nm, currents_a = loads.torque_nm.to_numpy(), loads.current_a.to_numpy()
+    columns = np.column_stack([torques_nm, np.ones(len(loads))])
     inverse = np.linalg.pinv(columns)
-    slope, intercept = (inverse @ y).tolist()
+    slope, intercept = (inverse @ currents_a).tolist()
     leverages = np.sum(columns.T * inverse, axis=0)
-    left_out = (y - columns @ (slope, intercept)) / (1.0 - leverages)  # residuals from the line of the other points
-    errors = student_factor(len(x) - 2) * np.sqrt(np.sum((inverse * left_out) ** 2, axis=1))
-    slope_error, intercept_error = errors.tolist()
-    return Line(
-        slope_a_nm=slope,
-        intercept_a=intercept,
-        slope_error=slope_error,
-        intercept_error=intercept_error,
-        readings=len(x),
-    )
+    left_out = (currents_a - columns @ (slope, intercept)) / (1.0 - leverages)  # from the line of the other points
+    errors = student_factor(len(loads) - 2) * np.sqrt(np.sum((inverse * left_out) ** 2, axis=1))
+    return Line(slope, intercept, *errors.tolist())
 
 
-class Load(NamedTuple):
-    """One weight in one trial."""
-
-    trial: int
-    weight_g: float
-    torque_nm: float  # of the weight at the measured angle
-    current_a: float  # without the tare
-    rest_friction_a: float
-    doubtful: bool  # the operator kept it although it did not fit
+def can_fit(loads: DataFrame) -> bool:
+    return len(loads) >= FEWEST and loads.weight_g.nunique() > 1
 
 
-class JointFit(NamedTuple):
-    joint: str
-    loads: tuple[Load, ...]
-    line: Line
-    torque_error: float  # relative, of all torques alike
-    configured_nm_a: float
-    direction: int  # of the weights' pull: -1 as on a level arm
-    rmse_configured_nm: float
-    rmse_fitted_nm: float  # each trial with the constant of the others
-    repeatability: float
-    loops: tuple[Loop, ...]
-    rest_friction_a: float  # of the empty arm
-    tares_a: tuple[float, ...]  # currents of the empty arm
+def loads_of(plan: Plan, entries: Mapping[str, Entry]) -> DataFrame:
+    """Return a row for each weight whose trial has a tare, with the joint's own sign of the current.
 
-    @property
-    def friction(self) -> Friction:
-        return friction_of(self.loops)
-
-    @property
-    def constant_nm_a(self) -> float:
-        return self.line.constant_nm_a
-
-    @property
-    def constant_error_nm_a(self) -> float:
-        return hypot(self.line.constant_error_nm_a, self.torque_error * self.constant_nm_a)
-
-    @property
-    def offset_nm(self) -> float:
-        return self.line.intercept_a * self.constant_nm_a
-
-    @property
-    def offset_error_nm(self) -> float:
-        tare_error_a = student_factor(len(self.tares_a) - 1) * self._tare_spread_a / sqrt(len(self.tares_a))
-        difference_a = fmean(load.rest_friction_a for load in self.loads) - self.rest_friction_a
-        return hypot(self.line.intercept_error, tare_error_a, difference_a / sqrt(3.0)) * self.constant_nm_a
-
-    @property
-    def friction_nm(self) -> tuple[float, float]:
-        """Dry friction and its standard error."""
-        return self._in_nm(self.friction.dry_a, self.friction.dry_error_a)
-
-    @property
-    def viscous_nm_s(self) -> tuple[float, float]:
-        return self._in_nm(self.friction.viscous_a_s, self.friction.viscous_error_a_s)
-
-    def _in_nm(self, current_a: float, error_a: float) -> tuple[float, float]:
-        constant_nm_a, constant_error_nm_a = self.constant_nm_a, self.constant_error_nm_a
-        return constant_nm_a * current_a, hypot(constant_nm_a * error_a, constant_error_nm_a * current_a)
-
-    @property
-    def tare_nm(self) -> float:
-        return fmean(self.tares_a) * self.constant_nm_a
-
-    @property
-    def tare_spread_nm(self) -> float:
-        return self._tare_spread_a * self.constant_nm_a
-
-    @property
-    def _tare_spread_a(self) -> float:
-        return stdev(self.tares_a) if len(self.tares_a) > 1 else nan
-
-    def fitted_nm(self, load: Load) -> float:
-        """Return the torque by the constant of the other trials."""
-        return load.current_a * self.constant_without(load.trial)
-
-    def constant_without(self, trial: int) -> float:
-        others = [load for load in self.loads if load.trial != trial]
-        return line_of(others).constant_nm_a if can_fit(others) else self.line.constant_nm_a
-
-
-def loads_of(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
-    """Return all weights whose trial has a tare, with a positive current where the motor holds the weight."""
-    raw = raw_loads(plan, entries)
-    sign = -direction_of(raw)
-    return [load._replace(current_a=sign * load.current_a) for load in raw]
-
-
-def raw_loads(plan: Plan, entries: Mapping[str, Entry]) -> list[Load]:
-    """Return the loads with the joint's own sign of the current."""
-    found = []
+    A reading that the operator kept as doubtful is left out.
+    """
+    rows = []
     for step in steps_of(plan):
-        entry, tare_a = entries.get(step.key), tare_of(entries, step.trial)
-        if step.weight_g and entry and "current_a" in entry and tare_a is not None:
+        entry, tare_a = entries.get(step.key, {}), tare_of(entries, step.trial)
+        if step.weight_g and "current_a" in entry and not entry.get("doubt") and tare_a is not None:
             torque_nm = plan.torque_nm(step.weight_g) * cos(entry["angle_rad"])
-            current_a, doubtful = entry["current_a"] - tare_a, bool(entry.get("doubt"))
-            found.append(
-                Load(
-                    trial=step.trial,
-                    weight_g=step.weight_g,
-                    torque_nm=torque_nm,
-                    current_a=current_a,
-                    rest_friction_a=entry["rest_friction_a"],
-                    doubtful=doubtful,
-                )
-            )
-    return found
+            rows.append((step.trial, step.weight_g, torque_nm, entry["current_a"] - tare_a, entry["rest_friction_a"]))
+    return DataFrame(rows, columns=LOAD)
 
 
 def tare_of(entries: Mapping[str, Entry], trial: int) -> float | None:
@@ -203,64 +107,94 @@ def _tare_a(entries: Mapping[str, Entry], trial: int) -> float | None:
     return None if entry.get("doubt") else entry.get("current_a")
 
 
-def direction_of(loads: Sequence[Load]) -> int:
+def direction_of(loads: DataFrame) -> int:
     """Return -1 where weights pull the joint to negative angles, so that the motor's current is positive."""
-    return -1 if fsum(load.torque_nm * load.current_a for load in loads) >= 0.0 else 1
+    return -1 if fsum(loads.torque_nm * loads.current_a) >= 0.0 else 1
 
 
 def current_per_nm(plan: Plan, entries: Mapping[str, Entry]) -> float | None:
     """Return the mean over the heavier weights so far, or nothing."""
-    loads = [load for load in raw_loads(plan, entries) if load.torque_nm >= LIGHT_NM and not load.doubtful]
-    total_nm = fsum(load.torque_nm for load in loads)
-    return abs(fsum(load.current_a for load in loads)) / total_nm if loads else None
+    loads = loads_of(plan, entries)
+    heavy = loads[loads.torque_nm >= LIGHT_NM]
+    return None if heavy.empty else abs(fsum(heavy.current_a)) / fsum(heavy.torque_nm)
 
 
-def can_fit(loads: Sequence[Load]) -> bool:
-    return len(loads) >= FEWEST and len({load.weight_g for load in loads}) > 1
+class JointFit(NamedTuple):
+    """The constants of one joint by their keys in JSON, and what they were fitted to."""
 
-
-def line_of(loads: Sequence[Load]) -> Line:
-    """Fit current over torque. Needs what `can_fit` checks."""
-    return fit_line([load.torque_nm for load in loads], [load.current_a for load in loads])
+    numbers: Mapping[str, Any]  # NaN where unknown
+    loads: DataFrame  # LOAD with a positive current, and `fitted_nm` by the constant of the other trials
+    loops: Sequence[Loop]
 
 
 def fit_joint(joint: str, plan: Plan, entries: Mapping[str, Entry], configured_nm_a: float) -> JointFit | None:
     """Return nothing where the readings do not suffice for a line."""
-    loads = [load for load in loads_of(plan, entries) if not load.doubtful]
+    loads = loads_of(plan, entries)
     if not can_fit(loads):
         return None
-    tares = (step for step in steps_of(plan) if not step.weight_g)
-    empty = [entries[step.key] for step in tares if _tare_a(entries, step.trial) is not None]  # at least one
-    fit = JointFit(
-        joint=joint,
-        loads=tuple(loads),
-        line=line_of(loads),
-        torque_error=plan.torque_error,
-        configured_nm_a=configured_nm_a,
-        direction=direction_of(raw_loads(plan, entries)),
-        rmse_configured_nm=_rmse(loads, lambda load: configured_nm_a * load.current_a),
-        rmse_fitted_nm=nan,
-        repeatability=repeatability(loads),
-        loops=tuple(Loop(**loop) for entry in empty for loop in entry.get("loops", ())),
-        rest_friction_a=fmean(entry["rest_friction_a"] for entry in empty),
-        tares_a=tuple(entry["current_a"] for entry in empty),
-    )
-    constants = {trial: fit.constant_without(trial) for trial in {load.trial for load in loads}}
-    return fit._replace(rmse_fitted_nm=_rmse(loads, lambda load: constants[load.trial] * load.current_a))
+    direction = direction_of(loads)
+    loads["current_a"] *= -direction
+    line = fit_line(loads)
+    constant_nm_a, error_nm_a = line.constant_nm_a, line.constant_error_nm_a
+    without = {trial: loads[loads.trial != trial] for trial in loads.trial.unique()}
+    constants = {trial: fit_line(others) if can_fit(others) else line for trial, others in without.items()}
+    loads["fitted_nm"] = loads.current_a * [constants[trial].constant_nm_a for trial in loads.trial]
+    empty = [
+        entries[step.key]
+        for step in steps_of(plan)
+        if not step.weight_g and _tare_a(entries, step.trial) is not None  # at least one is
+    ]
+    loops = [Loop(**loop) for entry in empty for loop in entry.get("loops", ())]
+    numbers: dict[str, Any] = {
+        "joint": joint,
+        "readings": len(loads),
+        "direction": direction,
+        "torque_constant_nm_a": constant_nm_a,
+        "torque_constant_error_nm_a": hypot(error_nm_a, plan.torque_error * constant_nm_a),
+        "torque_constant_scatter_nm_a": error_nm_a,
+        "torque_constant_tolerance_nm_a": plan.torque_error * constant_nm_a,
+        "configured_nm_a": configured_nm_a,
+        "rmse_configured_nm": _rmse_nm(configured_nm_a * loads.current_a, loads),
+        "rmse_fitted_nm": _rmse_nm(loads.fitted_nm, loads),
+        "paper_rmse_nm": PAPER_RMSE_NM[joint.split("_")[1]],
+        "repeatability": repeatability(loads),
+    }
+    numbers |= _offset(line, loads, empty)
+    return JointFit(numbers | _friction(loops, constant_nm_a, numbers["torque_constant_error_nm_a"]), loads, loops)
 
 
-def _rmse(loads: Sequence[Load], sensed_nm: Callable[[Load], float]) -> float:
-    return sqrt(fmean((sensed_nm(load) - load.torque_nm) ** 2 for load in loads))
+def _rmse_nm(sensed_nm: "Series[float]", loads: DataFrame) -> float:
+    return sqrt(fmean((sensed_nm - loads.torque_nm) ** 2))
 
 
-def repeatability(loads: Sequence[Load]) -> float:
+def repeatability(loads: DataFrame) -> float:
     """Return NaN where no weight was read twice. The constant cancels."""
-    by_weight: dict[float, list[float]] = {}
-    for load in loads:
-        by_weight.setdefault(load.weight_g, []).append(load.current_a)
-    fractions = [stdev(currents) / abs(fmean(currents)) for currents in by_weight.values() if len(currents) > 1]
-    return fmean(fractions) if fractions else nan
+    repeated = [currents_a for _, currents_a in loads.groupby("weight_g", sort=False).current_a if len(currents_a) > 1]
+    return fmean(stdev(currents_a) / abs(fmean(currents_a)) for currents_a in repeated) if repeated else nan
 
 
-def paper_rmse_nm(joint: str) -> float:
-    return PAPER_RMSE_NM[joint.split("_")[1]]
+def _offset(line: Line, loads: DataFrame, empty: Sequence[Entry]) -> dict[str, float]:
+    """Return the offset of the line, and the torque and friction of the empty arm at rest."""
+    tares_a, rest_friction_a = [entry["current_a"] for entry in empty], fmean(e["rest_friction_a"] for e in empty)
+    spread_a = stdev(tares_a) if len(tares_a) > 1 else nan
+    tare_error_a = student_factor(len(tares_a) - 1) * spread_a / sqrt(len(tares_a))
+    error_a = hypot(line.intercept_error, tare_error_a, (fmean(loads.rest_friction_a) - rest_friction_a) / sqrt(3.0))
+    currents_a = {
+        "offset_nm": line.intercept_a,
+        "offset_error_nm": error_a,
+        "rest_friction_nm": rest_friction_a,
+        "tare_nm": fmean(tares_a),
+        "tare_spread_nm": spread_a,
+    }
+    return {name: current_a * line.constant_nm_a for name, current_a in currents_a.items()}
+
+
+def _friction(loops: Sequence[Loop], constant_nm_a: float, error_nm_a: float) -> dict[str, float]:
+    """Return dry and viscous friction with their standard errors, which contain that of the torque constant."""
+    found = friction_of(loops)
+    return {
+        "friction_nm": constant_nm_a * found.dry_a,
+        "friction_error_nm": hypot(constant_nm_a * found.dry_error_a, error_nm_a * found.dry_a),
+        "viscous_nm_s": constant_nm_a * found.viscous_a_s,
+        "viscous_error_nm_s": hypot(constant_nm_a * found.viscous_error_a_s, error_nm_a * found.viscous_a_s),
+    }

@@ -9,15 +9,12 @@ from collections.abc import Mapping
 from math import inf, log
 from typing import Any, NamedTuple
 
-from experiments.actuator.fit import can_fit, direction_of, line_of, raw_loads, tare_of
+from experiments.actuator.fit import can_fit, direction_of, fit_line, loads_of, tare_of
 from experiments.actuator.plan import Plan, Step
 
 CONSTANT_NM = 0.05  # a lighter load shows friction more than the constant
 FRICTION_NM = 0.012  # error of any reading
-FITTED_FRACTION, CONFIGURED_FRACTION = (
-    0.1,
-    0.25,
-)  # of a weight, besides, by a constant of this joint or by the configured one
+FITTED_FRACTION, CONFIGURED_FRACTION = 0.1, 0.25  # of a weight, besides, by this joint's constant or the configured one
 FAR_BETTER = 3.0  # ratio of distances, in logarithms, to the nearest weight of the list
 SLIPPED_FRACTION = 0.3  # of the weight, at most, where it has slipped off
 
@@ -34,10 +31,11 @@ def find_mismatch(
     tare_a = tare_of(entries, step.trial)
     if tare_a is None:
         return None
-    heavy = [load for load in raw_loads(plan, entries) if load.torque_nm >= CONSTANT_NM and not load.doubtful]
-    sign = -direction_of(heavy) if heavy else (1 if current_a >= tare_a else -1)
+    loads = loads_of(plan, entries)
+    heavy = loads[loads.torque_nm >= CONSTANT_NM]
+    sign = -direction_of(heavy) if len(heavy) else (1 if current_a >= tare_a else -1)
     fitted = can_fit(heavy)
-    constant_nm_a = abs(line_of(heavy).constant_nm_a) if fitted else configured_nm_a
+    constant_nm_a = abs(fit_line(heavy).constant_nm_a) if fitted else configured_nm_a
     held_g = 1000.0 * sign * (current_a - tare_a) * constant_nm_a / (plan.gravity_m_s2 * plan.lever_m)
     fraction = FITTED_FRACTION if fitted else CONFIGURED_FRACTION
     if plan.torque_nm(abs(held_g - step.weight_g)) <= FRICTION_NM + fraction * plan.torque_nm(step.weight_g):

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import BenchRobot, move, require_hold
+from experiments.study.notebook import Entry
 
 OFF_RAD = radians(1.0)  # to the side, before an approach
 STEP_RAD = radians(0.6)  # at most at once: a hanging weight must not swing
@@ -64,27 +65,6 @@ class Side(NamedTuple):
     held_rad: float  # commanded
 
 
-class Reading(NamedTuple):
-    at_s: float  # by the robot's clock
-    below: Side
-    above: Side
-    winding_c: float
-
-    @property
-    def angle_rad(self) -> float:
-        return (self.below.angle_rad + self.above.angle_rad) / 2.0
-
-    @property
-    def current_a(self) -> float:
-        """The current that holds the load, without friction."""
-        return (self.below.current_a + self.above.current_a) / 2.0
-
-    @property
-    def rest_friction_a(self) -> float:
-        """Half the difference between the approaches: the friction at rest."""
-        return (self.below.current_a - self.above.current_a) / 2.0
-
-
 class HeldJoint:
     """Moves the held angle of one joint."""
 
@@ -95,14 +75,25 @@ class HeldJoint:
         self._warm_c = robot.configuration.limits.temperature_warm_c
         self.held_rad = self.sample().angle_rad  # arming holds the pose that it finds
 
-    def read(self) -> Reading:
-        """Raises MovedError, WarmError, and BenchError where the robot does not hold any more."""
+    def read(self) -> Entry:
+        """Return the entry of the notebook. Raises MovedError, WarmError, and BenchError where the robot lets go.
+
+        `current_a` holds the load without friction, and `rest_friction_a` is half of what the approaches differ by.
+        """
         below = self._from(1.0)
         above = self._from(-1.0)
         last, change_a = self.sample(), below.current_a - above.current_a
         if abs(change_a) > CHANGED_A:
             raise MovedError(f"the two approaches differ by {change_a:+.1f} A, as if the load had changed between them")
-        return Reading(last.now_s, below, above, last.winding_c)
+        return {
+            "current_a": (below.current_a + above.current_a) / 2.0,
+            "rest_friction_a": change_a / 2.0,
+            "angle_rad": (below.angle_rad + above.angle_rad) / 2.0,
+            "winding_c": last.winding_c,
+            "at_s": last.now_s,  # by the robot's clock
+            "below": below._asdict(),
+            "above": above._asdict(),
+        }
 
     def sample(self) -> Sample:
         return self._sample_of(self._robot.call("status"))

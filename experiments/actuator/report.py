@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from math import nan
-from statistics import fmean, stdev
 from typing import Any
 
 from pandas import DataFrame
@@ -12,9 +10,7 @@ from experiments.actuator.fit import (
     PAPER_CONSTANT_NM_A,
     PAPER_REPEATABILITY,
     PAPER_RMSE_NM,
-    Entry,
     JointFit,
-    paper_rmse_nm,
     repeatability,
 )
 from experiments.actuator.plan import Plan, steps_of
@@ -22,6 +18,7 @@ from experiments.actuator.plots import draw_friction, draw_torques
 from experiments.actuator.simulation import truth_rows
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import fraction_text, value_text
+from experiments.study.notebook import Entry
 from experiments.study.result import Figure, Result, Table
 
 Readings = Mapping[str, Mapping[str, Entry]]  # by joint and step
@@ -77,13 +74,13 @@ def make_result(
     plan: Plan, readings: Readings, fits: Sequence[JointFit], applied: str | None, simulated: bool
 ) -> Result:
     """Return tables, figures and numbers. `applied` is a message on the configuration file."""
-    fitted, left_out = {fit.joint for fit in fits}, list_left_out(plan, readings)
+    fitted, left_out = {fit.numbers["joint"] for fit in fits}, list_left_out(plan, readings)
     tables, figures = [_constant_table(fits), _friction_table(fits)], list[Figure]()
     if simulated:
         tables.append(Table("truth", TRUTH, {}, DataFrame(truth_rows(fits)), TRUTH))
     for fit in fits:
-        section = f"Weights on {fit.joint}"
-        tables.append(Table(section, "", {}, DataFrame(_weight_rows(fit)), section, on_page_only=True))
+        section = f"Weights on {fit.numbers['joint']}"
+        tables.append(Table(section, "", {}, _weight_rows(fit), section, on_page_only=True))
     if left_out:
         tables.append(Table("left_out", "", {}, DataFrame(left_out), "Left out", on_page_only=True))
     if fits:
@@ -98,7 +95,7 @@ def make_result(
     )
     summary = {
         "plan": plan,
-        "joints": [_joint_entries(fit) for fit in fits],
+        "joints": [fit.numbers for fit in fits],
         "not_fitted": [joint for joint in plan.joints if joint not in fitted],
         "left_out": left_out,
         "readings": readings,
@@ -115,33 +112,6 @@ def make_result(
     )
 
 
-def _joint_entries(fit: JointFit) -> dict[str, Any]:
-    """Name the constants of one joint for programs; NaN where they are unknown."""
-    return {
-        "joint": fit.joint,
-        "readings": fit.line.readings,
-        "direction": fit.direction,
-        "torque_constant_nm_a": fit.constant_nm_a,
-        "torque_constant_error_nm_a": fit.constant_error_nm_a,
-        "torque_constant_scatter_nm_a": fit.line.constant_error_nm_a,
-        "torque_constant_tolerance_nm_a": fit.torque_error * fit.constant_nm_a,
-        "configured_nm_a": fit.configured_nm_a,
-        "rmse_configured_nm": fit.rmse_configured_nm,
-        "rmse_fitted_nm": fit.rmse_fitted_nm,
-        "paper_rmse_nm": paper_rmse_nm(fit.joint),
-        "repeatability": fit.repeatability,
-        "offset_nm": fit.offset_nm,
-        "offset_error_nm": fit.offset_error_nm,
-        "friction_nm": fit.friction_nm[0],
-        "friction_error_nm": fit.friction_nm[1],
-        "viscous_nm_s": fit.viscous_nm_s[0],
-        "viscous_error_nm_s": fit.viscous_nm_s[1],
-        "rest_friction_nm": fit.rest_friction_a * fit.constant_nm_a,
-        "tare_nm": fit.tare_nm,
-        "tare_spread_nm": fit.tare_spread_nm,
-    }
-
-
 def list_left_out(plan: Plan, readings: Readings) -> list[dict[str, Any]]:
     """Return the readings that were skipped, or kept as doubtful and not fitted."""
     return [
@@ -156,65 +126,59 @@ def _constant_table(fits: Sequence[JointFit]) -> Table:
     """Return one line per joint, and the paper's numbers last."""
     rows = [
         {
-            "joint": fit.joint,
-            "k_t": value_text(fit.constant_nm_a, fit.constant_error_nm_a),
-            "configured": f"{fit.configured_nm_a:g}",
-            "RMSE": f"{fit.rmse_configured_nm:.4f}",
-            "RMSE fitted": f"{fit.rmse_fitted_nm:.4f}",
-            "repeatability": fraction_text(fit.repeatability),
-            "readings": fit.line.readings,
+            "joint": numbers["joint"],
+            "k_t": value_text(numbers["torque_constant_nm_a"], numbers["torque_constant_error_nm_a"]),
+            "configured": f"{numbers['configured_nm_a']:g}",
+            "RMSE": f"{numbers['rmse_configured_nm']:.4f}",
+            "RMSE fitted": f"{numbers['rmse_fitted_nm']:.4f}",
+            "repeatability": fraction_text(numbers["repeatability"]),
+            "readings": numbers["readings"],
         }
-        for fit in fits
+        for numbers, *_ in fits
     ]
     rows += [
         {
             "joint": f"paper, {kind}",
-            "k_t": "-",
             "configured": f"{PAPER_CONSTANT_NM_A:g}",
             "RMSE": f"{rmse_nm:.4f}",
-            "RMSE fitted": "-",
             "repeatability": fraction_text(PAPER_REPEATABILITY),
-            "readings": "-",
         }
         for kind, rmse_nm in PAPER_RMSE_NM.items()
     ]
     units = {"k_t": "N·m/A", "configured": "N·m/A", "RMSE": "N·m", "RMSE fitted": "N·m"}
-    return Table("constants", CONSTANTS_HEADING, units, DataFrame(rows), CONSTANTS)
+    return Table("constants", CONSTANTS_HEADING, units, DataFrame(rows).astype(object).fillna("-"), CONSTANTS)
 
 
 def _friction_table(fits: Sequence[JointFit]) -> Table:
     rows = [
         {
-            "joint": fit.joint,
-            "dry friction": value_text(*fit.friction_nm),
-            "viscous": value_text(*fit.viscous_nm_s),
-            "at rest at least": f"{fit.rest_friction_a * fit.constant_nm_a:.4f}",
-            "offset": value_text(fit.offset_nm, fit.offset_error_nm),
-            "empty arm": value_text(fit.tare_nm, fit.tare_spread_nm),
+            "joint": numbers["joint"],
+            "dry friction": value_text(numbers["friction_nm"], numbers["friction_error_nm"]),
+            "viscous": value_text(numbers["viscous_nm_s"], numbers["viscous_error_nm_s"]),
+            "at rest at least": f"{numbers['rest_friction_nm']:.4f}",
+            "offset": value_text(numbers["offset_nm"], numbers["offset_error_nm"]),
+            "empty arm": value_text(numbers["tare_nm"], numbers["tare_spread_nm"]),
         }
-        for fit in fits
+        for numbers, *_ in fits
     ]
     units = dict.fromkeys(("dry friction", "at rest at least", "offset", "empty arm"), "N·m") | {"viscous": "N·m·s"}
     return Table("friction", FRICTION_HEADING, units, DataFrame(rows), FRICTION)
 
 
-def _weight_rows(fit: JointFit) -> list[dict[str, Any]]:
-    rows = []
-    for weight_g in sorted({load.weight_g for load in fit.loads}):
-        loads = [load for load in fit.loads if load.weight_g == weight_g]
-        external_nm = fmean(load.torque_nm for load in loads)
-        fitted_nm = fmean(fit.fitted_nm(load) for load in loads)
-        spread_nm = fit.constant_nm_a * stdev(load.current_a for load in loads) if len(loads) > 1 else nan
-        rows.append(
-            {
-                "weight": f"{weight_g:g} g",
-                "trials": len(loads),
-                "τ_ext (N·m)": f"{external_nm:.4f}",
-                "τ_sense configured (N·m)": f"{fit.configured_nm_a * fmean(load.current_a for load in loads):.4f}",
-                "τ_sense fitted (N·m)": f"{fitted_nm:.4f}",
-                "error fitted (mN·m)": f"{1e3 * (fitted_nm - external_nm):+z.1f}",
-                "spread fitted (mN·m)": number(1e3 * spread_nm, 1),
-                "repeatability": fraction_text(repeatability(loads)),
-            }
-        )
-    return rows
+def _weight_rows(fit: JointFit) -> DataFrame:
+    """Return a row for each weight, averaged over the trials."""
+    numbers, by_weight = fit.numbers, fit.loads.groupby("weight_g")
+    mean = by_weight.mean()
+    spread_nm = numbers["torque_constant_nm_a"] * by_weight.current_a.std()
+    return DataFrame(
+        {
+            "weight": [f"{weight_g:g} g" for weight_g in mean.index],
+            "trials": by_weight.size().to_list(),
+            "τ_ext (N·m)": [f"{nm:.4f}" for nm in mean.torque_nm],
+            "τ_sense configured (N·m)": [f"{numbers['configured_nm_a'] * a:.4f}" for a in mean.current_a],
+            "τ_sense fitted (N·m)": [f"{nm:.4f}" for nm in mean.fitted_nm],
+            "error fitted (mN·m)": [f"{1e3 * nm:+z.1f}" for nm in mean.fitted_nm - mean.torque_nm],
+            "spread fitted (mN·m)": [number(1e3 * nm, 1) for nm in spread_nm],
+            "repeatability": [fraction_text(repeatability(loads)) for _, loads in by_weight],
+        }
+    )

@@ -52,11 +52,11 @@ def truth_rows(fits: Sequence[JointFit]) -> list[dict[str, str]]:
     """List the true constants of the simulated motors, and the errors of the fitted ones."""
     return [
         {
-            "joint": fit.joint,
+            "joint": fit.numbers["joint"],
             "true k_t (N·m/A)": f"{TRUE_CONSTANT_NM_A:.5f}",
-            "k_t error": miss_text(fit.constant_nm_a, TRUE_CONSTANT_NM_A),
+            "k_t error": miss_text(fit.numbers["torque_constant_nm_a"], TRUE_CONSTANT_NM_A),
             "true dry friction (N·m)": f"{COULOMB_NM:.4f}",
-            "dry friction error": miss_text(fit.friction_nm[0], COULOMB_NM),
+            "dry friction error": miss_text(fit.numbers["friction_nm"], COULOMB_NM),
         }
         for fit in fits
     ]

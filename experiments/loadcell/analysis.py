@@ -23,7 +23,6 @@ from experiments.loadcell.strokes import (
     Alignment,
     AnalysedTrial,
     Coefficient,
-    Insertion,
     Pace,
     Profile,
     Recorded,
@@ -76,10 +75,10 @@ def analyse(trials: Sequence[Recorded], settings: StageSettings, show: Show) -> 
 def _realigned(trial: AnalysedTrial, common: Alignment, settings: StageSettings) -> AnalysedTrial:
     """Analyse again, and add the relative error from the lag that all trials share."""
     again = analyse_trial(trial.recorded, settings, wide_pace(settings), common)
-    if again.alignment is None or not isinstance(again.motion, Insertion):
+    if again.alignment is None or again.speed_m_s is None or trial.recorded.kind == SHEAR:
         return again
     lag_s = min(common.lag_uncertainty_s, again.alignment.lag_uncertainty_s)
-    shared = SHIFT * again.motion.pace.speed_m_s * lag_s / settings.depth_m
+    shared = SHIFT * again.speed_m_s * lag_s / settings.depth_m
     return replace(again, shared_uncertainty=hypot(again.shared_uncertainty, shared))
 
 

@@ -14,13 +14,13 @@ from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
 from drivers.serial.serial_line import SerialLineError
 from experiments.loadcell.preparation import OR_WITHOUT, CellSettings
 from experiments.loadcell.recording import CellRecorder, WallClock
-from experiments.loadcell.stage import ManualStage, SimulatedStage, simulated_plate
+from experiments.loadcell.stage import ManualStage, SimulatedStage, water_of
 from experiments.loadcell.trials import TrialBench, TrialPlan
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Notebook
 from experiments.study.session import Session
 from simulation.test_rig.emulated_instruments import AmplifierParameters, StageEncoderParameters
-from simulation.test_rig.load_cell_bench import EmulatedBench
+from simulation.test_rig.load_cell_bench import EmulatedBench, clay_plate
 from simulation.test_rig.plate_stage import StageParameters
 from simulation.test_rig.stage_motion import ManualMotionParameters
 
@@ -73,7 +73,7 @@ def _emulated(plan: TrialPlan, settings: DeviceSettings) -> Iterator[EmulatedBen
             label=settings.encoder.label,
         )
         stage = StageParameters(manual=ManualMotionParameters(), seed=settings.seed)
-    plate = simulated_plate(plan.muds[0], plan.settings)
+    plate = clay_plate(water_of(plan.muds[0]), plan.settings.plate)
     with (
         tempfile.TemporaryDirectory(prefix="mudskipper-") as folder,
         closing(EmulatedBench(plate, Path(folder) / "load_cell", amplifier, stage, settings.seed, encoder)) as emulated,

@@ -14,7 +14,7 @@ is any chain of straight lines over the depth.
 """
 
 from functools import partial
-from math import hypot, nan, sqrt
+from math import hypot, inf, nan, sqrt
 
 import numpy as np
 
@@ -29,14 +29,11 @@ from experiments.loadcell.strokes import (
     YIELD_M,
     AnalysedTrial,
     Coefficient,
-    Extraction,
-    Insertion,
-    Mask,
     Pace,
     Profile,
     Recorded,
-    Shear,
     StageSettings,
+    Stroke,
     StrokeError,
     fit_slope,
     is_off_curve,
@@ -69,29 +66,37 @@ def analyse_insertion(trial: Recorded, profile: Profile, settings: StageSettings
     """Raises StrokeError where the way down does not show the motion."""
     times_s, depth_m = profile.times_s, settings.depth_m
     fit, samples = _fit_descent(profile, depth_m, expected)
-    pace, surface_s = _pace_of(fit, depth_m), float(fit.parameters[0] + times_s[profile.begin])
+    begin_error_s, speed_error, ramp_error = fit.std_errors.tolist()
+    pace = _limited_pace(fit.parameters, depth_m)._replace(
+        speed_uncertainty=speed_error, acceleration_uncertainty=ramp_error
+    )
+    surface_s = float(fit.parameters[0] + times_s[profile.begin])
     level_n, rise_n, _, slowing_n, jump_n = fit.factors.tolist()
-    motion = Insertion(surface_s, surface_s + pace.descent_s(depth_m), level_n, pace)
+    strokes = {"k_p": Stroke(surface_s, surface_s + pace.descent_s(depth_m), level_n)}
     depths_m, fractions = pace.descend(times_s - surface_s, depth_m)
     opposing_n = profile.forces_n - level_n - slowing_n * _slowing(depths_m, fractions)
-    shift = SHIFT * pace.speed_m_s * float(fit.std_errors[0]) / depth_m
+    shift = SHIFT * pace.speed_m_s * begin_error_s / depth_m
     k_p = fit_slope(settings, depths_m, opposing_n, depth_m, hypot(shift, pace.speed_uncertainty))
-    residual_n, remark = sqrt(fit.square / samples), ""
+    residual_n, remark, k_e = sqrt(fit.square / samples), "", Coefficient()
     if is_off_curve(profile, residual_n, jump_n + rise_n):
         remark = f"the force is {residual_n:.3f} N off the curve of a stage of one speed: the depth is uncertain"
-    extraction, k_e = None, Coefficient()
     try:
-        extraction, out_error_s = find_extraction(profile, motion, settings)
-        k_e = _fit_k_e(profile, settings, pace, extraction, out_error_s)
+        up, out_error_s = find_extraction(profile, strokes["k_p"], pace, settings)
+        to_m = (1.0 - REVERSAL_FRACTION) * depth_m
+        depths_m, _ = pace.descend(up.end_s - times_s, depth_m)
+        uncertainty = hypot(SHIFT * pace.speed_m_s * out_error_s / to_m, pace.speed_uncertainty)
+        strokes["k_e"], opposing_n = up, up.level_n - profile.forces_n
+        k_e = fit_slope(settings, depths_m, opposing_n, to_m, uncertainty)
     except StrokeError as problem:
         remark = str(problem)
     return AnalysedTrial(
         recorded=trial,
         profile=profile,
-        motion=motion,
-        extraction=extraction,
+        strokes=strokes,
         coefficients={"k_p": k_p, "k_e": k_e},
         remark=remark,
+        pace=pace,
+        speed_m_s=pace.speed_m_s,
     )
 
 
@@ -128,13 +133,6 @@ def _limited_pace(parameters: Array, depth_m: float) -> Pace:
     return Pace(speed_m_s, max(ramp_m_s2, 0.55 * speed_m_s * speed_m_s / depth_m))
 
 
-def _pace_of(fit: CurveFit, depth_m: float) -> Pace:
-    _, speed_error, ramp_error = fit.std_errors.tolist()
-    return _limited_pace(fit.parameters, depth_m)._replace(
-        speed_uncertainty=speed_error, acceleration_uncertainty=ramp_error
-    )
-
-
 def _slowing(depths_m: Array, fractions: Array) -> Array:
     """Return the part of the force that mud loses at a fraction of the full speed."""
     return np.asarray(np.clip(depths_m / YIELD_M, 0.0, 1.0) * (1.0 - fractions**RATE_EXPONENT))
@@ -156,13 +154,13 @@ def _shapes(t: Array, depth_m: float, jumps: bool, slows: bool, parameters: Arra
     )
 
 
-def find_extraction(profile: Profile, insertion: Insertion, settings: StageSettings) -> tuple[Extraction, float]:
+def find_extraction(profile: Profile, insertion: Stroke, pace: Pace, settings: StageSettings) -> tuple[Stroke, float]:
     """Return the way up, and the standard error of the moment at which the plate is out.
 
     Raises StrokeError where the plate was not drawn out.
     """
     times_s, forces_n = profile.times_s, profile.forces_n - insertion.level_n
-    after = times_s > insertion.stop_s + 0.2
+    after = times_s > insertion.end_s + 0.2
     least_n = float(np.min(forces_n[after], initial=0.0))
     threshold_n = max(CONTACT_NOISES * profile.noise_n, CONTACT_FRACTION * -least_n)
     if -least_n < max(threshold_n, LEAST_FORCE_N):
@@ -172,7 +170,7 @@ def find_extraction(profile: Profile, insertion: Insertion, settings: StageSetti
     last_s = float(times_s[lowest + int(pulled[-1])])
     if times_s[-1] < last_s + 0.1:
         raise StrokeError("the recording ended before the plate was out of the mud")
-    pace, depth_m = insertion.pace, settings.depth_m
+    depth_m = settings.depth_m
     unseen_m = depth_m * OUT_MARGIN * threshold_n / -least_n  # below the noise, for a force linear in depth
     period_s = float(np.median(np.diff(times_s)))
     reach_s = (unseen_m / pace.speed_m_s + OUT_MARGIN * period_s) / 2.0
@@ -180,17 +178,15 @@ def find_extraction(profile: Profile, insertion: Insertion, settings: StageSetti
     for _ in range(OUT_ROUNDS):
         tried_s = out_s + reach_s * np.linspace(-1.0, 1.0, OUT_PLACES)
         fits = [_fit_out(float(each) - times_s, forces_n, pace, depth_m) for each in tried_s]
-        best = _first_valley([square for square, *_ in fits])
+        squares = [inf, *(square for square, *_ in fits), inf]
+        best = next(  # the first valley: a chain that begins later, with a flat piece, fits as well
+            i
+            for i, (before, square, after) in enumerate(zip(squares, squares[1:], squares[2:], strict=False))
+            if square <= min(before, after, VALLEY * min(squares))
+        )
         out_s, reach_s = float(tried_s[best]), 2.0 * reach_s / (OUT_PLACES - 1)
     _, level_n, out_error_s = fits[best]
-    return Extraction(out_s - pace.descent_s(depth_m), out_s, insertion.level_n + level_n), out_error_s
-
-
-def _first_valley(squares: list[float]) -> int:
-    """Return the first minimum: a chain that begins later, with a flat piece, fits as well."""
-    padded = [float("inf"), *squares, float("inf")]
-    valleys = [i for i, square in enumerate(squares) if padded[i] >= square <= padded[i + 2]]
-    return next(i for i in valleys if squares[i] <= VALLEY * min(squares))
+    return Stroke(out_s - pace.descent_s(depth_m), out_s, insertion.level_n + level_n), out_error_s
 
 
 def _fit_out(left_s: Array, forces_n: Array, pace: Pace, depth_m: float) -> tuple[float, float, float]:
@@ -215,41 +211,37 @@ def _chain(depths_m: Array, depth_m: float) -> Array:
     return np.stack([np.ones_like(depths_m), *lines], 1)
 
 
-def _fit_k_e(
-    profile: Profile, settings: StageSettings, pace: Pace, extraction: Extraction, out_error_s: float
-) -> Coefficient:
-    depths_m, _ = pace.descend(extraction.out_s - profile.times_s, settings.depth_m)
-    to_m = (1.0 - REVERSAL_FRACTION) * settings.depth_m
-    shift = SHIFT * pace.speed_m_s * out_error_s / to_m
-    opposing_n = extraction.level_n - profile.forces_n
-    return fit_slope(settings, depths_m, opposing_n, to_m, hypot(shift, pace.speed_uncertainty))
-
-
-def depths_of(trial: AnalysedTrial, settings: StageSettings) -> Array | None:
-    """Return the depth of each sample, measured or found from the force; nothing where it is unknown."""
-    motion, extraction = trial.motion, trial.extraction
-    if trial.profile is None or not isinstance(motion, Insertion):
-        return None
+def depths_of(trial: AnalysedTrial, settings: StageSettings) -> Array:
+    """Return the depth of each sample of an insertion, measured or found from the force."""
     if trial.positions_m is not None:
         return trial.positions_m
-    times_s, pace = trial.profile.times_s, motion.pace
-    down_m, _ = pace.descend(times_s - motion.surface_s, settings.depth_m)
-    if extraction is None:
+    assert trial.profile is not None and trial.pace is not None
+    times_s, pace = trial.profile.times_s, trial.pace
+    down_m, _ = pace.descend(times_s - trial.strokes["k_p"].begin_s, settings.depth_m)
+    if "k_e" not in trial.strokes:
         return down_m
-    return np.minimum(down_m, pace.descend(extraction.out_s - times_s, settings.depth_m)[0])
+    return np.minimum(down_m, pace.descend(trial.strokes["k_e"].end_s - times_s, settings.depth_m)[0])
 
 
 def analyse_shear(trial: Recorded, profile: Profile, settings: StageSettings) -> AnalysedTrial:
     """Evaluate the second half of the travel, shorter where the stage stopped early. Raises StrokeError."""
     forces_n = profile.forces_n - profile.zero_n(trial)
-    motion = _find_shear(profile, forces_n, settings)
-    steady_n = forces_n[(profile.times_s >= motion.steady_from_s) & (profile.times_s <= motion.steady_to_s)]
+    stroke, speed_m_s = _find_shear(profile, forces_n, settings)
+    steady_n = forces_n[(profile.times_s >= stroke.steady_s) & (profile.times_s <= stroke.end_s)]
     error_n, remark = steadiness(steady_n)
     k_s = Coefficient(float(np.mean(steady_n)) / settings.moment_m3, error_n / settings.moment_m3)
-    return AnalysedTrial(trial, profile, motion, coefficients={"k_s": k_s}, remark=remark)
+    return AnalysedTrial(
+        recorded=trial,
+        profile=profile,
+        strokes={"k_s": stroke},
+        coefficients={"k_s": k_s},
+        remark=remark,
+        speed_m_s=speed_m_s,
+    )
 
 
-def _find_shear(profile: Profile, forces_n: Array, settings: StageSettings) -> Shear:
+def _find_shear(profile: Profile, forces_n: Array, settings: StageSettings) -> tuple[Stroke, float]:
+    """Return the stroke and its speed, NaN where the force does not show the stop."""
     times_s = profile.times_s
     begin_s = float(times_s[profile.begin])
     stroke_s = settings.shear_path_m / settings.speed_m_s
@@ -259,19 +251,19 @@ def _find_shear(profile: Profile, forces_n: Array, settings: StageSettings) -> S
     if np.count_nonzero(half) < 2:
         raise StrokeError("hardly any sample in the shear: use a faster amplifier or a slower stage")
     plateau_n = float(np.median(forces_n[half]))
-    stop_s = _falls_s(times_s, forces_n < FALLEN_FRACTION * plateau_n, begin_s + 0.5 * stroke_s)
+    is_low = forces_n < FALLEN_FRACTION * plateau_n
+    stop_s = next(
+        (
+            float(time_s)
+            for time_s in times_s[is_low & (times_s > begin_s + 0.5 * stroke_s)]
+            if np.all(is_low[(times_s >= time_s) & (times_s < time_s + LOW_S)])
+        ),
+        nan,
+    )
     to_s = float(np.nanmin([begin_s + 0.96 * stroke_s, stop_s - 0.03]))
     from_s = min(begin_s + 0.5 * stroke_s, (begin_s + to_s) / 2.0)
     if np.count_nonzero((times_s >= from_s) & (times_s <= to_s)) < 8 or plateau_n < LEAST_FORCE_N:
         raise StrokeError(
             "no steady shear: the force fell before half of the travel. Start the stage after the recording starts"
         )
-    return Shear(begin_s, from_s, to_s, settings.shear_path_m / (stop_s - begin_s))
-
-
-def _falls_s(times_s: Array, is_low: Mask, from_s: float) -> float:
-    """Return the time at which the force falls and stays low, or NaN."""
-    for time_s in times_s[is_low & (times_s > from_s)]:
-        if np.all(is_low[(times_s >= time_s) & (times_s < time_s + LOW_S)]):
-            return float(time_s)
-    return nan
+    return Stroke(begin_s, to_s, steady_s=from_s), settings.shear_path_m / (stop_s - begin_s)

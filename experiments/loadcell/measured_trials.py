@@ -31,14 +31,11 @@ from experiments.loadcell.strokes import (
     Alignment,
     AnalysedTrial,
     Coefficient,
-    Extraction,
-    Insertion,
     Mask,
-    Pace,
     Profile,
     Recorded,
-    Shear,
     StageSettings,
+    Stroke,
     StrokeError,
     fit_slope,
     is_off_curve,
@@ -124,25 +121,25 @@ def _analyse_insertion(trial: Recorded, stroke: PositionedProfile, expected: Ali
     down, up = (way & (depths.depths_m > 0.0) for way in (window.down, window.up))
     speed_m_s = _mean_speed_m_s(stroke.speeds_m_s(lag_s)[down])
     level_n, up_level_n = float(fit.factors[0]), float(fit.factors[-1 if window.has_air else 0])
-    motion = Insertion(float(times_s[wet[0]]), float(times_s[bottom[0]]), level_n, Pace(speed_m_s))
+    strokes = {"k_p": Stroke(float(times_s[wet[0]]), float(times_s[bottom[0]]), level_n)}
     depth_error_m = hypot(surface_error_m, stroke.track.interpolation_error_m)
     opposing_n = profile.forces_n - level_n
     k_p = _fit_slope(depths, stroke.settings, opposing_n, down, depths.deepest_m, depth_error_m)
     residual_n = sqrt(fit.square / np.count_nonzero(window.down | window.up))
     remark = _remark(stroke, depths.deepest_m, residual_n, float(np.max(np.abs(opposing_n[down]))))
-    extraction, k_e = None, Coefficient()
+    k_e = Coefficient()
     if np.count_nonzero(up) >= LEAST_SAMPLES:
-        extraction = Extraction(float(times_s[bottom[-1]]), float(times_s[wet[-1]]), up_level_n)
+        strokes["k_e"] = Stroke(float(times_s[bottom[-1]]), float(times_s[wet[-1]]), up_level_n)
         depth_error_m = hypot(depth_error_m, speed_m_s * lag_error_s)
         to_m = (1.0 - REVERSAL_FRACTION) * depths.deepest_m
         k_e = _fit_slope(depths, stroke.settings, up_level_n - profile.forces_n, up, to_m, depth_error_m)
     return AnalysedTrial(
         recorded=trial,
         profile=profile,
-        motion=motion,
-        extraction=extraction,
+        strokes=strokes,
         coefficients={"k_p": k_p, "k_e": k_e},
-        remark=remark if extraction else NO_EXTRACTION,
+        remark=remark if "k_e" in strokes else NO_EXTRACTION,
+        speed_m_s=speed_m_s,
         shared_uncertainty=depths.rate_uncertainty(down | up),
         positions_m=depths.depths_m,
         position_error_m=depth_error_m,
@@ -288,7 +285,8 @@ def _mean_speed_m_s(speeds_m_s: Array) -> float:
 
 def _analyse_shear(trial: Recorded, stroke: PositionedProfile, expected: Alignment) -> AnalysedTrial:
     profile, travels_m = stroke.profile, stroke.mean_positions_m(expected.lag_s)
-    motion, steady = _find_shear(stroke, travels_m, stroke.speeds_m_s(expected.lag_s))
+    speeds_m_s = stroke.speeds_m_s(expected.lag_s)
+    motion, steady = _find_shear(stroke, travels_m, speeds_m_s)
     felt_n = (profile.forces_n - profile.zero_n(trial))[steady]
     speed_terms = stroke.speed_terms(expected.lag_s)[steady]
     weights = np.clip(np.gradient(travels_m[steady]), 1e-9, None)
@@ -302,7 +300,8 @@ def _analyse_shear(trial: Recorded, stroke: PositionedProfile, expected: Alignme
     return AnalysedTrial(
         recorded=trial,
         profile=profile,
-        motion=motion,
+        strokes={"k_s": motion},
+        speed_m_s=_mean_speed_m_s(speeds_m_s[steady]),
         coefficients={"k_s": Coefficient(mean_n / moment_m3, hypot(error_n, rate_n) / moment_m3)},
         remark=remark,
         shared_uncertainty=abs(rate_n) / mean_n,
@@ -312,7 +311,7 @@ def _analyse_shear(trial: Recorded, stroke: PositionedProfile, expected: Alignme
     )
 
 
-def _find_shear(stroke: PositionedProfile, travels_m: Array, speeds_m_s: Array) -> tuple[Shear, Mask]:
+def _find_shear(stroke: PositionedProfile, travels_m: Array, speeds_m_s: Array) -> tuple[Stroke, Mask]:
     """Return the motion, and the samples of its second half that count. Raises StrokeError."""
     times_s, set_m = stroke.profile.times_s, stroke.settings.shear_path_m
     known = np.isfinite(travels_m)
@@ -328,4 +327,4 @@ def _find_shear(stroke: PositionedProfile, travels_m: Array, speeds_m_s: Array) 
     if np.count_nonzero(steady) < 8:
         raise StrokeError("fewer than 8 samples with force and position in the second half of the travel")
     from_s, to_s = float(times_s[steady][0]), float(times_s[steady][-1])
-    return Shear(float(times_s[begin]), from_s, to_s, _mean_speed_m_s(speeds_m_s[steady])), steady
+    return Stroke(float(times_s[begin]), to_s, steady_s=from_s), steady

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from experiments.loadcell.analysis import COEFFICIENTS, MudCoefficient
 from experiments.loadcell.force_trials import depths_of
-from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, Insertion, Shear, StageSettings
+from experiments.loadcell.strokes import REVERSAL_FRACTION, AnalysedTrial, StageSettings
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import INK, LABELS, looks_of, mark_of
 from experiments.reports.value_text import N_CM3
@@ -26,17 +26,23 @@ def draw_mud(
     """Draw all trials of one mud from their beginnings, with the model by the mud's coefficients."""
     figure = Figure(figsize=(12.0, 7.2))
     (vertical, shear), (depth, curve) = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
-    strokes = [trial for trial in trials if isinstance(trial.motion, Insertion)]
+    strokes = [trial for trial in trials if "k_p" in trial.strokes]
     for i, trial in enumerate(strokes):
         look = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.0}
         _plot_insertion((vertical, depth, curve), trial, settings, look, f"trial {i + 1}")
     if strokes:
         _plot_vertical_model(vertical, curve, strokes[-1], coefficients, settings)
-    drags = [trial for trial in trials if isinstance(trial.motion, Shear)]
-    for i, trial in enumerate(drags):
-        _plot_shear(shear, trial, COLOURS[i % len(COLOURS)], f"trial {i + 1}")
+    drags = [(trial, trial.strokes["k_s"]) for trial in trials if "k_s" in trial.strokes]
+    for i, (trial, stroke) in enumerate(drags):
+        assert trial.profile is not None
+        since_s = trial.profile.times_s - stroke.begin_s
+        forces_n, shown = trial.profile.forces_n - trial.profile.zero_n(trial.recorded), since_s > -BEFORE_S
+        look = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.0}
+        shear.plot(since_s[shown], forces_n[shown], label=f"trial {i + 1}", **look)
     if drags:
-        _plot_shear_model(shear, drags[-1], coefficients["k_s"], settings)
+        stroke = drags[-1][1]
+        steady_s = [stroke.steady_s - stroke.begin_s, stroke.end_s - stroke.begin_s]
+        shear.plot(steady_s, 2 * [coefficients["k_s"].value * settings.moment_m3], label="model", **MODEL)
     _name_axes(vertical, shear, depth, curve)
     return figure
 
@@ -45,11 +51,11 @@ def _plot_insertion(
     panels: tuple[Axes, Axes, Axes], trial: AnalysedTrial, settings: StageSettings, look: dict[str, Any], label: str
 ) -> None:
     """Plot force and depth against time, and force against depth."""
-    motion, profile, depths_m = trial.motion, trial.profile, depths_of(trial, settings)
-    assert isinstance(motion, Insertion) and profile is not None and depths_m is not None
-    end_s = profile.times_s[-1] if trial.extraction is None else trial.extraction.out_s
-    shown = (profile.times_s > motion.surface_s - BEFORE_S) & (profile.times_s < end_s + AFTER_S)
-    since_s, forces_n = profile.times_s[shown] - motion.surface_s, profile.forces_n[shown] - motion.level_n
+    profile, depths_m, down = trial.profile, depths_of(trial, settings), trial.strokes["k_p"]
+    assert profile is not None
+    end_s = trial.strokes["k_e"].end_s if "k_e" in trial.strokes else profile.times_s[-1]
+    shown = (profile.times_s > down.begin_s - BEFORE_S) & (profile.times_s < end_s + AFTER_S)
+    since_s, forces_n = profile.times_s[shown] - down.begin_s, profile.forces_n[shown] - down.level_n
     depths_cm = 100.0 * np.where(depths_m[shown] < -SHOWN_ABOVE_M, np.nan, depths_m[shown])
     vertical, depth, curve = panels
     vertical.plot(since_s, forces_n, label=label, **look)
@@ -66,34 +72,16 @@ def _plot_vertical_model(
     settings: StageSettings,
 ) -> None:
     """Plot the model against time, along the depths of the trial."""
-    motion, profile, trial_m = trial.motion, trial.profile, depths_of(trial, settings)
-    assert isinstance(motion, Insertion) and profile is not None and trial_m is not None
-    since_s, even_m = profile.times_s - motion.surface_s, np.linspace(0.0, settings.depth_m, 40)
-    strokes = [("k_p", 1.0, 1.0, motion.surface_s, motion.stop_s)]
-    if trial.extraction is not None:
-        strokes.append(("k_e", -1.0, 1.0 - REVERSAL_FRACTION, trial.extraction.lift_s, trial.extraction.out_s))
-    for name, sign, fraction, from_s, to_s in strokes:
+    profile, trial_m = trial.profile, depths_of(trial, settings)
+    assert profile is not None
+    times_s, even_m = profile.times_s, np.linspace(0.0, settings.depth_m, 40)
+    for name, stroke in trial.strokes.items():
+        sign, fraction = (1.0, 1.0) if name == "k_p" else (-1.0, 1.0 - REVERSAL_FRACTION)
         per_m3, within = sign * coefficients[name].value, (trial_m >= 0.0) & (trial_m <= fraction * np.nanmax(trial_m))
-        shown = within & (profile.times_s >= from_s) & (profile.times_s <= to_s)
-        label = "model" if name == "k_p" else None
-        vertical.plot(since_s[shown], per_m3 * settings.volumes_m3(trial_m[shown]), label=label, **MODEL)
+        shown = within & (times_s >= stroke.begin_s) & (times_s <= stroke.end_s)
+        since_s, label = times_s[shown] - trial.strokes["k_p"].begin_s, "model" if name == "k_p" else None
+        vertical.plot(since_s, per_m3 * settings.volumes_m3(trial_m[shown]), label=label, **MODEL)
         curve.plot(100.0 * fraction * even_m, per_m3 * settings.volumes_m3(fraction * even_m), **MODEL)
-
-
-def _plot_shear(panel: Axes, trial: AnalysedTrial, colour: str, label: str) -> None:
-    motion, profile = trial.motion, trial.profile
-    assert isinstance(motion, Shear) and profile is not None
-    since_s, forces_n = profile.times_s - motion.begin_s, profile.forces_n - profile.zero_n(trial.recorded)
-    shown = since_s > -BEFORE_S
-    panel.plot(since_s[shown], forces_n[shown], color=colour, linewidth=1.0, label=label)
-
-
-def _plot_shear_model(panel: Axes, trial: AnalysedTrial, k_s: MudCoefficient, settings: StageSettings) -> None:
-    motion = trial.motion
-    assert isinstance(motion, Shear)
-    force_n = k_s.value * settings.moment_m3
-    steady_s = [motion.steady_from_s - motion.begin_s, motion.steady_to_s - motion.begin_s]
-    panel.plot(steady_s, [force_n, force_n], label="model", **MODEL)
 
 
 def _name_axes(vertical: Axes, shear: Axes, depth: Axes, curve: Axes) -> None:

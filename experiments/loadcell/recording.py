@@ -57,25 +57,16 @@ class Tare(NamedTuple):
         return self.samples >= LEAST_CORRELATED and self.correlation > AVERAGED_CORRELATION
 
 
-class LineProblems(NamedTuple):
-    """The problems of a serial line during a stroke."""
-
-    garbled_lines: int
-    drop_outs: int
-    breaks: int  # unplugged, or a restarted encoder: positions before and after have different zeros
+Counts = dict[str, int]  # of the problems of a serial line, by their keys in the notebook
 
 
 class StrokeRecording(NamedTuple):
-    """The lines of a stroke, and the problems of both devices."""
+    """The lines of a stroke, and what went wrong on the lines of both devices."""
 
     samples: list[Sample]
-    problems: LineProblems
+    problems: Counts
     positions: list[StagePosition]
-    position_problems: LineProblems | None  # where the stage has an encoder
-
-    @property
-    def overloads(self) -> int:
-        return sum(sample.overloaded for sample in self.samples)
+    position_problems: Counts  # empty where the stage has no encoder
 
 
 class CellRecorder:
@@ -141,7 +132,7 @@ class CellRecorder:
         """Record until `stroke_s` after the contact, or until the patience ends without a contact."""
         self.await_port()
         self.drain()
-        before, positions_before = self._problems(), self._position_problems()
+        before = self._problems()
         samples, contact = list[Sample](), _Contact(noise_n)
         end_s = self.clock.now_s() + patience_s
         while self.clock.now_s() < end_s and self.port.line.is_there:
@@ -150,18 +141,29 @@ class CellRecorder:
             if contact.handle(fresh):
                 end_s = self.clock.now_s() + stroke_s
         positions, self._positions = self._positions, []
-        of_positions = _difference(self._position_problems(), positions_before) if self.encoder else None
+        problems, of_positions = (
+            {name: count - old[name] for name, count in new.items()}
+            for new, old in zip(self._problems(), before, strict=True)
+        )
         self.await_port()
-        return StrokeRecording(samples, _difference(self._problems(), before), positions, of_positions)
+        problems["overloads"] = sum(sample.overloaded for sample in samples)
+        return StrokeRecording(samples, problems, positions, of_positions)
 
-    def _problems(self) -> LineProblems:
-        return LineProblems(self.port.malformed_lines, self.port.line.clock.drop_outs, self.port.line.unpluggings)
-
-    def _position_problems(self) -> LineProblems:
-        encoder = self.encoder
+    def _problems(self) -> tuple[Counts, Counts]:
+        """Return the counts of both lines so far. Positions before and after a break have different zeros."""
+        line, encoder = self.port.line, self.encoder
+        problems = {
+            "garbled_lines": self.port.malformed_lines,
+            "drop_outs": line.clock.drop_outs,
+            "unpluggings": line.unpluggings,
+        }
         if encoder is None:
-            return LineProblems(0, 0, 0)
-        return LineProblems(encoder.counts.malformed, encoder.line.clock.drop_outs, encoder.breaks)
+            return problems, {}
+        return problems, {
+            "garbled_lines": encoder.counts.malformed,
+            "drop_outs": encoder.line.clock.drop_outs,
+            "breaks": encoder.breaks,
+        }
 
 
 def correlation(forces_n: Sequence[float]) -> float:
@@ -171,10 +173,6 @@ def correlation(forces_n: Sequence[float]) -> float:
     order = np.arange(len(forces_n))
     apart_n = np.asarray(forces_n) - np.polyval(np.polyfit(order, forces_n, 1), order)
     return float(apart_n[1:] @ apart_n[:-1] / (apart_n @ apart_n))
-
-
-def _difference(after: LineProblems, before: LineProblems) -> LineProblems:
-    return LineProblems(*(b - a for a, b in zip(before, after, strict=True)))
 
 
 class _Contact:
@@ -190,9 +188,10 @@ class _Contact:
 
     def handle(self, samples: Sequence[Sample]) -> bool:
         """Return whether these samples contain the first contact."""
-        before = self._touched
-        self._touched = before or any(self._is_away(sample) for sample in samples)
-        return self._touched and not before
+        if self._touched:
+            return False
+        self._touched = any(self._is_away(sample) for sample in samples)
+        return self._touched
 
     def _is_away(self, sample: Sample) -> bool:
         if self._first_s is None:
@@ -221,8 +220,8 @@ def raw_name(key: str, attempt: int, what: str = "") -> str:
 
 def write_rows(path: Path, columns: Mapping[str, str], rows: Sequence[tuple[float, ...]]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = [",".join(columns), *(",".join(columns.values()) % row for row in rows), ""]
-    path.write_text("\r\n".join(lines), encoding="utf-8", newline="")
+    table, head = np.reshape(rows, (-1, len(columns))), ",".join(columns)
+    np.savetxt(path, table, [*columns.values()], delimiter=",", newline="\r\n", header=head, comments="")
 
 
 def _read_columns(path: Path) -> Array:
@@ -250,5 +249,8 @@ def load_recorded(folder: Path, key: str, entry: Entry) -> Recorded:
 
 def load_counted(folder: Path, notebook: Notebook) -> list[Recorded]:
     """Read all trials that count."""
-    counted = {key: entry for key, entry in notebook.entries.items() if "file" in entry and not entry.get("skipped")}
-    return [load_recorded(folder, key, entry) for key, entry in counted.items()]
+    return [
+        load_recorded(folder, key, entry)
+        for key, entry in notebook.entries.items()
+        if "file" in entry and not entry.get("skipped")
+    ]

@@ -25,11 +25,11 @@ from experiments.loadcell.comparison import OTHER_PLATE, compare_muds
 from experiments.loadcell.plots import draw_coefficients, draw_mud
 from experiments.loadcell.recording import load_counted
 from experiments.loadcell.stage_track import common_alignment
-from experiments.loadcell.strokes import RATE_EXPONENT, AnalysedTrial, Insertion, StageSettings
+from experiments.loadcell.strokes import INSERTION, RATE_EXPONENT, AnalysedTrial, StageSettings
 from experiments.loadcell.trials import TrialPlan
 from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, miss_text, repeatability_text, value_text
-from experiments.study.notebook import Entry, Notebook
+from experiments.study.notebook import Notebook
 from experiments.study.result import Figure, Result, Table, to_json
 from experiments.study.session import Show
 from experiments.trials.load_cell_truth import TrueCoefficients
@@ -50,7 +50,7 @@ FITTED = "measured (solid, one colour a trial) and modelled with the mud's coeff
 HEADING = "Coefficients ± one standard error of the trials ± one of the bench; see the report for their parts"
 COMPARED = "Flipper and load cell; see the report for the effects of plate and path alone"
 TRUTH = "The same plate in even motion, without stage, cell and noise"
-ALIGNMENT_KEYS = ("lag_s", "rate_share", "lag_doubt_s", "rate_doubt")  # as in earlier summaries
+TRIAL_KEYS = ("speed_m_s", "is_measured", "alignment", "problem", "remark")
 UNITS = dict.fromkeys(COEFFICIENTS, "N/cm³") | {"flipper": "N/cm³", "load cell": "N/cm³", "speed": "m/s"}
 Muds = Mapping[str, Mapping[str, MudCoefficient]]  # by mud and coefficient
 
@@ -108,7 +108,9 @@ def make_result(
 ) -> Result:
     """Return the tables and figures. `truths` are those of simulated muds; `flipper` is a summary, or empty."""
     muds, compared = results.muds, compare_muds(flipper, results.muds)
-    tables, figures = [_coefficient_table(muds)], [_coefficient_figure(muds)]
+    tables = [_coefficient_table(muds)]
+    caption = "Mean of the trials with two standard errors; grey: every trial."
+    figures = [Figure("coefficients", caption, partial(draw_coefficients, muds), "Coefficients")]
     texts = {"Coefficients": "\n\n".join([METHOD, *position_texts(results.trials), _errors_text(muds, plan)])}
     if compared:
         tables.append(_comparison_table(compared))
@@ -119,9 +121,8 @@ def make_result(
         own, section = [trial for trial in results.trials if trial.recorded.mud == mud], f"Mud {mud_text(mud)}"
         rows = DataFrame([_trial_row(trial) for trial in own])
         tables.append(Table(f"trials {mud}", "", UNITS, rows, section, on_page_only=True))
-        caption = f"{section}: {FITTED}"
-        name = re.sub(r"[^\w.]+", "_", f"mud_{mud}")
-        figures.append(Figure(name, caption, partial(draw_mud, own, coefficients, plan.settings), section))
+        name, draw = re.sub(r"[^\w.]+", "_", f"mud_{mud}"), partial(draw_mud, own, coefficients, plan.settings)
+        figures.append(Figure(name, f"{section}: {FITTED}", draw, section))
     return Result(
         tables=tables,
         figures=figures,
@@ -145,21 +146,14 @@ def _summary(results: Results, notebook: Notebook, plan: TrialPlan, cell: Mappin
             {"mud": mud} | {name: each._asdict() | {"std_error": each.std_error} for name, each in coefficients.items()}
             for mud, coefficients in results.muds.items()
         ],
-        "trials": [_trial_entries(trial, notebook.entries[trial.recorded.key]) for trial in results.trials],
+        "trials": [
+            {"key": trial.recorded.key, **notebook.entries[trial.recorded.key], **trial.coefficients}
+            | {name: getattr(trial, name) for name in TRIAL_KEYS}
+            | {"place_error_m": trial.position_error_m if trial.is_measured else None}
+            for trial in results.trials
+        ],
         "left_out": notebook.left_out,
         "remarks": results.remarks,
-    }
-
-
-def _trial_entries(trial: AnalysedTrial, entry: Entry) -> dict[str, Any]:
-    """Join the notebook's entry of a trial and its results, by the names that programs read."""
-    return {"key": trial.recorded.key, **entry, **trial.coefficients} | {
-        "speed_m_s": trial.speed_m_s,
-        "is_measured": trial.is_measured,
-        "place_error_m": trial.position_error_m if trial.is_measured else None,
-        "alignment": trial.alignment and dict(zip(ALIGNMENT_KEYS, trial.alignment, strict=True)),
-        "problem": trial.problem,
-        "remark": trial.remark,
     }
 
 
@@ -174,11 +168,6 @@ def _coefficient_table(muds: Muds) -> Table:
             rows[-1][name] = value_text(each.value, each.trials_error, each.shared_error, per=N_CM3)
             rows[-1][f"repeatability of {name}"] = repeatability_text(each.repeatability, len(each.trials))
     return Table("coefficients", HEADING, UNITS, DataFrame(rows), "Coefficients")
-
-
-def _coefficient_figure(muds: Muds) -> Figure:
-    caption = "Mean of the trials with two standard errors; grey: every trial."
-    return Figure("coefficients", caption, partial(draw_coefficients, muds), "Coefficients")
 
 
 def _comparison_table(compared: Sequence[Mapping[str, Any]]) -> Table:
@@ -226,7 +215,7 @@ def position_texts(trials: Sequence[AnalysedTrial]) -> list[str]:
     """Explain how the position was measured, or that it was not."""
     measured = [trial for trial in trials if trial.is_measured]
     aligned = [trial.alignment for trial in measured if trial.alignment is not None]
-    insertions = [trial for trial in measured if isinstance(trial.motion, Insertion)]
+    insertions = [trial for trial in measured if trial.recorded.kind == INSERTION]
     if not measured:
         return [UNCONNECTED]
     if not aligned or not insertions:

@@ -87,7 +87,7 @@ class SimulatedStage:
 
     def __init__(self, settings: StageSettings, bench: EmulatedBench, muds: Sequence[str], seed: int) -> None:
         self._settings, self._bench = settings, bench
-        self.plates = {mud: simulated_plate(mud, settings) for mud in muds}
+        self.plates: dict[str, CarriedPlate] = {mud: clay_plate(water_of(mud), settings.plate) for mud in muds}
         self._random = Random(seed)
 
     def weigh(self, which: int) -> float:
@@ -135,10 +135,6 @@ def water_of(mud: str) -> float:
         raise ValueError(f"mud {mud!r}: a simulated one is a water content in percent, such as 48.6") from None
     clay_plate(water_percent)
     return water_percent
-
-
-def simulated_plate(mud: str, settings: StageSettings) -> CarriedPlate:
-    return clay_plate(water_of(mud), settings.plate)
 
 
 def clay_truth(mud: str, settings: StageSettings) -> TrueCoefficients:

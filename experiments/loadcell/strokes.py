@@ -57,7 +57,7 @@ class StageSettings:
     depth_m: Annotated[float, Bounds(0.005, 0.2)] = 0.03
     speed_m_s: Annotated[float, Bounds(0.001, 1.0)] = 0.1
     hold_s: Annotated[float, Bounds(0.5, 60.0)] = 3.0
-    shear_path_m: Annotated[float, Bounds(0.05, 2.0)] = field(default=0.2, metadata={"key": "shear_way_m"})
+    shear_path_m: Annotated[float, Bounds(0.05, 2.0)] = 0.2
     plate_width_m: Annotated[float, Bounds(0.002, 0.5)] = 0.03
     plate_height_m: Annotated[float, Bounds(0.002, 0.5)] = 0.035
     plate_thickness_m: Annotated[float, Bounds(0.0002, 0.1)] = 0.004
@@ -120,7 +120,7 @@ class Pace(NamedTuple):
     """Speed and ramp of a stage, with relative uncertainties."""
 
     speed_m_s: float
-    acceleration_m_s2: float = nan  # a hand has no ramp
+    acceleration_m_s2: float
     speed_uncertainty: float = nan
     acceleration_uncertainty: float = nan
 
@@ -139,24 +139,13 @@ class Pace(NamedTuple):
         )
 
 
-class Insertion(NamedTuple):
-    surface_s: float
-    stop_s: float
-    level_n: float  # before the surface
-    pace: Pace
+class Stroke(NamedTuple):
+    """One motion of the plate in the mud."""
 
-
-class Extraction(NamedTuple):
-    lift_s: float
-    out_s: float
-    level_n: float  # after it
-
-
-class Shear(NamedTuple):
     begin_s: float
-    steady_from_s: float
-    steady_to_s: float
-    speed_m_s: float  # NaN where the force does not show the stop
+    end_s: float
+    level_n: float = 0.0  # the force without mud: before an insertion, after an extraction
+    steady_s: float = nan  # time from which the force of a shear counts
 
 
 class Alignment(NamedTuple):
@@ -177,16 +166,17 @@ class Coefficient(NamedTuple):
 
 @dataclass(frozen=True)
 class AnalysedTrial:
-    """The results of one trial."""
+    """The results of one trial. An insertion has the stroke and the coefficient k_p, and k_e of the way up."""
 
     recorded: Recorded
     profile: Profile | None = None
-    motion: Insertion | Shear | None = None
-    extraction: Extraction | None = None
+    strokes: Mapping[str, Stroke] = field(default_factory=dict)  # by the coefficient that they show
     coefficients: Mapping[str, Coefficient] = field(default_factory=dict)
     problem: str = ""  # why there is no coefficient
     remark: str = ""
     shared_uncertainty: float = 0.0  # relative, of speed, lag or rate, alike in all trials of a stage
+    pace: Pace | None = None  # that the force of an insertion shows
+    speed_m_s: float | None = None  # of the stage; a rough one for a shear without an encoder
     positions_m: Array | None = None  # measured: depths of an insertion, travel of a shear
     position_error_m: float = 0.0  # one standard error
     alignment: Alignment | None = None  # of an encoder and the cell
@@ -194,18 +184,6 @@ class AnalysedTrial:
     @property
     def is_measured(self) -> bool:
         return self.positions_m is not None
-
-    @property
-    def pace(self) -> Pace | None:
-        """The speed and ramp that the force shows; nothing where an encoder measured the motion."""
-        return self.motion.pace if isinstance(self.motion, Insertion) and not self.is_measured else None
-
-    @property
-    def speed_m_s(self) -> float | None:
-        """The speed of the stage; a rough one for a shear without an encoder."""
-        if isinstance(self.motion, Shear):
-            return self.motion.speed_m_s
-        return None if self.motion is None else self.motion.pace.speed_m_s
 
 
 def noise_of(forces_n: Array) -> float:

@@ -28,7 +28,7 @@ from experiments.loadcell.recording import (
     write_rows,
 )
 from experiments.loadcell.stage import Stage, Trial
-from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Insertion, Mask, Shear, StageSettings
+from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Mask, StageSettings
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
 from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
@@ -124,18 +124,15 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
         "noise_n": before.noise_n,
         "rate_hz": recorder.port.line.clock.rate_hz,
         "samples": len(stroke.samples),
-        "garbled_lines": stroke.problems.garbled_lines,
-        "drop_outs": stroke.problems.drop_outs,
-        "unpluggings": stroke.problems.breaks,
-        "overloads": stroke.overloads,
+        **stroke.problems,
         "calibration": recorder.port.calibration._asdict(),
     }
-    if recorder.encoder is not None and stroke.position_problems is not None:
+    if recorder.encoder is not None:
         entry["position"] = {
             "file": raw_name(trial.key, attempt, "_position"),
             "places": len(stroke.positions),
             "rate_hz": recorder.encoder.line.clock.rate_hz,
-            **stroke.position_problems._asdict(),
+            **stroke.position_problems,
         }
         write_rows(bench.folder / entry["position"]["file"], POSITIONS, stroke.positions)
     recorded = load_recorded(bench.folder, trial.key, entry)
@@ -184,13 +181,13 @@ def _encoder_problem(encoder: StageEncoder, now_s: float) -> str:
 
 def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, before: Tare, after: Tare) -> list[str]:
     """Return messages on everything that may make a trial invalid."""
-    recorded, garbled = analysed.recorded, stroke.problems.garbled_lines
-    lines = len(stroke.samples) + garbled
+    recorded, problems = analysed.recorded, stroke.problems
+    garbled, lines = problems["garbled_lines"], len(stroke.samples) + problems["garbled_lines"]
     moved_n, missing = abs(after.force_n - before.force_n), _missing_fraction(analysed)
     largest_n = float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
     checks = [
-        (stroke.problems.breaks, "the load cell was unplugged during the trial"),
-        (stroke.overloads or is_clipped(recorded.forces_n), AT_ITS_LIMIT),
+        (problems["unpluggings"], "the load cell was unplugged during the trial"),
+        (problems["overloads"] or is_clipped(recorded.forces_n), AT_ITS_LIMIT),
         (garbled > GARBLED_FRACTION * lines, f"{garbled} of {lines} lines were garbled: check cable and ground"),
         (analysed.problem, analysed.problem),
         (analysed.remark, analysed.remark),
@@ -208,10 +205,10 @@ def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, before: Tare
 
 
 def _position_checks(analysed: AnalysedTrial, stroke: StrokeRecording) -> Iterator[tuple[bool, str]]:
-    line = stroke.position_problems
-    if line is None:
+    problems = stroke.position_problems
+    if not problems:
         return
-    if line.breaks:
+    if problems["breaks"]:
         yield True, f"the stage's encoder was unplugged or restarted during the trial: {FORCE_ALONE}"
     elif not stroke.positions:
         yield True, f"the stage's encoder sent no position: {FORCE_ALONE}"
@@ -219,8 +216,8 @@ def _position_checks(analysed: AnalysedTrial, stroke: StrokeRecording) -> Iterat
         unknown = max(np.mean(np.isnan(analysed.positions_m[inside])) for inside, _ in _strokes(analysed))
         yield (
             bool(unknown > MISSING_FRACTION),
-            f"the stage's position is unknown for {100.0 * unknown:.0f} % of its strokes ({line.garbled_lines} "
-            f"garbled lines, {line.drop_outs} gaps): check the encoder's cable and connectors",
+            f"the stage's position is unknown for {100.0 * unknown:.0f} % of its strokes ({problems['garbled_lines']} "
+            f"garbled lines, {problems['drop_outs']} gaps): check the encoder's cable and connectors",
         )
 
 
@@ -245,13 +242,7 @@ def _missing_fraction(analysed: AnalysedTrial) -> float:
 
 def _strokes(analysed: AnalysedTrial) -> Iterator[tuple[Mask, float]]:
     """Yield which samples belong to each stroke, and its duration."""
-    motion, spans_s = analysed.motion, list[tuple[float, float]]()
-    if isinstance(motion, Shear):
-        spans_s.append((motion.begin_s, motion.steady_to_s))
-    if isinstance(motion, Insertion):
-        spans_s.append((motion.surface_s, motion.stop_s))
-    if analysed.extraction is not None:
-        spans_s.append((analysed.extraction.lift_s, analysed.extraction.out_s))
-    for begin_s, end_s in spans_s:
+    for stroke in analysed.strokes.values():
         assert analysed.profile is not None
-        yield (analysed.profile.times_s >= begin_s) & (analysed.profile.times_s < end_s), end_s - begin_s
+        times_s = analysed.profile.times_s
+        yield (times_s >= stroke.begin_s) & (times_s < stroke.end_s), stroke.end_s - stroke.begin_s

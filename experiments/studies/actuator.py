@@ -90,12 +90,12 @@ def study(
 
 
 def list_remarks(joints: Sequence[str], fits: Sequence[JointFit], left_out: int) -> list[str]:
-    fitted = {fit.joint for fit in fits}
-    remarks = [f"{joint}: too few readings for a line" for joint in joints if joint not in fitted]
+    directions = {fit.numbers["joint"]: fit.numbers["direction"] for fit in fits}
+    remarks = [f"{joint}: too few readings for a line" for joint in joints if joint not in directions]
     remarks += [
-        f"{fit.joint}: by the sign of the current the weights pull upwards: check drive.{fit.joint}.sign"
-        for fit in fits
-        if fit.direction > 0 and fit.joint.endswith("adduction")
+        f"{joint}: by the sign of the current the weights pull upwards: check drive.{joint}.sign"
+        for joint, direction in directions.items()
+        if direction > 0 and joint.endswith("adduction")
     ]
     if left_out:
         remarks.append(f"{left_out} readings are left out: see the report")

@@ -28,6 +28,7 @@ from experiments.study.result import Result, to_json
 from experiments.study.session import Session
 
 HAS_ROBOT = False
+SCHEMA = 2
 UNNAMED = ("mud",)
 SIMULATED_MUDS = ("47.6", "48.6", "49.5", "50.3", "51.2")  # figure 5 of the paper
 SIMULATED_STEP_UM = 10.0
@@ -91,27 +92,19 @@ def study(
     elif port is None:
         raise OptionError("name the serial port of the load cell with --port, or use --simulated")
     try:
-        cell = CellSettings(_known_format(format), _known_unit(unit), scale, calibration)
+        if format != AUTO:
+            LineFormat(format)
+        if unit and unit.lower() not in UNITS:
+            raise ValueError(f"unit {unit!r}: must be one of {', '.join(UNITS)}")
         muds = _checked_muds(mud, session.simulated)
     except ValueError as problem:
         raise OptionError(str(problem)) from problem
     encoder = _encoder(port, position, position_step, position_baud, position_label)
+    cell = CellSettings(format, unit.lower(), scale, calibration)
     devices = DeviceSettings(port=port, baud=baud, cell=cell, encoder=encoder, seed=seed)
     plan = TrialPlan(muds, trials, _stage_settings(plate, depth, speed), depth_error / 1000.0)
     flipper = {} if compare is None else load_flipper(compare)
     return _run(session, plan, devices, flipper)
-
-
-def _known_format(name: str) -> str:
-    if name != AUTO:
-        LineFormat(name)
-    return name
-
-
-def _known_unit(unit: str) -> str:
-    if unit and unit.lower() not in UNITS:
-        raise ValueError(f"unit {unit!r}: must be one of {', '.join(UNITS)}")
-    return unit.lower()
 
 
 def _checked_muds(muds: tuple[str, ...], simulated: bool) -> tuple[str, ...]:

@@ -170,8 +170,8 @@ def test_an_uncertain_constant_is_not_written_and_a_good_one_is(tmp_path: Path, 
     assert "+torque_constant_nm_a = 0.07" in reported[-1]
     written = load_configuration(path)
     assert written.drive["right_sweep"].torque_constant_nm_a == pytest.approx(0.0719, abs=0.001)
-    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.friction_nm[0], abs=1e-4)
-    assert written.friction["right_sweep"].viscous_nm_s == pytest.approx(good.viscous_nm_s[0], abs=1e-4)
+    assert written.friction["right_sweep"].coulomb_nm == pytest.approx(good.numbers["friction_nm"], abs=1e-4)
+    assert written.friction["right_sweep"].viscous_nm_s == pytest.approx(good.numbers["viscous_nm_s"], abs=1e-4)
 
 
 def test_a_fit_that_cannot_be_applied_is_still_reported(tmp_path: Path, example_text: str) -> None:

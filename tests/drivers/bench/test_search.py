@@ -9,7 +9,6 @@ from drivers.bench.search import expectation_problems, id_problems, search
 from drivers.can.frames import Frame
 from drivers.can.mock_bus import MockBus
 from drivers.drive_types import DRIVE_BENCHES, DRIVE_TYPES
-from drivers.mit import codec as mit
 from drivers.odrive import codec as odrive
 from drivers.odrive.parameters import OdriveParameters
 from drivers.transmit_gate import TransmitGate
@@ -167,9 +166,3 @@ def test_old_registers_of_a_moteus_are_a_problem() -> None:
     old.receive = lambda frame, now_s: answer if frame.arbitration_id & 0xFF == 4 else []  # type: ignore[method-assign]
     (drive,) = search(SimulatedBus(old).bench_port(), DRIVE_BENCHES, True).found
     assert "register map 4" in drive.problem
-
-
-def test_the_questions_of_mit_mode_are_those_that_leave_it() -> None:
-    bus = SimulatedBus()
-    search(bus.bench_port(), DRIVE_BENCHES, False, ("mit",))
-    assert {frame.data for frame in bus.sent} == {mit.LEAVE}

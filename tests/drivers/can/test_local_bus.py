@@ -183,18 +183,9 @@ def test_garbage_is_reported_as_a_can_error(open_bus: Open, short_folder: Path) 
     link.close()
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        can.Message(arbitration_id=0x18FEF100, data=b"\x01\x02", is_extended_id=True),
-        can.Message(arbitration_id=0x029, is_remote_frame=True, is_extended_id=False),
-        can.Message(arbitration_id=0x044, data=bytes(8), is_error_frame=True, is_extended_id=False),
-        can.Message(arbitration_id=0x7FF, is_extended_id=False),
-        can.Message(arbitration_id=0x18FF0205, data=bytes(range(64)), is_fd=True, bitrate_switch=True),
-    ],
-)
-def test_every_kind_of_frame_survives(open_bus: Open, message: can.Message) -> None:
+def test_a_frame_arrives_whole_with_the_time_of_its_reading(open_bus: Open) -> None:
     sender, receiver = open_bus(), open_bus()
+    message = can.Message(arbitration_id=0x18FF0205, data=bytes(range(64)), is_fd=True, bitrate_switch=True)
     before_s = time.time()
     sender.send(message)
     received = receiver.recv(0)

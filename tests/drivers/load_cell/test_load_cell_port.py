@@ -9,34 +9,21 @@ import pytest
 
 from drivers.load_cell.calibration import LoadCellCalibration
 from drivers.load_cell.line_formats import LineFormat
-from drivers.load_cell.load_cell_port import LoadCellPort, Sample
+from drivers.load_cell.load_cell_port import LoadCellPort
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
+from tests.drivers.load_cell.instrument_bench import InstrumentBench
 
 FORCE_N = 1.5
 COUNTS = LoadCellCalibration("counts", 42000.0, 81000.0)
 
 
-class Cable:
-    """An amplifier under a constant load, a port, and the time of both."""
+class Cable(InstrumentBench):
+    """An amplifier under a constant load."""
 
     def __init__(self, folder: Path, baud: int = 115200, name: str = "number", **changes: float | str) -> None:
         parameters = AmplifierParameters(**{"noise_n": 0.0, **changes})  # type: ignore[arg-type]
-        self.amplifier = EmulatedAmplifier(lambda _: FORCE_N, parameters, folder / "cell")
-        self.path = str(folder / "cell")
-        self.port = LoadCellPort(self.path, baud, LineFormat(name), COUNTS)
-        self.now_s = 0.0
-
-    def run(self, duration_s: float) -> list[Sample]:
-        samples, end_s = list[Sample](), self.now_s + duration_s
-        while self.now_s < end_s:
-            self.now_s += 0.01
-            self.amplifier.step(self.now_s)
-            samples += self.port.read(self.now_s)
-        return samples
-
-    def close(self) -> None:
-        self.port.close()
-        self.amplifier.close()
+        amplifier = EmulatedAmplifier(lambda _: FORCE_N, parameters, folder / "cell")
+        super().__init__(amplifier, LoadCellPort(str(folder / "cell"), baud, LineFormat(name), COUNTS))
 
 
 @pytest.fixture

@@ -7,34 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings, StagePosition
+from drivers.load_cell.stage_encoder import StageEncoder, StageEncoderSettings
 from simulation.test_rig.emulated_instruments import EmulatedStageEncoder, StageEncoderParameters
+from tests.drivers.load_cell.instrument_bench import InstrumentBench
 
 pytest.importorskip("serial", reason="pyserial is not installed")
 
 SPEED_M_S = 0.1
 
 
-class Rail:
+class Rail(InstrumentBench):
     """A stage that moves evenly, its counter, and the encoder that reads it."""
 
-    def __init__(self, folder: Path, baud: int = 115200, label: str = "", **changes: float | str) -> None:
+    def __init__(self, folder: Path, **changes: float) -> None:
         parameters = StageEncoderParameters(**changes)  # type: ignore[arg-type]
-        self.counter = EmulatedStageEncoder(lambda at_s: SPEED_M_S * at_s, parameters, folder / "encoder")
-        self.encoder = StageEncoder(StageEncoderSettings(str(folder / "encoder"), 1e-5, baud, label))
-        self.now_s = 0.0
-
-    def run(self, duration_s: float) -> list[StagePosition]:
-        positions, end_s = list[StagePosition](), self.now_s + duration_s
-        while self.now_s < end_s:
-            self.now_s += 0.01
-            self.counter.step(self.now_s)
-            positions += self.encoder.read(self.now_s)
-        return positions
-
-    def close(self) -> None:
-        self.encoder.close()
-        self.counter.close()
+        counter = EmulatedStageEncoder(lambda at_s: SPEED_M_S * at_s, parameters, folder / "encoder")
+        super().__init__(counter, StageEncoder(StageEncoderSettings(str(folder / "encoder"), 1e-5)))
 
 
 @pytest.fixture
@@ -49,22 +37,22 @@ def test_positions_are_stamped_with_their_times_except_for_a_constant_delay(rail
     late_s = [each.stamp_s - each.position_m / SPEED_M_S for each in positions]
     assert len(positions) > 190
     assert max(late_s) - min(late_s) < 0.002
-    assert rail.encoder.line.clock.rate_hz == pytest.approx(100.0, rel=0.01)
+    assert rail.port.line.clock.rate_hz == pytest.approx(100.0, rel=0.01)
 
 
 def test_an_encoder_that_was_unplugged_reports_that_its_zero_changed(rail: Rail) -> None:
     rail.run(1.0)
-    rail.counter.unplug()
-    assert rail.run(1.0) == [] and not rail.encoder.line.is_there
-    assert rail.encoder.last_problem == "No such file or directory"
-    rail.counter.plug_in()
+    rail.instrument.unplug()
+    assert rail.run(1.0) == [] and not rail.port.line.is_there
+    assert rail.port.last_problem == "No such file or directory"
+    rail.instrument.plug_in()
     positions = rail.run(1.5)
-    assert rail.encoder.breaks == 1
+    assert rail.port.breaks == 1
     assert positions[0].position_m < 0.5 * SPEED_M_S  # a counter begins at zero
 
 
 def test_an_encoder_without_messages_is_silent(tmp_path: Path) -> None:
     rail = Rail(tmp_path, drop_out_rate_hz=10.0, rate_hz=10.0, drop_out_s=10.0)
     rail.run(2.0)
-    assert rail.encoder.silent_for_s(rail.now_s) > 1.9
+    assert rail.port.silent_for_s(rail.now_s) > 1.9
     rail.close()

@@ -116,17 +116,26 @@ def test_x_goes_along_a_direction_from_an_origin(open_laboratory: Open) -> None:
     assert lab.run(0.15)[-1][1].x_m == pytest.approx(1.4 - 0.5)
 
 
-def test_a_body_is_found_by_name_or_by_id(open_laboratory: Open) -> None:
-    selections: list[dict[str, Any]] = [{"body": "mudskipper"}, {"body_id": 7}, {}]
-    for selection in selections:
-        lab = open_laboratory(moving(0.3), selection, identity=7)
-        assert known(lab.run(0.3)), selection
-    wrong_selections: list[dict[str, Any]] = [{"body": "other_body"}, {"body_id": 6}]
-    for selection in wrong_selections:
-        lab = open_laboratory(moving(0.3), selection, identity=7)
-        assert not known(lab.run(0.29)), selection
-        trouble = lab.port.report().trouble
-        assert trouble == ("there is no rigid body named 'other_body'." if "body" in selection else NOT_SEEN)
+@pytest.mark.parametrize("selection", [{"body": "mudskipper"}, {"body_id": 7}, {}])
+def test_a_body_is_found_by_name_or_by_id(open_laboratory: Open, selection: dict[str, Any]) -> None:
+    assert known(open_laboratory(moving(0.3), selection, identity=7).run(0.3))
+
+
+@pytest.mark.parametrize(
+    ("listening", "serving", "trouble"),
+    [
+        ({"body": "other_body"}, {}, "there is no rigid body named 'other_body'."),
+        ({"body_id": 6}, {}, NOT_SEEN),
+        ({}, {"version": NatNetVersion(2, 5)}, "Motive speaks NatNet 2.5; 2.6 to 4 are supported."),
+        ({"version": "3.0"}, {"version": NatNetVersion(4, 1), "crowded": True}, "all NatNet frames are malformed."),
+    ],
+)
+def test_the_reason_why_no_pose_arrives_is_reported(
+    open_laboratory: Open, listening: dict[str, Any], serving: dict[str, Any], trouble: str
+) -> None:
+    lab = open_laboratory(moving(0.5), listening, identity=7, **serving)
+    assert not known(lab.run(0.4))
+    assert lab.port.report().trouble == trouble
 
 
 def test_a_body_that_is_defined_again_is_found_by_its_name(open_laboratory: Open) -> None:
@@ -155,12 +164,6 @@ def test_frames_wait_until_their_version_is_known(open_laboratory: Open) -> None
     assert "no NatNet frame arrives from 127.0.0.1" in unanswered.port.report().trouble
     unanswered.server.answers = True  # asked again a second later
     assert known(unanswered.run(2.0))
-
-
-def test_a_server_with_an_unsupported_version_is_reported(open_laboratory: Open) -> None:
-    lab = open_laboratory(moving(1.0), version=NatNetVersion(2, 5))
-    assert not known(lab.run(0.9))
-    assert lab.port.report().trouble == "Motive speaks NatNet 2.5; 2.6 to 4 are supported."
 
 
 def test_a_body_that_is_not_tracked_is_none_and_is_counted(open_laboratory: Open) -> None:
@@ -199,13 +202,6 @@ def test_malformed_and_foreign_packets_are_counted_and_cost_nothing_else(open_la
     lab.client.parameters = replace(lab.client.parameters, server="127.0.0.9")
     lab.send(frame)
     assert lab.client.malformed == 5
-
-
-def test_malformed_packets_are_reported(open_laboratory: Open) -> None:
-    """A version that is configured wrongly has this effect."""
-    lab = open_laboratory(moving(0.5), {"version": "3.0"}, version=NatNetVersion(4, 1), crowded=True)
-    assert not known(lab.run(0.4))
-    assert lab.port.report().trouble == "all NatNet frames are malformed."
 
 
 def test_a_server_that_comes_back_with_another_version_is_understood(open_laboratory: Open) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivers.serial.encoder_counts import EncoderCounts
 
@@ -34,11 +32,3 @@ def test_a_jump_is_accepted_once_it_stays_and_is_counted() -> None:
     reported = [counts.accept(line, 0.01 * i) for i, line in enumerate([b"50000", b"5000", b"50010", b"3", b"5", b"7"])]
     assert reported == [pytest.approx(0.5), None, pytest.approx(0.5001), None, pytest.approx(5e-5), pytest.approx(7e-5)]
     assert (counts.malformed, counts.jumps) == (2, 1)
-
-
-@given(st.lists(st.binary(max_size=20)))
-def test_no_bytes_break_it(lines: list[bytes]) -> None:
-    counts = EncoderCounts(1e-5, "n")
-    for i, line in enumerate(lines):
-        counts.accept(line, 0.01 * i)
-    assert counts.accepted + counts.malformed == len(lines)

@@ -11,10 +11,10 @@ from control.records import JOINTS
 from experiments.actuator.calibration import Calibration
 from experiments.actuator.friction import Loop
 from experiments.actuator.plan import Plan, Step
-from experiments.actuator.reading import MovedError, Reading, Side
+from experiments.actuator.reading import MovedError
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
-from experiments.study.notebook import Notebook
+from experiments.study.notebook import Entry, Notebook
 from experiments.study.prompt import GO_ON
 from firmware_host.configuration.configuration import Configuration
 from tests.experiments.still_robot import StillRobot
@@ -83,14 +83,13 @@ class ScriptedJoint:
     def __init__(self, robot: Any, joint: str) -> None:
         self.robot: ScriptedRobot = robot
 
-    def read(self) -> Reading:
+    def read(self) -> Entry:
         if self.robot.mode != "hold":
             raise BenchError(f"the robot no longer holds its pose: {self.robot.message}")
         if self.robot.hanging_g < 0.0:
             raise MovedError("the joint swings by 3.00 degrees")
         current_a = PLAN.torque_nm(self.robot.hanging_g) / TRUE_NM_A + 0.6
-        side = Side(0.0, current_a, 0.2, 0.0)
-        return Reading(0.0, side, side, self.robot.winding_c)
+        return {"current_a": current_a, "rest_friction_a": 0.0, "angle_rad": 0.0}
 
 
 LOOP = Loop(0.18, 0.2, quick=False)

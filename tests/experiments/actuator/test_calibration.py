@@ -13,8 +13,8 @@ from experiments.actuator.plan import Step, steps_of
 from experiments.actuator.reading import MovedError
 from experiments.robot.bench_errors import BenchError, EndedError
 from experiments.robot.bench_robot import LEAVE
-from experiments.study.prompt import GO_ON, REDO
-from tests.experiments.actuator.scripted_calibration import LOOP, PLAN, Case, ScriptedJoint, say
+from experiments.study.prompt import GO_ON
+from tests.experiments.actuator.scripted_calibration import LOOP, PLAN, Case, ScriptedJoint
 
 
 @pytest.fixture(autouse=True)
@@ -55,12 +55,6 @@ def test_an_arm_that_does_not_swing_costs_its_friction_alone(case: Case, monkeyp
     entries = case.run()
     assert list(entries) == KEYS and not any("loops" in entry for entry in entries.values())
     assert sum("friction was not measured" in reported for reported in case.operator.reported) == PLAN.trials + 1
-
-
-def test_the_one_before_is_read_again_when_asked(case: Case) -> None:
-    case.on(Step(1, 200.0), say(REDO))
-    assert list(case.run()) == [KEYS[0], *KEYS[1:]]
-    assert case.hand.asked[:5] == [KEYS[0], KEYS[1], KEYS[2], KEYS[1], KEYS[2]]
 
 
 def test_an_interrupted_calibration_continues(case: Case) -> None:
@@ -142,23 +136,8 @@ def test_weights_in_the_wrong_order_are_named_and_may_be_swapped(case: Case) -> 
     assert entries[Step(1, 400.0).key]["current_a"] > entries[Step(1, 200.0).key]["current_a"]
 
 
-def test_an_earlier_reading_is_not_replaced_by_a_mistake(case: Case) -> None:
-    case.operator.answers = [OTHER]
-    case.on(Step(1, 200.0), case.hanging(100.0))
-    case.run()
-    assert any("100 g of trial 1 was read already" in reported for reported in case.operator.reported)
-
-
 def test_a_mismatched_reading_is_repeated_or_kept_as_doubtful(case: Case) -> None:
     case.operator.answers = [GO_ON, KEEP]
     case.on(Step(2, 400.0), case.hanging(0.0), case.hanging(0.0))
     entry = case.run()[Step(2, 400.0).key]
     assert "slip off" in entry["doubt"] and len(case.operator.asked) == 2
-
-
-def test_a_reading_that_moved_is_reported_and_repeated(case: Case) -> None:
-    case.on(Step(1, 200.0), case.hanging(-1.0))
-    entry = case.run()[Step(1, 200.0).key]
-    assert "200 g did not come to rest: the joint swings by 3.00 degrees" in case.operator.asked[0]
-    assert entry == {"skipped": "the joint swings by 3.00 degrees"}
-    assert len(case.operator.asked) == actuator.MOST_REPEATS

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import copysign, cos, isnan, pi, sin
+from math import copysign, cos, pi, sin
 from pathlib import Path
-from random import Random
 
 import pytest
 
 from experiments.actuator import simulation as actuator_simulation
-from experiments.actuator.friction import FEWEST, Loop, friction_of, loop_of, swing_arm
+from experiments.actuator.friction import friction_of, loop_of, swing_arm
 from experiments.actuator.plan import Plan
 from experiments.actuator.reading import HeldJoint, MovedError, Sample
 from experiments.actuator.simulation import TRUE_CONSTANT_NM_A, bench_configuration, simulated_bench
@@ -59,32 +58,6 @@ def test_a_blocked_arm_makes_no_loop() -> None:
         loop_of(up, up, quick=True)
     with pytest.raises(MovedError, match=r"swings by -10\.3 degrees"):
         loop_of(down, up, quick=True)
-
-
-def made_loops(count: int, speed_rad_s: float, quick: bool, noise_a: float, random: Random) -> list[Loop]:
-    spent_a = DRY_A + VISCOUS_A_S * speed_rad_s
-    return [Loop(spent_a + random.gauss(0.0, noise_a), speed_rad_s, quick) for _ in range(count)]
-
-
-@pytest.mark.parametrize("trials", [1, 5])
-def test_the_truth_is_within_two_errors_in_nineteen_of_twenty(trials: int) -> None:
-    random, dry, viscous = Random(3), [], []
-    for _ in range(1000):
-        slow = made_loops(2 * (trials + 1), 0.19, False, 0.018, random)
-        friction = friction_of(slow + made_loops(4 * (trials + 1), 1.33, True, 0.036, random))
-        dry.append(abs(friction.dry_a - DRY_A) < 2.0 * friction.dry_error_a)
-        viscous.append(abs(friction.viscous_a_s - VISCOUS_A_S) < 2.0 * friction.viscous_error_a_s)
-    assert 0.935 < sum(dry) / len(dry) < 0.975
-    assert 0.935 < sum(viscous) / len(viscous) < 0.98
-
-
-def test_an_unknown_value_is_no_number() -> None:
-    random = Random(1)
-    slow, quick = (made_loops(FEWEST, speed_rad_s, speed_rad_s > 1.0, 0.01, random) for speed_rad_s in (0.19, 1.33))
-    assert all(isnan(value) for value in friction_of([*slow[1:], *quick]))
-    alone = friction_of(slow)
-    assert alone.dry_a > 0.0 and isnan(alone.viscous_a_s)
-    assert friction_of([*slow, *[loop._replace(speed_rad_s=0.3) for loop in quick]]) == alone
 
 
 def test_a_simulated_joint_has_the_friction_that_it_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

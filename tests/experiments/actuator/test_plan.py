@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from control.records import Rig
-from experiments.actuator.plan import Plan, require_possible, stays_cool, steps_of
+from experiments.actuator.plan import Plan, require_possible, steps_of
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
-from experiments.robot.lockstep_robot import simulated_configuration
 from firmware_host.configuration.configuration import Configuration
 
 
@@ -40,17 +38,3 @@ def test_a_weight_that_the_winding_does_not_bear_is_refused() -> None:
     hot = replace(configuration, winding=replace(configuration.winding, thermal_resistance_k_w=4.0))
     with pytest.raises(BenchError, match=r"winding.thermal_resistance_k_w = 4: 800 g would warm the winding of left_"):
         require_possible(Plan(("left_sweep",)), hot)
-
-
-def test_a_warm_winding_can_hold_less_than_a_cool_one() -> None:
-    configuration = bench_configuration()
-    assert stays_cool(configuration, 13.0, 35.0, 10.0)
-    assert not stays_cool(configuration, 13.0, 35.0, 20.0)
-    assert not stays_cool(configuration, 13.0, 60.0, 10.0)
-    assert stays_cool(configuration, 5.0, 60.0, 10.0)
-
-
-def test_a_joint_that_the_rig_lacks_is_refused() -> None:
-    alone = simulated_configuration(rig=Rig(("left",)))
-    with pytest.raises(BenchError, match="no right_sweep: give --joint, one of left_sweep, left_adduction"):
-        require_possible(Plan(("right_sweep",)), alone)

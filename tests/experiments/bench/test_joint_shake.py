@@ -68,29 +68,9 @@ def test_a_joint_with_a_stuck_encoder_hardly_moves_and_is_reported(
     assert not any(drive.torque_nm(bench.rig.now_s) > 0.01 for drive in bench.rig.robot.drives)
 
 
-@pytest.mark.parametrize("joint", ["right_sweep", "left_adduction"])
-def test_a_joint_with_half_the_inertia_and_no_friction_hardly_moves_either(
-    configuration: Configuration, joint: str
-) -> None:
-    bench = Bench(configuration, joint, inertia=0.5)
-    bench.without_friction()
-    bench.stick_encoder()
-    assert not shake_of(bench, joint).answered
-    bench.test_rig.run_for(0.3)  # until it has come to rest
-    assert bench.farthest_rad < UNSEEN_RAD
-
-
 def shake_of(bench: Bench, joint: str) -> Shake:
     bench.test_rig.arm()
     return shake_joint(bench.test_rig, joint)
-
-
-def test_noise_is_no_answer(configuration: Configuration) -> None:
-    """The noise is that of an encoder whose magnet has come off."""
-    bench = Bench(configuration, "left_sweep", noise_rad=0.002)
-    bench.stick_encoder()
-    law = shake_of(bench, "left_sweep")
-    assert law.answer_rad > 0.003 and not law.answered
 
 
 def test_a_working_encoder_answers_a_weak_shake(configuration: Configuration) -> None:

@@ -14,7 +14,7 @@ from experiments.bench.lateness import LATE_S
 from experiments.bench.operator import SimulatedBenchOperator
 from experiments.bench.reading import Reading, Readings
 from experiments.bench.rig import SimulatedRig
-from experiments.bench.stop_check import OFF_TICKS, QUIET_A, check_torque_off
+from experiments.bench.stop_check import OFF_TICKS, check_torque_off
 from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, check_stroke
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
@@ -80,26 +80,6 @@ def test_a_flipper_that_sinks_during_arming_only_delays_it(configuration: Config
     assert all(state.closed_loop for state in opened_rig.loop.states)
 
 
-def test_a_fault_against_arming_is_reported(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened_rig = sinking_rig(configuration, Sinking(1000))
-    monkeypatch.setattr("experiments.bench.test_rig.ARMING_S", 1.0)
-    with pytest.raises(BenchError, match=r"closed loop within 1 s\. The left_adduction joint moves"):
-        opened_rig.arm()
-
-
-@pytest.mark.parametrize(("missing_fraction", "waiting_fraction"), [(0.05, 0.1)])
-def test_the_current_before_torque_goes_off_is_seen_through_late_ticks_and_messages(
-    opened_rig: TestRig, rig: LateRig, briefly: None, missing_fraction: float, waiting_fraction: float
-) -> None:
-    opened_rig.arm()
-    opened_rig.switch_off()
-    rig.begin(missing_fraction, waiting_fraction, 2, 1)
-    reported = by_name(check_torque_off(opened_rig))
-    assert opened_rig.lateness.message
-    before = [reading for what, reading in reported.items() if what.endswith("current before")]
-    assert len(before) == 4 and all(reading.value > 3.0 * QUIET_A for reading in before)
-
-
 def test_a_drive_that_holds_its_torque_is_found_by_its_current(
     opened_rig: TestRig, rig: LateRig, briefly: None
 ) -> None:
@@ -156,27 +136,6 @@ def bench(opened_rig: TestRig) -> StagedBench:
     return StagedBench(opened_rig, report)
 
 
-def readings_kept(bench: StagedBench) -> dict[str, Reading]:
-    bench.report.end()
-    return {reading.what: reading for reading in bench.report.tests[-1]["readings"]}
-
-
-def test_the_report_keeps_a_bad_reading_that_was_repeated(
-    bench: StagedBench,
-) -> None:
-    values = [7.0, 5.0]
-
-    def measure(opened_rig: TestRig) -> Readings:
-        opened_rig.lateness.update(*late(3, 0.0))
-        yield Reading("error", values.pop(0), "deg", 0.0, 6.0, "check the gains")
-
-    bench.check(measure)
-    assert readings_kept(bench)["error"].value == 5.0
-    reported = r"test, before it was repeated: error is 7 deg, must be 0 to 6: check the gains\. Meanwhile .* 3 of 4"
-    assert any(re.match(reported, line) for line, good in bench.report.lines(brief=True))
-    assert "error is 7 deg" in bench.report.as_json["tests"][0]["spoiled"][0]
-
-
 @pytest.mark.parametrize(
     ("missed", "age_s", "message"),
     [
@@ -216,17 +175,6 @@ def test_a_bad_reading_without_lateness_is_measured_once(bench: StagedBench) -> 
     with pytest.raises(pytest.fail.Exception, match=r"check the gains\.$"):
         bench.check(measure)
     assert measured == [1]
-
-
-def test_a_measurement_that_ends_early_reports_the_lateness(bench: StagedBench) -> None:
-    def measure(opened_rig: TestRig) -> Readings:
-        opened_rig.lateness.update(*late(2, 0.0))
-        yield Reading("speed", 1.0)
-        raise BenchError("The end of a path did not come within 60 s.")
-
-    with pytest.raises(BenchError, match=r"within 60 s\. Meanwhile this computer missed 2 of 3 ticks"):
-        bench.check(measure)
-    assert "speed" in readings_kept(bench)
 
 
 def test_readings_are_computed_after_torque_is_off(opened_rig: TestRig, rig: LateRig) -> None:

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from control.records import JOINTS
-from experiments.bench.operator import Observation, PromptedBenchOperator, SimulatedBenchOperator
-from experiments.bench.rig import SimulatedRig
-from firmware_host.configuration.configuration import Configuration
+from experiments.bench.operator import Observation, PromptedBenchOperator
 from tests.scripted_operator import ScriptedOperator
 
 
@@ -42,26 +39,3 @@ def test_manual_checks_can_be_skipped(answer: str, done: bool) -> None:
     bench_operator = PromptedBenchOperator(ScriptedOperator(answer, answer), sure=True)
     assert bench_operator.hold_level(nothing) is done
     assert bench_operator.turn_joint("left_sweep", nothing) is done
-
-
-@pytest.mark.parametrize(
-    ("motions_rad", "observation"),
-    [
-        ((0.2, 0.0, 0.0, 0.0), Observation.RIGHT),
-        ((-0.2, 0.0, 0.0, 0.0), Observation.OPPOSITE),
-        ((0.0, 0.0, 0.2, 0.0), Observation.OTHER),
-        ((0.2, 0.2, 0.0, 0.0), Observation.OTHER),
-        ((0.0, 0.0, 0.0, 0.0), Observation.NOTHING),
-    ],
-)
-def test_the_simulated_operator_observes_the_mechanics(
-    configuration: Configuration, motions_rad: tuple[float, ...], observation: Observation
-) -> None:
-    rig = SimulatedRig(configuration)
-    bench_operator = SimulatedBenchOperator(rig)
-    bench_operator.start_observing()
-    for arm, (sweep_rad, adduction_rad) in zip(rig.robot.plant.arms, (motions_rad[:2], motions_rad[2:]), strict=True):
-        arm.sweep_rad += sweep_rad
-        arm.adduction_rad += adduction_rad
-    bench_operator.observe_farthest()
-    assert bench_operator.observed_motion(JOINTS[0], nothing) is observation

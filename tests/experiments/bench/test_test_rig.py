@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import nan
-
 import numpy as np
 import pytest
 
@@ -59,12 +57,6 @@ def test_a_fault_ends_a_measurement_with_its_message(bench: StagedBench, rig: Si
     rig.robot.restart_drive(1)
     with pytest.raises(BenchError, match=r"left_adduction.*\."):
         bench.test_rig.run_for(1.0)
-
-
-def test_a_robot_that_is_not_idle_is_not_armed_again(bench: StagedBench) -> None:
-    bench.test_rig.arm(lambda held, states: NO_TORQUE)
-    with pytest.raises(BenchError, match=r"cannot be armed: it is in hold\."):
-        bench.test_rig.arm()
 
 
 class Asked(PromptedBenchOperator):
@@ -161,13 +153,6 @@ def test_a_reading_out_of_its_bounds_fails_with_what_to_do(bench: StagedBench) -
     assert str(failure.value) == "load is 90 %, must be 0 to 80: take strangers off."
     bench.report.end()
     assert bench.report.as_json["tests"][0]["readings"] == [good.as_json, bad.as_json]
-
-
-def test_an_unknown_value_is_never_good_and_is_null_in_json() -> None:
-    reading = Reading("delay", nan, "s")
-    assert not reading.good
-    assert reading.value_text == "unknown"
-    assert reading.as_json["value"] is reading.as_json["low"] is None
 
 
 def report_with(*outcomes: str) -> BenchReport:

@@ -23,10 +23,3 @@ def test_the_standard_error_is_the_scatter_over_many_fits() -> None:
     ]
     scatter = float(np.std([fit.parameters[0] for fit in fits]))
     assert np.mean([fit.std_errors[0] for fit in fits]) == pytest.approx(scatter, rel=0.3)
-
-
-def test_a_sharp_prior_wins_over_few_and_noisy_samples() -> None:
-    y = 2.0 + 3.0 * np.exp(-1.5 * T) + np.random.default_rng(2).normal(0.0, 0.5, len(T))
-    reported = Prior(np.log(np.array([1.2])), np.array([1e-3]))
-    fit = fit_curve(fading, y, [np.zeros(1)], reported, 0.5)
-    assert np.exp(fit.parameters[0]) == pytest.approx(1.2, rel=1e-3)

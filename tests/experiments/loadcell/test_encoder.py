@@ -75,27 +75,11 @@ def test_an_unplugged_encoder_is_asked_for_and_then_left_out(make: Make) -> None
     assert "position" not in laboratory.notebook.entries["lawful/insertion/1"]
 
 
-def test_an_encoder_that_is_plugged_in_when_asked_for_continues(make: Make) -> None:
-    laboratory = make()
-    counter_of(laboratory).unplug()
-    laboratory.at(1.5, counter_of(laboratory).plug_in)
-    reported = laboratory.try_once()
-    assert len(reported) == 1 and "encoder is unplugged" in reported[0]
-    (recorded,) = load_counted(laboratory.folder, laboratory.notebook)
-    assert recorded.positions is not None
-
-
 def test_a_drop_out_in_the_stroke_is_reported(make: Make) -> None:
     laboratory = make(operator=ScriptedOperator(KEEP))
     laboratory.at(3.9, lambda: setattr(counter_of(laboratory), "line_at", lambda at_s: b""))
     reported = laboratory.try_once()
     assert any("position is unknown" in each or "the position is not used" in each for each in reported)
-
-
-def test_a_few_garbled_lines_do_no_harm(make: Make) -> None:
-    laboratory = make(encoder={"garbled_fraction": 0.05})
-    assert laboratory.try_once() == []
-    assert laboratory.notebook.entries["lawful/insertion/1"]["position"]["garbled_lines"] > 5
 
 
 @pytest.mark.parametrize(

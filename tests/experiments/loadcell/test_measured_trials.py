@@ -8,8 +8,7 @@ import pytest
 from experiments.loadcell.analysis import COEFFICIENTS, analyse, analyse_trial, gather_trials
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.force_trials import wide_pace
-from experiments.loadcell.measured_trials import moving
-from experiments.loadcell.stage_track import WIDE, common_alignment, fit_rate
+from experiments.loadcell.stage_track import WIDE
 from experiments.loadcell.strokes import (
     INSERTION,
     SHEAR,
@@ -74,12 +73,6 @@ def test_the_coefficients_do_not_depend_on_the_encoders_direction(insertion: Rec
     assert one(turned).coefficients == {name: pytest.approx(k) for name, k in one(insertion).coefficients.items()}
 
 
-def test_without_its_positions_the_same_trial_is_remarked(insertion: Recorded) -> None:
-    alone = one(insertion._replace(positions=None))
-    assert "one speed" in alone.remark or alone.problem
-    assert one(insertion).remark == ""
-
-
 def places_of(recorded: Recorded) -> tuple[Array, Array]:
     assert recorded.positions is not None
     return recorded.positions
@@ -102,25 +95,11 @@ def test_a_wrong_travel_per_count_is_reported(insertion: Recorded) -> None:
 def test_a_gap_in_the_positions_costs_its_own_samples_only(insertion: Recorded) -> None:
     times_s, positions_m = places_of(insertion)
     whole = one(insertion)
-    assert whole.motion is not None
     middle_s = times_s[int(np.argmin(np.abs(positions_m + 0.035)))]  # 1.5 cm deep
     kept = np.abs(times_s - middle_s) > 0.04
     reported = one(insertion._replace(positions=StagePositions(times_s[kept], positions_m[kept])))
     assert reported.is_measured
     assert reported.coefficients["k_p"].value == pytest.approx(whole.coefficients["k_p"].value, rel=0.02)
-
-
-def test_a_plate_that_was_not_lifted_still_shows_its_insertion(insertion: Recorded) -> None:
-    early = insertion.times_s < 4.0
-    reported = one(insertion._replace(times_s=insertion.times_s[early], forces_n=insertion.forces_n[early]))
-    assert "no extraction" in reported.remark
-    assert np.isfinite(reported.coefficients["k_p"].value) and np.isnan(reported.coefficients["k_e"].value)
-
-
-def test_a_drag_that_stopped_early_is_left_to_the_force(drag: Recorded) -> None:
-    times_s, positions_m = places_of(drag)
-    reported = one(drag._replace(positions=StagePositions(times_s, 0.4 * positions_m)))
-    assert not reported.is_measured and "the encoder saw 8.0 cm of 20 cm" in reported.remark
 
 
 def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> None:
@@ -129,36 +108,3 @@ def test_how_clay_follows_the_speed_is_read_from_the_drags(drag: Recorded) -> No
     reported = one(drag)
     assert reported.alignment is not None and np.isnan(reported.alignment.lag_s)
     assert reported.alignment.rate_fraction == pytest.approx(true, abs=0.05)
-
-
-@pytest.mark.parametrize(("kind", "name"), [("drag", "k_s"), ("insertion", "k_p"), ("insertion", "k_e")])
-def test_an_uncertain_rate_is_shared_by_all_trials(kind: str, name: str, request: pytest.FixtureRequest) -> None:
-    """Averaging over more trials does not reduce it."""
-    reported = one(request.getfixturevalue(kind))
-    shared = reported.shared_uncertainty * reported.coefficients[name].value
-    assert shared > reported.coefficients[name].std_error / 10.0
-    assert gather_trials([reported] * 100, name, 0.0).trials_error > shared
-
-
-def test_a_stage_of_one_speed_says_nothing_of_the_rate() -> None:
-    reported = fit_rate(np.full(50, 3.0), np.full(50, 0.01))
-    assert (reported.rate_fraction, reported.rate_uncertainty) == pytest.approx(
-        (WIDE.rate_fraction, WIDE.rate_uncertainty)
-    )
-
-
-def test_trials_share_lag_and_rate() -> None:
-    insertions = [Alignment(lag_s, 0.3, 1e-4, 0.02) for lag_s in (0.010, 0.011, 0.030)]
-    drags = [Alignment(float("nan"), rate, float("inf"), 0.01) for rate in (0.1, 0.12)]
-    common = common_alignment([*insertions, *drags])
-    assert (common.lag_s, common.rate_fraction) == pytest.approx((0.011, 0.11))
-    assert common.lag_uncertainty_s > 0.005  # the trials do not agree
-    assert common_alignment([]) == WIDE
-
-
-def test_after_a_rest_samples_count_again_two_millimetres_on() -> None:
-    positions_m = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0, 6.0, 7.0]) / 1000.0
-    speeds_m_s = np.array([0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.1, 0.1, 0.1, 0.1])
-    assert np.flatnonzero(moving(positions_m, speeds_m_s, 0.01, 0.002)).tolist() == [8]
-    in_air = np.zeros(10, dtype=bool)
-    assert np.flatnonzero(moving(positions_m, speeds_m_s, 0.01, 0.002, in_air)).tolist() == [1, 2, 6, 7, 8]

@@ -16,11 +16,6 @@ def even(times_s: Array = TIMES_S) -> StageTrack:
     return StageTrack(StagePositions(times_s, 5.0 + 0.1 * times_s))
 
 
-def test_the_mean_of_an_even_motion_is_its_middle() -> None:
-    until_s = np.array([0.5, 0.5037, 1.2])
-    assert even().mean_positions_m(until_s, 0.0125) == pytest.approx(0.1 * (until_s - 0.00625))
-
-
 def test_straight_lines_are_off_by_no_more_than_the_stated_error() -> None:
     """The stage accelerates at 5 m/s² and its encoder sends 20 positions per second."""
     times_s = np.arange(0.0, 1.0, 0.05)
@@ -37,19 +32,8 @@ def test_the_position_is_unknown_before_after_and_in_a_gap() -> None:
     assert np.isnan(reported).tolist() == [True, False, True, True, False, True]
 
 
-def test_the_position_is_known_over_a_gap_in_which_the_stage_stood_still() -> None:
-    gone = (TIMES_S > 0.8) & (TIMES_S < 1.0)
-    track = StageTrack(StagePositions(TIMES_S[~gone], np.minimum(TIMES_S[~gone], 0.7)))
-    assert track.mean_positions_m(np.array([0.9]), 0.0125) == pytest.approx([0.7])
-
-
 def test_a_single_wrong_position_is_removed() -> None:
     positions_m = 0.1 * TIMES_S
     positions_m[70] += 0.004
     track = StageTrack(StagePositions(TIMES_S, positions_m))
     assert track.positions_m(TIMES_S[70:71]) == pytest.approx([0.07])
-
-
-def test_positions_are_relative_to_the_first_and_go_forward_whatever_the_sign_of_the_encoder() -> None:
-    backward = StageTrack(StagePositions(TIMES_S, 5.0 - 0.1 * TIMES_S))
-    assert backward.positions_m(TIMES_S) == pytest.approx(0.1 * TIMES_S)

@@ -13,7 +13,7 @@ from experiments.loadcell.preparation import CellSettings, examine_lines
 from experiments.loadcell.recording import AVERAGED, RAW, load_counted
 from experiments.loadcell.stage import ManualStage, SimulatedStage, Trial
 from experiments.loadcell.strokes import INSERTION, SHEAR, AnalysedTrial
-from experiments.loadcell.trials import KEEP, list_problems, record
+from experiments.loadcell.trials import list_problems, record
 from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
@@ -62,17 +62,6 @@ def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) ->
     assert sharp.operator.reported == []
 
 
-def test_what_is_in_the_notebook_is_not_measured_again(make: Make) -> None:
-    laboratory = make()
-    laboratory.measure()
-    before = dict(laboratory.notebook.entries)
-    lines = laboratory.port.lines
-    laboratory.measure()
-    assert laboratory.notebook.entries == before
-    assert laboratory.port.lines < lines + 400  # it only read the port for a moment
-    assert "calibration from" in laboratory.operator.reported[-1]
-
-
 def test_a_trial_with_an_unplugged_cell_is_repeated_and_both_files_remain(make: Make) -> None:
     laboratory = make()
     laboratory.at(4.5, laboratory.bench.amplifier.unplug)
@@ -105,21 +94,6 @@ def test_an_invalid_trial_is_reported_and_left_out(
     assert entry["skipped"] and any(message in each for each in entry["why"])
     assert (laboratory.folder / entry["file"]).exists()
     assert load_counted(laboratory.folder, laboratory.notebook) == []
-
-
-def test_enter_repeats_an_invalid_trial_twice_and_then_leaves_it_out(make: Make) -> None:
-    laboratory = make(operator=ScriptedOperator())
-    laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
-    laboratory.try_once()
-    (entry,) = laboratory.notebook.entries.values()
-    assert entry["file"].endswith("_3.csv") and entry["skipped"]
-
-
-def test_a_stage_that_is_not_started_makes_no_contact(make: Make) -> None:
-    laboratory = make(operator=ScriptedOperator(KEEP))
-    laboratory.trial_bench.stage.start = lambda trial: None  # type: ignore[method-assign]
-    assert any("no contact" in each for each in laboratory.try_once())
-    assert "kept_in_spite_of" in laboratory.notebook.entries["lawful/insertion/1"]
 
 
 def test_a_cell_that_stays_at_its_largest_force_is_at_its_limit(make: Make) -> None:
@@ -180,29 +154,12 @@ def test_a_cell_that_cannot_be_read_is_refused(
         laboratory.measure()
 
 
-def test_an_amplifier_too_slow_for_the_stroke_is_reported_first(make: Make) -> None:
-    laboratory = make(amplifier=AmplifierParameters(rate_hz=10.0), operator=ScriptedOperator("q"))
-    with pytest.raises(BenchError, match="too slow"):
-        laboratory.measure(CellSettings(scale_n=1.0))
-    assert "RATE pin" in laboratory.operator.reported[1] and "--speed 0.02" in laboratory.operator.reported[1]
-    assert not laboratory.notebook.entries
-
-
 def test_a_cell_that_stays_unplugged_ends_the_recording(make: Make) -> None:
     laboratory = make()
     laboratory.recorder.listen(0.5)
     laboratory.bench.amplifier.unplug()
     with pytest.raises(BenchError, match="did not come back"):
         laboratory.recorder.tare()
-
-
-def test_a_tare_in_which_the_cell_is_unplugged_is_taken_again(make: Make) -> None:
-    laboratory = make()
-    laboratory.recorder.listen(0.5)
-    laboratory.at(0.02, laboratory.bench.amplifier.unplug)
-    laboratory.at(3.0, laboratory.bench.amplifier.plug_in)
-    assert laboratory.recorder.tare().samples > 60
-    assert laboratory.port.line.unpluggings == 1
 
 
 def test_the_manual_stage_prompts_for_every_step() -> None:

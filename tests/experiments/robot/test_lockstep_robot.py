@@ -19,7 +19,6 @@ from experiments.robot.bench_robot import (
     CLEAR,
     LEAVE,
     arm,
-    ask_to_clear_faults,
     disarm,
     fetch_strides,
     move,
@@ -167,22 +166,6 @@ def test_a_fault_that_the_operator_leaves_ends_the_experiment(faulty: LockstepRo
     assert faulty.call("status")["mode"] == "fault"
 
 
-def test_a_fault_remains_without_an_operator(faulty: LockstepRobot) -> None:
-    with pytest.raises(BenchError, match="(?s)The robot is in FAULT:.*right_sweep.*'mudskipper clear'"):
-        arm(faulty)
-    assert faulty.call("status")["mode"] == "fault"
-
-
-def test_a_fault_that_comes_back_is_cleared_three_times_at_most(
-    faulty: LockstepRobot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    call, operator = faulty.call, Decided(CLEAR)
-    monkeypatch.setattr(faulty, "call", lambda method, **params: None if method == "clear" else call(method, **params))
-    with pytest.raises(BenchError, match="the fault comes back: The robot is in FAULT"):
-        ask_to_clear_faults(faulty, operator)
-    assert len(operator.asked) == 3
-
-
 def test_a_transient_fault_makes_no_prompt(robot: LockstepRobot) -> None:
     robot.wait(1.0)
     robot.lockstep.fail("left_sweep.position", "off", 2.0)
@@ -205,10 +188,3 @@ def test_strides_that_the_daemon_no_longer_keeps_are_not_passed_over(
     else:
         with pytest.raises(BenchError, match="more strides than the daemon stores"):
             fetch_strides(robot, 5)
-
-
-def test_the_log_is_whole_after_the_end_and_torque_is_off(robot: LockstepRobot) -> None:
-    arm(robot)
-    robot.close()
-    log = robot.record(0.0, 1e9)
-    assert log.complete and log.ticks["mode"][-1] == Mode.IDLE

@@ -56,18 +56,6 @@ def test_a_segment_that_ends_before_the_experiment_began_is_left_out(
         assert len(read_logs(copies).ticks) == kept * SEGMENT_TICKS
 
 
-def test_of_a_run_that_ended_before_the_experiment_began_nothing_is_copied(
-    segments: list[Path], tmp_path: Path
-) -> None:
-    assert copy_since(segments[:4], 4.0, tmp_path) == []
-
-
-def test_a_segment_that_has_only_just_begun_hides_none_before_it(segments: list[Path], tmp_path: Path) -> None:
-    LogFile(segment_path(segments[0].parent.parent / ACTIVE / segments[0].name, 5), OPENING).flush()
-    logs = run_files(segments[-1])
-    assert [log.name for log in copy_since(logs, 3.5, tmp_path)] == [log.name for log in logs[3:]]
-
-
 def test_a_full_disk_leaves_no_copy_that_is_cut(
     segments: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -55,13 +55,6 @@ def test_it_prints_counts_at_its_rate_with_its_noise(listener: Listener) -> None
     assert stdev(counts) == pytest.approx(420.0, rel=0.15)
 
 
-@pytest.mark.parametrize(("style", "line"), [("newtons", b"Load: 1.0000 N"), ("indicator", b"ST,GS,+00.10197kg")])
-def test_other_amplifiers_print_other_lines(tmp_path: Path, style: str, line: bytes) -> None:
-    listener = Listener(tmp_path, AmplifierParameters(style=style, noise_n=0.0))
-    assert set(listener.hear(0.0, 0.5).split(b"\r\n")) == {line, b""}
-    listener.close()
-
-
 def test_an_unplugged_amplifier_hangs_up_and_comes_back_by_the_same_name(tmp_path: Path) -> None:
     listener = Listener(tmp_path, AmplifierParameters())
     listener.amplifier.unplug()
@@ -70,15 +63,6 @@ def test_an_unplugged_amplifier_hangs_up_and_comes_back_by_the_same_name(tmp_pat
     listener.amplifier.plug_in()
     assert (tmp_path / "cell").exists()
     listener.close()
-
-
-def test_unread_lines_are_lost_and_counted(tmp_path: Path) -> None:
-    amplifier = EmulatedAmplifier(lambda _: 1.0, AmplifierParameters(rate_hz=1000.0), tmp_path / "cell")
-    amplifier.waits_for_delivery = False
-    for second in range(1, 60):
-        amplifier.step(float(second))
-    assert amplifier.lost_lines > 1000
-    amplifier.close()
 
 
 def test_an_operator_at_the_emulated_bench_moves_the_plate(tmp_path: Path) -> None:

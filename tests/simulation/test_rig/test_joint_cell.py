@@ -5,7 +5,6 @@ from math import cos, degrees, radians, sin
 import numpy as np
 import pytest
 
-import simulation.test_rig.joint_cell
 from control.geometry import FlipperGeometry
 from control.plate_integrals import submerged_part
 from simulation.mud.clay import clay_of_water
@@ -36,12 +35,6 @@ def test_a_depth_beyond_the_arm_s_reach_ends_at_its_reach() -> None:
     """The depth is below the surface, which lies 2 mm below its nominal height."""
     down, _ = measure_arc(CLAY, GEOMETRY, SWEEP_RAD, 0.002, 0.08, 0.1)
     assert down.depths_m[-1] == pytest.approx(GEOMETRY.deepest_m(degrees(SWEEP_RAD)) - 0.002)
-
-
-def test_steps_are_fine_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    coarse = stiffness(0.05)
-    monkeypatch.setattr(simulation.test_rig.joint_cell, "STEP_M", 2e-5)
-    assert stiffness(0.05) == pytest.approx(coarse, rel=3e-3)
 
 
 @pytest.mark.parametrize(("depth_m", "more"), [(0.03, 0.04), (0.04, 0.13), (0.05, 0.31)])

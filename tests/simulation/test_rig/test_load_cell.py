@@ -71,13 +71,6 @@ def test_a_hold_of_half_a_second_loses_the_stated_fraction() -> None:
         assert lost == pytest.approx(fractions, abs=0.005)
 
 
-@pytest.mark.parametrize("speed_m_s", [0.05, 0.1, 0.5])
-def test_an_upright_plate_is_dragged_at_the_limit_of_the_clay(speed_m_s: float) -> None:
-    shear_n = measure_shear(CLAY, GEOMETRY, 0.0, 0.0, 0.03, speed_m_s)
-    limit_n = rate_factor(speed_m_s) * CLAY.lateral_n(0.03, GEOMETRY.plate_width_m)
-    assert shear_n == pytest.approx(limit_n, rel=0.01)
-
-
 @pytest.mark.parametrize("sweep_rad", [0.0, 0.4, -0.4])
 def test_a_body_that_is_pushed_back_drags_its_flipper_with_the_same_force(sweep_rad: float) -> None:
     adduction_rad, force = lowered_rad(sweep_rad), NO_CONTACT

@@ -58,22 +58,6 @@ def test_an_insertion_lowers_holds_and_lifts() -> None:
     assert stage.ends_s == pytest.approx(1.0 + 2.0 * stroke_s + 3.0)
 
 
-def test_lowering_and_lifting_end_at_their_depths_and_a_drag_moves_backward() -> None:
-    air = Air()
-    stage = PlateStage(air)
-    stage.move_over(air, sideways=True)
-    stage.mean_force_n(0.0)
-    stage.lower(0.0, 0.03)
-    stage.mean_force_n(2.0)
-    assert air.depth_m == pytest.approx(0.03)
-    stage.drag(2.0, 0.2, 0.1)
-    stage.mean_force_n(5.0)
-    assert (air.path_m, stage.force_n) == pytest.approx((-0.2, -0.2))
-    stage.lift(5.0)
-    stage.mean_force_n(7.0)
-    assert air.depth_m == pytest.approx(-LIFTED_M)
-
-
 def test_the_cell_reads_the_mean_since_the_last_reading_and_a_hanging_weight() -> None:
     stage = PlateStage(Air(), StageParameters(1e6, cell_sign=-1.0))
     stage.reset()
