@@ -81,14 +81,14 @@ class FaultMonitor:
         self._log = LogMonitor(configuration.faults)
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
         self._warm_c = configuration.limits.temperature_warm_c
-        self._failed_sends = {name: port.failed_sends for name, port in self._drives.ports.items()}
-        self._bus_events = {name: (0, BusState.ACTIVE) for name in self._drives.ports}
-        self._error_s = dict.fromkeys(self._drives.ports, NEVER_S)
-        self._lost_frames = {name: port.lost_frames for name, port in self._drives.ports.items()}
-        self._refused_ticks = dict.fromkeys(self._drives.ports, 0)
-        self._restarts = {health.joint: health.restarts for health in self._drives.health}
-        self._foreign_commands = {health.joint: health.foreign_commands for health in self._drives.health}
-        self._refused_commands = self._drives.refused_commands
+        self._failed_sends = {name: port.failed_sends for name, port in drives.ports.items()}
+        self._bus_events = {name: (0, BusState.ACTIVE) for name in drives.ports}
+        self._error_s = dict.fromkeys(drives.ports, NEVER_S)
+        self._lost_frames = {name: port.lost_frames for name, port in drives.ports.items()}
+        self._refused_ticks = dict.fromkeys(drives.ports, 0)
+        self._restarts = {health.joint: health.restarts for health in drives.health}
+        self._foreign_commands = {health.joint: health.foreign_commands for health in drives.health}
+        self._refused_commands = drives.refused_commands
         self._held_back_s = dict.fromkeys(joints, NEVER_S)  # by the mud
         self._lagging_strides = dict.fromkeys(joints, (-9, -9))  # the last two in which a joint lagged in its swing
         self._sound: dict[str, DriveHealth | None] = dict.fromkeys(joints)  # the last report in which nothing was wrong
@@ -127,7 +127,9 @@ class FaultMonitor:
             found.append(FaultKind.TORQUE_NOT_FINITE.fault())
         if monitor_input.mode is Mode.ARMING and tick.now_s - monitor_input.mode_since_s > ARMING_S:
             self._check_arming(found, monitor_input.states)
-        self._check_gate(found)
+        if self._drives.refused_commands > self._refused_commands:
+            self._refused_commands = self._drives.refused_commands
+            found.append(FaultKind.COMMAND_REFUSED.fault(reason=self._drives.last_refusal))
         self._check_drives(found, health, monitor_input.mode)
         self._check_pose(found, tick.now_s, monitor_input.body)
         return found
@@ -169,7 +171,8 @@ class FaultMonitor:
             for fault in joint.update(facts, state, torque_nm, target):
                 if fault.kind is FaultKind.FOLLOWING_ERROR and self._is_held_back(fault.subject, tick, monitor_input):
                     continue
-                found.append(_explained(fault, health))
+                explained = fault.kind in EXPLAINED and health.errors
+                found.append(fault.with_values(reason=health.errors) if explained else fault)
 
     def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:
         """Return whether mud may hold a joint that lags behind, or held it until CATCH_UP_S ago.
@@ -205,12 +208,6 @@ class FaultMonitor:
     def _check_arming(self, found: list[Fault], states: DriveStates) -> None:
         idle = (joint for joint, state in zip(self._rig.joints, states, strict=True) if not state.closed_loop)
         found += [FaultKind.ARMING_FAILED.fault(joint, longest_s=ARMING_S) for joint in idle]
-
-    def _check_gate(self, found: list[Fault]) -> None:
-        refused = self._drives.refused_commands
-        if refused > self._refused_commands:
-            self._refused_commands = refused
-            found.append(FaultKind.COMMAND_REFUSED.fault(reason=self._drives.last_refusal))
 
     def _check_drives(self, found: list[Fault], drives: Joints[DriveHealth], mode: Mode) -> None:
         """Check the drives' reports about themselves. A report in which nothing was wrong is not read again."""
@@ -284,10 +281,3 @@ def _joint_monitors(configuration: Configuration) -> tuple[JointMonitor, ...]:
         )
         for joint, joint_range, own_dynamics in zip(configuration.rig.joints, ranges, dynamics, strict=True)
     )
-
-
-def _explained(fault: Fault, health: DriveHealth) -> Fault:
-    """Return the fault with the drive's own error text as its reason, for kinds that it explains."""
-    if fault.kind not in EXPLAINED or not health.errors:
-        return fault
-    return fault.with_values(reason=health.errors)

@@ -150,7 +150,7 @@ class SimulatedRig:
             world.plant(built),
             world.track,
             drives or world.drives(built),
-            {joint: built.drive[joint].bus for joint in built.rig.joints},
+            built.bus_of,
             {name: bus.open() for name, bus in self.buses.items()},
             seed,
         )

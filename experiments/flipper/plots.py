@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from control.geometry import FlipperGeometry
 from control.records import Phase
 from experiments.flipper.modelled_force import ModelledForces, drawn_coefficients, modelled_forces
-from experiments.reports.coefficient_table import PER_CM3, MudSummary
+from experiments.reports.coefficient_table import PER_CM3
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import (
@@ -27,6 +27,7 @@ from experiments.reports.mud_styles import (
 from experiments.study.notebook import Entry
 from experiments.trials.stride_profile import Floats, StrideProfile, profile_from_row
 
+Muds = Sequence[Mapping[str, Any]]  # of the summary
 THIN: dict[str, Any] = {"linewidth": 1.1}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
 
@@ -105,13 +106,13 @@ def _draw_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> 
 # figure 5
 
 
-def draw_coefficients(muds: Sequence[MudSummary], firsts: Mapping[str, Entry], geometry: FlipperGeometry) -> Figure:
+def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry], geometry: FlipperGeometry) -> Figure:
     """Draw the forces of one trial in each mud, the coefficients, and their comparison with a load cell: figure 5."""
-    compared = any(mud.truth for mud in muds)
+    compared = any(mud["truth"] for mud in muds)
     rows = 3 if compared else 2
     figure = Figure(figsize=(11.0, 3.3 * rows + 0.5))
     panels = figure.subplots(rows, 3)
-    looks = looks_of([mud.mud for mud in muds])
+    looks = looks_of([mud["mud"] for mud in muds])
     _draw_curves(panels[0], firsts, looks)
     for column, name in enumerate(COEFFICIENTS):
         _draw_by_mud(panels[1][column], muds, name, looks)
@@ -146,12 +147,12 @@ def _draw_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Map
             panel.invert_xaxis()  # in the direction of the motion
 
 
-def _draw_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
+def _draw_by_mud(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw mean and standard deviation over the trials; a lower bound has an arrow up."""
-    names = [mud.mud for mud in muds]
+    names = [mud["mud"] for mud in muds]
     waters = waters_of(names)
     for x, mud in zip(waters or range(len(names)), muds, strict=True):
-        gathered, look = mud.coefficient(name), looks[mud.mud]
+        gathered, look = mud[name], looks[mud["mud"]]
         if gathered.value is None:
             continue
         value, sd = PER_CM3 * gathered.value, PER_CM3 * gathered.value * (gathered.repeatability or 0.0)
@@ -166,16 +167,16 @@ def _draw_by_mud(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapp
         panel.set_xticks(range(len(names)), names)
 
 
-def _draw_compared(panel: Axes, muds: Sequence[MudSummary], name: str, looks: Mapping[str, dict[str, Any]]) -> None:
+def _draw_compared(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw against a load cell's values, with two standard errors, and the grey line on which both are equal."""
     largest = 0.0
     for mud in muds:
-        gathered, truth = mud.coefficient(name), (mud.truth or {}).get(name)
+        gathered, truth = mud[name], (mud["truth"] or {}).get(name)
         if gathered.value is None or truth is None:
             continue
         value, uncertainty = PER_CM3 * gathered.value, 2.0 * PER_CM3 * (gathered.std_error or 0.0)
         panel.errorbar(PER_CM3 * truth, value, uncertainty or None, capsize=4, ecolor=INK, linestyle="",
-                       lolims=gathered.at_least, **mark_of(looks[mud.mud]))  # fmt: skip
+                       lolims=gathered.at_least, **mark_of(looks[mud["mud"]]))  # fmt: skip
         largest = max(largest, value + uncertainty, PER_CM3 * truth)
     panel.plot([0.0, 1.1 * largest], [0.0, 1.1 * largest], color=GREY, linewidth=1.0, label="equal")
     panel.set_xlabel(f"{LABELS[name]} by load cell (N/cm³)")

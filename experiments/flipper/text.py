@@ -8,16 +8,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from pandas import DataFrame
+
 from experiments.flipper.measurement import FlipperTrials
 from experiments.flipper.plots import draw_coefficients, draw_stride
-from experiments.flipper.report import STROKES, FlipperReport, muds_of, trials_of
+from experiments.flipper.report import STROKES, Report, muds_of, trials_of
 from experiments.loadcell.comparison import OTHER_PLATE
-from experiments.reports.coefficient_table import MudSummary, error_text_rows, mud_rows
+from experiments.reports.coefficient_table import error_text_table, mud_table
 from experiments.reports.error_table import Row
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
+from experiments.reports.text_tables import number
 from experiments.study.notebook import Entry
-from experiments.study.result import Figure, Result, Table, text_table
+from experiments.study.result import Figure, Result, Table
 from experiments.trials.estimation_methods import DEFAULT
 from experiments.trials.mud_trials import left_out_texts
 from firmware_host.configuration.configuration import Configuration
@@ -71,7 +74,7 @@ MODELLED_PAPER = (
 
 
 def result_of(
-    report: FlipperReport,
+    report: Report,
     plan: FlipperTrials,
     entries: Mapping[str, Entry],
     configuration: Configuration,
@@ -79,20 +82,20 @@ def result_of(
 ) -> Result:
     """Return the tables, figures and explanations of all trials."""
     firsts = {mud: trials[0] for mud in muds_of(plan, entries) if (trials := trials_of(mud, entries))}
-    method = report.settings["method"]
-    remarks = [f"{mud_text(mud.mud)}: {remark}" for mud in report.muds for remark in mud.remarks]
+    method = report["settings"]["method"]
+    remarks = [f"{mud_text(mud['mud'])}: {remark}" for mud in report["muds"] for remark in mud["remarks"]]
     return Result(
-        tables=[*coefficient_tables(report.muds, report.errors, COEFFICIENTS), _force_table(report)],
+        tables=[*coefficient_tables(report["muds"], report["errors"], COEFFICIENTS), _force_table(report)],
         figures=[_coefficient_figure(report, firsts, configuration), *_stride_figures(firsts, configuration, method)],
         summary=report,
         title="A single flipper through muds",
         texts={
             COEFFICIENTS: _explanation(report),
-            COMPARISON: TRUTHS[report.settings["truth"]] if report.errors else "",
+            COMPARISON: TRUTHS[report["settings"]["truth"]] if report["errors"] else "",
             FORCES: FORCES_TEXT,
             STRIDES: MODELLED_PAPER if method == "paper" else MODELLED,
         }
-        | remark_texts(remarks, report.left_out),
+        | remark_texts(remarks, report["left_out"]),
         logs=logs,
     )
 
@@ -103,10 +106,10 @@ def remark_texts(remarks: Sequence[str], left_out: Mapping[str, Entry]) -> dict[
     return {"Remarks": "\n\n".join(sentences)} if sentences else {}
 
 
-def coefficient_tables(muds: Sequence[MudSummary], errors: Sequence[Row], section: str) -> list[Table]:
+def coefficient_tables(muds: Sequence[Mapping[str, Any]], errors: Sequence[Row], section: str) -> list[Table]:
     """Return the tables of every report of coefficients; `section` is the part of the page with the muds."""
-    tables = [text_table("muds", HEADING, mud_rows(muds), section)]
-    return [*tables, text_table("errors", ERRORS, error_text_rows(errors), COMPARISON)] if errors else tables
+    tables = [Table("muds", HEADING, {}, mud_table(muds), section)]
+    return [*tables, Table("errors", ERRORS, {}, error_text_table(errors), COMPARISON)] if errors else tables
 
 
 def error_paragraphs(settings: Mapping[str, Any]) -> list[str]:
@@ -115,42 +118,45 @@ def error_paragraphs(settings: Mapping[str, Any]) -> list[str]:
     return known + [WRONG_CONSTANTS] * settings["simulated"]
 
 
-def _coefficient_figure(report: FlipperReport, firsts: Mapping[str, Entry], configuration: Configuration) -> Figure:
+def _coefficient_figure(report: Report, firsts: Mapping[str, Entry], configuration: Configuration) -> Figure:
     caption = (
         "Figure 5 of the paper. A to C: force of one trial in each mud. D to F: coefficients, mean and standard "
         "deviation over the trials; each grey dash is a trial."
     )
-    if any(mud.truth for mud in report.muds):
+    if any(mud["truth"] for mud in report["muds"]):
         caption += " G to I: against the load cell, with two standard errors; on the grey line both are equal."
-    draw = partial(draw_coefficients, report.muds, firsts, configuration.geometry)
+    draw = partial(draw_coefficients, report["muds"], firsts, configuration.geometry)
     return Figure("figure5", caption, draw, COEFFICIENTS)
 
 
-def _explanation(report: FlipperReport) -> str:
-    paragraphs = [report.missing_truth] if report.missing_truth else []
-    falls = {name: falls for name, falls in report.falls_with_water.items() if falls is not None}
+def _explanation(report: Report) -> str:
+    paragraphs = [report["missing_truth"]] if report["missing_truth"] else []
+    falls = {name: falls for name, falls in report["falls_with_water"].items() if falls is not None}
     if falls:
         answers = ", ".join(f"{name} {'yes' if each else 'no'}" for name, each in falls.items())
         paragraphs.append(f"Does a coefficient fall with water from mud to mud, as in the paper? {answers}.")
-    for name, fractions in report.later_strokes.items():
+    for name, fractions in report["later_strokes"].items():
         if fractions:
             percent = ", ".join(f"{100.0 * fraction:.0f} %" for fraction in fractions)
             paragraphs.append(f"{name} of later strides in the same hole, relative to the first: {percent}.")
-    return "\n\n".join([*paragraphs, UNCERTAINTIES, *error_paragraphs(report.settings)])
+    return "\n\n".join([*paragraphs, UNCERTAINTIES, *error_paragraphs(report["settings"])])
 
 
-def _force_table(report: FlipperReport) -> Table:
-    rows = [["mud", *(f"{stroke} (N)" for stroke in STROKES)]]
-    for mud, forces in report.largest_forces_n.items():
-        misfits = report.misfit_n[mud]
-        rows.append([mud_text(mud), *(_force_text(forces[stroke], misfits[stroke]) for stroke in STROKES)])
-    rows.append(["authors' logs", *(f"{low:g} to {high:g}" for low, high in AUTHORS_N.values())])
-    return text_table("forces", "Largest forces, in brackets the misfit of the laws", rows, FORCES)
+def _force_table(report: Report) -> Table:
+    rows = [
+        {"mud": mud_text(mud)} | {stroke: _force_text(forces_n[stroke], misfits_n[stroke]) for stroke in STROKES}
+        for mud, forces_n in report["largest_forces_n"].items()
+        for misfits_n in (report["misfit_n"][mud],)
+    ]
+    authors = {stroke: f"{low:g} to {high:g}" for stroke, (low, high) in AUTHORS_N.items()}
+    frame = DataFrame([*rows, {"mud": "authors' logs"} | authors])
+    return Table(
+        "forces", "Largest forces, in brackets the misfit of the laws", dict.fromkeys(STROKES, "N"), frame, FORCES
+    )
 
 
-def _force_text(force_n: float | None, misfit_n: float | None) -> str:
-    text = "-" if force_n is None else f"{force_n:.2f}"
-    return text if misfit_n is None else f"{text} ({misfit_n:.2f})"
+def _force_text(force_n: float, misfit_n: float | None) -> str:
+    return number(force_n, 2) + (f" ({misfit_n:.2f})" if misfit_n is not None else "")
 
 
 def _stride_figures(firsts: Mapping[str, Entry], configuration: Configuration, method: str) -> list[Figure]:

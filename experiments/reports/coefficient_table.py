@@ -1,40 +1,53 @@
-"""Coefficients of muds over several trials, compared with a load cell's: the records of a summary, and its tables.
+"""Coefficients of muds over several trials, next to a load cell's: the rows of a data frame, their summary and tables.
 
-Two standard errors contain the truth in about 19 of 20 cases. Muds that one robot measured are compared by the error
-of the trials alone, since the shared error moves all of them alike.
+A row is one coefficient of one stride by one method, with the load cell's reading. Two standard errors contain the
+truth in about 19 of 20 cases. Muds that one robot measured are compared by the error of the trials alone, since the
+shared error moves all of them alike.
 
 A mud whose trials report more lower bounds than values has a bound as well (`at_least`): the median of all trials. The
 few trials in which such a mud yielded met less resistance, or pushed harder, than anybody knows.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
 from statistics import fmean, median, stdev
-from typing import Any, NamedTuple
+from typing import Any
 
-from pandas import DataFrame
+from pandas import Categorical, DataFrame
 
-from control.records import UNKNOWN, Estimate
 from estimation.strokes.origin_fit import student_factor
 from estimation.strokes.stroke_fit import TORQUE_REPEATABILITY
-from experiments.reports.error_table import COEFFICIENTS, Row, error_rows, evaluation_of
+from experiments.reports.error_table import COEFFICIENTS, Row, error_rows
 from experiments.reports.mud_names import mud_text
 from experiments.reports.value_text import N_CM3, fraction_text, repeatability_text, value_text
 
 PER_CM3 = 1.0 / N_CM3
 EstimateReport = Mapping[str, Any]  # an estimate as the daemon reports it: value, std_error, valid, at_least, ...
+NUMBERS = ["value", "std_error", "truth"]  # N/m³
+COLUMNS = ["mud", "method", "trial", "t_start_s", "t_end_s", "plates_m", "coefficient", "kind", "valid", "at_least",
+           "reason", *NUMBERS]  # fmt: skip
 
 
-class ComparedStride(NamedTuple):
-    """The estimates of one stride by one method, and a load cell's readings in N/m³."""
+def compared_rows(stride: Mapping[str, Any], truth: Mapping[str, float | None], **keys: Any) -> list[Row]:
+    """Return the coefficients that a method reports of one stride, with a load cell's readings.
 
-    mud: str  # empty where it is not certain
-    method: str
-    stride: Mapping[str, Any]
-    truth: Mapping[str, float | None]
-    trial: int = 0  # of a walk over several muds
-    plates_m: float = UNKNOWN  # in such a walk, from the start of the first mud
+    The mud is empty where it is not certain.
+    """
+    times = {name: stride.get(name) for name in ("t_start_s", "t_end_s")}
+    return [
+        keys | times | dict(estimate) | {"coefficient": name, "kind": _kind_of(estimate), "truth": truth.get(name)}
+        for name in COEFFICIENTS
+        if (estimate := stride[name]) is not None
+    ]
+
+
+def _kind_of(estimate: EstimateReport) -> str:
+    return ("bound" if estimate["at_least"] else "value") if estimate["valid"] else "not valid"
+
+
+def compared_frame(rows: Iterable[Row]) -> DataFrame:
+    return DataFrame(list(rows), columns=COLUMNS).astype(dict.fromkeys(NUMBERS, float))
 
 
 @dataclass(frozen=True)
@@ -50,21 +63,6 @@ class GatheredCoefficient:
     at_least: bool  # the value is a lower bound
     bounds: int  # trials that report a lower bound
     not_valid: Sequence[str]  # why trials report nothing
-
-
-@dataclass(frozen=True)
-class MudSummary:
-    """All coefficients of one mud, and a load cell's."""
-
-    mud: str
-    k_p: GatheredCoefficient
-    k_s: GatheredCoefficient
-    k_e: GatheredCoefficient
-    truth: Mapping[str, float] | None
-
-    def coefficient(self, name: str) -> GatheredCoefficient:
-        gathered: GatheredCoefficient = getattr(self, name)
-        return gathered
 
 
 def gather_coefficient(estimates: Iterable[EstimateReport]) -> GatheredCoefficient:
@@ -90,16 +88,34 @@ def gather_coefficient(estimates: Iterable[EstimateReport]) -> GatheredCoefficie
     )
 
 
-def gather_coefficients(strides: Sequence[Mapping[str, Any]]) -> dict[str, GatheredCoefficient]:
-    """Combine the strides of all trials, coefficient by coefficient."""
-    return {name: gather_coefficient(stride[name] for stride in strides) for name in COEFFICIENTS}
+def mud_summaries(
+    rows: DataFrame, muds: Iterable[str], method: str, average: Callable[[Sequence[float]], float]
+) -> list[dict[str, Any]]:
+    """Return each mud's name, coefficients by one method, and the average of the load cell's readings."""
+    own = {mud: rows[(rows["mud"] == mud) & (rows["method"] == method)] for mud in muds}
+    return [
+        {"mud": mud}
+        | {name: gather_rows(each[each["coefficient"] == name]) for name in COEFFICIENTS}
+        | {"truth": average_truth(each, average) or None}
+        for mud, each in own.items()
+    ]
+
+
+def gather_rows(rows: DataFrame) -> GatheredCoefficient:
+    return gather_coefficient(rows.to_dict("records"))
+
+
+def average_truth(rows: DataFrame, average: Callable[[Sequence[float]], float]) -> dict[str, float]:
+    """Return the average of the load cell's readings, by coefficient."""
+    known = rows[rows["truth"].notna()].groupby("coefficient")["truth"]
+    return {name: average(readings.tolist()) for name, readings in known}
 
 
 def _errors(values: Sequence[EstimateReport], spread: float | None) -> tuple[float | None, float | None, float | None]:
     """Return the standard error, and its parts from the trials and shared by them; bounds have none."""
-    if spread is None or not values:
-        return (values[0]["std_error"] if values else None), None, None
     known = [error for each in values if (error := each["std_error"]) is not None and isfinite(error)]
+    if spread is None or not values:
+        return (known[0] if known else None), None, None
     estimated = fmean(error**2 for error in known) if known else 0.0
     trials_error = student_factor(len(values) - 1) * spread / sqrt(len(values))
     alike = TORQUE_REPEATABILITY * fmean(each["value"] for each in values)
@@ -107,20 +123,9 @@ def _errors(values: Sequence[EstimateReport], spread: float | None) -> tuple[flo
     return hypot(trials_error, shared_error), trials_error, shared_error
 
 
-def error_table(rows: Iterable[ComparedStride], setup: str) -> list[Row]:
+def error_table(rows: DataFrame, setup: str) -> list[Row]:
     """Evaluate every coefficient that has a true value."""
-    evaluations = [
-        evaluation_of(setup, row.mud, name, row.method, estimate_of(row.stride[name]), float(truth), UNKNOWN)
-        for row in rows
-        for name in COEFFICIENTS
-        if (truth := row.truth.get(name)) is not None and row.stride[name] is not None
-    ]
-    return error_rows(DataFrame(evaluations))
-
-
-def estimate_of(report: EstimateReport) -> Estimate:
-    value, std_error = (UNKNOWN if report[name] is None else float(report[name]) for name in ("value", "std_error"))
-    return Estimate(value, std_error, report["samples"], report["valid"], report["reason"], report["at_least"])
+    return error_rows(rows[rows["truth"].notna()].assign(setup=setup))
 
 
 # tables for people
@@ -136,41 +141,31 @@ def coefficient_text(gathered: GatheredCoefficient) -> str:
     return f"≥ {text}" if gathered.at_least else text
 
 
-def mud_rows(muds: Sequence[MudSummary]) -> list[list[str]]:
-    """List each mud's coefficients with their repeatability and the load cell's."""
-    head = ["mud"]
-    for name in COEFFICIENTS:
-        head += [f"{name} (N/cm³)", "repeatability", "load cell"]
-    return [head, *([mud_text(mud.mud), *_mud_cells(mud)] for mud in muds)]
+def mud_table(muds: Sequence[Mapping[str, Any]]) -> DataFrame:
+    """Return each mud's coefficients with their repeatability and the load cell's."""
+    rows = []
+    for mud in muds:
+        row = {"mud": mud_text(mud["mud"])}
+        for name in COEFFICIENTS:
+            gathered: GatheredCoefficient = mud[name]
+            row[f"{name} (N/cm³)"] = coefficient_text(gathered)
+            row[f"{name} repeatability"] = repeatability_text(gathered.repeatability, len(gathered.trials))
+            row[f"{name} load cell"] = value_text((mud["truth"] or {}).get(name), per=N_CM3)
+        rows.append(row)
+    return DataFrame(rows)
 
 
-def _mud_cells(mud: MudSummary) -> list[str]:
-    cells = []
-    for name in COEFFICIENTS:
-        gathered = mud.coefficient(name)
-        cells += [coefficient_text(gathered), repeatability_text(gathered.repeatability, len(gathered.trials))]
-        cells.append(value_text((mud.truth or {}).get(name), per=N_CM3))
-    return cells
-
-
-def error_text_rows(errors: Sequence[Row]) -> list[list[str]]:
-    """List the median error of each coefficient by mud and method, mud by mud."""
-    head = ["mud", "method", *(f"{name} error" for name in COEFFICIENTS), "strides"]
-    muds = list(dict.fromkeys(row["mud"] for row in errors))
-    keys = sorted(dict.fromkeys((row["mud"], row["method"]) for row in errors), key=lambda key: muds.index(key[0]))
-    rows = [head]
-    for key in keys:
-        own = {row["coefficient"]: row for row in errors if (row["mud"], row["method"]) == key}
-        cells = [_error_text(own[name]) if name in own else "-" for name in COEFFICIENTS]
-        rows.append(
-            [
-                mud_text(key[0]),
-                key[1],
-                *cells,
-                str(max(row["strides"] + row["bounds"] + row["not_valid"] for row in own.values())),
-            ]
-        )
-    return rows
+def error_text_table(errors: Sequence[Row]) -> DataFrame:
+    """Return the median error of each coefficient by mud and method, mud by mud."""
+    frame = DataFrame(errors)
+    for name in ("mud", "method"):
+        frame[name] = Categorical(frame[name], categories=frame[name].unique())
+    frame["text"] = [_error_text(row) for row in errors]
+    frame["all"] = frame["strides"] + frame["bounds"] + frame["not_valid"]
+    groups = frame.groupby(["mud", "method"], observed=True)
+    texts = frame.set_index(["mud", "method", "coefficient"])["text"].unstack().reindex(columns=COEFFICIENTS)
+    table = texts.astype(object).fillna("-").add_suffix(" error").assign(strides=groups["all"].max()).reset_index()
+    return table.astype({"mud": str, "method": str}).assign(mud=lambda rows: rows["mud"].map(mud_text))
 
 
 def _error_text(row: Row) -> str:

@@ -47,7 +47,14 @@ def truth_in(truth: TruthOfMud, mud: str) -> dict[str, float]:
     return truth.get(mud_key(mud), {})
 
 
-def missing_text(truth: TruthOfMud | None, muds: Iterable[str]) -> str:
-    """Name the muds that a truth file lacks; return nothing where it lacks none or there is no file."""
+def truth_settings(
+    identity: Mapping[str, Any], method: str, truth: TruthOfMud | None, muds: Iterable[str]
+) -> dict[str, Any]:
+    """Return the part of a summary with the settings, and a sentence with the muds that a truth file lacks."""
     missing = [mud for mud in muds if truth is not None and mud_key(mud) not in truth]
-    return f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}." if missing else ""
+    return {
+        "settings": {**identity, "method": method, "truth": "file" if truth else "bed"},
+        "missing_truth": f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}."
+        if missing
+        else "",
+    }

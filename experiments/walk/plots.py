@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from pandas import DataFrame
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
-from experiments.reports.coefficient_table import PER_CM3, ComparedStride, GatheredCoefficient
+from experiments.reports.coefficient_table import PER_CM3, GatheredCoefficient
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import GREY, INK, LABELS
@@ -18,7 +19,6 @@ from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
 from experiments.trials.stride_profile import StrideProfile, profile_from_row
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import WalkTrials
-from experiments.walk.report import SoftMud
 
 THIN: dict[str, Any] = {"linewidth": 0.8}
 METHOD_STYLES: dict[str, dict[str, Any]] = {
@@ -39,10 +39,10 @@ DEPTH_STYLES: dict[float, dict[str, Any]] = {
 }
 
 
-def draw_walk_over(plan: WalkTrials, walk: Entry, strides: Sequence[ComparedStride], reach_m: float) -> Figure:
+def draw_walk_over(plan: WalkTrials, walk: Entry, strides: DataFrame, reach_m: float) -> Figure:
     """Draw position, forces and coefficients of one walk against time: figure 6."""
     profile = profile_from_row(walk["course"])
-    own = [each for each in strides if each.trial == walk["trial"]]
+    own = strides[strides["trial"] == walk["trial"]]
     begun_s = float(profile.time_s[0])
     borders_s = _borders_s(plan, walk, profile, own, reach_m)
     figure = Figure(figsize=(9.0, 11.0))
@@ -52,7 +52,7 @@ def draw_walk_over(plan: WalkTrials, walk: Entry, strides: Sequence[ComparedStri
     upward_n = np.where(profile.phase == Phase.STANCE, np.nan, profile.force_z_n)
     _draw_force(panels[2], profile, upward_n, begun_s, "$f_z$ up (N)")
     for panel, name in zip(panels[3:], COEFFICIENTS, strict=True):
-        _draw_coefficient(panel, plan, name, own, begun_s)
+        _draw_coefficient(panel, plan, name, own[own["coefficient"] == name], begun_s)
     for letter, panel in zip("ABCDEF", panels, strict=True):
         panel.set_title(letter, loc="left", fontsize="medium", fontweight="bold")
         for border_s in borders_s:
@@ -63,14 +63,12 @@ def draw_walk_over(plan: WalkTrials, walk: Entry, strides: Sequence[ComparedStri
     return figure
 
 
-def _borders_s(
-    plan: WalkTrials, walk: Entry, profile: StrideProfile, own: Sequence[ComparedStride], reach_m: float
-) -> list[float]:
+def _borders_s(plan: WalkTrials, walk: Entry, profile: StrideProfile, own: DataFrame, reach_m: float) -> list[float]:
     """Return when the plates first went down past each border; by the order of the strides where there is no pose."""
     found = []
     for border_m in plan.borders_m:
         if walk["start_m"] is None:
-            beyond = [each.stride["t_start_s"] for each in own if each.plates_m >= border_m]
+            beyond = own.loc[own["plates_m"] >= border_m, "t_start_s"].tolist()
         else:
             there = np.flatnonzero(profile.body_m - walk["start_m"] + reach_m >= border_m)
             beyond = [float(profile.time_s[there[0]])] if len(there) else []
@@ -108,40 +106,37 @@ def _draw_force(panel: Axes, profile: StrideProfile, force_n: Any, begun_s: floa
     panel.legend(ncols=3, **LEGEND)
 
 
-def _draw_coefficient(panel: Axes, plan: WalkTrials, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
+def _draw_coefficient(panel: Axes, plan: WalkTrials, name: str, own: DataFrame, begun_s: float) -> None:
     """Draw the estimates by all methods; triangles are lower bounds, dashed lines the load cell's values."""
     methods = [method for method in METHOD_STYLES if method != COMPENSATED or name == "k_s"]
-    valid = [each for each in own if each.method in methods and each.stride[name]["valid"]]
-    truths = [each.truth.get(name) for each in own]
-    tallest = max([t for t in truths if t] or [each.stride[name]["value"] for each in valid] or [1.0])
+    valid = own[own["method"].isin(methods) & own["valid"].astype(bool)]
+    tallest = own["truth"].max() if own["truth"].any() else valid["value"].max() if len(valid) else 1.0
     top = HEADROOM * PER_CM3 * tallest
-    for each in valid:
-        estimate, style = each.stride[name], METHOD_STYLES[each.method]
-        value = PER_CM3 * estimate["value"]
-        uncertainty = 2.0 * PER_CM3 * estimate["std_error"] if each.method == DEFAULT else None
-        marker = "^" if estimate["at_least"] else ("$\\uparrow$" if value > top else style["marker"])
-        panel.errorbar(each.stride["t_end_s"] - begun_s, min(value, 0.97 * top), uncertainty, linestyle="",
+    for each in valid.itertuples():
+        style, value = METHOD_STYLES[each.method], PER_CM3 * each.value
+        uncertainty = 2.0 * PER_CM3 * each.std_error if each.method == DEFAULT else None
+        marker = "^" if each.at_least else ("$\\uparrow$" if value > top else style["marker"])
+        panel.errorbar(each.t_end_s - begun_s, min(value, 0.97 * top), uncertainty, linestyle="",
                        color=style["color"], marker=marker, markersize=6.0, linewidth=1.0)  # fmt: skip
-    _draw_truth(panel, plan, name, own, begun_s)
+    _draw_truth(panel, plan, own, begun_s)
     for method in methods:
         style = METHOD_STYLES[method]
         panel.plot([], [], color=style["color"], marker=style["marker"], linestyle="", label=method)
-    if any(each.stride[name]["at_least"] for each in valid):
+    if valid["at_least"].any():
         panel.plot([], [], color=METHOD_STYLES[DEFAULT]["color"], marker="^", linestyle="", label="lower bound")
     panel.set_ylim(0.0, top)
     panel.set_ylabel(f"{LABELS[name]}\n(N/cm³)")
     panel.legend(ncols=5, **LEGEND)
 
 
-def _draw_truth(panel: Axes, plan: WalkTrials, name: str, own: Sequence[ComparedStride], begun_s: float) -> None:
+def _draw_truth(panel: Axes, plan: WalkTrials, own: DataFrame, begun_s: float) -> None:
     """Draw the load cell's values over each mud, from its first stride to its last."""
     label = "load cell"
     for mud in plan.muds:
-        there = [each for each in own if each.mud == mud.name and each.truth.get(name)]
-        if there:
-            level = PER_CM3 * float(np.median([each.truth[name] for each in there]))
-            start_s = min(each.stride["t_start_s"] for each in there) - begun_s
-            end_s = max(each.stride["t_end_s"] for each in there) - begun_s
+        there = own[(own["mud"] == mud.name) & own["truth"].notna()]
+        if len(there):
+            level = PER_CM3 * there["truth"].median()
+            start_s, end_s = there["t_start_s"].min() - begun_s, there["t_end_s"].max() - begun_s
             panel.plot([start_s, end_s], [level, level], "--", color=GREY, linewidth=1.8, label=label)
             label = "_"
 
@@ -149,7 +144,7 @@ def _draw_truth(panel: Axes, plan: WalkTrials, name: str, own: Sequence[Compared
 # figure 7
 
 
-def draw_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]]) -> Figure:
+def draw_soft(soft: Mapping[str, Any], walks: Mapping[float, Sequence[Entry]]) -> Figure:
     """Draw f_x in one stance at each depth, and k_s by method with the load cell's: figure 7."""
     figure = Figure(figsize=(11.0, 4.2))
     forces, bars = figure.subplots(1, 2, width_ratios=(1.0, 1.5))
@@ -161,7 +156,7 @@ def draw_soft(soft: SoftMud, walks: Mapping[float, Sequence[Entry]]) -> Figure:
     forces.set_ylabel("$f_x$ of one flipper (N)")
     forces.set_ylim(bottom=0.0)
     forces.legend(fontsize="small", loc="lower right")
-    forces.set_title(f"A   mud {mud_text(soft.mud)}", loc="left", fontsize="medium")
+    forces.set_title(f"A   mud {mud_text(soft['mud'])}", loc="left", fontsize="medium")
     _draw_bars(bars, soft)
     return figure
 
@@ -174,19 +169,19 @@ def _draw_stance(panel: Axes, depth_cm: float, trial: Entry) -> None:
     panel.plot(time_s - time_s[0], profile.force_x_n[stance], linewidth=1.4, label=f"z = {depth_cm:g} cm", **style)
 
 
-def _draw_bars(panel: Axes, soft: SoftMud) -> None:
+def _draw_bars(panel: Axes, soft: Mapping[str, Any]) -> None:
     """Draw k_s by the paper's law, the default method and the load cell; a lower bound is hatched."""
-    deepest_first = sorted(soft.depths, key=lambda each: -each.depth_cm)
+    deepest_first = sorted(soft["depths"], key=lambda each: -each["depth_cm"])
     names: list[str] = []
     for method, (label, colour) in BARS.items():
         for each in deepest_first[:1] if method == KNOWN_COMPENSATED else deepest_first:
-            own = DEPTH_STYLES.get(each.depth_cm, {"color": INK})["color"]
-            gathered = each.k_s.get(method)
+            own = DEPTH_STYLES.get(each["depth_cm"], {"color": INK})["color"]
+            gathered = each["k_s"].get(method)
             _draw_bar(panel, len(names), gathered.value if gathered else None, colour or own, gathered)
-            names.append(f"{label}\n{each.depth_cm:g} cm")
+            names.append(f"{label}\n{each['depth_cm']:g} cm")
     for each in deepest_first:
-        _draw_bar(panel, len(names), each.truth, "#d9d9d9")
-        names.append(f"load cell\n{each.depth_cm:g} cm")
+        _draw_bar(panel, len(names), each["truth"], "#d9d9d9")
+        names.append(f"load cell\n{each['depth_cm']:g} cm")
     panel.set_xticks(range(len(names)), names, fontsize="small")
     panel.set_ylabel("$k_s$ (N/cm³)")
     panel.margins(y=0.12)

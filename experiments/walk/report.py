@@ -2,77 +2,39 @@
 
 The paper prints no coefficients of these walks. Its text says that k_s was underestimated where the body moves; that in
 the soft mud it was half of the load cell's at 5 cm, close to it at 3 cm, and better at 5 cm with the body's drag added;
-and that this drag was about 2.5 N. The fields of these records are the keys of the summary in JSON.
+and that this drag was about 2.5 N.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from statistics import fmean, median
 from typing import Any
 
 import numpy as np
+import pandas
+from pandas import DataFrame
 
 from control.records import Phase
 from estimation.mud import PAPER_DRAG_N
 from experiments.reports.coefficient_table import (
-    ComparedStride,
-    GatheredCoefficient,
-    MudSummary,
+    average_truth,
+    compared_frame,
+    compared_rows,
     error_table,
-    gather_coefficient,
-    gather_coefficients,
+    gather_rows,
+    mud_summaries,
 )
-from experiments.reports.error_table import COEFFICIENTS, Row
 from experiments.reports.mud_names import mud_text
 from experiments.study.notebook import Entry
 from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
 from experiments.trials.stride_profile import profile_from_row
-from experiments.trials.truth_file import TruthOfMud, missing_text, truth_in
+from experiments.trials.truth_file import TruthOfMud, truth_in, truth_settings
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import SOFT_DEPTHS_M, WalkTrials, soft_key, soft_name
 from firmware_host.configuration.configuration import Configuration
 
-StrideReport = Mapping[str, Any]  # as the daemon reports it
-
-
-@dataclass(frozen=True)
-class SoftDepth:
-    """The walks at one depth in a soft mud."""
-
-    depth_cm: float
-    k_s: Mapping[str, GatheredCoefficient]  # by method
-    truth: float | None  # the load cell's k_s
-    thrust_n: float | None  # of both flippers
-
-
-@dataclass(frozen=True)
-class SoftMud:
-    mud: str
-    depths: Sequence[SoftDepth]
-
-
-@dataclass(frozen=True)
-class PaperFinding:
-    what: str
-    paper: str
-    ours: float | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class WalkReport:
-    experiment: str = "walk"
-    muds: Sequence[MudSummary]
-    soft: Sequence[SoftMud]
-    errors: Sequence[Row]
-    findings: Sequence[PaperFinding] = field(metadata={"key": "beside_paper"})
-    without_pose: int  # walks
-    at_a_border: int  # strides that belong to no mud
-    remarks: Sequence[str]
-    missing_truth: str
-    settings: Mapping[str, Any]
-    left_out: Mapping[str, Entry]
+Report = dict[str, Any]  # the summary, as it is in JSON
 
 
 def walks_of(plan: WalkTrials, entries: Mapping[str, Entry]) -> list[Entry]:
@@ -86,48 +48,43 @@ def soft_walks_of(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, dept
 
 def located_strides(
     plan: WalkTrials, entries: Mapping[str, Entry], configuration: Configuration, truth: TruthOfMud | None
-) -> list[ComparedStride]:
-    """Locate the strides of the walks over all muds. `truth` of another experiment replaces the bed's own."""
-    return [
-        located
-        for walk in walks_of(plan, entries)
-        for method, strides in walk["strides"].items()
-        for located in _locate(plan, walk, method, strides, reach_of(configuration), truth)
-    ]
+) -> DataFrame:
+    """Return the strides of the walks over all muds, each in its mud.
+
+    `truth` of another experiment replaces the bed's.
+    """
+    rows = []
+    for walk in walks_of(plan, entries):
+        for method, strides in walk["strides"].items():
+            for number, stride in enumerate(strides):
+                position_m, start_m = stride["place_m"], walk["start_m"]
+                if position_m is None or start_m is None:
+                    plates_m = plan.length_m * (number + 0.5) / len(strides)
+                else:
+                    plates_m = position_m - start_m + reach_of(configuration)
+                mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
+                known = _truth_of(mud, walk, stride, truth)
+                keys = {"mud": mud, "method": method, "trial": walk["trial"], "plates_m": plates_m}
+                rows += compared_rows(stride, known, **keys)
+    return compared_frame(rows)
 
 
-def _locate(
-    plan: WalkTrials,
-    walk: Entry,
-    method: str,
-    strides: Sequence[StrideReport],
-    reach_m: float,
-    truth: TruthOfMud | None,
-) -> Iterator[ComparedStride]:
-    for number, stride in enumerate(strides):
-        position_m, start_m = stride["place_m"], walk["start_m"]
-        if position_m is None or start_m is None:
-            plates_m = plan.length_m * (number + 0.5) / len(strides)
-        else:
-            plates_m = position_m - start_m + reach_m
-        mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
-        compared = _truth_of(mud, walk, stride, truth)
-        yield ComparedStride(mud, method, stride, compared, trial=walk["trial"], plates_m=plates_m)
-
-
-def soft_strides(plan: WalkTrials, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> list[ComparedStride]:
+def soft_strides(plan: WalkTrials, entries: Mapping[str, Entry], truth: TruthOfMud | None) -> DataFrame:
     """Return the strides in soft muds, without the first of each walk, which starts from a standing body."""
-    return [
-        ComparedStride(soft_name(mud, depth_m), method, stride, _truth_of(mud, walk, stride, truth))
+    return compared_frame(
+        row
         for mud in plan.soft
         for depth_m in SOFT_DEPTHS_M
         for walk in soft_walks_of(plan, entries, mud, depth_m)
         for method, strides in walk["strides"].items()
         for stride in strides[1:]
-    ]
+        for row in compared_rows(
+            stride, _truth_of(mud, walk, stride, truth), mud=soft_name(mud, depth_m), method=method
+        )
+    )
 
 
-def _truth_of(mud: str, walk: Entry, stride: StrideReport, truth: TruthOfMud | None) -> Mapping[str, float | None]:
+def _truth_of(mud: str, walk: Entry, stride: Mapping[str, Any], truth: TruthOfMud | None) -> Mapping[str, float | None]:
     if truth:
         return truth_in(truth, mud)
     own: Mapping[str, float | None] = walk["truths"].get(str(stride["index"]), {})
@@ -140,53 +97,42 @@ def report_of(
     configuration: Configuration,
     truth: TruthOfMud | None,
     left_out: Mapping[str, Entry] | None = None,
-) -> WalkReport:
+) -> Report:
     method = configured_method(configuration.estimation)
-    located = located_strides(plan, entries, configuration, truth)
-    certain = [each for each in located if each.mud]
-    soft = soft_strides(plan, entries, truth)
-    return WalkReport(
-        muds=[_mud_report(mud.name, method, certain) for mud in plan.muds],
-        soft=[SoftMud(mud, _soft_depths(plan, entries, mud, soft)) for mud in plan.soft],
-        errors=error_table([*certain, *soft], "walking"),
-        findings=_findings(plan, entries, certain, soft),
-        without_pose=sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
-        at_a_border=sum(not each.mud for each in located if each.method == method),
-        remarks=[f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
-        missing_truth=missing_text(truth, dict.fromkeys([*(mud.name for mud in plan.muds), *plan.soft])),
-        settings=plan.identity | {"method": method, "truth": "file" if truth else "bed"},
-        left_out=left_out or {},
-    )
+    located, soft = located_strides(plan, entries, configuration, truth), soft_strides(plan, entries, truth)
+    certain = located[located["mud"] != ""]
+    uncertain = located[(located["mud"] == "") & (located["method"] == method)]
+    muds = [mud.name for mud in plan.muds]
+    return {
+        "experiment": "walk",
+        "muds": mud_summaries(certain, muds, method, median),
+        "soft": [{"mud": mud, "depths": _soft_depths(plan, entries, mud, soft)} for mud in plan.soft],
+        "errors": error_table(pandas.concat([certain, soft]), "walking"),
+        "beside_paper": _findings(plan, entries, certain, soft),
+        "without_pose": sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
+        "at_a_border": len(_k_s_of(uncertain)),  # strides that belong to no mud
+        "remarks": [f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
+        "left_out": left_out or {},
+    } | truth_settings(plan.identity, method, truth, dict.fromkeys([*muds, *plan.soft]))
 
 
-def _mud_report(mud: str, method: str, rows: Sequence[ComparedStride]) -> MudSummary:
-    own = [row for row in rows if (row.mud, row.method) == (mud, method)]
-    return MudSummary(mud=mud, **gather_coefficients([row.stride for row in own]), truth=median_truth(own) or None)
-
-
-def median_truth(rows: Sequence[ComparedStride]) -> dict[str, float]:
-    """Return the median of the load cell's readings by coefficient."""
-    values = {name: [value for row in rows if (value := row.truth.get(name)) is not None] for name in COEFFICIENTS}
-    return {name: median(each) for name, each in values.items() if each}
-
-
-def _soft_depths(
-    plan: WalkTrials, entries: Mapping[str, Entry], mud: str, strides: Sequence[ComparedStride]
-) -> list[SoftDepth]:
+def _soft_depths(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, strides: DataFrame) -> list[dict[str, Any]]:
     """Gather k_s by depth and method, with the load cell's."""
+    depths = {depth_m: strides[strides["mud"] == soft_name(mud, depth_m)] for depth_m in SOFT_DEPTHS_M}
     return [
-        SoftDepth(
-            depth_cm=100.0 * depth_m,
-            k_s={
-                method: gather_coefficient(row.stride["k_s"] for row in own if row.method == method)
-                for method in dict.fromkeys(row.method for row in own)
-            },
-            truth=median_truth(own).get("k_s"),
-            thrust_n=_thrust_n(soft_walks_of(plan, entries, mud, depth_m)),
-        )
-        for depth_m in SOFT_DEPTHS_M
-        if (own := [row for row in strides if row.mud == soft_name(mud, depth_m)])
+        {
+            "depth_cm": 100.0 * depth_m,
+            "k_s": {method: gather_rows(k_s) for method, k_s in _k_s_of(own).groupby("method", sort=False)},
+            "truth": average_truth(own, median).get("k_s"),
+            "thrust_n": _thrust_n(soft_walks_of(plan, entries, mud, depth_m)),  # of both flippers
+        }
+        for depth_m, own in depths.items()
+        if len(own)
     ]
+
+
+def _k_s_of(strides: DataFrame) -> DataFrame:
+    return strides[strides["coefficient"] == "k_s"]
 
 
 def _thrust_n(walks: Sequence[Entry]) -> float | None:
@@ -204,36 +150,30 @@ def _thrust_n(walks: Sequence[Entry]) -> float | None:
 
 
 def _findings(
-    plan: WalkTrials, entries: Mapping[str, Entry], certain: Sequence[ComparedStride], soft: Sequence[ComparedStride]
-) -> list[PaperFinding]:
+    plan: WalkTrials, entries: Mapping[str, Entry], certain: DataFrame, soft: DataFrame
+) -> list[dict[str, Any]]:
     """Pair each finding in the paper's text with ours, by its law with a known surface."""
-    rows = [
-        PaperFinding(f"k_s over the load cell's, {mud_text(mud.name)}", "well below 1", _ratio(certain, mud.name))
-        for mud in plan.muds
+    over = "k_s over the load cell's"
+    rows: list[tuple[str, str, float | None]] = [
+        (f"{over}, {mud_text(mud.name)}", "well below 1", _ratio(certain, mud.name)) for mud in plan.muds
     ]
-    return rows + [row for mud in plan.soft for row in _soft_findings(plan, entries, mud, soft)]
+    for mud in plan.soft:
+        at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
+        text_3, text_5 = mud_text(at_3), mud_text(at_5)
+        cell = average_truth(soft[soft["mud"] == at_3], median).get("k_s")  # the paper's load cell measured at 3 cm
+        thrust_n = _thrust_n(soft_walks_of(plan, entries, mud, SOFT_DEPTHS_M[1]))
+        rows += [
+            (f"{over} at 3 cm, {text_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
+            (f"{over} at 3 cm, {text_5}", "0.5", _ratio(soft, at_5, cell=cell)),
+            (f"{over} at 3 cm, {text_5}, with drag", "better", _ratio(soft, at_5, KNOWN_COMPENSATED, cell)),
+            (f"{over} at 5 cm, {text_5}", "-", _ratio(soft, at_5)),
+            (f"thrust of both flippers in stance, {text_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
+        ]
+    return [{"what": what, "paper": paper, "ours": ours} for what, paper, ours in rows]
 
 
-def _soft_findings(
-    plan: WalkTrials, entries: Mapping[str, Entry], mud: str, soft: Sequence[ComparedStride]
-) -> list[PaperFinding]:
-    """The paper's load cell measured at 3 cm."""
-    at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
-    text_3, text_5 = mud_text(at_3), mud_text(at_5)
-    cell = median_truth([row for row in soft if row.mud == at_3]).get("k_s")
-    with_drag = _ratio(soft, at_5, KNOWN_COMPENSATED, cell)
-    thrust_n = _thrust_n(soft_walks_of(plan, entries, mud, SOFT_DEPTHS_M[1]))
-    return [
-        PaperFinding(f"k_s over the load cell's at 3 cm, {text_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
-        PaperFinding(f"k_s over the load cell's at 3 cm, {text_5}", "0.5", _ratio(soft, at_5, cell=cell)),
-        PaperFinding(f"k_s over the load cell's at 3 cm, {text_5}, with drag", "better", with_drag),
-        PaperFinding(f"k_s over the load cell's at 5 cm, {text_5}", "-", _ratio(soft, at_5)),
-        PaperFinding(f"thrust of both flippers in stance, {text_5} (N)", f"{PAPER_DRAG_N:g}", thrust_n),
-    ]
-
-
-def _ratio(rows: Sequence[ComparedStride], mud: str, method: str = KNOWN, cell: float | None = None) -> float | None:
+def _ratio(strides: DataFrame, mud: str, method: str = KNOWN, cell: float | None = None) -> float | None:
     """Return the median of k_s over the load cell's reading of the same stride, or over `cell`."""
-    own = [row for row in rows if (row.mud, row.method) == (mud, method) and row.stride["k_s"]["valid"]]
-    ratios = [row.stride["k_s"]["value"] / truth for row in own if (truth := cell or row.truth.get("k_s"))]
-    return median(ratios) if ratios else None
+    own = _k_s_of(strides[(strides["mud"] == mud) & (strides["method"] == method) & strides["valid"].astype(bool)])
+    ratios = (own["value"] / (cell or own["truth"])).dropna()
+    return float(ratios.median()) if len(ratios) else None

@@ -3,6 +3,9 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+from pandas import DataFrame
 
 from experiments.flipper.text import (
     COMPARISON,
@@ -15,14 +18,15 @@ from experiments.flipper.text import (
 from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_text
 from experiments.reports.mud_styles import file_name
+from experiments.reports.text_tables import number
 from experiments.study.notebook import Entry
-from experiments.study.result import Figure, Result, text_table
+from experiments.study.result import Figure, Result, Table
 from experiments.trackway.bench import reach_of
 from experiments.trials.estimation_methods import configured_method
 from experiments.trials.truth_file import TruthOfMud
 from experiments.walk.measurement import SOFT_DEPTHS_M, WalkTrials
 from experiments.walk.plots import draw_soft, draw_walk_over
-from experiments.walk.report import SoftMud, WalkReport, located_strides, soft_walks_of, walks_of
+from experiments.walk.report import Report, located_strides, soft_walks_of, walks_of
 from firmware_host.configuration.configuration import Configuration
 
 TRACK = "Coefficients along the track"
@@ -51,7 +55,7 @@ FINDINGS = "The paper's findings, and ours by its law below the default method's
 
 
 def result_of(
-    report: WalkReport,
+    report: Report,
     plan: WalkTrials,
     entries: Mapping[str, Entry],
     configuration: Configuration,
@@ -59,13 +63,14 @@ def result_of(
     logs: Sequence[Path],
 ) -> Result:
     """Return the tables, figures and explanations of all walks."""
-    findings = [[row.what, row.paper, "-" if row.ours is None else f"{row.ours:.2f}"] for row in report.findings]
-    walked = [soft for soft in report.soft if soft.depths]
+    findings = DataFrame(report["beside_paper"]).rename(columns={"what": ""})
+    findings["ours"] = [number(ours, 2) for ours in findings["ours"]]
+    walked = [soft for soft in report["soft"] if soft["depths"]]
     drag = f"{DRAG_NOT_STRENGTH} {SIMULATED_DRAG}" if plan.simulated else DRAG_NOT_STRENGTH
     return Result(
         tables=[
-            *coefficient_tables(report.muds, report.errors, TRACK),
-            text_table("findings", FINDINGS, [["", "paper", "ours"], *findings], "Findings"),
+            *coefficient_tables(report["muds"], report["errors"], TRACK),
+            Table("findings", FINDINGS, {}, findings, "Findings"),
         ],
         figures=[
             *_walk_figures(plan, entries, configuration, truth),
@@ -76,9 +81,9 @@ def result_of(
         texts={
             TRACK: _explanation(report, configuration),
             **{_soft_section(soft): drag for soft in walked[:1]},  # the first one explains what all have in common
-            COMPARISON: METHODS if report.errors else "",
+            COMPARISON: METHODS if report["errors"] else "",
         }
-        | remark_texts(report.remarks, report.left_out),
+        | remark_texts(report["remarks"], report["left_out"]),
         logs=logs,
     )
 
@@ -103,33 +108,37 @@ def _walk_figures(
     ]
 
 
-def _explanation(report: WalkReport, configuration: Configuration) -> str:
+def _explanation(report: Report, configuration: Configuration) -> str:
     gait = configuration.gait
     paragraphs = [
         f"All strides of all trials by method {configured_method(configuration.estimation)}, as the daemon reported "
         f"them. Its gait: insertion at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, "
         f"pauses of {gait.pause_s:g} s.",
         "Left out of the tables, because the plate came too near to a border or went down past the last mud: "
-        f"{counted(report.at_a_border, 'stride')}.",
+        f"{counted(report['at_a_border'], 'stride')}.",
     ]
-    if report.without_pose:
+    if report["without_pose"]:
         paragraphs.append(
-            f"{counted(report.without_pose, 'walk')} had no pose: strides are assigned to muds by their order."
+            f"{counted(report['without_pose'], 'walk')} had no pose: strides are assigned to muds by their order."
         )
-    paragraphs += [f"{TRIALS} {UNCERTAINTIES}", *error_paragraphs(report.settings), TRUTHS[report.settings["truth"]]]
-    return "\n\n".join([*paragraphs, report.missing_truth])
+    paragraphs += [
+        f"{TRIALS} {UNCERTAINTIES}",
+        *error_paragraphs(report["settings"]),
+        TRUTHS[report["settings"]["truth"]],
+    ]
+    return "\n\n".join([*paragraphs, report["missing_truth"]])
 
 
-def _soft_section(soft: SoftMud) -> str:
-    return f"Soft mud, {mud_text(soft.mud)}"
+def _soft_section(soft: Mapping[str, Any]) -> str:
+    return f"Soft mud, {mud_text(soft['mud'])}"
 
 
-def _soft_figure(soft: SoftMud, plan: WalkTrials, entries: Mapping[str, Entry]) -> Figure:
-    walks = {100.0 * depth_m: soft_walks_of(plan, entries, soft.mud, depth_m) for depth_m in SOFT_DEPTHS_M}
+def _soft_figure(soft: Mapping[str, Any], plan: WalkTrials, entries: Mapping[str, Entry]) -> Figure:
+    walks = {100.0 * depth_m: soft_walks_of(plan, entries, soft["mud"], depth_m) for depth_m in SOFT_DEPTHS_M}
     caption = (
         "Figure 7 of the paper. A: forward force in one stance. B: k_s by method, mean and standard deviation over "
         "strides; hatched: a lower bound. The paper's law is used with the default method's surface, because its own "
         "trigger at 0.5 N finds the surface of soft mud too deep."
     )
     draw = partial(draw_soft, soft, {depth_cm: made for depth_cm, made in walks.items() if made})
-    return Figure(f"figure7_{file_name(soft.mud)}", caption, draw, _soft_section(soft))
+    return Figure(f"figure7_{file_name(soft['mud'])}", caption, draw, _soft_section(soft))

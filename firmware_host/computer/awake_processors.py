@@ -24,10 +24,8 @@ class AwakeProcessors:
         self.problem = ""
         self._awake = False
         self._descriptor = CLOSED
-        if wanted:
-            self._open(device)
-
-    def _open(self, device: Path) -> None:
+        if not wanted:
+            return
         try:
             self._descriptor = os.open(device, os.O_WRONLY | os.O_CLOEXEC)
         except OSError as problem:

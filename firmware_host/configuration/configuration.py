@@ -135,6 +135,11 @@ class Configuration:
     warnings: tuple[str, ...] = ()  # about former names of keys, and about a gait that measures badly
 
     @property
+    def bus_of(self) -> dict[str, str]:
+        """Return the name of the bus of each joint's drive."""
+        return {joint: self.drive[joint].bus for joint in self.rig.joints}
+
+    @property
     def torque_constants_nm_a(self) -> Joints[float]:
         return Joints(*(self.drive[joint].torque_constant_nm_a for joint in self.rig.joints))
 

@@ -36,6 +36,7 @@ ORDERED = (  # pairs of keys, the first of which must be at most the second
     ("faults.quiet_s", "faults.silence_s"),
     ("faults.lag_s", "faults.silence_s"),
     ("faults.voltage_min_v", "faults.voltage_low_v"),
+    ("limits.temperature_warm_c", "limits.temperature_hot_c"),
     ("adaptation.min_depth_m", "adaptation.max_depth_m"),
 )
 
@@ -192,11 +193,6 @@ def _range_problems(configuration: Configuration) -> Iterator[str]:
         yield f"limits.sweep_min_deg = {limits.sweep_min_deg}: must be at most {-sweep_deg:g} for gait.sweep_angle_deg"
     if limits.sweep_max_deg < sweep_deg:
         yield f"limits.sweep_max_deg = {limits.sweep_max_deg}: must be at least {sweep_deg:g} for gait.sweep_angle_deg"
-    if limits.temperature_hot_c < limits.temperature_warm_c:
-        yield (
-            f"limits.temperature_hot_c = {limits.temperature_hot_c}: must be at least"
-            f" limits.temperature_warm_c = {limits.temperature_warm_c}"
-        )
     if limits.adduction_max_deg < 0.0:
         yield f"limits.adduction_max_deg = {limits.adduction_max_deg}: must be at least 0, the raised arm"
     depth_m = configuration.adaptation.max_depth_m
@@ -256,9 +252,11 @@ def _natnet_problems(pose: PoseParameters) -> Iterator[str]:
         yield f"pose.natnet.server = {natnet.server!r}: must be an address of four numbers, such as 192.168.1.10"
     if natnet.group and not (is_address(natnet.group) and ipaddress.IPv4Address(natnet.group).is_multicast):
         yield f"pose.natnet.group = {natnet.group!r}: must be from 224.0.0.0 to 239.255.255.255, or empty"
-    if not is_address(natnet.interface) and not _is_interface(natnet.interface):
+    name = natnet.interface
+    is_name = len(name.encode()) <= LONGEST_INTERFACE and name.isprintable() and not set(name) & set("/ ")
+    if not (is_name or is_address(name)):
         longest = f"a name of at most {LONGEST_INTERFACE} letters, such as eth0, or an address of this computer"
-        yield f"pose.natnet.interface = {natnet.interface!r}: must be {longest}"
+        yield f"pose.natnet.interface = {name!r}: must be {longest}"
     if natnet.version and parse_version(natnet.version) is None:
         yield f"pose.natnet.version = {natnet.version!r}: must be from 2.6 to 4.255, such as 4.1"
     if natnet.body and natnet.body_id:
@@ -271,10 +269,6 @@ def _natnet_problems(pose: PoseParameters) -> Iterator[str]:
         yield "pose.natnet.version = '': must be given where no pose.natnet.server can be asked for it"
     if natnet.body:
         yield f"pose.natnet.body = {natnet.body!r}: needs a pose.natnet.server to ask; or give pose.natnet.body_id"
-
-
-def _is_interface(name: str) -> bool:
-    return len(name.encode()) <= LONGEST_INTERFACE and name.isprintable() and not set(name) & set("/ ")
 
 
 def _encoder_problems(pose: PoseParameters) -> Iterator[str]:

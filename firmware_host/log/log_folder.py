@@ -28,11 +28,6 @@ class FreeSpace(NamedTuple):
     free_bytes: int
 
 
-class DeletedLog(NamedTuple):
-    name: str
-    size: int  # bytes
-
-
 def new_run_id(robot: str) -> str:
     """Return an id that sorts by time and is a valid file name for any name of the robot."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
@@ -100,16 +95,15 @@ def free_space(folder: Path) -> FreeSpace:
     return FreeSpace(disk.f_bavail / max(1, disk.f_blocks), disk.f_bavail * disk.f_frsize)
 
 
-def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[DeletedLog]:
-    """Delete the oldest finished logs one by one until quota and free space are respected. Raises OSError."""
+def delete_by_quota(folder: Path, quota_bytes: int, min_free_fraction: float, most: int = 4) -> Iterator[str]:
+    """Delete the oldest finished logs until quota and free space are respected; yield the messages. Raises OSError."""
     used = sum(_size(path) for path in stored_files(folder))
     for oldest in deletable_logs(folder)[:most]:
         too_much = 0 < quota_bytes < used
         if not too_much and free_space(folder).free_fraction >= min_free_fraction:
             return
-        deleted = delete_log(oldest)
-        used -= deleted.size
-        yield deleted
+        used -= _size(oldest)
+        yield delete_log(oldest)
 
 
 def deletable_logs(folder: Path) -> list[Path]:
@@ -118,10 +112,11 @@ def deletable_logs(folder: Path) -> list[Path]:
     return [path for path in log_files(folder, TOP, DONE) if path not in unfinished][:-1]
 
 
-def delete_log(path: Path) -> DeletedLog:
-    deleted = DeletedLog(path.name, _size(path))
+def delete_log(path: Path) -> str:
+    """Delete a log, and return the message about it."""
+    message = f"room for logs: {path.name} was deleted, {_size(path)} bytes"
     path.unlink()
-    return deleted
+    return message
 
 
 def _size(path: Path) -> int:

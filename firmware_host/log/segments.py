@@ -21,7 +21,6 @@ from firmware_host.configuration.log_parameters import LogParameters
 from firmware_host.log.log_file import LogFile, Rows
 from firmware_host.log.log_folder import (
     ACTIVE,
-    DeletedLog,
     deletable_logs,
     delete_by_quota,
     delete_log,
@@ -193,7 +192,7 @@ class LogSegments:
         if self._full and self._folder is not None and may_delete and self._deleting_helps:
             for oldest in deletable_logs(self._folder)[:1]:
                 before = free_space(self._folder).free_bytes
-                self._deleted.append(_message(delete_log(oldest)))
+                self._deleted.append(delete_log(oldest))
                 self._deleting_helps = free_space(self._folder).free_bytes > before
         self._full = False
 
@@ -203,8 +202,8 @@ class LogSegments:
         self._quota_s = time.monotonic() + QUOTA_INTERVAL_S
         quota_bytes, fraction = self._parameters.quota_bytes, self._parameters.min_free_fraction
         with suppress(OSError):  # a log that cannot be deleted shows as a full disk
-            for deleted in delete_by_quota(self._folder, quota_bytes, fraction):
-                self._write([self._event(_message(deleted))])
+            for message in delete_by_quota(self._folder, quota_bytes, fraction):
+                self._write([self._event(message)])
 
     def _start_recovery(self) -> None:
         """Recover the files of other runs, or of this run before its disk failed, in a process of its own."""
@@ -217,7 +216,3 @@ class LogSegments:
         command = [sys.executable, "-P", "-m", "logs.recovery", str(self._folder)]
         with suppress(OSError):  # the next start finds them too
             self._recovery = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-
-
-def _message(deleted: DeletedLog) -> str:
-    return f"room for logs: {deleted.name} was deleted, {deleted.size} bytes"

@@ -77,7 +77,7 @@ def write_log(pipe: int, reports: int, path: Path) -> bool:
     reporter, stream = Reporter(reports), _open_stream(opening)
     reporter.update(log)
     for batch in chain([rows], batches):
-        valid = _valid(batch)
+        valid = [row for row in batch if row[0] < len(ROW_KINDS) and len(row[1]) >= STAMP.size]
         if stream is not None:
             stream.publish(valid)  # first: a disk may be slow
         log.write(valid)
@@ -106,11 +106,6 @@ def _open_stream(opening: dict[str, Any]) -> RowStream | None:
     return stream
 
 
-def _valid(rows: Rows) -> Rows:
-    """Return the rows that have a known kind and a stamp, as every row of the recorder has."""
-    return [row for row in rows if row[0] < len(ROW_KINDS) and len(row[1]) >= STAMP.size]
-
-
 def _read_batches(pipe: int) -> Iterator[Rows]:
     """Yield whole rows as they come, or none after a while without any, until the input ends."""
     poll = select.poll()
@@ -128,17 +123,13 @@ def _read_batches(pipe: int) -> Iterator[Rows]:
         time.sleep(GATHER_S)
 
 
-def _yield_to_the_loop() -> None:
-    """Ignore the loop's signals, gives up its real-time priority and takes the CPU last."""
+def main() -> None:
+    """Ignore the loop's signals, give up its real-time priority, take the CPU last, and write the log."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     with suppress(PermissionError):  # a hardened service may refuse both; the log is written all the same
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         os.nice(10)
-
-
-def main() -> None:
-    _yield_to_the_loop()
     if not write_log(sys.stdin.fileno(), sys.stdout.fileno(), Path(sys.argv[1])):
         sys.exit(1)
 

@@ -57,10 +57,9 @@ def arming_checks(loop: Loop, warnings: Sequence[str]) -> list[dict[str, Any]]:
 
 def _cause_lines(faults: Sequence[AgedFault], configuration: Configuration) -> dict[Fault, str]:
     """Return the line of the cause of each fault."""
-    bus_of = {joint: configuration.drive[joint].bus for joint in configuration.rig.joints}
     return {
         each.fault: cause.root.check_line
-        for cause in group_by_cause(faults, bus_of)
+        for cause in group_by_cause(faults, configuration.bus_of)
         for each in (*cause.faults, *cause.consequences)
     }
 

@@ -32,6 +32,8 @@ from firmware_host.sockets.status_socket import Methods
 from firmware_host.software_version import is_compiled, software_version
 
 Method = Callable[[dict[str, Any], Caller], Any]
+MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v")  # by a drive
+PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
 
 def validated(name: str, method: Method) -> Method:
@@ -47,13 +49,8 @@ class OperatorCalls:
         self._clock = clock
         self._version = software_version()
         self._compiled = is_compiled()
-        drives = loop.configuration.drive
         self._rig = loop.configuration.rig
-        self._bus_of = {joint: drives[joint].bus for joint in self._rig.joints}
-        self._drive_settings = {
-            joint: {"bus": drives[joint].bus, "current_limit_a": drives[joint].current_limit_a}
-            for joint in self._rig.joints
-        }
+        self._bus_of = loop.configuration.bus_of
 
     @property
     def methods(self) -> Methods:
@@ -94,10 +91,7 @@ class OperatorCalls:
             "lease_left_s": known(lease.until_s - now_s) if lease.held else None,
             **_walk_report(loop),
             "pose": loop.pose.report()._asdict(),
-            "drives": [
-                {"joint": joint} | _drive_report(loop, index, now_s) | self._drive_settings[joint]
-                for index, joint in enumerate(self._rig.joints)
-            ],
+            "drives": [_drive_report(loop, index, joint, now_s) for index, joint in enumerate(self._rig.joints)],
             "strides_closed": learning.strides_closed,
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
@@ -231,17 +225,14 @@ def _fault_report(fault: Fault, age_s: float) -> dict[str, Any]:
     }
 
 
-def _drive_report(loop: Loop, index: int, now_s: float) -> dict[str, Any]:
-    state, health = loop.states[index], loop.drives.health[index]
+def _drive_report(loop: Loop, index: int, joint: str, now_s: float) -> dict[str, Any]:
+    state, health, drive = loop.states[index], loop.drives.health[index], loop.configuration.drive[joint]
     return {
-        "angle_rad": known(state.angle_rad),
-        "velocity_rad_s": known(state.velocity_rad_s),
-        "current_a": known(state.current_a),
+        "joint": joint,
+        **{name: known(getattr(state, name)) for name in MEASURED},
         "torque_command_nm": loop.sent.torques_nm[index],
         "closed_loop": state.closed_loop,
         "errors": health.active_errors,
-        "temperature_c": known(state.temperature_c),
-        "bus_voltage_v": known(state.bus_voltage_v),
         "firmware": health.firmware or None,
         "hardware": health.hardware or None,
         "watchdog_s": known(health.watchdog_s),
@@ -249,6 +240,8 @@ def _drive_report(loop: Loop, index: int, now_s: float) -> dict[str, Any]:
         "angle_age_s": known(now_s - state.angle_stamp_s),
         "current_age_s": known(now_s - state.current_stamp_s),
         "heartbeat_age_s": known(now_s - state.heartbeat_stamp_s),
+        "bus": drive.bus,
+        "current_limit_a": drive.current_limit_a,
     }
 
 
@@ -285,7 +278,5 @@ def _bus_report(loop: Loop) -> dict[str, Any]:
         "refused_commands": drives.refused_commands,
         "state": {name: port.state.name.lower() for name, port in ports.items()},
         "last_error": {name: port.last_error for name, port in ports.items() if port.last_error},
-        "error_frames": sum(port.error_frames for port in ports.values()),
-        "failed_sends": sum(port.failed_sends for port in ports.values()),
-        "lost_frames": sum(port.lost_frames for port in ports.values()),
+        **{name: sum(getattr(port, name) for port in ports.values()) for name in PORT_COUNTERS},
     }

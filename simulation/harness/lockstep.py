@@ -88,7 +88,7 @@ class Lockstep:
             plant or plant_of(configuration, disturbances, fixed_base),
             track,
             drives or drives_of(configuration, **drive_changes(disturbances)),
-            {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
+            configuration.bus_of,
             {name: bus.open() for name, bus in self.buses.items()},
             seed,
         )

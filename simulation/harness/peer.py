@@ -45,7 +45,7 @@ class Peer:
             world.plant(configuration),
             world.track,
             world.drives(configuration, watchdog_s=WATCHDOG_S),
-            {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
+            configuration.bus_of,
             self._ports,
             seed,
             start_s=self.ticker.wait().now_s,

@@ -87,6 +87,14 @@ def test_nothing_is_armed_while_the_daemon_ends(robot: Lockstep) -> None:
     assert robot.loop.request(Request.ARM, robot.now_s) == "the daemon is ending"
 
 
+def a_bug() -> Exception:
+    """Return an exception with a traceback."""
+    try:
+        raise ZeroDivisionError("somewhere in a tick")
+    except ZeroDivisionError as problem:
+        return problem
+
+
 def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pytest.CaptureFixture[str]) -> None:
     port = robot.loop.drives.ports["left"]
     assert isinstance(port, MockPort)
@@ -95,10 +103,7 @@ def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pyt
         raise OSError("the adapter was unplugged")
 
     port.send = broken  # type: ignore[method-assign]
-    try:
-        raise ZeroDivisionError("somewhere in a tick")
-    except ZeroDivisionError as problem:
-        assert end_safely(robot.loop, problem) == EXIT_FAILED
+    assert end_safely(robot.loop, a_bug()) == EXIT_FAILED
     robot.robot.advance(robot.now_s + 0.01)
     assert energised(robot)[2:] == [False] * 2
     said = capsys.readouterr().err
@@ -108,24 +113,12 @@ def test_a_bug_idles_all_drives_that_can_be_reached(robot: Lockstep, capsys: pyt
 
 def test_a_bug_in_the_log_does_not_prevent_idling_the_drives(robot: Lockstep) -> None:
     def broken(number: int, row: bytes) -> bool:
-        raise DeliberateBugError
+        raise ZeroDivisionError
 
     robot.loop.recorder.put = broken  # type: ignore[method-assign]
-    assert end_safely(robot.loop, caught(DeliberateBugError())) == EXIT_FAILED
+    assert end_safely(robot.loop, a_bug()) == EXIT_FAILED
     robot.robot.advance(robot.now_s + 0.01)
     assert energised(robot) == [False] * 4
-
-
-class DeliberateBugError(Exception):
-    pass
-
-
-def caught(problem: Exception) -> Exception:
-    """Raise and catch the exception, so that it has a traceback."""
-    try:
-        raise problem
-    except DeliberateBugError:
-        return problem
 
 
 class Notices(SystemdNotifier):

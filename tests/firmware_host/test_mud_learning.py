@@ -157,18 +157,21 @@ def faults_of(learning: MudLearning, closed: StrideEstimate) -> list[Fault]:
     return learning.pop_faults()
 
 
+WILD = [
+    *(Estimate(value, 1e5, 100, True) for value in (nan, inf, -inf, LARGEST_N_M3, -1.01 * LARGEST_N_M3)),
+    *(Estimate(2e6, std_error, 100, True) for std_error in (nan, inf, LARGEST_N_M3)),
+]
+
+
 @pytest.mark.parametrize("name", ["k_p", "k_s", "k_e"])
-@pytest.mark.parametrize("value", [nan, inf, -inf, LARGEST_N_M3, -1.01 * LARGEST_N_M3])
-def test_a_coefficient_beyond_any_mud_is_a_fault(learning: MudLearning, name: str, value: float) -> None:
-    (fault,) = faults_of(learning, stride("right", 7, **{name: Estimate(value, 1e5, 100, True)}))
-    assert fault == FaultKind.ESTIMATE_WILD.fault("right", stride=7)
-
-
-@pytest.mark.parametrize("std_error", [nan, inf, LARGEST_N_M3])
-def test_a_std_error_that_is_not_finite_is_a_fault(learning: MudLearning, std_error: float) -> None:
-    faults = faults_of(learning, stride(k_s=Estimate(2e6, std_error, 100, True)))
-    assert [fault.name for fault in faults] == ["estimate_wild"]
-    assert learning.pop_faults() == []  # it lasts for one tick
+@pytest.mark.parametrize("estimate", WILD)
+def test_a_coefficient_beyond_any_mud_is_a_fault_for_one_tick(
+    learning: MudLearning, name: str, estimate: Estimate
+) -> None:
+    assert faults_of(learning, stride("right", 7, **{name: estimate})) == [
+        FaultKind.ESTIMATE_WILD.fault("right", stride=7)
+    ]
+    assert learning.pop_faults() == []
 
 
 @pytest.mark.parametrize(

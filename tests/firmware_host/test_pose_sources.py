@@ -33,6 +33,7 @@ from simulation.mud.track import Track
 from tests.waiting import LONGEST_S
 
 NATNET = 'source = "natnet"\n'
+TABLE = NATNET + "[pose.natnet]\n"
 ENCODER = 'source = "rail_encoder"\n[pose.rail_encoder]\n'
 
 
@@ -53,8 +54,8 @@ def problems_of(example_text: str, section: str) -> list[str]:
         ('socket = "/run/pose"', "socket"),
         ('source = "socket"\nsocket = "/run/pose"', "socket"),
         ('source = "none"\nsocket = "/run/pose"', "none"),
-        (NATNET + '[pose.natnet]\nserver = "192.168.1.10"', "natnet"),
-        (NATNET + '[pose.natnet]\nversion = "4.1"', "natnet"),
+        (TABLE + 'server = "192.168.1.10"', "natnet"),
+        (TABLE + 'version = "4.1"', "natnet"),
         (
             NATNET + 'axis = [0.7, 0, -0.7]\n[pose.natnet]\nserver = "10.0.0.1"\ngroup = ""\ninterface = "eth0"',
             "natnet",
@@ -80,18 +81,18 @@ def test_the_pose_section_chooses_the_source(example_text: str, section: str, ch
         ("axis = 1979-05-27", "pose.axis = datetime.date(1979, 5, 27): must be"),
         ("origin_m = nan", "pose.origin_m = nan: "),
         (NATNET, "pose.natnet.version = '': must be given where no pose.natnet.server can be asked for it"),
-        (NATNET + '[pose.natnet]\ngroup = ""\nversion = "4.1"', "pose.natnet.server = '': must be given where"),
-        (NATNET + '[pose.natnet]\nserver = "motive.lab"', "pose.natnet.server = 'motive.lab': must be an address"),
-        (NATNET + '[pose.natnet]\nversion = "4.1"\ngroup = "10.0.0.1"', "pose.natnet.group = '10.0.0.1': must be from"),
-        (NATNET + '[pose.natnet]\nversion = "2.5"', "pose.natnet.version = '2.5': must be from 2.6"),
-        (NATNET + '[pose.natnet]\nversion = "4"', "pose.natnet.version = '4': must be from 2.6"),
-        (NATNET + '[pose.natnet]\nversion = "4.1"\nbody = "a"', "pose.natnet.body = 'a': needs a pose.natnet.server"),
+        (TABLE + 'group = ""\nversion = "4.1"', "pose.natnet.server = '': must be given where"),
+        (TABLE + 'server = "motive.lab"', "pose.natnet.server = 'motive.lab': must be an address"),
+        (TABLE + 'version = "4.1"\ngroup = "10.0.0.1"', "pose.natnet.group = '10.0.0.1': must be from"),
+        (TABLE + 'version = "2.5"', "pose.natnet.version = '2.5': must be from 2.6"),
+        (TABLE + 'version = "4"', "pose.natnet.version = '4': must be from 2.6"),
+        (TABLE + 'version = "4.1"\nbody = "a"', "pose.natnet.body = 'a': needs a pose.natnet.server"),
         (
-            NATNET + '[pose.natnet]\nserver = "10.0.0.1"\nbody = "a"\nbody_id = 3',
+            TABLE + 'server = "10.0.0.1"\nbody = "a"\nbody_id = 3',
             "pose.natnet.body_id = 3: must be left out",
         ),
-        (NATNET + '[pose.natnet]\nversion = "4.1"\ninterface = "a/b"', "pose.natnet.interface = 'a/b': must be a name"),
-        (NATNET + '[pose.natnet]\nversion = "4.1"\nport = 0', "pose.natnet.port = 0: must be at least 1"),
+        (TABLE + 'version = "4.1"\ninterface = "a/b"', "pose.natnet.interface = 'a/b': must be a name"),
+        (TABLE + 'version = "4.1"\nport = 0', "pose.natnet.port = 0: must be at least 1"),
         (ENCODER + "metres_per_count = 0.001", "pose.rail_encoder.device = '': must name a serial port"),
         (ENCODER + 'device = "/dev/ttyACM0"', "pose.rail_encoder.metres_per_count = 0.0: must be given, and not 0"),
         (
@@ -151,7 +152,7 @@ def test_motion_capture_is_received_by_a_process_of_its_own(example_text: str) -
 
 
 def test_a_refusal_of_that_process_is_the_daemon_s(example_text: str) -> None:
-    section = NATNET + '[pose.natnet]\nserver = "127.0.0.1"\ngroup = ""\ninterface = "nothing0"'
+    section = TABLE + 'server = "127.0.0.1"\ngroup = ""\ninterface = "nothing0"'
     with pytest.raises(PoseSourceError, match="from 127.0.0.1 on nothing0: No such device"):
         open_pose(pose_of(example_text, section))
 

@@ -37,6 +37,26 @@ def read_settings(name: str) -> Settings:
     return settings
 
 
+PLAIN = {  # settings of the daemon's unit with one value
+    "RestartPreventExitStatus": str(EXIT_CONFIGURATION),  # a wrong configuration is not tried again
+    "Restart": "on-failure",
+    "Type": "notify",
+    "NotifyAccess": "main",
+    "KillMode": "control-group",
+    "KillSignal": "SIGTERM",  # which the log's writer ignores, so it may finish
+    "LimitMEMLOCK": "infinity",
+    "RuntimeDirectoryMode": "0755",  # every user may enter, who may stop
+    "StateDirectoryMode": "0750",
+    "ProtectSystem": "strict",  # so nothing but logs could be written
+}
+ABSENT = {
+    "ExecStartPre",  # RestartPreventExitStatus ignores its status
+    "RestrictRealtime",
+    "CPUSchedulingPolicy",  # it would make the log's writer a real-time process too
+    "PrivateUsers",  # the daemon would see every caller as the user "nobody"
+}
+
+
 @pytest.fixture(scope="module")
 def unit() -> Settings:
     return read_settings("mudskipper.service")
@@ -82,21 +102,15 @@ def test_an_operator_who_starts_the_daemon_without_options_gets_the_same_configu
     assert asked == [Path(unit["ExecStart"][-1])]
 
 
-def test_the_socket_is_in_the_unit_s_runtime_directory_which_every_user_may_enter_who_may_stop(
-    unit: Settings, configuration: Configuration
-) -> None:
+def test_the_socket_is_in_the_unit_s_runtime_directory(unit: Settings, configuration: Configuration) -> None:
     assert Path(configuration.status.socket).parent == Path("/run") / only(unit, "RuntimeDirectory")
     assert configuration.status.socket == StatusParameters().socket
     assert configuration.status.anyone_may_stop
-    assert only(unit, "RuntimeDirectoryMode") == "0755"
-    assert "PrivateUsers" not in unit  # the daemon would see every caller as the user "nobody"
 
 
 def test_logs_go_into_the_unit_s_state_directory(unit: Settings, configuration: Configuration) -> None:
     state = Path("/var/lib") / only(unit, "StateDirectory")
     assert Path(configuration.log.directory).is_relative_to(state)
-    assert only(unit, "StateDirectoryMode") == "0750"
-    assert only(unit, "ProtectSystem") == "strict"  # so nothing else could be written
 
 
 def test_the_unit_s_user_and_group_are_the_ones_that_sysusers_makes(unit: Settings) -> None:
@@ -105,10 +119,8 @@ def test_the_unit_s_user_and_group_are_the_ones_that_sysusers_makes(unit: Settin
     assert users == [only(unit, "User")] == [only(unit, "Group")]
 
 
-def test_a_wrong_configuration_is_not_tried_again(unit: Settings) -> None:
-    assert only(unit, "RestartPreventExitStatus") == str(EXIT_CONFIGURATION)
-    assert only(unit, "Restart") == "on-failure"
-    assert "ExecStartPre" not in unit  # RestartPreventExitStatus ignores its status
+def test_the_unit_has_the_settings_on_which_the_daemon_relies(unit: Settings) -> None:
+    assert {key: only(unit, key) for key in PLAIN} == PLAIN and not unit.keys() & ABSENT
 
 
 def test_systemd_waits_longer_than_the_daemon_ever_takes_to_end(unit: Settings) -> None:
@@ -119,22 +131,12 @@ def test_systemd_waits_longer_than_the_daemon_ever_takes_to_end(unit: Settings) 
 def test_a_healthy_loop_feeds_the_watchdog_several_times_over(unit: Settings) -> None:
     slowest_s = 2 * daemon.NOTIFY_TICKS / RATE_HZ  # a loop that misses every other tick still counts as healthy
     assert seconds(unit, "WatchdogSec") >= 3 * slowest_s
-    assert only(unit, "Type") == "notify"
-    assert only(unit, "NotifyAccess") == "main"
 
 
 def test_the_loop_may_have_its_priority_but_not_that_of_the_interrupts(
     unit: Settings, configuration: Configuration
 ) -> None:
     assert configuration.loop.priority <= int(only(unit, "LimitRTPRIO")) < 50
-    assert only(unit, "LimitMEMLOCK") == "infinity"
-    assert "RestrictRealtime" not in unit
-    assert "CPUSchedulingPolicy" not in unit  # it would make the log's writer a real-time process too
-
-
-def test_the_log_s_writer_may_finish_before_it_is_killed(unit: Settings) -> None:
-    assert only(unit, "KillMode") == "control-group"
-    assert only(unit, "KillSignal") == "SIGTERM"  # the log's writer ignores it
 
 
 def test_the_unit_lives_and_dies_with_the_buses_of_the_example_configuration(

@@ -229,7 +229,7 @@ def _wire(
         plant_of(configuration),
         paper_track(),
         drives_of(configuration),
-        {joint: configuration.drive[joint].bus for joint in configuration.rig.joints},
+        configuration.bus_of,
         robot_ports,
     )
     drives = make_drives(configuration.drive, loop_ports, configuration.limits, configuration.watchdog_endpoints)

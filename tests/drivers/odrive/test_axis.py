@@ -3,55 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from math import isnan, nan
 from random import Random
 
 import pytest
 
 from control.rate import PERIOD_S
-from control.records import JOINTS, Joints
+from control.records import Joints
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus
 from drivers.drive import WatchdogEndpoints
-from drivers.drive_types import make_drives
-from drivers.odrive.axis import OdriveAxis
-from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message, arbitration_id
-from drivers.odrive.parameters import OdriveParameters
+from drivers.odrive.codec import GET_ENCODER_ESTIMATES, GET_IQ, GET_VERSION, HEARTBEAT, TX_SDO, Message
 from drivers.odrive.settings import REFRESH_S
+from tests.drivers.odrive.odrive_bench import PARAMETERS, OdriveBench
 
 BUILD = WatchdogEndpoints("0.6.11", "4.4.58", enable=219, timeout=218)
 PRO = (2, 4, 4, 58, 0, 6, 11, 0)
 
 
-class Bench:
-    """Four drives on one bus, of which the tests examine node 0, and a clock."""
+class Bench(OdriveBench):
+    """The drives, of which the tests examine the first one, and a clock."""
 
-    def __init__(self, endpoints: tuple[WatchdogEndpoints, ...] = (BUILD,), heartbeat_period_s: float = 0.1) -> None:
-        bus = MockBus()
-        self.far = bus.open()
-        parameters = {
-            joint: OdriveParameters("one", node, heartbeat_period_s=heartbeat_period_s)
-            for node, joint in enumerate(JOINTS)
-        }
-        self.drives = make_drives(parameters, {"one": bus.open()}, endpoints=endpoints)
+    def __init__(self, heartbeat_period_s: float = 0.1) -> None:
+        parameters = {joint: replace(each, heartbeat_period_s=heartbeat_period_s) for joint, each in PARAMETERS.items()}
+        super().__init__(parameters, endpoints=(BUILD,))
         self.now_s = 0.0
-
-    @property
-    def axis(self) -> OdriveAxis:
-        axis = self.drives.axes[0]
-        assert isinstance(axis, OdriveAxis)
-        return axis
-
-    def report(self, message: Message, *values: float, stamp_s: float = -1.0) -> None:
-        self.far.send(Frame(arbitration_id(0, message), message.encode(*values), stamp_s=stamp_s))
 
     def request_watchdogs(self, now_s: float) -> list[Frame]:
         """Return the requests for parameters; versions are requested by remote frames."""
         self.drives.request_settings(now_s)
-        return [frame for frame in self.far.receive() if not frame.is_remote]
+        return [frame for frame in self.far["left"].receive() if not frame.is_remote]
 
     def report_setting(self, endpoint: int, value: str) -> None:
-        self.far.send(Frame(0x005, TX_SDO.encode(0, endpoint, 0) + bytes.fromhex(value)))
+        self.far["left"].send(Frame(0x005, TX_SDO.encode(0, endpoint, 0) + bytes.fromhex(value)))
 
     def read(self, now_s: float) -> None:
         self.now_s = now_s
@@ -268,7 +252,7 @@ def test_a_setting_that_makes_no_sense_is_malformed_and_stays_unknown(bench: Ben
 def test_a_torque_that_no_bytes_hold_raises_nothing_and_becomes_zero(bench: Bench, torque_nm: float) -> None:
     bench.drives.gate.open()
     bench.drives.send(Joints(torque_nm, 0.0, 0.0, 0.0), PERIOD_S)
-    assert {frame.data for frame in bench.far.receive()} <= {bytes(4), bytes.fromhex("00000080")}
+    assert {frame.data for frame in bench.far["left"].receive()} <= {bytes(4), bytes.fromhex("00000080")}
     assert bench.drives.gate.refused == 1
 
 
@@ -281,7 +265,7 @@ def test_settings_are_asked_for_again_and_a_change_over_usb_is_seen(bench: Bench
     asked = []
     for tick in range(round(3.0 * REFRESH_S / PERIOD_S)):
         bench.axis.request_settings(tick * PERIOD_S)
-        asked.append(len(bench.far.receive()))
+        asked.append(len(bench.far["left"].receive()))
     assert [count for count in asked if count] == [1 + 2] * 3  # the version, the flag and the time-out
     bench.report_setting(BUILD.enable, "00")
     bench.read(6.0)

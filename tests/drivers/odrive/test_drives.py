@@ -11,10 +11,8 @@ from control.parameters.joint_limits import JointLimits
 from control.rate import PERIOD_S
 from control.records import JOINTS, NEVER_S, DriveStates, Joints
 from drivers.can.frames import Frame
-from drivers.can.mock_bus import MockBus, MockPort
-from drivers.drive_types import make_drives
+from drivers.can.mock_bus import MockPort
 from drivers.drives import REPEAT_S
-from drivers.odrive.axis import OdriveAxis
 from drivers.odrive.codec import (
     GET_BUS_VOLTAGE_CURRENT,
     GET_ENCODER_ESTIMATES,
@@ -28,13 +26,8 @@ from drivers.odrive.codec import (
 )
 from drivers.odrive.parameters import OdriveParameters
 from drivers.odrive.settings import REPEAT_UNKNOWN_S
+from tests.drivers.odrive.odrive_bench import OdriveBench
 
-PARAMETERS = {
-    "left_sweep": OdriveParameters("left", 0),
-    "left_adduction": OdriveParameters("left", 1, sign=-1, zero_turn=0.25),
-    "right_sweep": OdriveParameters("right", 3, sign=-1),
-    "right_adduction": OdriveParameters("right", 2, velocity_limit_turn_s=8.0, current_limit_a=6.0),
-}
 SIGNALS: list[tuple[Message, tuple[float, ...]]] = [
     (GET_ENCODER_ESTIMATES, (0.5, 2.0)),
     (GET_IQ, (1.0, 3.0)),
@@ -50,30 +43,14 @@ RECEIVED = [message for message, _ in SIGNALS + SLOW_SIGNALS]
 BOUNDLESS = JointLimits(torque_nm=1e9, torque_rate_nm_s=1e12)
 
 
-class Bench:
-    """The drives, and the far ends of their two buses."""
-
-    def __init__(self, parameters: dict[str, OdriveParameters] = PARAMETERS, limits: JointLimits | None = None) -> None:
-        buses = {"left": MockBus(), "right": MockBus()}
-        self.parameters = parameters
-        self.far: dict[str, MockPort] = {name: bus.open() for name, bus in buses.items()}
-        self.drives = make_drives(parameters, {name: bus.open() for name, bus in buses.items()}, limits)
-
-    def axis(self, index: int) -> OdriveAxis:
-        axis = self.drives.axes[index]
-        assert isinstance(axis, OdriveAxis)
-        return axis
-
-    def report(self, joint: str, message: Message, *values: float, stamp_s: float = NEVER_S) -> None:
-        drive = self.parameters[joint]
-        frame = Frame(arbitration_id(drive.node_id, message), message.encode(*values), stamp_s=stamp_s)
-        self.far[drive.bus].send(frame)
+class Bench(OdriveBench):
+    """Reports every signal, and reads what is sent."""
 
     def report_everything(self, now_s: float, closed_loop: bool = True) -> DriveStates:
         for joint in JOINTS:
             for message, values in SIGNALS + SLOW_SIGNALS:
-                self.report(joint, message, *values)
-            self.report(joint, HEARTBEAT, 0, 8 if closed_loop else 1, 0, 0)
+                self.report(message, *values, joint=joint)
+            self.report(HEARTBEAT, 0, 8 if closed_loop else 1, 0, 0, joint=joint)
         return self.drives.read(now_s)
 
     def sent(self) -> dict[str, list[Frame]]:
@@ -89,9 +66,9 @@ def bench() -> Bench:
 
 
 def test_the_newest_measured_current_counts_and_the_zero_is_subtracted_before_the_sign(bench: Bench) -> None:
-    bench.report("left_adduction", GET_ENCODER_ESTIMATES, 0.5, 0.0)
+    bench.report(GET_ENCODER_ESTIMATES, 0.5, 0.0, joint="left_adduction")
     for current_a in (1.0, 2.0, 1.5):
-        bench.report("left_sweep", GET_IQ, 9.0, current_a)
+        bench.report(GET_IQ, 9.0, current_a)
     states = bench.drives.read(1.0)
     assert states[0].current_a == 1.5
     assert states[1].angle_rad == pytest.approx(-0.25 * 2.0 * pi)
@@ -100,7 +77,7 @@ def test_the_newest_measured_current_counts_and_the_zero_is_subtracted_before_th
 
 def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
     for now_s, (message, values) in enumerate(SIGNALS, start=1):
-        bench.report("left_sweep", message, *values)
+        bench.report(message, *values)
         bench.drives.read(float(now_s))
     state, unreported = bench.drives.read(9.0)[:2]
     assert (state.angle_stamp_s, state.current_stamp_s, state.heartbeat_stamp_s) == (1.0, 2.0, 3.0)
@@ -114,26 +91,26 @@ def test_every_signal_has_its_own_stamp(bench: Bench) -> None:
 def test_a_signal_has_the_stamp_of_its_frame_unless_that_is_of_another_clock(
     bench: Bench, frame_s: float, stamp_s: float
 ) -> None:
-    bench.report("left_sweep", GET_IQ, 0.0, 1.0, stamp_s=frame_s)
+    bench.report(GET_IQ, 0.0, 1.0, stamp_s=frame_s)
     assert bench.drives.read(9.0)[0].current_stamp_s == stamp_s
 
 
 def test_every_field_comes_from_its_message(bench: Bench) -> None:
     bench.report_everything(1.0)
-    bench.report("right_sweep", HEARTBEAT, 0x1000000, 1, 0, 0)
-    state = bench.drives.read(2.0)[2]
+    bench.report(HEARTBEAT, 0x1000000, 1, 0, 0)
+    state = bench.drives.read(2.0)[0]
     assert (state.closed_loop, state.error_flags, state.heartbeat_stamp_s) == (False, 0x1000000, 2.0)
     assert (state.temperature_c, state.bus_voltage_v) == (40.0, 24.0)
-    bench.report("right_sweep", GET_ERROR, 0x2000000, 0x1000000)
-    assert bench.drives.read(3.0)[2].error_flags == 0x2000000
-    assert bench.axis(2).disarm_reason == 0x1000000
+    bench.report(GET_ERROR, 0x2000000, 0x1000000)
+    assert bench.drives.read(3.0)[0].error_flags == 0x2000000
+    assert bench.axis.disarm_reason == 0x1000000
 
 
 def test_the_same_node_id_on_two_buses_is_two_drives() -> None:
     duplicates = {joint: OdriveParameters(joint.split("_")[0], joint.endswith("adduction")) for joint in JOINTS}
     bench = Bench(duplicates)
-    bench.report("left_sweep", GET_IQ, 0.0, 1.0)
-    bench.report("right_sweep", GET_IQ, 0.0, 2.0)
+    bench.report(GET_IQ, 0.0, 1.0)
+    bench.report(GET_IQ, 0.0, 2.0, joint="right_sweep")
     states = bench.drives.read(1.0)
     assert (states[0].current_a, states[2].current_a) == (1.0, 2.0)
 
@@ -213,10 +190,10 @@ def test_the_drives_are_heard_once_every_signal_of_all_has_come(bench: Bench, jo
     for other in JOINTS:
         for message, values in SIGNALS:
             if (other, message) != (joint, missing):
-                bench.report(other, message, *values)
+                bench.report(message, *values, joint=other)
     bench.drives.read(1.0)
     assert not bench.drives.heard
-    bench.report(joint, missing, *dict(SIGNALS)[missing])
+    bench.report(missing, *dict(SIGNALS)[missing], joint=joint)
     bench.drives.read(2.0)
     assert bench.drives.heard
 
@@ -269,7 +246,7 @@ def test_arming_is_repeated_after_a_while_and_only_for_drives_not_in_closed_loop
     bench.drives.arm(1.0)
     assert {name: len(frames) for name, frames in bench.sent().items()} == {"left": 10, "right": 10}
     for joint in JOINTS[:3]:
-        bench.report(joint, HEARTBEAT, 0, 8, 0, 0)
+        bench.report(HEARTBEAT, 0, 8, 0, 0, joint=joint)
     bench.drives.read(1.05)
     bench.drives.arm(1.0 + 0.99 * REPEAT_S)
     assert bench.silent()
@@ -292,7 +269,7 @@ def test_disarming_at_once_goes_to_all_with_zero_torque_and_idle(bench: Bench) -
 
 def test_disarming_is_repeated_for_drives_still_in_closed_loop(bench: Bench) -> None:
     bench.report_everything(1.0, closed_loop=False)
-    bench.report("left_adduction", HEARTBEAT, 0, 8, 0, 0)
+    bench.report(HEARTBEAT, 0, 8, 0, 0, joint="left_adduction")
     bench.drives.read(1.0)
     for _ in range(3):
         bench.drives.disarm(1.0)
@@ -330,7 +307,7 @@ def test_versions_are_requested_by_remote_frame_until_they_are_known(bench: Benc
     }
     bench.far["left"].send(Frame(0x000, bytes.fromhex("02 04 04 3a 00 06 0b 00")))
     bench.drives.read(1.1)
-    assert bench.axis(0).settings.version == (0, 6, 11)
+    assert bench.axis.settings.version == (0, 6, 11)
     bench.drives.request_settings(1.0 + 0.99 * REPEAT_UNKNOWN_S)
     assert bench.silent()
     bench.drives.request_settings(1.01 + REPEAT_UNKNOWN_S)
@@ -344,5 +321,5 @@ def test_a_reset_forgets_everything(bench: Bench) -> None:
     bench.drives.reset()
     assert not bench.drives.heard
     assert bench.drives.malformed_frames == 0
-    assert bench.axis(0).settings.version is None
+    assert bench.axis.settings.version is None
     assert repr(bench.drives.read(2.0)) == repr(Bench().drives.read(2.0))

@@ -12,16 +12,17 @@ import pytest
 from scipy.stats import t as student_t
 
 from experiments.reports.coefficient_table import (
-    ComparedStride,
-    MudSummary,
     coefficient_text,
+    compared_frame,
+    compared_rows,
     error_table,
-    error_text_rows,
+    error_text_table,
     gather_coefficient,
-    mud_rows,
+    mud_table,
 )
+from experiments.reports.error_table import COEFFICIENTS, Row
 from experiments.robot.bench_errors import BenchError
-from experiments.trials.truth_file import load_truth, missing_text, truth_in
+from experiments.trials.truth_file import load_truth, truth_in, truth_settings
 from tests.experiments.synthetic_strides import make_estimate, make_stride
 
 
@@ -128,7 +129,8 @@ def test_a_mud_is_found_however_its_name_is_written(tmp_path: Path) -> None:
     assert truth_in(truth, "48.6") == truth_in(truth, "w = 48.600 %") == {"k_p": 1e6}
     assert truth_in(truth, "pond") == {"k_p": 2e6}
     assert truth_in(truth, "48.61") == {}
-    assert missing_text(truth, ["48.6", "pond", "48.61"]).endswith("says nothing of 48.61 %.")
+    missing = truth_settings({}, "default", truth, ["48.6", "pond", "48.61"])["missing_truth"]
+    assert "48.61 %" in missing and "pond" not in missing
 
 
 def test_a_summary_is_read_by_mud_and_coefficient_but_for_bounds(tmp_path: Path) -> None:
@@ -164,33 +166,43 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
 # tables
 
 
+def errors_of(strides: dict[tuple[str, str], list[dict[str, Any]]], truth: dict[str, float | None]) -> list[Row]:
+    """Return the errors of strides by mud and method."""
+    rows = compared_frame(
+        row
+        for (mud, method), own in strides.items()
+        for stride in own
+        for row in compared_rows(stride, truth, mud=mud, method=method)
+    )
+    return error_table(rows, "walking")
+
+
 def test_errors_are_of_values_and_bounds_are_printed_as_bounds() -> None:
-    truth = {"k_p": 1e6, "k_s": 1e6, "k_e": None}
     strides = [
         make_stride(k_p=make_estimate(1.1e6), k_s=make_estimate(0.8e6, at_least=True)),
         make_stride(k_p=make_estimate(1.3e6), k_s=make_estimate(0.6e6, at_least=True)),
     ]
-    errors = error_table((ComparedStride("49.5", "default", stride, truth) for stride in strides), "walking")
-    (row,) = error_text_rows(errors)[1:]
-    assert row == ["49.5 %", "default", "20 % (+20 %)", "≥ 70 % of it (2)", "-", "2"]
+    errors = errors_of({("49.5", "default"): strides}, {"k_p": 1e6, "k_s": 1e6, "k_e": None})
+    (row,) = error_text_table(errors).to_numpy().tolist()
+    assert row == ["49.5 %", "default", "20 % (+20 %)", "≥ 70 % of it (2)", "-", 2]
 
 
 def test_a_method_that_says_nothing_of_a_coefficient_has_no_row_of_it() -> None:
-    stride = make_stride(k_p=None, k_e=None)
-    errors = error_table([ComparedStride("49.5", "law", stride, {"k_p": 1e6, "k_s": 1e6, "k_e": 1e6})], "walking")
+    errors = errors_of({("49.5", "law"): [make_stride(k_p=None, k_e=None)]}, dict.fromkeys(COEFFICIENTS, 1e6))
     assert [row["coefficient"] for row in errors] == ["k_s"]
 
 
 def test_a_table_of_muds_has_a_column_of_the_load_cell() -> None:
     reported = gather_coefficient([make_estimate(1.5e6), make_estimate(1.7e6)])
-    muds = [MudSummary("47.6", k_p=reported, k_s=reported, k_e=reported, truth={"k_p": 1.55e6})]
-    head, row = mud_rows(muds)
-    assert len(head) == len(row)
+    muds = [{"mud": "47.6", "truth": {"k_p": 1.55e6}} | dict.fromkeys(COEFFICIENTS, reported)]
+    row = mud_table(muds).iloc[0].tolist()
     assert row[:4] == ["47.6 %", "1.600 ± 0.65 ± 0.051", "8.8 % of 2", "1.550"]
     assert row[6] == "-"
 
 
 def test_methods_of_one_mud_are_adjacent() -> None:
-    rows = [ComparedStride(mud, method, make_stride(), {"k_p": 1e6}) for method in ("one", "two") for mud in ("b", "a")]
-    table = error_text_rows(error_table(rows, "walking"))
-    assert [row[:2] for row in table[1:]] == [["b", "one"], ["b", "two"], ["a", "one"], ["a", "two"]]
+    keys = [(mud, method) for method in ("one", "two") for mud in ("b", "a")]
+    table = error_text_table(errors_of({key: [make_stride()] for key in keys}, {"k_p": 1e6}))
+    assert list(zip(table["mud"], table["method"], strict=True)) == [
+        ("b", "one"), ("b", "two"), ("a", "one"), ("a", "two")
+    ]  # fmt: skip

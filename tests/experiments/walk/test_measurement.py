@@ -10,8 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
+from pandas import DataFrame
 
 from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS
+from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.lockstep_robot import LockstepRobot
 from experiments.study.notebook import Entry, Notebook
 from experiments.trackway.bench import Mud
@@ -21,7 +23,7 @@ from experiments.trials.simulated_bed import CarriedBed
 from experiments.walk import measurement as walk_mapping
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import MUDS, Advance, WalkTrials, measure, require_mud
-from experiments.walk.report import WalkReport, located_strides, report_of, walks_of
+from experiments.walk.report import Report, located_strides, report_of, walks_of
 from experiments.walk.simulation import walking_bench
 from experiments.walk.text import result_of
 from tests.experiments.synthetic_strides import CONFIGURATION, make_estimate, make_stride
@@ -44,7 +46,7 @@ def bench_of(folder: Path, plan: WalkTrials) -> Bench:
     return Bench(*walking_bench(folder, plan, 1), ScriptedOperator(), Notebook(folder, plan.identity))
 
 
-def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> WalkReport:
+def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> Report:
     return report_of(plan, measured(), CONFIGURATION, truth)
 
 
@@ -90,67 +92,68 @@ def test_every_walk_is_in_the_notebook_with_all_methods() -> None:
         assert len({len(strides) for strides in entry["strides"].values()}) == 1
 
 
+def located() -> DataFrame:
+    """Return a row for each stride by the default method."""
+    strides = located_strides(SHORT, measured(), CONFIGURATION, None)
+    return strides[(strides["method"] == DEFAULT) & (strides["coefficient"] == "k_s")]
+
+
 def test_the_robot_stops_past_the_last_mud() -> None:
     """Its plates were in both muds, and no stride went down more than a step past the end."""
-    located = [each for each in located_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
-    positions_m = [each.plates_m for each in located]
+    positions_m = located()["plates_m"].tolist()
     assert positions_m == sorted(positions_m)
     assert 0.0 < positions_m[0] < 0.1
     assert SHORT.length_m - 0.13 < positions_m[-1] < SHORT.length_m
-    assert {"47.6", "51.2"} <= {each.mud for each in located}
+    assert {"47.6", "51.2"} <= set(located()["mud"])
 
 
 def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None:
     """A stance is 12 cm long. A stride belongs to a mud only if its plate stayed in that mud despite its slip."""
-    located = [each for each in located_strides(SHORT, measured(), CONFIGURATION, None) if each.method == DEFAULT]
-    for each in located:
-        slip_m = each.stride["slip_m"]
-        if each.mud:
-            assert (0.055 < slip_m < 0.09) if each.mud == "51.2" else slip_m < 0.055
-        assert each.mud in ("", SHORT.mud_at(each.plates_m - slip_m))
+    slips_m = [stride["slip_m"] for stride in measured()["walk/1"]["strides"][DEFAULT]]
+    for (mud, plates_m), slip_m in zip(located()[["mud", "plates_m"]].to_numpy().tolist(), slips_m, strict=True):
+        if mud:
+            assert (0.055 < slip_m < 0.09) if mud == "51.2" else slip_m < 0.055
+        assert mud in ("", SHORT.mud_at(plates_m - slip_m))
 
 
 def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> None:
     """With dry friction in the joints k_p of the soft mud is 8 % high (median of 32 strides of two walks)."""
-    strong, soft = report().muds
-    assert strong.truth and soft.truth
-    for mud in (strong, soft):
-        assert mud.truth and mud.k_p.value == pytest.approx(mud.truth["k_p"], rel=0.16)
-    assert strong.k_s.at_least
-    assert strong.k_s.value and strong.k_s.value < strong.truth["k_s"]
+    for mud in report()["muds"]:
+        assert mud["k_p"].value == pytest.approx(mud["truth"]["k_p"], rel=0.16)
+    strong = report()["muds"][0]
+    assert strong["k_s"].at_least and strong["k_s"].value < strong["truth"]["k_s"]
 
 
 def test_without_compensation_firm_mud_seems_softer_and_less_so_with_it() -> None:
     """The paper reports the same."""
-    rows = [row for row in report().errors if (row["mud"], row["coefficient"]) == ("47.6", "k_s")]
+    rows = [row for row in report()["errors"] if (row["mud"], row["coefficient"]) == ("47.6", "k_s")]
     biases = {row["method"]: row["bias"] or 0.0 for row in rows}
     assert biases[KNOWN] < biases[KNOWN_COMPENSATED] < 0.0
     assert biases[PAPER] < biases[COMPENSATED] < 0.0
 
 
 def test_the_soft_mud_has_k_s_at_both_depths_by_every_method() -> None:
-    (soft,) = report().soft
-    assert (soft.mud, [each.depth_cm for each in soft.depths]) == ("51.2", [3.0, 5.0])
-    for each in soft.depths:
-        assert set(each.k_s) == {DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED}
-        assert each.truth and each.truth > 0.0
-        assert each.thrust_n and 2.5 < each.thrust_n < 20.0
+    (soft,) = report()["soft"]
+    assert (soft["mud"], [each["depth_cm"] for each in soft["depths"]]) == ("51.2", [3.0, 5.0])
+    for each in soft["depths"]:
+        assert set(each["k_s"]) == {DEFAULT, PAPER, COMPENSATED, KNOWN, KNOWN_COMPENSATED}
+        assert each["truth"] > 0.0
+        assert 2.5 < each["thrust_n"] < 20.0
 
 
 def test_the_papers_findings_are_next_to_ours() -> None:
-    found = {row.what: row for row in report().findings}
+    found = {row["what"]: row for row in report()["beside_paper"]}
     half = found["k_s over the load cell's at 3 cm, 51.2 % at 5 cm"]
-    assert half.paper == "0.5"
-    assert half.ours and 0.3 < half.ours < 0.8
-    assert found["thrust of both flippers in stance, 51.2 % at 5 cm (N)"].paper == "2.5"
+    assert half["paper"] == "0.5" and 0.3 < half["ours"] < 0.8
+    assert found["thrust of both flippers in stance, 51.2 % at 5 cm (N)"]["paper"] == "2.5"
 
 
 def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
     reported = report(truth={"47.6": {"k_p": 2e6}})
-    assert reported.muds[0].truth == {"k_p": 2e6}
-    assert reported.muds[1].truth is None
-    assert reported.missing_truth.endswith("says nothing of 51.2 %.")
-    assert {(row["mud"], row["coefficient"]) for row in reported.errors} == {("47.6", "k_p")}
+    assert reported["muds"][0]["truth"] == {"k_p": 2e6}
+    assert reported["muds"][1]["truth"] is None
+    assert reported["missing_truth"].endswith("says nothing of 51.2 %.")
+    assert {(row["mud"], row["coefficient"]) for row in reported["errors"]} == {("47.6", "k_p")}
 
 
 def test_the_report_is_json_with_a_table_and_a_picture_of_everything() -> None:
@@ -197,8 +200,8 @@ def test_without_a_pose_the_robot_makes_only_as_many_strides_as_lead_to_the_end(
     assert [remark for remark in entry["remarks"] if "no pose arrives" in remark]
     assert len(entry["strides"][DEFAULT]) == 2
     reported = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None)
-    assert reported.without_pose == 1
-    assert len(reported.muds[0].k_p.trials) == 2
+    assert reported["without_pose"] == 1
+    assert len(reported["muds"][0]["k_p"].trials) == 2
 
 
 class StoppedRobot(LockstepRobot):
@@ -223,8 +226,8 @@ def test_a_walk_that_another_client_stops_is_invalid(tmp_path: Path) -> None:
 def test_without_a_pose_strides_are_spread_over_the_lengths_of_the_muds() -> None:
     plan = replace(SHORT, muds=(Mud("a", 0.2), Mud("b", 0.6)))
     entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
-    located = located_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
-    assert [each.mud for each in located] == ["a", "b", "b", "b"]
+    spread = located_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
+    assert spread["mud"].tolist() == [mud for mud in ("a", "b", "b", "b") for _ in COEFFICIENTS]
     assert walks_of(plan, {"walk/1": entry, "walk/2": entry}) == [entry]
 
 

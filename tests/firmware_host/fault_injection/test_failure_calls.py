@@ -31,13 +31,10 @@ class Bench:
         self.methods = with_failures(self._plain(), failures, self._report, lambda: self.now_s)
 
     def _plain(self) -> Methods:
-        return {"status": self._status, "disarm": self._disarm, "arm": self._arm}
+        return {"status": self._status, "disarm": self._disarm}
 
     def _status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
         return {"warnings": ["hot"], "mode": "idle"}
-
-    def _arm(self, params: dict[str, Any], caller: Caller) -> str:
-        return "accepted"
 
     def _disarm(self, params: dict[str, Any], caller: Caller) -> str:
         self.failing_at_disarm = list(self.failures.failing) if self.failures else []

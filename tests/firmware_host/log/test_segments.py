@@ -91,40 +91,33 @@ def full(descriptor: int, piece: bytes) -> int:
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def fill_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
-    monkeypatch.setattr(os, "write", full)
-
-
-def test_a_full_disk_frees_nothing_where_nothing_may_be_freed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    old = make_old_logs(tmp_path)
-    log = make_segments(tmp_path, ONE_FILE)
-    with monkeypatch.context() as patch:
-        fill_disk(patch)
-        for number in range(5):
-            log.write(make_ticks(100 * number, 100 * number + 190))
-    assert log.problem and all(path.exists() for path in old)
-
-
-def test_freeing_that_does_not_help_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another program uses the freed space, or a second link keeps the deleted file."""
-    old = make_old_logs(tmp_path, 5)
-    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=10**9))
-    monkeypatch.setattr(log_segments, "free_space", lambda folder: log_folder.FreeSpace(0.0, 0))
-    with monkeypatch.context() as patch:
-        fill_disk(patch)
-        for number in range(5):
-            log.write(make_ticks(100 * number, 100 * number + 190))
-    assert [path.exists() for path in old] == [False, True, True, True, True]
-
-
-@pytest.mark.parametrize("removed", [ACTIVE, "."])
-def test_a_log_removed_under_the_writer_is_noticed(
-    tmp_path: Path, removed: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the writer flush, synchronise and try again at every call."""
     monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
     monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
     monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
+
+
+@pytest.mark.usefixtures("at_once")
+@pytest.mark.parametrize(("quota_bytes", "deleted"), [(0, 0), (10**9, 1)])
+def test_a_full_disk_frees_nothing_where_nothing_may_be_freed_and_stops_where_it_does_not_help(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quota_bytes: int, deleted: int
+) -> None:
+    """Another program uses the freed space, or a second link keeps the deleted file."""
+    old = make_old_logs(tmp_path, 5)
+    log = make_segments(tmp_path, replace(ONE_FILE, quota_bytes=quota_bytes))
+    monkeypatch.setattr(log_segments, "free_space", lambda folder: log_folder.FreeSpace(0.0, 0))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", full)
+        for number in range(5):
+            log.write(make_ticks(100 * number, 100 * number + 190))
+    assert log.problem and [path.exists() for path in old] == [False] * deleted + [True] * (5 - deleted)
+
+
+@pytest.mark.usefixtures("at_once")
+@pytest.mark.parametrize("removed", [ACTIVE, "."])
+def test_a_log_removed_under_the_writer_is_noticed(tmp_path: Path, removed: str) -> None:
     folder = tmp_path / "logs"
     log = make_segments(folder, ONE_FILE)
     log.write(make_ticks(0, 100))
@@ -140,13 +133,9 @@ def test_a_log_removed_under_the_writer_is_noticed(
     assert read.events[0]["text"].startswith("rows missing here: 200, ")
 
 
-def test_a_log_moved_away_keeps_its_rows_and_a_file_at_its_path_is_left_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(log_segments, "RETRY_S", 0.0)
+@pytest.mark.usefixtures("at_once")
+def test_a_log_moved_away_keeps_its_rows_and_a_file_at_its_path_is_left_alone(tmp_path: Path) -> None:
     log = make_segments(tmp_path, ONE_FILE)
-    monkeypatch.setattr(log_file, "SYNC_INTERVAL_S", 0.0)
-    monkeypatch.setattr(log_file, "FLUSH_INTERVAL_S", 0.0)
     log.write(make_ticks(0, 100))
     (tmp_path / ACTIVE / "run-0000.mcap").rename(tmp_path / "elsewhere")
     (tmp_path / ACTIVE / "run-0000.mcap").write_text("somebody's")
