@@ -41,7 +41,7 @@ def print_json(name: str, report: dict[str, Any]) -> None:
 
 
 def print_value(value: Any) -> None:
-    """Prints one line of JSON. Raises ValueError for a number that JSON does not have."""
+    """Print one line of JSON. Raises ValueError for a number that JSON does not have."""
     import json  # every command imports this module, and few print JSON
 
     answers.append(None)
@@ -49,5 +49,5 @@ def print_value(value: Any) -> None:
 
 
 def print_error(status: int, messages: Sequence[str]) -> None:
-    """Prints why a command failed, in the one shape of all commands."""
+    """Print why a command failed, in the one shape of all commands."""
     print_json("error", {"status": status, "meaning": exit_codes.MEANINGS[status], "messages": list(messages)})

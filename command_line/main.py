@@ -16,7 +16,7 @@ from command_line.screen import complaints
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command; with --json, one that fails prints its reason as JSON where it has printed none yet."""
+    """Run one command; with --json, one that fails prints its reason as JSON where it has printed none yet."""
     given = sys.argv[1:] if arguments is None else arguments
     complaints.clear()
     answers.clear()

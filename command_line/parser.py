@@ -118,7 +118,7 @@ class PrintCompletion(argparse.Action):
 
 
 def build_parser(given: Sequence[str] = ()) -> Parser:
-    """Builds the parser of this command line: of that command alone where one is named, else of all commands."""
+    """Build the parser of this command line: of that command alone where one is named, else of all commands."""
     statuses = ", ".join(f"{status} {meaning}" for status, meaning in exit_codes.MEANINGS.items())
     parser = Parser(
         prog="mudskipper",

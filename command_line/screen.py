@@ -37,7 +37,7 @@ class Count(NamedTuple):
 
 
 def time_left_text(begun: Count, now: Count, total: int) -> str:
-    """Formats the time that the rest will take at the pace so far; empty before there is a pace."""
+    """Format the time that the rest will take at the pace so far; empty before there is a pace."""
     done, elapsed_s = now.done - begun.done, now.now_s - begun.now_s
     if done <= 0 or elapsed_s < PACE_S or now.done >= total:
         return ""
@@ -56,7 +56,7 @@ class Progress:
         self._due_s = time.monotonic() + quiet_s
 
     def follow(self, what: str, done: int, total: int) -> None:
-        """Shows a part of the work that has its own count."""
+        """Show a part of the work that has its own count."""
         if what != self._what:
             self._what, self._begun = what, None
         self.show(done, total)
@@ -78,7 +78,7 @@ class Progress:
 
 @contextmanager
 def watched() -> Iterator[Callable[[str, int, int], None]]:
-    """Yields a function that shows progress: what is done, how much, of how much."""
+    """Yield a function that shows progress: what is done, how much, of how much."""
     progress = Progress("", QUIET_S)
     try:
         yield progress.follow
@@ -87,14 +87,14 @@ def watched() -> Iterator[Callable[[str, int, int], None]]:
 
 
 def complain(*messages: str) -> None:
-    """Prints messages to standard error."""
+    """Print messages to standard error."""
     complaints.extend(messages)
     for message in messages:
         print(f"mudskipper: {message}", file=sys.stderr)
 
 
 def coefficient(estimate: dict[str, Any]) -> str:
-    """Formats an estimate in N/cm³ with its standard error; ≥ marks a lower bound, brackets an invalid one."""
+    """Format an estimate in N/cm³ with its standard error; ≥ marks a lower bound, brackets an invalid one."""
     if estimate["value"] is None or estimate["std_error"] is None:
         return "-"
     text = value_text(estimate["value"], estimate["std_error"], per=N_CM3)
@@ -113,7 +113,7 @@ STRIDE_UNITS = (
 
 
 def stride_line(stride: dict[str, Any], start_s: float = 0.0) -> str:
-    """Formats one stride of one flipper: time, durations of its phases, estimates, depth and step."""
+    """Format one stride of one flipper: time, durations of its phases, estimates, depth and step."""
     chosen_m = stride.get("chosen_depth_m")
     return (
         f"{stride['flipper']:7} {stride['index']:3d} {stride['t_end_s'] - start_s:7.2f} "
@@ -125,7 +125,7 @@ def stride_line(stride: dict[str, Any], start_s: float = 0.0) -> str:
 
 
 def other_surface(stride: dict[str, Any]) -> str:
-    """Returns a note on a stride of a trial that has two surfaces; empty for the others."""
+    """Return a note on a stride of a trial that has two surfaces; empty for the others."""
     other_m = stride.get("other_surface_m")
     return "" if other_m is None else f"  other surface {100.0 * other_m:.1f} cm"
 

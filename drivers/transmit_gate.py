@@ -44,9 +44,9 @@ class GateTable(NamedTuple):
     zero_torque: bytes  # its payload
     decode_torque: Callable[[bytes], float]  # in N·m; NaN for a payload that is not exactly one torque command
     always: Mapping[int, frozenset[bytes]]
-    while_open: Mapping[int, frozenset[bytes]]
-    checks: Mapping[int, Callable[[bytes], bool]]  # return whether a payload may leave, where a set cannot list it
-    requests: frozenset[Frame]  # remote frames that may always leave
+    while_open: Mapping[int, frozenset[bytes]] = {}
+    checks: Mapping[int, Callable[[bytes], bool]] = {}  # return whether a payload may leave that no set can list
+    requests: frozenset[Frame] = frozenset()  # remote frames that may always leave
     kind: FrameKind = FrameKind()
     idle: bytes = b""  # replaces a torque while the gate is closed, where even zero torque ends a drive's idleness
     torque_step_nm: float = 0.0  # between two codes of torque, of which the nearest is sent

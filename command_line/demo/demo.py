@@ -92,7 +92,7 @@ def _perform(out: Path, seed: int, depth_cm: float | None, world: Path | None) -
 
 
 def _conclude(out: Path, report: dict[str, Any], demonstration: Demo) -> dict[str, Any]:
-    """Prints the summary, draws the plot, and returns the summary."""
+    """Print the summary, draw the plot, and return the summary."""
     log_path = present_path(Path(report["log"]["path"]))
     log = read_log(log_path, fields=WALKED)
     plot_path = out / log_path.with_suffix(".png").name
@@ -126,7 +126,7 @@ def summarise(report: dict[str, Any], demonstration: Demo, log: Log, log_path: P
 
 
 def walked_path(log: Log) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-    """Returns time in s and position in m of the ticks in which the robot walked with a known pose."""
+    """Return time in s and position in m of the ticks in which the robot walked with a known pose."""
     rows = log.ticks[(log.ticks["mode"] == Mode.WALKING) & np.isfinite(log.ticks["body_x_m"])]
     return rows["stamp_s"], rows["body_x_m"]
 
@@ -134,7 +134,7 @@ def walked_path(log: Log) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
 def speeds_cm_s(
     stamps_s: np.ndarray[Any, Any], positions_m: np.ndarray[Any, Any], track: Track
 ) -> dict[str, float | None]:
-    """Returns the mean speed from the first arrival in each mud to the first arrival in the next."""
+    """Return the mean speed from the first arrival in each mud to the first arrival in the next."""
     speeds: dict[str, float | None] = {}
     start_m = float(positions_m[0]) if len(positions_m) else 0.0
     for segment in track.segments:

@@ -61,7 +61,7 @@ class Demo:
         self.armed = False
 
     def _start(self, module: str, *arguments: str) -> subprocess.Popen[bytes]:
-        """Starts a process in a session of its own.
+        """Start a process in a session of its own.
 
         Signals are blocked during the fork, in which Python drops the exception of a signal handler.
         """
@@ -104,7 +104,7 @@ class Demo:
         return lines[-1] if lines else "it printed nothing"
 
     def _wait_for(self, done: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """Returns the first status that is `done`. Raises DemoError after MODE_TIMEOUT_S or at a fault."""
+        """Return the first status that is `done`. Raises DemoError after MODE_TIMEOUT_S or at a fault."""
         deadline_s = time.monotonic() + MODE_TIMEOUT_S
         while time.monotonic() < deadline_s:
             self._check_processes()
@@ -123,7 +123,7 @@ class Demo:
         self._wait_for(lambda report: bool(report["mode"] == "hold"))
 
     def walk(self, depth_cm: float | None, show: Callable[[dict[str, Any]], None]) -> None:
-        """Walks to the end of the track, for LONGEST_WALK_S at most."""
+        """Walk to the end of the track, for LONGEST_WALK_S at most."""
         self._call("reset_timing")
         self._call("walk", **({} if depth_cm is None else {"depth_m": depth_cm / 100.0}))
         self.walk_start_s = time.monotonic()
@@ -157,7 +157,7 @@ class Demo:
         return f"stopped, but the daemon ended with status {self.daemon.returncode}"
 
     def end(self) -> None:
-        """Ends the daemon, which stops the robot, and then the robot. Further signals are ignored meanwhile."""
+        """End the daemon, which stops the robot, and then the robot. Further signals are ignored meanwhile."""
         handlers = {number: signal.signal(number, signal.SIG_IGN) for number in ENDING_SIGNALS}
         if self._client is not None:
             self._client.close()
@@ -177,7 +177,7 @@ class Demo:
 
 @contextmanager
 def running_demo(logs: Path, seed: int, world: Path | None = None) -> Iterator[Demo]:
-    """Yields a demo and ends its processes. Raises InterruptedDemoError for KeyboardInterrupt."""
+    """Yield a demo and end its processes. Raises InterruptedDemoError for KeyboardInterrupt."""
     folder = Path(tempfile.mkdtemp(prefix="mudskipper-"))  # short, as the path of a Unix socket must be
     try:
         demonstration = Demo(folder, logs, seed, world)

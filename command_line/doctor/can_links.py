@@ -47,7 +47,7 @@ class CanLink(NamedTuple):
 
 
 def parse_links(text: str) -> dict[str, CanLink]:
-    """Returns the CAN interfaces in the output of `ip`. Raises ValueError for another output."""
+    """Return the CAN interfaces in the output of `ip`. Raises ValueError for another output."""
     try:
         wanted = [link for link in json.loads(text) if link.get("link_type") == "can"]
         return {link.name: link for link in map(_parse_link, wanted)}
@@ -74,7 +74,7 @@ def _parse_link(link: dict[str, Any]) -> CanLink:
 
 
 def read_links(root: Path = Path("/")) -> dict[str, CanLink]:
-    """Returns the links by name, from iproute2, or else from /sys."""
+    """Return the links by name, from iproute2, or else from /sys."""
     with suppress(OSError, subprocess.SubprocessError, ValueError):
         command = ["ip", "-details", "-json", "link", "show"]
         return parse_links(subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=True).stdout)
@@ -101,7 +101,7 @@ def examine_buses(configuration: Configuration, links: dict[str, CanLink]) -> It
 def examine_bus(
     name: str, bus: BusParameters, drives: Sequence[DriveParameters], links: dict[str, CanLink]
 ) -> list[Finding]:
-    """Checks a configured bus that has these drives, and its interface."""
+    """Check a configured bus that has these drives, and its interface."""
     link = links.get(bus.channel)
     if bus.interface != "socketcan":
         state = [ok(f"bus.{name}", f"{bus.interface} {bus.channel}")]
@@ -162,7 +162,7 @@ def _examine_fd(name: str, bus: BusParameters, link: CanLink) -> Iterator[Findin
 
 
 def _examine_load(name: str, bus: BusParameters, drives: Sequence[DriveParameters], link: CanLink | None) -> Finding:
-    """Uses the interface's bit rate where it is known, or else the configured one."""
+    """Use the interface's bit rate where it is known, or else the configured one."""
     bit_s = (link.bit_rate_bit_s if link else 0) or 1000 * bus.bit_rate_kbit_s
     load = bus_load(traffic_of(drives), bus.bit_rates._replace(nominal_bit_s=bit_s))
     text = f"{len(drives)} drives will take {load} of {bit_s / 1000:g} kbit/s"

@@ -135,7 +135,7 @@ def _examine_clock() -> Finding:
 
 
 def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, list[Finding]]:
-    """Returns the daemon's process id, and the findings about itself and its drives."""
+    """Return the daemon's process id, and the findings about itself and its drives."""
     pid = None
     try:
         client = StatusClient(socket)
@@ -148,7 +148,7 @@ def _ask_daemon(socket: Path, longest_watchdog_s: float) -> tuple[int | None, li
 
 
 def examine_daemon(status: dict[str, Any], version: str, longest_watchdog_s: float) -> Iterator[Finding]:
-    """Yields the findings about the status of a daemon; `version` is that of this command."""
+    """Yield the findings about the status of a daemon; `version` is that of this command."""
     form = "compiled" if status.get("compiled") else "interpreted"  # an older daemon does not say it
     text, same = f"runs, version {status['version']}, {form}, {status['mode']}", status["version"] == version
     text += "" if same else f"; this command is version {version}"
@@ -169,7 +169,7 @@ def _examine_watchdog(identity: str, watchdog_s: float | None, longest_s: float)
 
 
 def _log_writer() -> Account:
-    """Returns the daemon's user where the service is installed, or else this one."""
+    """Return the daemon's user where the service is installed, or else this one."""
     with suppress(KeyError):
         if (ROOT / UNIT).exists():
             user = pwd.getpwnam(OURS)
@@ -178,7 +178,7 @@ def _log_writer() -> Account:
 
 
 def _examine_groups(configuration: Configuration, socket: Path) -> Iterator[Finding]:
-    """Checks who may use the socket."""
+    """Check who may use the socket."""
     with suppress(OSError):
         status = socket.stat()
         yield ok("socket", f"{socket}, mode {status.st_mode & 0o777:o}, group {_group_name(status.st_gid)}")

@@ -36,5 +36,5 @@ def fail(identity: str, text: str, fix: str) -> Finding:
 
 
 def ok_if(condition: bool, identity: str, text: str, fix: str, otherwise: Level = Level.WARN) -> Finding:
-    """Returns an ok finding where the condition holds, or else one of the other level with its fix."""
+    """Return an ok finding where the condition holds, or else one of the other level with its fix."""
     return ok(identity, text) if condition else Finding(identity, otherwise, text, fix)

@@ -96,7 +96,7 @@ def examine_limits(loop: LoopParameters, limits: Limits | None) -> Iterator[Find
 
 
 def examine_shell(loop: LoopParameters, limits: Limits | None) -> Iterator[Finding]:
-    """Checks the limits of a daemon that is started by hand, where a service is installed: none of them fails."""
+    """Check the limits of a daemon that is started by hand, where a service is installed: none of them fails."""
     for finding in examine_limits(loop, limits):
         text = f"{finding.text}; it counts only for a daemon that you start by hand"
         yield ok_if(finding.level is Level.OK, f"shell.{finding.id}", text, finding.fix)
@@ -123,7 +123,7 @@ def _examine_governor(root: Path) -> Finding:
 
 
 def _examine_sleep(root: Path, stay_awake: bool) -> Finding:
-    """Checks whether the processors sleep between two ticks, and whether the daemon may forbid it."""
+    """Check whether the processors sleep between two ticks, and whether the daemon may forbid it."""
     deepest_us = deepest_sleep_us(root)
     if deepest_us == 0:
         return ok("sleep", "the processors have no sleep state that takes time to leave")
@@ -149,7 +149,7 @@ def examine_processor(cpu: int, isolated: set[int], present: int) -> Finding:
 
 
 def examine_interrupts(priority: int, threads: list[Thread]) -> Finding:
-    """Compares the loop's priority with the threads that receive its frames: above them it would wait in vain."""
+    """Compare the loop's priority with the threads that receive its frames: above them it would wait in vain."""
     if not threads:
         return ok("interrupts", "no interrupt thread of a CAN adapter")
     text = ", ".join(f"{thread.name} {thread.priority}" for thread in threads)
@@ -161,7 +161,7 @@ def examine_interrupts(priority: int, threads: list[Thread]) -> Finding:
 
 
 def examine_storage(root: Path, log: LogParameters, writer: Account, daemon_runs: bool) -> Iterator[Finding]:
-    """Checks the folder of the logs."""
+    """Check the folder of the logs."""
     if not log.enabled:
         yield warn("log", "no log is written", "set log.enabled = true")
         return
@@ -202,7 +202,7 @@ def examine_space(space: FreeSpace, least_fraction: float) -> Finding:
 
 
 def log_space(log: LogParameters, root: Path = Path("/")) -> Finding:
-    """Checks the free space for the logs."""
+    """Check the free space for the logs."""
     folder = Path(log.directory).absolute()
     try:
         return examine_space(free_space(root / folder.relative_to("/")), log.min_free_fraction)
@@ -211,7 +211,7 @@ def log_space(log: LogParameters, root: Path = Path("/")) -> Finding:
 
 
 def examine_folder(folder: Path, writer: Account) -> Finding:
-    """Checks the folder, or its nearest parent that exists: the daemon makes the missing ones."""
+    """Check the folder, or its nearest parent that exists: the daemon makes the missing ones."""
     nearest = folder
     try:
         while not nearest.exists():
@@ -227,7 +227,7 @@ def examine_folder(folder: Path, writer: Account) -> Finding:
 
 
 def folder_of_systemd(folder: Path) -> Path | None:
-    """Returns the folder in which systemd will make the service's StateDirectory, if the log folder is in that."""
+    """Return the folder in which systemd will make the service's StateDirectory, if the log folder is in that."""
     return next((path.parent for path in (folder, *folder.parents) if path.parts[-3:] == STATE_FOLDER), None)
 
 
@@ -248,7 +248,7 @@ def examine_unfinished(folder: Path) -> Finding:
 
 
 def examine_clock(now: datetime, synchronised: bool, chip: bool) -> Finding:
-    """Checks the wall clock: it names the logs, and the quota deletes the oldest names first."""
+    """Check the wall clock: it names the logs, and the quota deletes the oldest names first."""
     fix = "'timedatectl set-ntp true', or set it yourself with 'date --set'"
     if now.year < EARLIEST_YEAR:
         return fail("clock", f"it shows {now:%Y-%m-%d}: it was never set", fix)
@@ -259,7 +259,7 @@ def examine_clock(now: datetime, synchronised: bool, chip: bool) -> Finding:
 
 
 def examine_python(version: tuple[int, ...], owners: Mapping[str, Collection[str]]) -> Iterator[Finding]:
-    """Checks the interpreter and our import names; `owners` are the distributions of each top-level package."""
+    """Check the interpreter and our import names; `owners` are the distributions of each top-level package."""
     recent, text = version[:2] >= OLDEST_PYTHON, ".".join(map(str, version[:3]))
     fix = "install Python 3.11 or newer"
     yield ok_if(recent, "python", text if recent else f"{text} is too old", fix, Level.FAIL)

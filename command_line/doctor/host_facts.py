@@ -42,14 +42,14 @@ class Mount(NamedTuple):
 
 
 def read_text(path: Path) -> str:
-    """Returns the text of a file, empty where it cannot be read."""
+    """Return the text of a file, empty where it cannot be read."""
     with suppress(OSError):
         return path.read_text(encoding="utf-8", errors="replace").strip()
     return ""
 
 
 def process_limits(root: Path, pid: int | None) -> Limits | None:
-    """Returns the limits of a process, or of this one; root may exceed them."""
+    """Return the limits of a process, or of this one; root may exceed them."""
     if pid is None and os.geteuid() == 0:
         return Limits(inf, inf, "for root")
     text = read_text(root / "proc" / str(pid or "self") / "limits")
@@ -60,7 +60,7 @@ def process_limits(root: Path, pid: int | None) -> Limits | None:
 
 
 def unit_limits(root: Path) -> Limits | None:
-    """Returns the limits that the installed service, with its drop-ins, gives its daemon."""
+    """Return the limits that the installed service, with its drop-ins, gives its daemon."""
     files = [root / UNIT, *sorted((root / f"{UNIT}.d").glob("*.conf"))]
     settings = dict(re.findall(r"^(Limit\w+)=(\S+)$", "\n".join(map(read_text, files)), re.MULTILINE))
     if not settings:
@@ -75,13 +75,13 @@ def _limit(text: str) -> float:
 
 
 def deepest_sleep_us(root: Path) -> int:
-    """Returns the longest time that the first processor's sleep states take to leave."""
+    """Return the longest time that the first processor's sleep states take to leave."""
     texts = [read_text(path) for path in (root / "sys/devices/system/cpu/cpu0/cpuidle").glob("state*/latency")]
     return max((int(text) for text in texts if text.isdigit()), default=0)
 
 
 def wake_limit_us(root: Path) -> int | None:
-    """Returns the time that processors may take to wake, by all programs' requests; None where it is not readable."""
+    """Return the time that processors may take to wake, by all programs' requests; None where it is not readable."""
     with suppress(OSError, struct.error):
         limit_us: int = struct.unpack("=i", (root / "dev/cpu_dma_latency").read_bytes()[:4])[0]
         return limit_us
@@ -89,7 +89,7 @@ def wake_limit_us(root: Path) -> int | None:
 
 
 def isolated_processors(root: Path) -> set[int]:
-    """Returns the numbers in a list such as 2-3,5."""
+    """Return the numbers in a list such as 2-3,5."""
     found: set[int] = set()
     for first, last in re.findall(r"(\d+)(?:-(\d+))?", read_text(root / "sys/devices/system/cpu/isolated")):
         found.update(range(int(first), int(last or first) + 1))
@@ -97,7 +97,7 @@ def isolated_processors(root: Path) -> set[int]:
 
 
 def can_interrupts(root: Path) -> list[Thread]:
-    """Returns the threads that receive frames: those of CAN controllers, and of the SPI and USB that carry them."""
+    """Return the threads that receive frames: those of CAN controllers, and of the SPI and USB that carry them."""
     names = {int(folder.name): read_text(folder / "comm") for folder in (root / "proc").glob("[0-9]*")}
     return sorted(Thread(name, thread_priority(root, pid)) for pid, name in names.items() if CAN_INTERRUPT.match(name))
 
@@ -108,7 +108,7 @@ def thread_priority(root: Path, pid: int) -> int:
 
 
 def mount_of(root: Path, folder: Path) -> Mount | None:
-    """Returns the file system that a folder is on, or will be on."""
+    """Return the file system that a folder is on, or will be on."""
     best: Mount | None = None
     for line in read_text(root / "proc/self/mounts").splitlines():
         fields = line.split()
@@ -125,6 +125,6 @@ def has_clock_chip(root: Path) -> bool:
 
 
 def clock_is_synchronised() -> bool:
-    """Reads the state of the clock from the kernel; changes nothing."""
+    """Read the state of the clock from the kernel, and change nothing."""
     state: int = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_BYTES))
     return state not in (TIME_ERROR, REFUSED)

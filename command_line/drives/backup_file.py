@@ -27,7 +27,7 @@ class Backup(NamedTuple):
     new: dict[str, float]
 
     def state(self, values: Mapping[str, float]) -> str:
-        """Says which of both settings these are."""
+        """Say which of both settings these are."""
         for name, expected in (("new", self.new), ("old", self.old)):
             if all(key in values and same(values[key], value) for key, value in expected.items()):
                 return f"has the {name} settings"
@@ -39,7 +39,7 @@ def default_path() -> Path:
 
 
 def write_backup(path: Path, setups: list[JointSetup], changes: Mapping[str, Mapping[str, float]]) -> None:
-    """Writes the file whole, and waits until the disk has it. Raises OSError."""
+    """Write the file whole, and wait until the disk has it. Raises OSError."""
     document = tomlkit.document()
     document.add(tomlkit.comment(HEAD.format(f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC")))
     for setup in setups:
@@ -60,7 +60,7 @@ def write_backup(path: Path, setups: list[JointSetup], changes: Mapping[str, Map
 
 
 def read_backup(path: Path) -> dict[str, Backup]:
-    """Returns the settings by joint. Raises ConfigurationError."""
+    """Return the settings by joint. Raises ConfigurationError."""
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
         return {joint: _backup(each) for joint, each in document.items()}

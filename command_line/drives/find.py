@@ -9,7 +9,7 @@ from command_line.errors import CommandError
 from command_line.json_output import print_json
 from command_line.screen import GREEN, RED, YELLOW, coloured, watched
 from command_line.shared_options import Json, RobotConfiguration
-from drivers.bench.search import SearchResult, expectation_problems, id_problems, search
+from drivers.bench.search import SearchResult, expectation_problems, id_problems
 from drivers.drive import DriveParameters
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table
@@ -41,13 +41,13 @@ def find(
     else:
         configuration = load_configuration(config)
         drives, configured = configuration.drive, configuration.bus
-        if unknown := next((name for name in bus or () if name not in configured), None):
+        if unknown := next((name for name in bus if name not in configured), None):
             there_are = f"--bus {unknown}: {config} has {', '.join(configured)}"
             raise CommandError(there_are, status=exit_codes.CONFIGURATION)
         buses = {name: each for name, each in configured.items() if name in (bus or configured)}
     with opened_buses(buses) as opened, watched() as show:
-        results = [(each, search(each.port, DRIVE_BENCHES, each.carries_fd, type or (), show)) for each in opened]
-    reports = [_report(each, result, _on_bus(drives, each.name)) for each, result in results]
+        results = [(each, each.search(type, show)) for each in opened]
+    reports = [_report(each, result, drives) for each, result in results]
     if json:
         print_json("drives-find", {"buses": reports})
     else:
@@ -56,15 +56,12 @@ def find(
     return exit_codes.UNHEALTHY if failed else exit_codes.OK
 
 
-def _on_bus(drives: Mapping[str, DriveParameters], bus: str) -> dict[str, DriveParameters]:
-    return {joint: drive for joint, drive in drives.items() if drive.bus == bus}
-
-
-def _report(bus: OpenedBus, result: SearchResult, expected: Mapping[str, DriveParameters]) -> dict[str, Any]:
+def _report(bus: OpenedBus, result: SearchResult, configured: Mapping[str, DriveParameters]) -> dict[str, Any]:
+    expected = {joint: drive for joint, drive in configured.items() if drive.bus == bus.name}
     joints = {(drive.node_id, drive.type): joint for joint, drive in expected.items()}
     drives = [each._asdict() | {"joint": joints.get((each.node_id, each.type), "")} for each in result.found]
-    problems = [f"id {each.node_id} ({each.type}): {each.problem}" for each in result.found if each.problem]
-    problems += [*id_problems(result.found), *expectation_problems(result.found, expected)]
+    found = result.found
+    problems = [*result.drive_problems, *id_problems(found), *expectation_problems(found, expected)]
     if result.error_frames:
         problems.append(
             f"{result.error_frames} error frames: two drives may send under one id, or the bit rates differ"

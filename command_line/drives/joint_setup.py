@@ -9,7 +9,7 @@ from command_line.drives.opened_buses import OpenedBus
 from drivers.bench.bench_port import NoAnswerError
 from drivers.bench.drive_bench import SetupFacts
 from drivers.bench.drive_setup import CannotReadError, DriveSetup, FoundDrive, Setting
-from drivers.bench.search import expectation_problems, id_problems, search
+from drivers.bench.search import expectation_problems, id_problems
 from drivers.drive_types import DRIVE_BENCHES
 from experiments.reports.text_tables import table
 from firmware_host.configuration.configuration import Configuration
@@ -47,7 +47,7 @@ class JointSetup(NamedTuple):
 
 
 def read_documents(options_files: Sequence[Path] | None, configuration: Path) -> list[Any]:
-    """Returns the makers' files, by default those next to the configuration. Raises ConfigurationError."""
+    """Return the makers' files, by default those next to the configuration. Raises ConfigurationError."""
     files = options_files or sorted(configuration.parent.glob(NUMBERS))
     documents = []
     for file in files:
@@ -60,22 +60,22 @@ def read_documents(options_files: Sequence[Path] | None, configuration: Path) ->
 
 
 def bus_problems(bus: OpenedBus, configuration: Configuration, joints: Sequence[str], show: Show) -> list[str]:
-    """Searches a bus; returns why its drives are not those that the configuration describes."""
+    """Search a bus, and return why its drives are not those that the configuration describes."""
     expected = {joint: configuration.drive[joint] for joint in joints if configuration.drive[joint].bus == bus.name}
     types = {drive.type for drive in configuration.drive.values() if drive.bus == bus.name}
-    result = search(bus.port, DRIVE_BENCHES, bus.carries_fd, types if len(types) > 1 else (), show)
+    result = bus.search(types if len(types) > 1 else (), show)
     ids = {drive.node_id for drive in expected.values()}
     return [
         *id_problems([each for each in result.found if each.node_id in ids]),
         *expectation_problems(result.found, expected),
-        *(f"id {each.node_id} ({each.type}): {each.problem}" for each in result.found if each.problem),
+        *result.drive_problems,
     ]
 
 
 def read_joint(
     joint: str, bus: OpenedBus, configuration: Configuration, documents: Sequence[Any], show: Show
 ) -> JointSetup:
-    """Reads all settings of a drive. Raises NoAnswerError, and ConfigurationError for a wrong document."""
+    """Read all settings of a drive. Raises NoAnswerError, and ConfigurationError for a wrong document."""
     parameters = configuration.drive[joint]
     facts = SetupFacts(parameters, configuration.faults.longest_watchdog_s, configuration.watchdog_endpoints, documents)
     try:
@@ -91,7 +91,7 @@ def read_joint(
 
 
 def read_values(drive: DriveSetup, keys: Sequence[str], show: Show) -> tuple[dict[str, float], dict[str, str]]:
-    """Returns the values, and the reasons for those that cannot be read."""
+    """Return the values, and the reasons for those that cannot be read."""
     values, unreadable = {}, {}
     for done, key in enumerate(keys):
         show("settings read", done, len(keys))
@@ -103,7 +103,7 @@ def read_values(drive: DriveSetup, keys: Sequence[str], show: Show) -> tuple[dic
 
 
 def lines_of(setup: JointSetup) -> Iterator[str]:
-    """Yields the drive, its settings as a table, and what cannot be done about them."""
+    """Yield the drive, its settings as a table, and what cannot be done about them."""
     yield setup.title
     if setup.drive.cannot:
         yield f"  {setup.drive.cannot}"

@@ -1,12 +1,14 @@
 """Opens the buses for the commands on drives, which never share them with the daemon."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
 from drivers.bench.bench_port import BenchPort
+from drivers.bench.search import SearchResult, search
 from drivers.can.bus_lock import BusRole
 from drivers.can.can_port import CanPort
+from drivers.drive_types import DRIVE_BENCHES
 from firmware_host.buses import BusError, lock_buses, open_ports
 from firmware_host.configuration.configuration import BusParameters
 
@@ -26,10 +28,14 @@ class OpenedBus(NamedTuple):
     def carries_fd(self) -> bool:
         return self.parameters.data_bit_rate_kbit_s > 0
 
+    def search(self, types: Collection[str], show: Callable[[str, int, int], None]) -> SearchResult:
+        """Search for drives of these types, of all without one."""
+        return search(self.port, DRIVE_BENCHES, self.carries_fd, types, show)
+
 
 @contextmanager
 def opened_buses(buses: dict[str, BusParameters]) -> Iterator[list[OpenedBus]]:
-    """Yields the buses; no other program of this computer can command their drives meanwhile. Raises BusError."""
+    """Yield the buses; no other program of this computer can command their drives meanwhile. Raises BusError."""
     try:
         locks = lock_buses(buses, BusRole.COMMANDS)
     except BusError as problem:

@@ -124,7 +124,7 @@ def _restoring(setups: Sequence[JointSetup], backups: Mapping[str, Backup]) -> C
 
 
 def _write(setups: Sequence[JointSetup], changes: Changes, names: Names) -> int:
-    """Writes one drive at a time, and stops at the first that does not end with its new settings."""
+    """Write one drive at a time, and stop at the first that does not end with its new settings."""
     with deferred_ending() as interrupted, watched() as show:
         for done, each in enumerate(setups):
             show("drives written", done, len(setups))
@@ -144,7 +144,7 @@ def _write(setups: Sequence[JointSetup], changes: Changes, names: Names) -> int:
 
 @contextmanager
 def deferred_ending() -> Iterator[Callable[[], bool]]:
-    """Yields whether a signal asked this program to end. Without this it would end between two settings."""
+    """Yield whether a signal asked this program to end. Without this it would end between two settings."""
     asked = []
     before = {number: signal.signal(number, lambda number, frame: asked.append(number)) for number in ENDINGS}
     try:

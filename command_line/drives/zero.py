@@ -92,7 +92,7 @@ def _agreed(question: str) -> bool:
 
 
 def _read(configuration: Configuration, joints: Sequence[str]) -> list[Reading]:
-    """Reads all joints at once. Raises BusError and CommandError."""
+    """Read all joints at once. Raises BusError and CommandError."""
     names = {configuration.drive[joint].bus for joint in joints}
     chosen = {joint: configuration.drive[joint] for joint in configuration.rig.joints if joint in joints}
     with opened_buses({name: configuration.bus[name] for name in configuration.bus if name in names}) as opened:
@@ -106,7 +106,7 @@ def _read(configuration: Configuration, joints: Sequence[str]) -> list[Reading]:
 def read_angles(
     drives: Drives, clock: BenchPort, show: Callable[[str, int, int], None]
 ) -> Mapping[str, Sequence[float]]:
-    """Returns the new readings of every joint's angle for READING_S. Raises CommandError."""
+    """Return the new readings of every joint's angle for READING_S. Raises CommandError."""
     begun_s = clock.now_s
     states = drives.read(begun_s)
     while not drives.heard and clock.now_s - begun_s < HEARING_S:

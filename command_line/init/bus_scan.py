@@ -10,7 +10,7 @@ from command_line.drives.opened_buses import FD_RATE_KBIT_S, opened_buses
 from command_line.init.new_file import NewRobot
 from command_line.screen import watched
 from drivers.bench.drive_setup import FoundDrive
-from drivers.bench.search import id_problems, search
+from drivers.bench.search import id_problems
 from drivers.drive_types import DRIVE_BENCHES
 from firmware_host.configuration.configuration import BusParameters
 from firmware_host.configuration.file_problems import ConfigurationError
@@ -25,27 +25,23 @@ def scan(robot: NewRobot, carries_fd: bool, drive_type: str | None) -> Found:
     carries_fd = carries_fd or bool(drive_type and DRIVE_BENCHES[drive_type].is_fd)
     rate_kbit_s = FD_RATE_KBIT_S if carries_fd else 0
     buses = {name: BusParameters(robot.interface, name, {}, 1000, rate_kbit_s) for name in robot.channels}
-    chosen = (drive_type,) if drive_type else ()
     with opened_buses(buses) as opened, watched() as show:
-        found = {bus.name: search(bus.port, DRIVE_BENCHES, carries_fd, chosen, show).found for bus in opened}
+        results = {bus.name: bus.search((drive_type,) if drive_type else (), show) for bus in opened}
     problems = [
         f"{channel}: {text}"
-        for channel, drives in found.items()
-        for text in (
-            *id_problems(drives),
-            *(f"id {each.node_id} ({each.type}): {each.problem}" for each in drives if each.problem),
-        )
+        for channel, result in results.items()
+        for text in (*id_problems(result.found), *result.drive_problems)
     ]
-    types = sorted({each.type for drives in found.values() for each in drives})
+    types = sorted({each.type for result in results.values() for each in result.found})
     if len(types) > 1:
         problems.append(f"the buses have drives of the types {', '.join(types)}: name one with --drive")
     if problems:
         raise ConfigurationError(problems)
-    return found
+    return {channel: result.found for channel, result in results.items()}
 
 
 def with_found(robot: NewRobot, found: Found, given: Mapping[str, int]) -> NewRobot:
-    """Returns the robot with the type and the ids of the drives. Raises ConfigurationError where they do not fit."""
+    """Return the robot with the type and the ids of the drives. Raises ConfigurationError where they do not fit."""
     types = [each.type for drives in found.values() for each in drives]
     node_ids: dict[str, int] = {}
     for channel, drives in found.items():
@@ -61,7 +57,7 @@ def with_found(robot: NewRobot, found: Found, given: Mapping[str, int]) -> NewRo
 
 
 def with_identities(robot: NewRobot, found: Found) -> NewRobot:
-    """Returns the robot with serial numbers and models, by its ids. Raises ConfigurationError for an id without one."""
+    """Return the robot with serial numbers and models, by its ids. Raises ConfigurationError for an id without one."""
     serial_numbers, models = {}, {}
     for channel, drives in found.items():
         by_id = {each.node_id: each for each in drives}

@@ -167,7 +167,7 @@ def _geometry(plate: str | None, given: Mapping[str, float], read: Ask | None) -
 
 
 def _corners(plate: str | None, given: Mapping[str, float], read: Ask | None) -> tuple[Corner, ...]:
-    """Returns the plate's corners; none for a rectangle. Raises ConfigurationError."""
+    """Return the plate's corners; none for a rectangle. Raises ConfigurationError."""
     sides = [name for name in SIDES if name in given]
     if plate and sides:
         raise ConfigurationError([f"--set {sides[0]}: must be left out where --plate gives the plate's corners"])
@@ -180,7 +180,7 @@ def _corners(plate: str | None, given: Mapping[str, float], read: Ask | None) ->
 
 
 def _plate_answer(line: str) -> str:
-    """Accepts `rectangle` or a file of corners. Raises ValueError."""
+    """Accept `rectangle` or a file of corners. Raises ValueError."""
     if line != RECTANGLE:
         read_corners(Path(line))
     return line

@@ -25,7 +25,7 @@ class Key(NamedTuple):
 
 
 def configuration_keys(record: type = Configuration, section: str = "") -> Iterator[Key]:
-    """Yields all keys, section by section in the order of the records."""
+    """Yield all keys, section by section in the order of the records."""
     hints = get_type_hints(record, include_extras=True)
     for item in fields(record):
         inner, path = _record_of(hints[item.name]), f"{section}.{item.name}".lstrip(".")
@@ -63,7 +63,7 @@ def is_required(key: Key) -> bool:
 
 
 def toml_value(value: object) -> str:
-    """Returns a value as the file states it."""
+    """Return a value as the file states it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, tuple):

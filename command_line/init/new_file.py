@@ -52,7 +52,7 @@ def drive_keys(drive_type: str) -> list[Key]:
 
 
 def new_file(robot: NewRobot) -> str:
-    """Returns the text of the file."""
+    """Return the text of the file."""
     return HEAD + "".join(f"\n{section}" for section in _sections(robot))
 
 
@@ -73,7 +73,7 @@ def _sections(robot: NewRobot) -> Iterator[str]:
 
 
 def _identity(robot: NewRobot, joint: str) -> dict[str, str]:
-    """Returns what was found of one drive; a serial number of zeros is none."""
+    """Return what was found of one drive; a serial number of zeros is none."""
     found = {"model": robot.models.get(joint, ""), "serial_number": robot.serial_numbers.get(joint, "")}
     return {name: text for name, text in found.items() if text.strip("0")}
 
@@ -93,7 +93,7 @@ def _common(robot: NewRobot) -> dict[str, dict[str, Any]]:
 
 
 def _geometry(geometry: FlipperGeometry) -> dict[str, Any]:
-    """Returns the keys of a rectangle, or of a plate with corners."""
+    """Return the keys of a rectangle, or of a plate with corners."""
     left_out = ("plate_width_m", "plate_height_m") if geometry.plate_corners_m else ("plate_corners_m",)
     return {name: value for name, value in asdict(geometry).items() if name not in left_out}
 

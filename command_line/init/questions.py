@@ -9,7 +9,7 @@ Ask = Callable[[str], str]  # prints a prompt and returns a line
 
 
 def ask(prompt: str, default: T, parse: Callable[[str], T], read: Ask | None) -> T:
-    """Returns the parsed answer; the default for an empty line, or without a terminal."""
+    """Return the parsed answer; the default for an empty line, or without a terminal."""
     while read is not None:
         line = read(f"{prompt} [{shown(default)}]: ").strip()
         if not line:

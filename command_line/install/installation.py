@@ -64,7 +64,7 @@ def perform(step: Step, run: Run) -> None:
 
 
 def _temporary_path(path: Path) -> Path:
-    """Returns an unused path in the same folder, which it makes; removes the rest of an interrupted installation."""
+    """Return an unused path in the same folder, which it makes, without the rest of an interrupted installation."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     temporary.unlink(missing_ok=True)
@@ -121,7 +121,7 @@ def _system(root: Path, run: Run) -> System:
 
 
 def location_problem(folders: Sequence[Path]) -> str:
-    """Returns why the service could not be started from these folders, or an empty text."""
+    """Return why the service could not be started from these folders, or an empty text."""
     for folder in folders:
         if any(folder.is_relative_to(hidden) for hidden in HIDDEN):
             return (

@@ -97,14 +97,14 @@ class System(NamedTuple):
 
 
 def source_folder() -> Path:
-    """Returns systemd/ of a working tree, or the environment's share/ where the package is installed."""
+    """Return systemd/ of a working tree, or the environment's share/ where the package is installed."""
     in_tree = Path(__file__).resolve().parents[2] / "systemd"
     installed = Path(sysconfig.get_path("data")) / "share" / "mudskipper"
     return in_tree if (in_tree / "mudskipper.service").exists() else installed
 
 
 def load_sources(prefix: Path) -> dict[str, str]:
-    """Returns the text of each file by its installed path. Raises OSError."""
+    """Return the text of each file by its installed path. Raises OSError."""
     texts = {path: (source_folder() / name).read_text(encoding="utf-8") for path, name in SOURCES.items()}
     for unit in (UNIT, LIVE_UNIT):
         texts[unit] = texts[unit].replace(DEFAULT_PREFIX, str(prefix))
@@ -211,7 +211,7 @@ def _plan_removal_of(plan: Plan, path: Path, known_digests: set[str | None], pur
 
 
 def _plan_manifest(plan: Plan, root: Path, removed: set[Path], before: dict[str, str]) -> None:
-    """Keeps the digests of the files that stay."""
+    """Keep the digests of the files that stay."""
     left = {path: digest for path, digest in before.items() if (root / path).exists() and root / path not in removed}
     if left != before:
         plan.steps.append(WriteFile(root / MANIFEST, json.dumps(left, indent=1) + "\n"))
@@ -229,7 +229,7 @@ def _load_manifest(root: Path) -> dict[str, str]:
 
 
 def _text_of(path: Path) -> str:
-    """Returns the text of a file, empty where it is missing."""
+    """Return the text of a file, empty where it is missing."""
     with suppress(FileNotFoundError):
         return path.read_text(encoding="utf-8", errors="replace")
     return ""

@@ -71,7 +71,7 @@ def _open_viewers(host: str, port: int) -> tuple[Audience, str]:
 
 
 def pass_on(rows: RowSubscription, audience: Audience) -> NoReturn:
-    """Passes rows on for ever. Raises NotPermittedError."""
+    """Pass rows on for ever. Raises NotPermittedError."""
     served, reported = 0, ""
     while True:
         received = rows.read(READ_S, time.monotonic())

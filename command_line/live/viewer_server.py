@@ -72,7 +72,7 @@ class ViewerServer:
 
 
 def geometry_of(configuration_text: str) -> FlipperGeometry:
-    """Returns the default where the configuration is of another version."""
+    """Return the default where the configuration is of another version."""
     try:
         return parse_configuration(configuration_text).geometry
     except ConfigurationError:

@@ -13,7 +13,7 @@ from command_line.json_output import print_json
 from command_line.logs.lab_findings import chosen_vertical, complain_of
 from command_line.logs.log_options import MOST, LogFiles, Segments, Vertical, Walk
 from command_line.logs.refusals import complain_of_end
-from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, Progress, complain, other_surface, stride_line, watched
+from command_line.screen import STRIDE_HEAD, STRIDE_UNITS, complain, other_surface, stride_line, watched
 from command_line.shared_options import Json
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Stride, choose_strides, duration_s, outcome_of, with_strides
@@ -113,11 +113,8 @@ def film(
     if moving:
         from experiments.pictures.stride_film import draw_film
 
-        progress = Progress("frames")
-        try:
-            draw_film(recorded, strides, path, progress.show)
-        finally:
-            progress.clear()
+        with watched() as watch:
+            draw_film(recorded, strides, path, partial(watch, "frames"))
     else:
         from experiments.pictures.stride_strip import draw_strip
 

@@ -11,7 +11,7 @@ from command_line import exit_codes
 from command_line.json_output import print_json
 from command_line.logs.catalogue_commands import catalogued, chosen_folder, configured_folder
 from command_line.logs.log_options import CONFIGURED, Folder, FolderConfiguration
-from command_line.screen import QUIET_S, Progress, complain
+from command_line.screen import complain, watched
 from command_line.shared_options import Json
 from experiments.reports.text_tables import number, table
 from experiments.study.option import Option
@@ -153,19 +153,18 @@ def _recover_each(paths: list[Path], named: set[Path]) -> tuple[list[Any], list[
     from logs.recovery import recover_log  # slow to import, and a listing does without it
 
     recovered, problems = [], []
-    progress = Progress("", QUIET_S)
-    for done, path in enumerate(paths):
-        progress.follow("logs", done, len(paths))
-        try:
-            recovered.append(recover_log(path, progress.follow))
-        except LogError as problem:
-            problems.append(str(problem))
-        except BlockingIOError:
-            if path in named:
-                problems.append(f"{path}: is being written; its writer will finish it")
-        except OSError as problem:
-            problems.append(why_not_moved(path, problem))
-    progress.clear()
+    with watched() as watch:
+        for done, path in enumerate(paths):
+            watch("logs", done, len(paths))
+            try:
+                recovered.append(recover_log(path, watch))
+            except LogError as problem:
+                problems.append(str(problem))
+            except BlockingIOError:
+                if path in named:
+                    problems.append(f"{path}: is being written; its writer will finish it")
+            except OSError as problem:
+                problems.append(why_not_moved(path, problem))
     return recovered, problems
 
 

@@ -21,7 +21,7 @@ MILD = ("none", "warn")  # reactions that do not end a walk
 
 
 def attend(client: StatusClient, as_json: bool, params: dict[str, Any]) -> int:
-    """Walks, and returns when the robot is at rest. A walk that is refused takes no lease."""
+    """Walk, and return when the robot is at rest. A walk that is refused takes no lease."""
     client.call("walk", lease_s=LEASE_S, **params)
     try:
         report, status = _renew(client, as_json), exit_codes.OK
@@ -33,7 +33,7 @@ def attend(client: StatusClient, as_json: bool, params: dict[str, Any]) -> int:
 
 
 def _renew(client: StatusClient, as_json: bool) -> dict[str, Any]:
-    """Renews the lease until the walk ends; returns the last status."""
+    """Renew the lease until the walk ends, and return the last status."""
     line = LiveLine(silent=as_json)
     while True:
         report: dict[str, Any] = client.call("status")
@@ -51,7 +51,7 @@ def _renew(client: StatusClient, as_json: bool) -> dict[str, Any]:
 
 
 def _conclude(report: dict[str, Any], as_json: bool, status: int) -> int:
-    """Prints why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
+    """Print why the walk ended. It succeeded if the robot holds its pose and no fault ended the walk."""
     fault = report["fault"]
     is_sound = report["mode"] == "hold" and not report["notice"] and (not fault or fault["reaction"] in MILD)
     print_mode("walk", as_json, report["mode"], reached=is_sound)

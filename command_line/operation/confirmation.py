@@ -49,7 +49,7 @@ class Answer(NamedTuple):
 
 
 def unconfirmed_drives(report: dict[str, Any], since_request_s: float) -> list[str]:
-    """Returns the joints whose drives have not confirmed since the request."""
+    """Return the joints whose drives have not confirmed since the request."""
     holding = report["mode"] == "hold"
     return [drive["joint"] for drive in report["drives"] if not _confirms(drive, holding, since_request_s)]
 
@@ -60,7 +60,7 @@ def _confirms(drive: dict[str, Any], holding: bool, since_request_s: float) -> b
 
 
 def confirm(client: StatusClient, method: str) -> Confirmation:
-    """Waits for the drives after the method was accepted. Raises NotPermittedError where the status is not shown."""
+    """Wait for the drives after the method was accepted. Raises NotPermittedError where the status is not shown."""
     requested_s = time.monotonic()
     reached_s: float | None = None
     while True:
@@ -78,13 +78,13 @@ def confirm(client: StatusClient, method: str) -> Confirmation:
 
 
 def who_may_see(accepted: str, problem: NotPermittedError) -> str:
-    """Returns the message for a user who may stop the robot, but not see its status."""
+    """Return the message for a user who may stop the robot, but not see its status."""
     group = str(problem).partition(FOR_MEMBERS)[2].partition(". ")[0]
     return f"{accepted}; only members of the group {group} can see whether the robot has stopped"
 
 
 def end_motion(path: Path, method: str) -> Answer:
-    """Requests a stop or a disarm over a connection of its own, and waits for the drives."""
+    """Request a stop or a disarm over a connection of its own, and wait for the drives."""
     try:
         with closing(StatusClient(path, ANSWER_S)) as client:
             accepted = client.call(method)

@@ -48,7 +48,7 @@ def _show(report: dict[str, Any], as_json: bool) -> None:
 
 
 def families_table(rows: list[dict[str, Any]]) -> str:
-    """Returns a row for each family of components with the same kinds; --json lists every component."""
+    """Return a row for each family of components with the same kinds; --json lists every component."""
     kinds: dict[str, dict[str, None]] = {}
     members: dict[str, dict[str, None]] = {}
     for row in rows:

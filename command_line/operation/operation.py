@@ -144,7 +144,7 @@ def _refusal(message: str) -> CommandError:
 
 
 def stopping_faults(report: dict[str, Any]) -> list[dict[str, Any]]:
-    """Returns the active faults that are more than a warning."""
+    """Return the active faults that are more than a warning."""
     return [fault for fault in report["faults"] if fault["reaction"] not in MILD]
 
 
@@ -162,7 +162,7 @@ def _change_mode(command: str, mode: str, socket: Path, as_json: bool, params: d
 
 
 def _poll(client: StatusClient, done: Callable[[dict[str, Any]], bool], longest_s: float) -> dict[str, Any]:
-    """Returns the first status that is `done`, or the last one after `longest_s`."""
+    """Return the first status that is `done`, or the last one after `longest_s`."""
     deadline_s = time.monotonic() + longest_s
     while not done(report := client.call("status")) and time.monotonic() < deadline_s:
         time.sleep(POLL_S)
@@ -195,7 +195,7 @@ def check(
 
 
 def _check_text(item: dict[str, Any], following: list[str]) -> str:
-    """Formats one item, and names those that follow from it."""
+    """Format one item, and name those that follow from it."""
     mark = coloured("ok  ", GREEN) if item["ok"] else coloured("FAIL", RED)
     lines = [f"{mark} {item['id']:24} {item['text']}"]
     if following:

@@ -25,6 +25,11 @@ class SearchResult(NamedTuple):
     error_frames: int  # on the bus meanwhile
     send_problem: str = ""
 
+    @property
+    def drive_problems(self) -> list[str]:
+        """What the drives say against their use."""
+        return [f"id {each.node_id} ({each.type}): {each.problem}" for each in self.found if each.problem]
+
 
 def search(
     port: BenchPort,

@@ -26,8 +26,6 @@ def gate_table(drive: MitParameters) -> GateTable:
         decode_torque=lambda data: codec.decode_torque(data, ranges.torque_nm),
         always=always,
         while_open={node_id: frozenset({codec.ENTER})},
-        checks={},
-        requests=frozenset(),
         idle=codec.LEAVE,
         torque_step_nm=ranges.torque_step_nm,
     )

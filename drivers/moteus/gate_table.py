@@ -21,9 +21,6 @@ def gate_table(drive: MoteusParameters) -> GateTable:
         zero_torque=codec.encode_torque(0.0),
         decode_torque=codec.decode_torque,
         always={identifier: frozenset({codec.QUERY_ALONE, codec.STOP_AND_QUERY, IDENTITY, POLL, *QUESTIONS})},
-        while_open={},
-        checks={},
-        requests=frozenset(),
         kind=KIND,
         idle=codec.QUERY_ALONE,
     )

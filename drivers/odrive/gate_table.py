@@ -26,7 +26,7 @@ def cansimple_table(
     drive: OdriveParameters,
     clearing: Mapping[Message, bytes],
     requests: tuple[Message, ...],
-    checks: Mapping[Message, Callable[[bytes], bool]],
+    checks: Mapping[Message, Callable[[bytes], bool]] = {},
 ) -> GateTable:
     """List what the firmwares have in common, and what one of them adds."""
     always: dict[Message, bytes] = {

@@ -12,4 +12,4 @@ from drivers.transmit_gate import GateTable
 
 def gate_table(drive: Odrive05Parameters) -> GateTable:
     clearing = {codec.CLEAR_ERRORS: codec.CLEAR_ERRORS.encode()}
-    return cansimple_table(drive, clearing, (GET_VERSION, codec.GET_ENCODER_COUNT), {})
+    return cansimple_table(drive, clearing, (GET_VERSION, codec.GET_ENCODER_COUNT))

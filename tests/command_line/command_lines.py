@@ -17,7 +17,7 @@ from tests.waiting import LONGEST_S
 
 
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs a command with additional environment variables, in this process: it has imported all libraries already."""
+    """Run a command with additional environment variables, in this process: it has imported all libraries already."""
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
         for name, value in environment.items():
             patch.setenv(name, value)
@@ -26,7 +26,7 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
 
 
 def run_process(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs a command in a process of its own."""
+    """Run a command in a process of its own."""
     command = [sys.executable, "-m", "command_line.main", *arguments]
     return subprocess.run(
         command, capture_output=True, text=True, timeout=LONGEST_S, env=os.environ | environment, check=False
@@ -34,12 +34,12 @@ def run_process(*arguments: str, **environment: str) -> subprocess.CompletedProc
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """Returns the message with which a command line is refused as wrong usage."""
+    """Return the message with which a command line is refused as wrong usage."""
     return _complaint(capsys, exit_codes.USAGE, arguments)
 
 
 def failure(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """Returns the message of a command that failed."""
+    """Return the message of a command that failed."""
     return _complaint(capsys, exit_codes.UNHEALTHY, arguments)
 
 

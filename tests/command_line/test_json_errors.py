@@ -19,13 +19,10 @@ from tests.command_line.command_lines import run
     [
         ("status --socket /none", exit_codes.NO_DAEMON, "no daemon answers on /none"),
         ("fail --list all", exit_codes.USAGE, "--list takes neither"),
-        ("fail left_sweep off --socket /none", exit_codes.NO_DAEMON, "no daemon answers on /none"),
         ("log info /none.mcap", exit_codes.UNHEALTHY, "/none.mcap: No such file"),
-        ("log list /none", exit_codes.UNHEALTHY, "/none: there is no such folder"),
         ("log query nonsense /none", exit_codes.UNHEALTHY, "/none: there is no such folder"),
         ("replay /none.csv --config /none.toml", exit_codes.CONFIGURATION, "/none.toml: No such file"),
         ("status --bogus", exit_codes.USAGE, "unrecognized arguments: --bogus"),
-        ("demo --depth -1", exit_codes.USAGE, "--depth"),
         ("experiment sweep", exit_codes.USAGE, "--simulated"),
     ],
 )

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import grp
 import os
-import threading
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,9 +12,6 @@ import pytest
 from command_line import exit_codes
 from command_line.operation import operation
 from command_line.operation.confirmation import TORQUE_UNKNOWN
-from firmware_host.configuration.configuration import StatusParameters
-from firmware_host.sockets.status_socket import Methods, StatusSocket
-from firmware_host.sockets.user_groups import load_rights
 from operator_client.status_client import NotPermittedError, StatusClient
 from tests.command_line.command_lines import run
 from tests.running_bench import Bench
@@ -79,31 +73,6 @@ def permitted(path: Path, method: str, groups: Sequence[int] = ()) -> bool:
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     assert status in (0, 1)
     return status == 0
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-def test_only_members_of_the_named_group_may_connect_where_others_may_not_stop(short_folder: Path) -> None:
-    """The callers match neither the user nor the group that owns the file of the socket."""
-    short_folder.chmod(0o755)
-    viewers = grp.getgrall()[-1]
-    rights = load_rights(StatusParameters(read_group=viewers.gr_name, anyone_may_stop=False))
-    methods: Methods = {name: lambda params, caller: "accepted" for name in ("hello", "stop", "status")}
-    status = StatusSocket(short_folder / "run" / "s", methods, rights)
-    ended = threading.Event()
-
-    def serve() -> None:
-        while not ended.wait(0.002):
-            status.serve(time.monotonic())
-
-    server = threading.Thread(target=serve)
-    server.start()
-    try:
-        for groups, expected in (([viewers.gr_gid], {"hello", "stop", "status"}), ([], set())):
-            assert {name for name in methods if permitted(status.path, name, groups)} == expected
-    finally:
-        ended.set()
-        server.join()
-        status.close()
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")

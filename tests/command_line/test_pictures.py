@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from PIL import Image
@@ -21,7 +20,7 @@ from experiments.pictures.mud_layout import describe_mud, layout_of_track, mud_r
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import Outcome, duration_s
 from experiments.pictures.stride_film import FRAMES_PER_S, film_frames
-from experiments.pictures.walk_plot import MOST_DASHES, draw_walk
+from experiments.pictures.walk_plot import draw_walk
 from experiments.reports.style import OUTCOME_COLOURS
 from logs.files.log_reader import read_log
 from logs.lab.export import write_lab_csv
@@ -121,13 +120,6 @@ def row_of(figure: Figure, label: str) -> list[Axes]:
     return [axes for axes in figure.axes if (spec := axes.get_subplotspec()) and spec.rowspan == row[1].rowspan]
 
 
-def test_the_flippers_stand_side_by_side_with_the_same_scales(figure: Figure) -> None:
-    assert [axes.get_title() for axes in figure.axes[:2]] == ["left flipper", "right flipper"]
-    for label in ("force", "$k_p$", "$k_s$", "$k_e$", "depth"):
-        left, right = row_of(figure, label)
-        assert left.get_ylim() == right.get_ylim() and left.get_xlim() == right.get_xlim()
-
-
 def test_the_plot_shows_the_logs_own_numbers(two_walks: Path, figure: Figure) -> None:
     walk = read_walk(two_walks, 1)
     lines = {str(line.get_label()): np.asarray(line.get_ydata()) for axes in figure.axes for line in axes.lines}
@@ -203,22 +195,6 @@ def test_muds_are_shaded_where_the_robot_said_so_and_described_by_their_k_p(two_
         (0.0, second["t_start_s"], describe_mud(walk.strides[:2])),
         (second["t_start_s"], walk.time_s[-1], "k_p 0.20 N/cm³"),
     ]
-
-
-@pytest.mark.parametrize(("muds", "is_across"), [(MOST_DASHES, True), (MOST_DASHES + 1, False)])
-def test_many_noticed_muds_are_marked_at_the_top_of_each_panel(
-    muds: int, is_across: bool, two_walks: Path, tmp_path: Path
-) -> None:
-    walk = read_walk(two_walks, 1)
-    noticed_s = np.linspace(0.0, walk.time_s[-1], muds)
-    figure = draw_walk(walk._replace(noticed_s=noticed_s.tolist()))
-    for axes in figure.axes:
-        across = axes.get_xaxis_transform()
-        lines = [line for each in axes.collections if isinstance(each, LineCollection) for line in each.get_segments()]
-        lines = [line for line in lines if is_across and set(line[:, 1]) == {0.0, 1.0}]
-        marks = [line.get_xdata() for line in axes.lines if line.get_transform() == across]
-        found = [line[0, 0] for line in lines] if is_across else [x for each in marks for x in np.asarray(each)]
-        assert found == pytest.approx(noticed_s)
 
 
 def test_muds_with_equal_values_are_distinguished_by_time_and_those_without_a_value_are_marked(two_walks: Path) -> None:

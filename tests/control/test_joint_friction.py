@@ -1,6 +1,5 @@
 """The friction of a joint against numpy, and the laws that any friction must keep."""
 
-from math import pi, radians
 from typing import get_type_hints
 
 import numpy as np
@@ -11,7 +10,6 @@ from hypothesis import strategies as st
 from control.joint_friction import NO_FRICTION, SLOW_RAD_S, JointFriction
 
 DRY = JointFriction(coulomb_nm=0.02)
-COGGING = JointFriction(cogging_nm=0.01, cogging_per_turn=84, cogging_phase_deg=30.0)
 
 angles = st.floats(-10.0, 10.0)
 velocities = st.floats(-50.0, 50.0)
@@ -52,26 +50,6 @@ def test_dry_friction_of_a_joint_at_rest_points_nowhere() -> None:
 def test_friction_never_gives_a_joint_energy(velocity: float, angle: float) -> None:
     friction = JointFriction(coulomb_nm=0.02, viscous_nm_s=0.004)
     assert friction.torque_nm(angle, velocity) * velocity >= 0.0
-
-
-def test_cogging_repeats_as_often_a_turn_as_configured() -> None:
-    angles_rad = np.linspace(0.0, 2.0 * pi, 84 * 100, endpoint=False)
-    torques_nm = np.array([COGGING.torque_nm(float(angle), 0.0) for angle in angles_rad])
-    spectrum = np.abs(np.fft.rfft(torques_nm)) * 2.0 / len(torques_nm)
-    assert int(spectrum.argmax()) == 84
-    assert spectrum[84] == pytest.approx(0.01)
-    assert np.delete(spectrum, 84).max() < 1e-12  # one frequency only, to rounding
-
-
-def test_cogging_gives_back_over_a_turn_what_it_takes() -> None:
-    angles_rad = np.linspace(0.0, 2.0 * pi, 1000, endpoint=False)
-    assert sum(COGGING.torque_nm(float(angle), 3.0) for angle in angles_rad) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_the_phase_of_cogging_is_that_of_the_sine_at_angle_zero() -> None:
-    assert COGGING.torque_nm(0.0, 0.0) == pytest.approx(0.01 * np.sin(radians(30.0)))
-    turned = JointFriction(cogging_nm=0.01, cogging_per_turn=1, cogging_phase_deg=90.0)
-    assert turned.torque_nm(0.0, 0.0) == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("field", ["coulomb_nm", "viscous_nm_s", "cogging_nm", "cogging_per_turn"])

@@ -262,8 +262,6 @@ FD_TABLE = GateTable(
     decode_torque=decode_fd_torque,
     always={FD_MODE: frozenset({FD_IDLE})},
     while_open={FD_MODE: frozenset({FD_FOLLOW})},
-    checks={},
-    requests=frozenset(),
     kind=FrameKind(is_extended=True, is_fd=True, bit_rate_switch=True),
 )
 

@@ -22,7 +22,7 @@ def start_demo(out: Path, *arguments: str) -> subprocess.Popen[str]:
 
 
 def interrupt(demo: subprocess.Popen[str], number: signal.Signals, line: str) -> tuple[str, str]:
-    """Sends the signal after a line that begins with `line`; returns standard output and standard error."""
+    """Send the signal after a line that begins with `line`; returns standard output and standard error."""
     assert demo.stdout is not None
     shown = ""
     for text in demo.stdout:
@@ -36,7 +36,7 @@ def interrupt(demo: subprocess.Popen[str], number: signal.Signals, line: str) ->
 
 
 def children_of(out: Path) -> list[str]:
-    """Returns the command lines of processes that still use the demo's files."""
+    """Return the command lines of processes that still use the demo's files."""
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -50,29 +49,13 @@ def levels(links: dict[str, CanLink], drives: int = 2, bus: BusParameters = CAN0
     }
 
 
-def test_all_of_a_configured_interface_is_read() -> None:
-    assert parse_links(DEBIAN_12) == {
-        "can0": CanLink("can0", True, "can", "ERROR-ACTIVE", 1_000_000, 0.75, 100, 32, carries_fd=False),
-    }
-
-
-def test_a_newer_iproute2_s_numbers_are_read_like_an_older_one_s_strings() -> None:
-    assert changed(sample_point=0.75) == parse_links(DEBIAN_12)
-
-
-def test_missing_details_are_not_invented() -> None:
-    link = parse_links(UNTOUCHED)["can1"]
-    assert (link.up, link.state, link.bit_rate_bit_s, link.restart_ms, link.queue_frames) == (
-        False,
-        "STOPPED",
-        0,
-        0,
-        10,
-    )
-    virtual = parse_links(VIRTUAL)
-    assert set(virtual) == {"vcan0"}
-    assert (virtual["vcan0"].kind, virtual["vcan0"].state, virtual["vcan0"].restart_ms) == ("vcan", "", -1)
-    assert isnan(virtual["vcan0"].sample_point)
+def test_settings_are_read_as_far_as_they_are_there() -> None:
+    """The sample point is text in older releases of iproute2, and a number in newer ones."""
+    configured = CanLink("can0", True, "can", "ERROR-ACTIVE", 1_000_000, 0.75, 100, 32, carries_fd=False)
+    assert parse_links(DEBIAN_12) == changed(sample_point=0.75) == {"can0": configured}
+    stopped = CanLink("can1", False, "can", "STOPPED", restart_ms=0, queue_frames=10, carries_fd=False)
+    assert parse_links(UNTOUCHED) == {"can1": stopped}
+    assert parse_links(VIRTUAL) == {"vcan0": CanLink("vcan0", True, "vcan", queue_frames=1000, carries_fd=True)}
 
 
 @pytest.mark.parametrize("text", ["Option -json is unknown", "5", "[5]", '[{"link_type": "can", "flags": 7}]'])
@@ -82,15 +65,13 @@ def test_another_output_is_refused(text: str) -> None:
 
 
 def test_an_interface_as_ours_are_set_up_is_ok_in_every_line() -> None:
-    found = levels(parse_links(DEBIAN_12))
-    assert set(found) == {"bus.left", "bit_rate.left", "sample_point.left", "restart.left", "queue.left", "load.left"}
-    assert set(found.values()) == {Level.OK}
+    lines = ("bus", "bit_rate", "sample_point", "restart", "queue", "load")
+    assert levels(parse_links(DEBIAN_12)) == {f"{line}.left": Level.OK for line in lines}
 
 
 def test_an_interface_that_is_down_fails_with_the_command_that_brings_it_up() -> None:
     found = examine_bus("left", BusParameters("socketcan", "can1"), [], parse_links(UNTOUCHED))
-    assert (found[0].level, found[0].text) == (Level.FAIL, "can1 is down")
-    assert "ip link set can1 up type can bitrate 1000000" in found[0].fix
+    assert found[0].level is Level.FAIL and "ip link set can1 up type can bitrate 1000000" in found[0].fix
     assert {finding.id: finding.level for finding in found}["queue.left"] is Level.WARN
 
 
@@ -114,15 +95,12 @@ def test_each_setting_is_evaluated(details: dict[str, Any], line: str, level: Le
     assert levels(changed(**details))[line] is level
 
 
-def test_a_bit_rate_is_compared_with_that_of_the_drives() -> None:
+def test_bit_rate_and_load_are_compared_with_the_drives() -> None:
     slow = BusParameters("socketcan", "can0", {}, 250)
     assert levels(changed(bitrate=250000), bus=slow)["bit_rate.left"] is Level.OK
     assert levels({})["bus.left"] is Level.FAIL  # an interface that does not exist
-
-
-def test_more_drives_on_a_bus_are_warned_of_and_then_refused() -> None:
-    links = parse_links(DEBIAN_12)
-    assert [levels(links, drives)["load.left"] for drives in (2, 4, 6)] == [Level.OK, Level.WARN, Level.FAIL]
+    loads = [levels(parse_links(DEBIAN_12), drives)["load.left"] for drives in (2, 4, 6)]
+    assert loads == [Level.OK, Level.WARN, Level.FAIL]
 
 
 def test_a_bus_that_is_no_interface_of_the_kernel_is_evaluated_by_its_load_alone() -> None:
@@ -144,8 +122,5 @@ def test_without_iproute2_the_kernel_s_files_tell(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(subprocess, "run", missing)
     links = can_links.read_links(tmp_path)
     assert links == read_sys_links(tmp_path)
-    assert {name: (link.up, link.queue_frames) for name, link in links.items()} == {
-        "can0": (True, 10),
-        "can1": (False, 10),
-    }
+    assert {name: link.up for name, link in links.items()} == {"can0": True, "can1": False}
     assert levels(links) == {"bus.left": Level.OK, "queue.left": Level.WARN, "load.left": Level.OK}

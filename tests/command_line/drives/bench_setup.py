@@ -41,7 +41,7 @@ class Bench:
         return {name: self.buses[name].port for name in buses}
 
     def change(self, old: str, new: str) -> None:
-        """Changes the text of the configuration."""
+        """Change the text of the configuration."""
         text = self.config.read_text(encoding="utf-8")
         assert old in text
         self.config.write_text(text.replace(old, new, 1), encoding="utf-8")

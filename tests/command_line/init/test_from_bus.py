@@ -21,7 +21,7 @@ SERIALS = {"odrive": "385f324d303{}", "moteus": "0123456789abcdef0123456{}", "mi
 
 @pytest.fixture
 def attach(monkeypatch: pytest.MonkeyPatch) -> object:
-    """Returns a function that attaches simulated drives to channels."""
+    """Return a function that attaches simulated drives to channels."""
 
     def attach(**drives: Sequence[SimulatedDrive]) -> None:
         buses = {name: SimulatedBus(*each) for name, each in drives.items()}

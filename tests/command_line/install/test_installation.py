@@ -60,11 +60,11 @@ class Machine:
             self.enabled.discard(words[-1])
         return Outcome(0, "")
 
-    def install(self, *options: str) -> int:
-        return install(dry_run="--dry-run" in options, root=self.root, run=self.run, find=str)
+    def install(self, dry_run: bool = False) -> int:
+        return install(dry_run=dry_run, root=self.root, run=self.run, find=str)
 
-    def uninstall(self, *options: str) -> int:
-        return uninstall(purge="--purge" in options, root=self.root, run=self.run, find=str)
+    def uninstall(self, purge: bool = False) -> int:
+        return uninstall(purge=purge, root=self.root, run=self.run, find=str)
 
     def system(self) -> System:
         """Return this folder as a system that is running."""
@@ -149,39 +149,28 @@ def test_the_second_time_there_is_nothing_to_do(machine: Machine, capsys: pytest
 
 
 def test_a_dry_run_shows_everything_and_does_nothing(machine: Machine, capsys: pytest.CaptureFixture[str]) -> None:
-    assert machine.install("--dry-run") == exit_codes.OK
+    assert machine.install(dry_run=True) == exit_codes.OK
     shown = capsys.readouterr().out
     assert all(str(machine.root / location) in shown for location in (*SOURCES, LINK, MANIFEST))
     assert "run systemd-sysusers" in shown
     assert (machine.files(), machine.ran) == ({}, [])
 
 
-def test_an_upgrade_replaces_unedited_files(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("location", "edited"), [(NETWORK, False), (NETWORK, True), (CONFIGURATION, True)])
+def test_an_upgrade_replaces_a_file_and_is_written_once_next_to_an_edited_one(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch, location: str, edited: bool
 ) -> None:
     machine.install()
-    assert "Next: edit" in capsys.readouterr().out
-    release(monkeypatch, NETWORK)
-    assert machine.install() == exit_codes.OK
-    assert "Next" not in capsys.readouterr().out
-    assert machine.text(NETWORK).endswith("# new\n")
-    assert not (machine.root / f"{NETWORK}.new").exists()
-
-
-@pytest.mark.parametrize("location", [CONFIGURATION, NETWORK])
-def test_an_upgrade_keeps_an_edited_file_and_writes_the_new_one_next_to_it_once(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch, location: str
-) -> None:
-    machine.install()
-    edited = machine.edit(location)
+    before = machine.edit(location) if edited else machine.text(location)
     assert Path(location).name not in written(plan_installation(machine.system()))
     release(monkeypatch, location)
     assert machine.install() == exit_codes.OK
-    assert machine.text(location) == edited
-    assert machine.text(f"{location}.new").endswith("# new\n")
-    (machine.root / f"{location}.new").unlink()
+    newer = machine.root / f"{location}.new"
+    assert (newer if edited else machine.root / location).read_text(encoding="utf-8").endswith("# new\n")
+    assert newer.exists() is (machine.text(location) == before) is edited
+    newer.unlink(missing_ok=True)
     assert machine.install() == exit_codes.OK
-    assert not (machine.root / f"{location}.new").exists()
+    assert not newer.exists()
 
 
 def test_a_running_system_reloads_the_installed_files(machine: Machine) -> None:
@@ -220,10 +209,7 @@ def test_a_failure_lists_the_finished_steps_and_the_next_run_does_the_rest(
     machine.failing = "systemd-sysusers"
     assert machine.install() == exit_codes.UNHEALTHY
     said = capsys.readouterr().err
-    assert "could not run systemd-sysusers" in said
-    assert "Failed to connect to bus" in said
-    assert "done before that: 8 of 13 steps" in said
-    assert "Traceback" not in said
+    assert "systemd-sysusers" in said and "Failed to connect to bus" in said and "8 of 13" in said
     machine.failing = ""
     assert machine.install() == exit_codes.OK
     assert "systemd-sysusers" in machine.ran
@@ -253,14 +239,16 @@ def test_without_root_it_is_refused_before_anything_is_written(
     assert machine.ran == []
 
 
-@pytest.mark.parametrize("location", ["/home/ann/venv", "/root/venv", "/tmp/venv"])
-def test_an_environment_that_the_unit_hides_from_the_service_is_refused(location: str) -> None:
-    assert "hidden from the service" in location_problem((Path(location), PREFIX))
-    assert "hidden from the service" in location_problem((PREFIX, Path(location)))  # an editable installation
-
-
-def test_an_environment_without_the_daemon_is_refused(tmp_path: Path) -> None:
-    assert "there is no mudskipperd" in location_problem((PREFIX, PREFIX))
+@pytest.mark.parametrize(
+    ("folders", "named"),
+    [
+        *(((hidden, "/opt/venv"), hidden) for hidden in ("/home/ann/venv", "/root/venv", "/tmp/venv")),
+        (("/opt/venv", "/home/ann/tree"), "/home/ann/tree"),  # an editable installation
+        (("/opt/venv", "/opt/venv"), "no mudskipperd in /opt/venv"),
+    ],
+)
+def test_an_environment_from_which_the_service_cannot_start_is_refused(folders: tuple[str, str], named: str) -> None:
+    assert named in location_problem([Path(folder) for folder in folders])
 
 
 def test_uninstall_keeps_configuration_and_logs_and_forgets_the_rest(machine: Machine) -> None:
@@ -285,7 +273,7 @@ def test_uninstall_leaves_a_network_file_that_was_edited_and_purge_does_not(mach
     edited = machine.edit(NETWORK)
     machine.uninstall()
     assert machine.text(NETWORK) == edited
-    machine.uninstall("--purge")
+    machine.uninstall(purge=True)
     assert machine.files() == {}
 
 
@@ -313,16 +301,12 @@ def test_files_that_were_there_before_stay(machine: Machine) -> None:
     (machine.root / UNIT).symlink_to("/dev/null")  # a masked unit
     machine.install()
     assert machine.text(CONFIGURATION) == "[robot]\n" and (machine.root / UNIT).readlink() == Path("/dev/null")
-    machine.uninstall("--purge")
+    machine.uninstall(purge=True)
     assert machine.text(LINK) == "#!/bin/sh\n"
 
 
-def test_a_step_that_fails_raises_its_reason(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    for step, reason in (
-        (Command((str(tmp_path / "nothing"),)), "is not installed"),
-        (Command(("false",)), "exit status 1"),
-        (WriteFile(tmp_path / "file" / "below", "x"), "Not a directory|File exists"),
-    ):
-        with pytest.raises((StepError, OSError), match=reason):
-            perform(step, run_command)
+@pytest.mark.parametrize("step", [Command(("/nothing",)), Command(("false",)), WriteFile(Path("/dev/null/x"), "")])
+def test_a_step_that_fails_raises_its_reason(step: Command | WriteFile) -> None:
+    with pytest.raises((StepError, OSError)) as raised:
+        perform(step, run_command)
+    assert str(raised.value)

@@ -28,7 +28,7 @@ class Browser:
         self._response: HTTPResponse | None = None
 
     def wait_for(self, *names: str) -> dict[str, Any]:
-        """Returns the next message in which all of these are known."""
+        """Return the next message in which all of these are known."""
         deadline_s = time.monotonic() + LONGEST_S
         while time.monotonic() < deadline_s:
             message = self.next_message()
@@ -37,7 +37,7 @@ class Browser:
         raise AssertionError(f"no message with {' and '.join(names)}")
 
     def next_message(self) -> dict[str, Any] | None:
-        """Returns None for an empty line, and where there is no connection."""
+        """Return None for an empty line, and where there is no connection."""
         try:
             line = self._connected().readline().decode()
         except OSError:
@@ -58,7 +58,7 @@ class Browser:
 
 @contextmanager
 def serving(bench: Bench, port: int = 0) -> Iterator[int]:
-    """Runs `mudskipper live --page`, and yields its port."""
+    """Run `mudskipper live --page`, and yield its port."""
     command = [sys.executable, "-m", "command_line.main", "live", "--page", "--port", str(port)]
     environment = os.environ | {"MUDSKIPPER_SOCKET": str(bench.socket)}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)

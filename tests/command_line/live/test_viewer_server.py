@@ -41,7 +41,7 @@ def server() -> Iterator[ViewerServer]:
 
 @contextmanager
 def viewer_of(server: ViewerServer) -> Iterator[tuple[ClientConnection, dict[str, Any]]]:
-    """Yields a connection and the advertised channels by topic."""
+    """Yield a connection and the advertised channels by topic."""
     with connect(f"ws://127.0.0.1:{server.port}", subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
         yield socket, {channel["topic"]: channel for channel in next_json(socket, "advertise")["channels"]}
 
@@ -51,7 +51,7 @@ def subscribe(socket: ClientConnection, channel_id: int) -> None:
 
 
 def decoded(channel: dict[str, Any], payload: bytes) -> Any:
-    """Decodes a message with the advertised definition."""
+    """Decode a message with the advertised definition."""
     types = get_typestore(Stores.EMPTY)
     types.register(get_types_from_msg(channel["schema"], channel["schemaName"]))
     return types.deserialize_cdr(payload, channel["schemaName"])
@@ -90,7 +90,7 @@ def test_a_viewer_that_asks_for_an_unknown_channel_reads_so_and_goes_on(server: 
 
 
 def received(socket: ClientConnection, server: ViewerServer, row_of: Callable[[int], LiveRow]) -> bytes:
-    """Returns the content of the first data message; the subscription may take effect after a few rows."""
+    """Return the content of the first data message; the subscription may take effect after a few rows."""
     for number in range(1000):
         server.take([row_of(number)], lost=0)
         try:

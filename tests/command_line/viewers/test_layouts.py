@@ -39,7 +39,7 @@ def paths_of_plotjuggler() -> list[str]:
 
 
 def problem_of(path: str, grammar: re.Pattern[str], numeric: bool) -> str:
-    """Returns why a path shows no value; empty if it shows one."""
+    """Return why a path shows no value; empty if it shows one."""
     found = grammar.fullmatch(path)
     if not found or found["topic"] not in FIELDS:
         return f"{path}: no topic of ours"

@@ -400,7 +400,7 @@ flippers = st.sampled_from(["left", "right"])
 strides = st.builds(stride, flippers, numbers, st.booleans(), numbers, estimates, estimates, numbers)
 
 
-@settings(max_examples=400)
+@settings(max_examples=150)
 @given(
     st.lists(st.tuples(mud_estimates, st.lists(strides, min_size=1, max_size=2)), min_size=1, max_size=2),
     st.floats(0.005, 0.2),

@@ -83,16 +83,18 @@ def work_j(plate: PlateContact, twist: Twist, attitude: Attitude = UPRIGHT, clay
     return DT_S * sum(force * speed for force, speed in zip(wrench, twist, strict=True))
 
 
-def dense_wrench(size: PlateSize, attitude: Attitude, clay: Clay, velocity_m_s: Velocity, pieces: int) -> Wrench:
+def dense_wrench(
+    size: PlateSize, attitude: Attitude, clay: Clay, velocity_m_s: Velocity, pieces: int, columns: int
+) -> Wrench:
     """Return the wrench of clay that yields everywhere to a straight motion, as a dense sum of the stated laws.
 
-    The sum covers pieces of the face, the narrow sides by height, and the lower edges by width.
+    The sum covers pieces of the face, in columns, the narrow sides by height, and the lower edges by width.
     """
     (_, outward, upward), rate = velocity_m_s, rate_factor(hypot(*velocity_m_s))
     along = -np.array([outward, upward]) / hypot(outward, upward)
     corners = size.corners_m or RECTANGLE
-    lowest_m, du, ds = min(u for u, _ in corners), size.width_m / pieces, size.height_m / pieces
-    u, s = np.meshgrid(lowest_m + du * (np.arange(pieces) + 0.5), ds * (np.arange(pieces) + 0.5), indexing="ij")
+    lowest_m, du, ds = min(u for u, _ in corners), size.width_m / columns, size.height_m / pieces
+    u, s = np.meshgrid(lowest_m + du * (np.arange(columns) + 0.5), ds * (np.arange(pieces) + 0.5), indexing="ij")
     plate = np.zeros(u.shape, dtype=bool)
     for (a, b), (c, d) in pairwise([*corners, corners[0]]):
         if a != c:
@@ -114,7 +116,7 @@ def dense_wrench(size: PlateSize, attitude: Attitude, clay: Clay, velocity_m_s: 
     across_n = -np.sign(velocity_m_s[0]) * du * ds * pressure_pa(z, strength_pa, size.width_m) * plate
     out_n, up_n = (part * 0.5 * du * ds * strength_pa * plate for part in along)
     rims = np.diff(np.pad(plate.astype(int), 1), axis=0)[:, 1:-1] != 0  # where a row enters and leaves the plate
-    rim_u, rim_s = np.meshgrid(lowest_m + du * np.arange(pieces + 1), s[0], indexing="ij")
+    rim_u, rim_s = np.meshgrid(lowest_m + du * np.arange(columns + 1), s[0], indexing="ij")
     z, strength_pa = stresses(rim_u, rim_s)
     rim_m2, pressed_pa = size.thickness_m * ds * rims, pressure_pa(z, strength_pa, size.thickness_m)
     rim_out_n = rim_m2 * (along[0] * 0.25 * strength_pa - np.sign(outward) * 0.5 * pressed_pa)
@@ -138,14 +140,14 @@ def dense_wrench(size: PlateSize, attitude: Attitude, clay: Clay, velocity_m_s: 
 @settings(max_examples=60)
 @given(attitudes, st.sampled_from(list(MUDS.values())), velocities)
 def test_strips_give_the_wrench_of_a_dense_sum(attitude: Attitude, clay: Clay, velocity_m_s: Velocity) -> None:
-    """They agree to 3 % of the total force, and of its moment at half of the plate's height.
+    """They agree to 4 % of the total force, and of its moment at half of the plate's height.
 
-    1 % comes from the bend of the law at 9, 2 % from the begin of the suction's fade. At the first contact the dense
-    sum itself is uncertain by 2 mN, and the rate factor raises that.
+    Up to 2 % comes from the bend of the law at 9, 2 % from the begin of the suction's fade. At the first contact the
+    dense sum itself is uncertain by 4 mN, and the rate factor raises that.
     """
     wrench = yielded(SIZE, velocity_m_s, attitude, clay)
-    dense = dense_wrench(SIZE, attitude, clay, velocity_m_s, 400)
-    largest_n = 0.03 * hypot(*dense[:3]) + 4e-3
+    dense = dense_wrench(SIZE, attitude, clay, velocity_m_s, 200, 200)
+    largest_n = 0.04 * hypot(*dense[:3]) + 8e-3
     assert wrench[:3] == pytest.approx(dense[:3], abs=largest_n)
     assert wrench[3:] == pytest.approx(dense[3:], abs=largest_n * SIZE.height_m / 2.0)
 
@@ -161,7 +163,7 @@ def test_panels_give_the_forces_of_a_dense_sum_over_any_outline(
     When a leaning plate just touches the mud, its narrow sides, each at one distance outward, carry most of the load.
     """
     wrench = yielded(size_of(corners), velocity_m_s, attitude)
-    dense = dense_wrench(size_of(corners), attitude, CLAY, velocity_m_s, 150)
+    dense = dense_wrench(size_of(corners), attitude, CLAY, velocity_m_s, 150, 150)
     assert wrench[:3] == pytest.approx(dense[:3], abs=0.04 * hypot(*dense[:3]) + 0.2)
 
 
@@ -178,7 +180,7 @@ def test_every_strip_has_the_strength_of_the_mud_at_its_own_depth(
     """
     attitude = Attitude(depth_m, 0.0, 1.0)
     wrench = yielded(SIZE, velocity_m_s, attitude, clay)
-    dense = dense_wrench(SIZE, attitude, clay, velocity_m_s, 400)
+    dense = dense_wrench(SIZE, attitude, clay, velocity_m_s, 400, 10)  # all columns are alike
     slice_n = 9.0 * 6000.0 * SIZE.width_m * SIZE.height_m / 400
     assert wrench[:3] == pytest.approx(dense[:3], abs=0.05 * hypot(*dense[:3]) + 4.0 * slice_n)
 
