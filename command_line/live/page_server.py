@@ -122,14 +122,10 @@ class PageServer:
                 kept.append(finite(row.values))
         if newest is not None:
             self._tick = finite(newest.values)
-        if self._tick is not None and self._is_due(self._tick["stamp_s"]):
+        if self._tick is not None and not 0.0 <= self._tick["stamp_s"] - self._sent_s < INTERVAL_S:
+            self._sent_s = self._tick["stamp_s"]
             self._viewers.publish({"tick": self._tick, "strides": self._strides, "events": self._events, "lost": lost})
             self._strides, self._events = [], []
-
-    def _is_due(self, stamp_s: float) -> bool:
-        due = not 0.0 <= stamp_s - self._sent_s < INTERVAL_S
-        self._sent_s = stamp_s if due else self._sent_s
-        return due
 
     def close(self) -> None:
         self._server.shutdown()

@@ -4,7 +4,7 @@ A failure is one row, and each fault that it must lead to is one `expects`. Four
 the rows without a cause of their own as `mudskipper fail` asks; the fault matrix injects every row that expects
 something, in each of its phases; the random schedules draw the rows that are `scheduled`; the tests of the loop choose
 rows by their fault. A row with a cause needs the simulated robot: `drive` names parameters of a simulated drive and
-their values while it lasts, `act` a function of verification/faults/injectors.py with its arguments. In components
+their values while it lasts, `act` a function of verification/faults/ with its arguments. In components
 JOINT stands for each joint and NAME for each bus. Components and kinds of `mudskipper fail` follow PX4's `failure`
 command.
 """
@@ -12,6 +12,7 @@ command.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import nan
 from typing import Any
 
 from control.faults import FAULT_KINDS, FaultKind
@@ -141,6 +142,8 @@ def _signal(part: str, name: str, off: tuple[dict[str, Any], ...], stuck: tuple[
 
 
 FOREIGN_NM = 1.0  # as much as the current limit allows, and more than the torque limit
+TOO_STIFF = {"sweep_stiffness_nm_rad": 200.0, "adduction_stiffness_nm_rad": 200.0}  # for the delay of the loop
+NOT_NUMBERS = {"sweep_stiffness_nm_rad": nan, "adduction_damping_nm_s_rad": nan}
 NO_SPACE = "Nothing can be written to the log: No space left on device."
 
 
@@ -277,7 +280,8 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     *_rows("JOINT.arm", "blocked off its pose", "", expects("joint_not_following", 3.0, ("hold",)), act=("blocked",)),
     *_rows("JOINT.arm", "blocked", "", expects("following_error", 6.0, ("stance", "swing"), turns=True),
            act=("jammed",), scheduled=True),
-    *_rows("JOINT.arm", "stiff", "", expects("joint_oscillating", 1.0, ("swing", "stopping")), act=("stiff",)),
+    *_rows("JOINT.arm", "stiff", "", expects("joint_oscillating", 1.0, ("swing", "stopping")),
+           act=("gains_changed", TOO_STIFF)),
     *_rows("flipper", "stuck", "", expects("flipper_stuck", phases=("recovery",)), act=("recovery_given_up",)),
 
     # buses
@@ -323,7 +327,8 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
                         act=("wall_clock_stepped", step_s))),
 
     # the daemon
-    *_rows("loop", "torque not a number", "", expects("torque_not_finite", phases=MOVING), act=("gains_of_nan",)),
+    *_rows("loop", "torque not a number", "", expects("torque_not_finite", phases=MOVING),
+           act=("gains_changed", NOT_NUMBERS)),
     *_rows("loop", "torque too large", "", expects("command_refused", phases=PHASES), act=("sent_torque", 5.0)),
     *_rows("loop", "wild estimate", "", expects("estimate_wild", phases=GAIT), act=("absurd_stride",)),
     *_rows("lease", "lost", "", expects("lease_lost", phases=PHASES), act=("lease_hung_up",)),

@@ -31,6 +31,10 @@ class Promise:
         self.robot = robot
         self.loop = robot.loop
         self.reach = reach
+        self.begin()
+
+    def begin(self) -> None:
+        """Set the state before the first tick."""
 
     def update(self) -> Iterator[str]:
         yield from ()
@@ -39,10 +43,9 @@ class Promise:
 class NoTorqueWithoutMode(Promise):
     """A motor has no torque in a mode without torque, as soon as a command or its watchdog can reach the drive."""
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
+    def begin(self) -> None:
         self._off_since_s: float | None = None
-        robot.lockstep.robot.observers.append(self._measure)
+        self.robot.lockstep.robot.observers.append(self._measure)
         self._late: dict[int, float] = {}
 
     def _measure(self, dt_s: float, torques_nm: Torques) -> None:
@@ -65,19 +68,18 @@ class NoTorqueWithoutMode(Promise):
 class LimitedMotors(Promise):
     """No motor exceeds the torque limit, except where it brakes, and none exceeds the slew rate."""
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
+    def begin(self) -> None:
         limits = self.loop.configuration.limits
         self._largest_nm, self._rate_nm_s = limits.torque_nm, limits.torque_rate_nm_s
         self._fast_rad_s = limits.velocity_rad_s
         self._least_nm = WEAKEST * self._largest_nm  # less is within the limit for any gain of the motor
         self._torques_nm: Torques | None = None  # one step of the mechanics ago
-        drives = robot.lockstep.robot.drives
-        self._before_nm = [drive.torque_nm(robot.lockstep.robot.now_s) for drive in drives]  # as commanded
+        drives = self.robot.lockstep.robot.drives
+        self._before_nm = [drive.torque_nm(self.robot.lockstep.robot.now_s) for drive in drives]  # as commanded
         self._fast_s = [NEVER_S] * len(JOINTS)
-        self._changed_s = [robot.now_s] * len(JOINTS)
+        self._changed_s = [self.robot.now_s] * len(JOINTS)
         self._broken: list[str] = []
-        robot.lockstep.robot.observers.append(self._measure)
+        self.robot.lockstep.robot.observers.append(self._measure)
 
     def _measure(self, dt_s: float, torques_nm: Torques) -> None:
         """Check the motors whose torque changed or is large."""
@@ -120,8 +122,7 @@ class LimitedMotors(Promise):
 class StopInTime(Promise):
     """After `stop` no joint follows a path for longer than the soft stop."""
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
+    def begin(self) -> None:
         self.since_s: float | None = None
 
     def update(self) -> Iterator[str]:
@@ -141,8 +142,7 @@ class StopInTime(Promise):
 class DisarmAtOnce(Promise):
     """`disarm` ends every mode with torque in the next tick."""
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
+    def begin(self) -> None:
         self._ticks: int | None = None  # of the loop since the request
 
     def update(self) -> Iterator[str]:
@@ -158,8 +158,7 @@ class DisarmAtOnce(Promise):
 class ArmedByRequest(Promise):
     """Torque comes on only in the tick after an accepted `arm`."""
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
+    def begin(self) -> None:
         self._before = self.loop.mode
         self._requested = False
         self._energised_s = [0.0] * len(JOINTS)
@@ -189,8 +188,7 @@ class WithinStops(Promise):
 
     LONGEST_S = 0.5  # a stuck encoder is detected within 120 ticks, then braking takes as long as the slew
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
+    def begin(self) -> None:
         self._pressed_s = [0.0] * len(JOINTS)
         self._before_s = [0.0] * len(JOINTS)  # in all, one tick ago
 
@@ -232,9 +230,8 @@ class LittleEnergy(Promise):
 
     MOST_J = 1.0  # a motor with inverted torque is detected by then
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
-        self._rise = EnergyRise(robot, reach)
+    def begin(self) -> None:
+        self._rise = EnergyRise(self.robot, self.reach)
 
     def update(self) -> Iterator[str]:
         if self.loop.mode is not Mode.DAMPING:
@@ -251,10 +248,9 @@ class BoundedEnergy(Promise):
     The bounds are those of the faults that stopped the robot, plus that of the gait for the time on a path.
     """
 
-    def __init__(self, robot: OperatedRobot, reach: Reachability) -> None:
-        super().__init__(robot, reach)
+    def begin(self) -> None:
         self._bounds = energy_bounds(self.loop.configuration)
-        self._rise = EnergyRise(robot, reach)
+        self._rise = EnergyRise(self.robot, self.reach)
         self._held_s = self._stopping_j = 0.0
 
     def update(self) -> Iterator[str]:

@@ -6,11 +6,11 @@ otherwise spend without a failure.
 
 from __future__ import annotations
 
-import json
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
+
+import tomlkit
 
 from control.controller import WalkOrder
 from control.modes import ENERGISED, Mode, Request
@@ -73,27 +73,13 @@ def configuration_of(surroundings: Surroundings) -> Configuration:
     for key, value in (("failures.allowed", True), *surroundings.configuration):
         section, _, name = key.rpartition(".")
         document.setdefault(section, {})[name] = value
-    return parse_configuration(_toml(document))
-
-
-def _toml(document: Mapping[str, Any], above: str = "") -> str:
-    """Write tables, arrays of tables and plain values, the JSON of which is TOML too."""
-    lines = []
-    for key, value in document.items():
-        if isinstance(value, dict):
-            plain = {name: each for name, each in value.items() if not isinstance(each, dict)}
-            nested = {name: each for name, each in value.items() if isinstance(each, dict)}
-            lines += [f"[{above}{key}]" if plain or not nested else "", _toml(plain), _toml(nested, f"{above}{key}.")]
-        elif isinstance(value, list):
-            lines += [f"[[{above}{key}]]\n{_toml(each)}" for each in value]
-        else:
-            lines.append(f"{key} = {json.dumps(value)}")
-    return "\n".join(lines)
+    return parse_configuration(tomlkit.dumps(document))
 
 
 def robot_of(surroundings: Surroundings) -> RecordedRobot:
     """Make a robot at power-on."""
-    stones = [] if surroundings.stone_m is None else [_stone(surroundings.stone_m)]
+    start_m = surroundings.stone_m
+    stones = [] if start_m is None else [Stone(start_m, start_m + STONE_LENGTH_M, STONE_TOP_M)]
     clay = Clay(f"{surroundings.strength_pa:g} Pa", surroundings.strength_pa)
     world = World(
         Track([(TRACK_M, clay)], stones),
@@ -102,10 +88,6 @@ def robot_of(surroundings: Surroundings) -> RecordedRobot:
         dict(surroundings.drives),
     )
     return RecordedRobot(configuration_of(surroundings), world, surroundings.seed)
-
-
-def _stone(start_m: float) -> Stone:
-    return Stone(start_m, start_m + STONE_LENGTH_M, STONE_TOP_M)
 
 
 class SoundWalk:

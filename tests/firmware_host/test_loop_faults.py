@@ -314,15 +314,7 @@ def test_a_disarmed_request_by_force_leaves_no_trace(unread: Robot) -> None:
     assert mode_of(unread) is Mode.IDLE
 
 
-def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
-    robot = at("idle")
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
-    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
-    assert not robot.loop.forced
-    assert not any("despite" in text for text in robot.recorder.texts)
-
-
-@pytest.mark.parametrize("name", ["drive_silent", "voltage_under", "motor_hot", "current_stale", "joint_position"])
+@pytest.mark.parametrize("name", ["drive_silent", "voltage_under", "joint_position"])
 def test_mandatory_faults_are_never_overruled(at: Copied, name: str) -> None:
     robot = at("idle")
     fail(robot, name)
@@ -393,26 +385,29 @@ def test_a_robot_without_requests_disarms_by_itself(configuration: Configuration
 # no false alarms
 
 
-def faults_reported(robot: Robot) -> list[str]:
-    """Return the faults since the robot was ready to arm."""
-    texts = robot.recorder.texts
-    return [text for text in texts[texts.index("request arm") :] if text.startswith("fault ")]
-
-
-def test_a_deep_walk_in_stiff_mud_is_no_fault(configuration: Configuration) -> None:
-    robot = Robot(configuration, MUDS["45.3"])
+@pytest.mark.parametrize(
+    ("options", "order"),
+    [({"clay": MUDS["45.3"]}, WalkOrder(0.05, False, 1)), ({"disturbances": LAB}, WalkOrder(0.03, True, 2))],
+)
+def test_a_deep_or_disturbed_walk_is_no_fault(
+    configuration: Configuration, options: dict[str, Any], order: WalkOrder
+) -> None:
+    robot = Robot(configuration, **options)
     robot.arm()
-    robot.walk(WalkOrder(0.05, False, 1))
-    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 12.0)
-    assert faults_reported(robot) == []
-
-
-def test_a_walk_with_a_labs_disturbances_is_no_fault(configuration: Configuration) -> None:
-    robot = Robot(configuration, disturbances=LAB)
-    robot.arm()
-    robot.walk(WalkOrder(0.03, True, 2))
+    robot.walk(order)
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 15.0)
-    assert faults_reported(robot) == []
+    texts = robot.recorder.texts
+    assert [text for text in texts[texts.index("request arm") :] if text.startswith("fault ")] == []
+
+
+def test_a_lease_that_is_lost_right_after_an_arm_request_prevents_arming(at: Copied) -> None:
+    robot = at("idle")
+    robot.loop.lease.renew("alice", robot.now_s, 1.0)
+    assert robot.loop.request(Request.ARM, robot.now_s) is None
+    robot.loop.lease.hang_up("alice")
+    robot.step()
+    assert mode_of(robot) is Mode.IDLE
+    assert FaultKind.LEASE_LOST.fault(holder="alice") in robot.loop.faults.present
 
 
 def test_disarm_works_during_every_kind_of_fault(at: Copied) -> None:

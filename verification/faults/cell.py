@@ -90,7 +90,10 @@ class Measurement:
         self._steps = 0
         self._first_tick = bench.loop_ticks
         self._first_text = len(bench.rows.texts)
-        self._mode_before = bench.loop.mode
+        self._strictness = max(0, self._kind.reaction - Reaction.WARN) if self._kind else 0
+        self._only_reported = self._kind is not None and (  # the mode was as strict before, or none is demanded
+            self._kind.reaction < Reaction.HOLD or STRICTNESS[bench.loop.mode] >= self._strictness
+        )
         self._angles_rad = bench.robot.plant.angles_rad
         self._last_torque_steps = 0
         self._damping_steps = 0
@@ -139,25 +142,16 @@ class Measurement:
         return self._bench.loop_ticks - self._first_tick
 
     def _measure_loop(self) -> None:
-        cell, mode, kind = self._cell, self._bench.loop.mode, self._kind
-        if kind is not None:
-            self._measure_report(kind)
-            if cell.reaction_ticks is None and self._has_reacted(kind, mode):
+        cell, mode = self._cell, self._bench.loop.mode
+        if self._kind is not None:
+            self._measure_report(self._kind)
+            is_reported, is_strict = cell.reported_ticks is not None, STRICTNESS[mode] >= self._strictness
+            if cell.reaction_ticks is None and (is_reported if self._only_reported else is_strict):
                 cell.reaction_ticks = self._ticks
         if mode in (Mode.STOPPING, Mode.DAMPING) and self._stopping_since is None:
             self._stopping_since = self._steps
         if mode not in ENERGISED and self._stopping_since is not None and cell.stop_s is None:
             cell.stop_s = (self._steps - self._stopping_since) * PERIOD_S
-
-    def _has_reacted(self, kind: FaultKind, mode: Mode) -> bool:
-        """Return whether the mode is strict enough, or the fault is reported where the mode says nothing."""
-        if self._only_reported(kind):
-            return self._cell.reported_ticks is not None
-        return STRICTNESS[mode] >= _needed_strictness(kind)
-
-    def _only_reported(self, kind: FaultKind) -> bool:
-        """Return whether the mode was as strict before, or the fault demands no mode."""
-        return kind.reaction < Reaction.HOLD or STRICTNESS[self._mode_before] >= _needed_strictness(kind)
 
     def _measure_report(self, kind: FaultKind) -> None:
         if self._cell.reported_ticks is not None:
@@ -165,7 +159,8 @@ class Measurement:
         loop = self._bench.loop
         if any(fault.name in self._failure.names for fault in loop.faults.present):
             self._cell.reported_ticks = self._ticks
-            refusing = self._cell.phase == "idle" and _blocks_arming(kind)
+            blocks = kind.blocks is not Blocks.NO or kind.reaction >= Reaction.HOLD
+            refusing = self._cell.phase == "idle" and blocks
             forced = self._bench.forced and kind.blocks is not Blocks.UNLESS_FORCED
             if refusing and loop.request(Request.ARM, self._bench.now_s, forced=forced) is None:
                 self._cell.why.append("arming was not refused")
@@ -245,11 +240,3 @@ class Measurement:
             cell.travel_rad = self._travel_rad
         if self._failure.ends_loop:
             cell.reaction_ticks = cell.zero_torque_ticks
-
-
-def _needed_strictness(kind: FaultKind) -> int:
-    return max(0, kind.reaction - Reaction.WARN)
-
-
-def _blocks_arming(kind: FaultKind) -> bool:
-    return kind.blocks is not Blocks.NO or kind.reaction >= Reaction.HOLD

@@ -243,16 +243,6 @@ def blocked(robot: FailingRobot, joint: str) -> Iterator[None]:
         yield
 
 
-@during
-def stiff(robot: FailingRobot, joint: str) -> Iterator[None]:
-    """Multiply the stiffness, beyond what the delay of the loop permits."""
-    controller = robot.loop.controller
-    before = controller.gains
-    controller.gains = replace(before, sweep_stiffness_nm_rad=200.0, adduction_stiffness_nm_rad=200.0)
-    yield
-    controller.gains = before
-
-
 @once
 def recovery_given_up(robot: FailingRobot, joint: str) -> None:
     """Wait until the last attempt of a recovery has failed; the injection begins there."""

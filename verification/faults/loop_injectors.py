@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import nan
 from typing import Any
 
 from control.computing.bounded_work import finished
@@ -58,10 +57,10 @@ def heated(robot: FailingRobot, joint: str, temperature_c: float) -> None:
 
 
 @during
-def gains_of_nan(robot: FailingRobot, joint: str) -> Iterator[None]:
+def gains_changed(robot: FailingRobot, joint: str, changes: Mapping[str, float]) -> Iterator[None]:
     controller = robot.loop.controller
     before = controller.gains
-    controller.gains = replace(before, sweep_stiffness_nm_rad=nan, adduction_damping_nm_s_rad=nan)
+    controller.gains = replace(before, **changes)
     yield
     controller.gains = before
 
@@ -157,13 +156,10 @@ class DeliberateBugError(Exception):
 
 @once
 def bug_in(robot: FailingRobot, joint: str, path: str) -> None:
-    """Make the next call of a method of the loop raise. `path` is the dotted name of the method."""
-    *owners, method = path.split(".")
-    part: Any = robot.loop
-    for owner in owners:
-        part = getattr(part, owner)
+    """Make the next call of a method of the loop raise. `path` is "part.method"."""
+    part, method = path.split(".")
 
     def broken(*arguments: Any, **options: Any) -> Any:
         raise DeliberateBugError(path)
 
-    setattr(part, method, broken)
+    setattr(getattr(robot.loop, part), method, broken)

@@ -10,7 +10,6 @@ from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from pandas import DataFrame
@@ -167,16 +166,16 @@ def _draw_panel(panel: Axes, cells: Cells, rows: Cells, phases: Sequence[str]) -
             own = [cell for cell in cells if (cell["mode_name"], cell["phase"]) == (row["mode_name"], phase)]
             if own:
                 percent[y, x] = _write_cell(panel, x, y, own)
-    colours = colormaps["YlGnBu"].with_extremes(bad="#f4f4f4")
-    mesh = panel.imshow(percent, cmap=colours, vmin=0.0, vmax=HIGHEST_PERCENT, aspect="auto")
-    panel.set_xticks(range(len(phases)), list(phases), rotation=35, ha="left", fontsize="small")
+    mesh = panel.pcolormesh(
+        np.ma.masked_invalid(percent), cmap="YlGnBu", vmin=0.0, vmax=HIGHEST_PERCENT, edgecolors="white", linewidth=1.0
+    )
+    panel.set_facecolor("#f4f4f4")
+    panel.invert_yaxis()
+    panel.set_xticks(np.arange(len(phases)) + 0.5, list(phases), rotation=35, ha="left", fontsize="small")
     panel.xaxis.tick_top()
-    panel.set_yticks(range(len(rows)), [_label(row) for row in rows], fontsize="x-small")
-    panel.set_xticks(np.arange(len(phases) + 1) - 0.5, minor=True)
-    panel.set_yticks(np.arange(len(rows) + 1) - 0.5, minor=True)
-    panel.grid(visible=False, which="major")
-    panel.grid(which="minor", color="white", linewidth=1.0)
-    panel.tick_params(length=0, which="both")
+    panel.set_yticks(np.arange(len(rows)) + 0.5, [_label(row) for row in rows], fontsize="x-small")
+    panel.grid(visible=False)
+    panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
     return mesh
 
@@ -196,7 +195,7 @@ def _write_cell(panel: Axes, x: int, y: int, cells: Cells) -> float:
         largest = max(cells, key=lambda cell: cell["energy_j"] - cell["energy_bound_j"])
         text, percent = f"{largest['energy_j']:.1f}", 100.0 * largest["energy_j"] / max(largest["energy_bound_j"], 1e-9)
     colour = "white" if percent > DARK_PERCENT else "#333333"
-    panel.text(x, y, text, ha="center", va="center", fontsize=6.5, color=colour)
+    panel.text(x + 0.5, y + 0.5, text, ha="center", va="center", fontsize=6.5, color=colour)
     if not all(cell["ok"] for cell in cells):
-        panel.plot(x, y, "x", color="tab:red", markersize=11, markeredgewidth=2.0)
+        panel.plot(x + 0.5, y + 0.5, "x", color="tab:red", markersize=11, markeredgewidth=2.0)
     return percent

@@ -203,12 +203,6 @@ def walked(depth_m: float, strength_pa: float, strides: int = 3) -> Walk:
     return walk_by(constant_depth(depth_m), track, 1, lambda made: len(made) >= strides)
 
 
-def test_a_walk_has_the_ordered_length_and_is_deterministic() -> None:
-    first = walked(0.03, 3000.0)
-    assert (len(first.strides), first.fault) == (3, "")
-    assert walked(0.03, 3000.0, strides=1).strides == first.strides[:1]
-
-
 def test_strides_join_without_gaps() -> None:
     """A stride's position plus its step is the next position: the arms are at the front of their sweep in both."""
     before, after = walked(0.03, 3000.0).strides[1:]

@@ -63,13 +63,6 @@ def test_the_robot_reacts_to_every_fault_as_its_kind_demands(cells: Sequence[Cel
     assert {cell.fault for cell in cells} == set(FAULTS)
 
 
-def test_a_fault_that_stops_the_robot_leaves_it_without_torque(cells: Sequence[Cell]) -> None:
-    stopped = [cell for cell in cells if cell.reaction in ("soft_stop", "damping", "drives_idle")]
-    assert len(stopped) > 20
-    assert all(cell.zero_torque_ticks is not None and cell.disarmed for cell in stopped)
-    assert any(cell.peak_torque_nm > 0.0 for cell in stopped)
-
-
 def test_a_cell_follows_from_its_name_phase_and_seed() -> None:
     first, again, other = (run_cell("drive_quiet", "hold", seed) for seed in (1, 1, 2))
     assert first == again
@@ -85,18 +78,11 @@ def test_the_differences_of_a_type_of_drive_name_failure_modes_and_faults(drive:
         assert {*mode.instead, *mode.also} <= set(FaultKind) and mode.why == table[name].why
 
 
-def test_a_failure_that_shows_as_another_has_the_bounds_of_that_one() -> None:
-    mode = mode_of("watchdog_off", "moteus")
-    assert (
-        mode.fault_kind is FaultKind.FOREIGN_COMMANDS
-        and mode_of("watchdog_off", "odrive").fault_kind is FaultKind.WATCHDOG_OFF
-    )
-
-
 def test_a_push_ends_with_the_fault_that_the_protocol_shows_at_the_latest() -> None:
     name = "encoder_stuck, at zero speed"
-    bounds = [run_cell(name, "stance", 1, drive).pushed_bound_ticks for drive in ("odrive", "moteus")]
-    assert bounds == [
+    cells = [run_cell(name, "stance", 1, drive) for drive in ("odrive", "moteus")]
+    assert cells[1].ok
+    assert [cell.pushed_bound_ticks for cell in cells] == [
         REACTING_TICKS + kind.bound_ticks for kind in (FaultKind.ENCODER_STUCK, FaultKind.JOINT_NOT_FOLLOWING)
     ]
     assert mode_of(name, "moteus").pushes_until in set(FaultKind)
@@ -105,19 +91,6 @@ def test_a_push_ends_with_the_fault_that_the_protocol_shows_at_the_latest() -> N
 def test_a_failure_that_a_drive_cannot_show_is_injected_and_its_energy_bounded() -> None:
     cell = run_cell("voltage_under", "hold", 1, "mit")
     assert (cell.ok, cell.reported, cell.bound_ticks) == (True, [], None) and cell.energy_j <= cell.energy_bound_j
-
-
-@pytest.mark.parametrize(
-    ("name", "drive"),
-    [
-        ("position_silent", "mit"),
-        ("drive_error, by another program's stop", "mit:AK80-9"),
-        ("torque_missing", "mit"),
-        ("drive_silent", "mit:AK80-9"),
-    ],
-)
-def test_a_drive_in_mit_mode_shows_a_failure_as_its_protocol_can(name: str, drive: str) -> None:
-    assert run_cell(name, "hold", 1, drive).why == []
 
 
 def test_damping_in_stiff_mud_gives_no_energy_to_joints_whose_drives_answer_a_tick_late() -> None:
@@ -148,31 +121,26 @@ def test_a_stepped_wall_clock_ends_a_walk_only_where_its_stamps_are_believed(mon
 
 
 @pytest.mark.parametrize(
-    ("name", "phase"),
+    ("drive", "name", "phase"),
     [
-        ("none", "stance"),
-        ("drive_late", "hold"),
-        ("drive_energised", "idle"),
-        ("drive_error, by its watchdog", "hold"),
-        ("drive_error, by another program's stop", "hold"),
-        ("foreign_commands", "idle"),
-        ("setpoint_mismatch, every second command", "hold"),
-        ("bus_refuses", "hold"),
-        ("loop_overrun", "hold"),
-        ("loop_lagging", "hold"),
-        ("loop_stalled", "idle"),
-        ("daemon_hung", "hold"),
-        ("current_stale", "recovery"),  # in clay of 9 kPa, in which the pose is held without oscillation
-        ("arming_failed", "arming"),
-        ("watchdog_unknown", "idle"),
-        ("watchdog_off", "idle"),
-        ("watchdog_off", "stance"),
-        ("encoder_stuck, at zero speed", "stance"),
+        ("moteus", "drive_late", "hold"),
+        ("moteus", "drive_error, by its watchdog", "hold"),
+        ("moteus", "drive_error, by another program's stop", "hold"),
+        ("moteus", "setpoint_mismatch, every second command", "hold"),
+        ("moteus", "bus_refuses", "hold"),
+        ("moteus", "daemon_hung", "hold"),
+        ("moteus", "current_stale", "recovery"),  # in clay of 9 kPa, in which the pose is held without oscillation
+        ("moteus", "arming_failed", "arming"),
+        ("moteus", "watchdog_unknown", "idle"),
+        ("moteus", "watchdog_off", "stance"),
+        ("mit", "position_silent", "hold"),
+        ("mit", "torque_missing", "hold"),
+        ("mit:AK80-9", "drive_error, by another program's stop", "hold"),
+        ("mit:AK80-9", "drive_silent", "hold"),
     ],
 )
-def test_moteus_react_to_what_differs_from_drives_that_report_by_themselves(name: str, phase: str) -> None:
-    cell = run_cell(name, phase, 1, "moteus")
-    assert cell.why == []
+def test_a_type_of_drive_shows_a_failure_as_its_protocol_can(drive: str, name: str, phase: str) -> None:
+    assert run_cell(name, phase, 1, drive).why == []
 
 
 def test_torque_of_another_program_must_end_with_that_program(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,11 +162,6 @@ def run_mode(monkeypatch: pytest.MonkeyPatch, mode: FailureMode, phase: str = "h
 def test_a_missing_fault_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = run_mode(monkeypatch, replace(BY_NAME["drive_quiet"], act=("nothing",)))
     assert not cell.ok and "no reaction" in cell.why and "torque at the end" in cell.why
-
-
-def test_an_escaped_exception_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
-    cell = run_mode(monkeypatch, replace(BY_NAME["clock_step"], act=("bug_in", "controller.step")))
-    assert "an exception escaped: DeliberateBugError: controller.step" in cell.why
 
 
 def test_a_fault_in_the_control_group_fails_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -264,32 +227,3 @@ def test_a_good_cell_has_no_problem() -> None:
 def test_every_deviation_fails_the_cell(change: dict[str, Any], word: str) -> None:
     (message,) = problems(replace(GOOD, **change), BY_NAME["drive_quiet"])
     assert word in message
-
-
-# the bench
-
-
-def make_bench() -> FaultBench:
-    return bench_for("hold", Random(1))
-
-
-def test_a_stalled_loop_misses_its_ticks_while_the_robot_moves_on() -> None:
-    bench = make_bench()
-    bench.run_for(0.1)
-    made, missed = bench.loop_ticks, bench.loop.missed_ticks
-    bench.stall(5)
-    for _ in range(6):
-        bench.step()
-    assert (bench.loop_ticks, bench.loop.missed_ticks) == (made + 1, missed + 5)
-    assert bench.robot.now_s == pytest.approx(bench.now_s, abs=0.001)
-
-
-def test_a_lease_lost_right_after_an_arm_request_names_its_holder_and_prevents_arming() -> None:
-    bench = make_bench()
-    bench.run_for(1.0)
-    bench.loop.lease.renew("alice", bench.now_s, 1.0)
-    assert bench.loop.request(Request.ARM, bench.now_s) is None
-    bench.loop.lease.hang_up("alice")
-    bench.step()
-    assert bench.loop.mode is Mode.IDLE
-    assert FaultKind.LEASE_LOST.fault(holder="alice") in bench.loop.faults.present
