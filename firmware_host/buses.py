@@ -61,7 +61,7 @@ def lock_buses(buses: Mapping[str, BusParameters], role: BusRole) -> ExitStack:
 
 
 def open_ports(buses: Mapping[str, BusParameters]) -> dict[str, CanPort]:
-    """Open every bus, by name; if one fails, closes the others and raises BusError."""
+    """Open every bus, by name; if one fails, close the others and raise BusError."""
     return _all_or_none(buses, open_bus)
 
 

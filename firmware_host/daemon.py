@@ -86,7 +86,7 @@ class Shutdown:
         self.requested = True
 
     def step(self, loop: Loop, now_s: float) -> bool:
-        """Request the next step of the shutdown; returns whether the loop may end now."""
+        """Request the next step of the shutdown; return whether the loop may end now."""
         if not self.requested:
             return False
         loop.ending = True
@@ -120,7 +120,7 @@ def open_recorder(configuration: Configuration, rights: Rights) -> Recorder | Nu
 
 
 def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int:
-    """Run the loop until the shutdown is complete; returns the exit status.
+    """Run the loop until the shutdown is complete; return the exit status.
 
     Raises BusError, PoseSourceError, AlreadyServedError or OSError before the first tick.
     """

@@ -53,7 +53,7 @@ class Lease:
         )
 
     def renew(self, holder: Hashable, now_s: float, for_s: float) -> str | None:
-        """Take or renew the lease; returns why this is refused, or None."""
+        """Take or renew the lease; return why this is refused, or None."""
         self.update(now_s)
         refused = self.refusal(holder, now_s)
         if refused is None:
@@ -67,7 +67,7 @@ class Lease:
             self.reset()
 
     def release(self, holder: Hashable) -> str | None:
-        """Free the lease; returns why this is refused, or None.
+        """Free the lease; return why this is refused, or None.
 
         No other program frees a lost lease: the loop would then not see that it was lost, and the robot would move on.
         """

@@ -147,7 +147,7 @@ class MudLearning:
     def _choose(
         self, controller: Controller, order: WalkOrder, strides: Sequence[StrideEstimate], walked_m: float
     ) -> Work[list[str]]:
-        """Choose the depth of the next stride, and its gait if the method chooses that too; returns messages."""
+        """Choose the depth of the next stride, and its gait if the method chooses that too; return messages."""
         gait = controller.gait
         if not order.adaptive:
             gait.next_depth_m, self.depth_reason = order.depth_m, "fixed"

@@ -6,7 +6,6 @@ means, and a parabola through the best three ticks), so a constant error is no l
 
 from collections.abc import Sequence
 from math import degrees, radians
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,40 +35,7 @@ STRIDES = 10
 WALK_DEPTH_M = 0.02  # 2 cm above the support of the flippers
 WALK_DEG = 8.0  # in swing and extraction, which are faster than the strokes
 MOST_MISSED_FRACTION = 0.001  # of ticks: more, and the computer is too slow
-MOST_LIMITED_FRACTION = (
-    0.005  # of ticks: where two phases meet, slew and torque limit take a few; in mud they take more
-)
-
-
-class Tracking(NamedTuple):
-    """Tracking of one joint."""
-
-    max_deg: float
-    rms_deg: float
-    lag_ms: float
-
-
-def stroke(test_rig: TestRig, speed_rad_s: float) -> list[Sample]:
-    """Move all joints to and fro about level."""
-    front: JointAngles = same_for_each(*STROKE, test_rig.configuration.rig)
-    back = front.map(lambda angle_rad: -angle_rad)
-    samples = test_rig.move([front, back] * STROKES + [test_rig.level], speed_rad_s)
-    test_rig.run_for(0.3)
-    return samples
-
-
-def tracking(rig: Rig, samples: Sequence[Sample]) -> dict[str, Tracking]:
-    """Return the tracking of each joint."""
-    aimed = [(sample.aim, sample.states) for sample in samples if sample.aim is not None]
-    result = {}
-    for index, joint in enumerate(rig.joints):
-        aims = np.array([aim[index] for aim, _ in aimed])
-        angles = np.array([states[index].angle_rad for _, states in aimed])
-        errors_rad = aims[:, 0] - angles
-        rms_rad = float(np.sqrt(np.mean(errors_rad**2)))
-        lag_ms = 1e3 * PERIOD_S * lag_ticks(aims[:, 0], angles)
-        result[joint] = Tracking(degrees(float(np.abs(errors_rad).max())), degrees(rms_rad), lag_ms)
-    return result
+MOST_LIMITED_FRACTION = 0.005  # of ticks: where two phases meet, limits take a few; in mud they take more
 
 
 def lag_ticks(commanded: Vector, measured: Vector) -> float:
@@ -93,15 +59,23 @@ def _fit(commanded: Vector, measured: Vector, lag: int) -> float:
 
 
 def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: float) -> Readings:
-    """Check one stroke. The robot is idle before and after."""
+    """Check a motion of all joints to and fro about level. The robot is idle before and after."""
+    front: JointAngles = same_for_each(*STROKE, test_rig.configuration.rig)
+    back = front.map(lambda angle_rad: -angle_rad)
     with test_rig.flippers_raised():
-        samples = stroke(test_rig, speed_rad_s)
+        samples = test_rig.move([front, back] * STROKES + [test_rig.level], speed_rad_s)
+        test_rig.run_for(0.3)
     gains = "check stiffness and damping in [gains], the drives' limits, and friction of the joint"
     yield from _tracking_readings(test_rig.configuration.rig, f"{name} stroke", samples, most_deg, gains)
 
 
 def _tracking_readings(rig: Rig, motion: str, samples: Sequence[Sample], most_deg: float, advice: str) -> Readings:
-    for joint, (max_deg, rms_deg, lag_ms) in tracking(rig, samples).items():
+    aimed = [(sample.aim, sample.states) for sample in samples if sample.aim is not None]
+    for index, joint in enumerate(rig.joints):
+        aims_rad = np.array([aim[index].angle_rad for aim, _ in aimed])
+        angles_rad = np.array([states[index].angle_rad for _, states in aimed])
+        errors_rad, lag_ms = aims_rad - angles_rad, 1e3 * PERIOD_S * lag_ticks(aims_rad, angles_rad)
+        max_deg, rms_deg = degrees(np.abs(errors_rad).max()), degrees(np.sqrt(np.mean(errors_rad**2)))
         yield Reading(f"{joint}: {motion}, largest error", max_deg, "deg", 0.0, most_deg, advice)
         yield Reading(f"{joint}: {motion}, error (RMS)", rms_deg, "deg", 0.0, most_deg / 2.0, advice)
         yield Reading(f"{joint}: {motion}, lag", lag_ms, "ms", -LAG_MS, LAG_MS, advice)
@@ -111,7 +85,11 @@ def check_strides(test_rig: TestRig) -> Readings:
     """Check ten strides of the robot's own gait. The robot is idle before and after."""
     with test_rig.flippers_raised():
         missed = test_rig.loop.missed_ticks
-        samples = walk(test_rig)
+        order_strides(test_rig, STRIDES)
+        stride_s = stride_duration_s(test_rig.configuration.gait, test_rig.configuration.geometry, WALK_DEPTH_M)
+        test_rig.run_until(lambda sample: sample.mode is Mode.WALKING, 1.0, "The walk")
+        longest_s = 2.0 * STRIDES * stride_s + 10.0
+        samples = test_rig.run_until(lambda sample: sample.mode is Mode.HOLD, longest_s, "The end of the walk")
         fraction = 100.0 * (test_rig.loop.missed_ticks - missed) / len(samples)
         overruled = {FaultKind.WATCHDOG_UNKNOWN} if test_rig.forced else set()
         reported = [fault.message for fault in test_rig.loop.faults.present if fault.kind not in overruled]
@@ -125,15 +103,6 @@ def order_strides(test_rig: TestRig, count: int) -> None:
     refused = test_rig.loop.request(Request.WALK, test_rig.rig.now_s, WalkOrder(WALK_DEPTH_M, False, count))
     if refused:
         raise BenchError(f"The robot does not walk: {refused}")
-
-
-def walk(test_rig: TestRig) -> list[Sample]:
-    """Walk and return to HOLD."""
-    order_strides(test_rig, STRIDES)
-    stride_s = stride_duration_s(test_rig.configuration.gait, test_rig.configuration.geometry, WALK_DEPTH_M)
-    test_rig.run_until(lambda sample: sample.mode is Mode.WALKING, 1.0, "The walk")
-    longest_s = 2.0 * STRIDES * stride_s + 10.0
-    return test_rig.run_until(lambda sample: sample.mode is Mode.HOLD, longest_s, "The end of the walk")
 
 
 def _walk_readings(test_rig: TestRig, walked: Sequence[Sample]) -> Readings:

@@ -29,6 +29,7 @@ PRESSING_S = 0.5
 PATIENCE_S = 0.5  # after the longest watchdog: then torque is switched off by command
 REPORTING_S = 0.3  # for the drives to report the reason
 LATE_TICKS = 3  # for the message, its transfer, and the tick that reads it
+LATE_S = LATE_TICKS * PERIOD_S
 GONE_FRACTION = 0.5  # of the current
 GONE_TICKS = 5  # in a row, with less than that
 
@@ -60,7 +61,12 @@ def check_watchdog_times(test_rig: TestRig) -> Readings:
         yield from _observed_readings(test_rig, "after the last command", fed)
         yield from _reasons(test_rig)
     if any(_asked_by_command(test_rig)):
-        yield from _asked_times(test_rig)
+        known_s = [health.watchdog_s for health in test_rig.drives.health if health.watchdog_s > 0.0]
+        if known_s:
+            yield from _asked_readings(test_rig, min(known_s) - LATE_S, True, "after the last command")
+            clear(test_rig)
+        yield from _asked_readings(test_rig, _longest_s(test_rig) + LATE_S, False, "after the last command")
+        yield from _reasons(test_rig)
 
 
 def _asked_by_command(test_rig: TestRig) -> list[bool]:
@@ -70,27 +76,18 @@ def _asked_by_command(test_rig: TestRig) -> list[bool]:
 def _observed_readings(test_rig: TestRig, when: str, advice: str, others: Others = ()) -> Readings:
     """Let the watchdogs trip and watch the reports of the drives that need not be asked by a command."""
     pressed, silence = let_watchdogs_trip(test_rig, others)
-    late_s = LATE_TICKS * PERIOD_S
     for index, (health, by_command) in enumerate(zip(test_rig.drives.health, _asked_by_command(test_rig), strict=True)):
         if by_command:
             continue
         joint, drive = health.joint, test_rig.configuration.drive[health.joint]
-        earliest_s, gone_s = health.watchdog_s - late_s, health.watchdog_s + late_s
+        earliest_s, gone_s = health.watchdog_s - LATE_S, health.watchdog_s + LATE_S
         latest_s, todo = gone_s + drive.heartbeat_period_s, advice.format(joint=joint)
-        yield Reading(f"{joint}: idle {when}", _idle_s(pressed, silence, index), "s", earliest_s, latest_s, todo)
+        first_idle = (sample for sample in silence if not sample.states[index].closed_loop)
+        idle_s = next((sample.tick.now_s - pressed[-1].tick.now_s for sample in first_idle), nan)
+        yield Reading(f"{joint}: idle {when}", idle_s, "s", earliest_s, latest_s, todo)
         if "adduction" in joint and not others:
             seen_s, latest_s = _gone_s(pressed, silence, index), latest_s if drive.holds_idle_current else gone_s
             yield Reading(f"{joint}: no current after it", seen_s, "s", earliest_s, latest_s, todo)
-
-
-def _asked_times(test_rig: TestRig) -> Readings:
-    known_s = [health.watchdog_s for health in test_rig.drives.health if health.watchdog_s > 0.0]
-    late_s = LATE_TICKS * PERIOD_S
-    if known_s:
-        yield from _asked_readings(test_rig, min(known_s) - late_s, True, "after the last command")
-        clear(test_rig)
-    yield from _asked_readings(test_rig, _longest_s(test_rig) + late_s, False, "after the last command")
-    yield from _reasons(test_rig)
 
 
 def _longest_s(test_rig: TestRig) -> float:
@@ -135,18 +132,14 @@ def check_what_feeds_watchdogs(test_rig: TestRig) -> Readings:
     harmless = [(test_rig.drives.ports[drive.bus], type_of(drive).harmless_frames(drive.node_id)) for drive in drives]
     for kind in dict.fromkeys(kind for _, frames in harmless for kind in frames):
         others = [(port, frames[kind]) for port, frames in harmless if kind in frames]
-        yield from _readings_among(test_rig, kind, others)
-
-
-def _readings_among(test_rig: TestRig, kind: str, others: Others) -> Readings:
-    if any(_asked_by_command(test_rig)):
-        latest_s = _longest_s(test_rig) + LATE_TICKS * PERIOD_S
-        yield from _asked_readings(test_rig, latest_s, False, f"among {kind}", others)
-        clear(test_rig)
-    if not all(_asked_by_command(test_rig)):
-        advice = f"{kind} feed its watchdog: no program may send them while torque is on; update its firmware"
-        yield from _observed_readings(test_rig, f"among {kind}", advice, others)
-        clear(test_rig)
+        if any(_asked_by_command(test_rig)):
+            latest_s = _longest_s(test_rig) + LATE_S
+            yield from _asked_readings(test_rig, latest_s, False, f"among {kind}", others)
+            clear(test_rig)
+        if not all(_asked_by_command(test_rig)):
+            advice = f"{kind} feed its watchdog: no program may send them while torque is on; update its firmware"
+            yield from _observed_readings(test_rig, f"among {kind}", advice, others)
+            clear(test_rig)
 
 
 def clear(test_rig: TestRig) -> Sequence[DriveHealth]:
@@ -156,12 +149,6 @@ def clear(test_rig: TestRig) -> Sequence[DriveHealth]:
     reported = test_rig.drives.health
     test_rig.clear_fault()
     return reported
-
-
-def _idle_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
-    """Return the time from the last command to the first heartbeat without torque; NaN where none came."""
-    last_s = pressed[-1].tick.now_s
-    return next((sample.tick.now_s - last_s for sample in silence if not sample.states[index].closed_loop), nan)
 
 
 def _gone_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:

@@ -40,8 +40,8 @@ DEFINITIONS = (
     "In air every value and every bound is wrong. Lost: values that became invalid or a bound."
 )
 Summary = dict[str, Any]
-HEADS = {"first_cv": "first CV", "later_cv": "later CV", "chi_between_trials": "chi trials",
-            "chi_between_strokes": "chi strokes", "with_neighbour": "with a neighbour"}  # fmt: skip
+HEADS = {"first_cv": "first CV", "later_cv": "later CV", "chi_between_trials": "chi between trials",
+            "chi_between_strokes": "chi between strokes", "with_neighbour": "with a neighbour"}  # fmt: skip
 
 
 def summary_of(

@@ -1,10 +1,9 @@
 """Tables as plain text, for the screen and for pages that show what the screen showed."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import isfinite
 
 Rows = Sequence[Sequence[str]]  # the head first
-TitledRows = tuple[str, Rows]
 
 
 def table(rows: Rows) -> str:
@@ -18,8 +17,3 @@ def table(rows: Rows) -> str:
 def number(value: float | None, digits: int = 3) -> str:
     """Format a value, or a dash for one that is unknown."""
     return "-" if value is None or not isfinite(value) else f"{value:z.{digits}f}"
-
-
-def text_of_tables(tables: Iterable[TitledRows]) -> str:
-    """Join tables, each below its title."""
-    return "\n\n".join(f"{title}\n{table(rows)}" for title, rows in tables)

@@ -37,11 +37,6 @@ class Table:
         return f"{self.title}\n{aligned(self.cells())}".lstrip("\n")
 
 
-def text_table(name: str, title: str, cells: Sequence[Sequence[str]], section: str = "Result") -> Table:
-    """Return a table of formatted cells, the head first."""
-    return Table(name, title, {}, DataFrame(cells[1:], columns=cells[0]), section)
-
-
 @dataclass(frozen=True)
 class Figure:
     """A picture, which is drawn in the one style of all studies (page.py)."""
@@ -81,14 +76,10 @@ def _cell(value: Any) -> str:
 
 
 def to_json(value: Any) -> Any:
-    """Turn records into mappings by field name, numbers of numpy into plain ones, and NaN into None, as JSON has them.
-
-    A field of a dataclass with `metadata={"key": ...}` has that key; the entries of a `flat` field stand next to those
-    of its record.
-    """
+    """Turn records into mappings by field name, numbers of numpy into plain ones, and NaN into None."""
     if is_dataclass(value) and not isinstance(value, type):
-        return _record_to_json(value)
-    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        value = {each.name: getattr(value, each.name) for each in fields(value)}
+    elif isinstance(value, tuple) and hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, Mapping):
         return {key: to_json(each) for key, each in value.items()}
@@ -97,11 +88,3 @@ def to_json(value: Any) -> Any:
     if hasattr(value, "tolist"):  # of numpy
         return to_json(value.tolist())
     return None if isinstance(value, float) and not isfinite(value) else value
-
-
-def _record_to_json(record: Any) -> dict[str, Any]:
-    entries: dict[str, Any] = {}
-    for each in fields(record):
-        value = to_json(getattr(record, each.name))
-        entries |= value if "flat" in each.metadata else {each.metadata.get("key", each.name): value}
-    return entries

@@ -16,7 +16,7 @@ SWITCH_INTERVAL_S = 1e-4  # another Python thread would give way after this time
 
 
 def prepare_loop(priority: int, cpu: int, lock_memory: bool) -> list[str]:
-    """Apply all settings; returns a warning for each that is refused."""
+    """Apply all settings; return a warning for each that is refused."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1)  # ns, where an ordinary process may be woken 50 us late
     warnings = [_pin(cpu) if cpu >= 0 else "", _lock_memory() if lock_memory else "", _schedule(priority)]
@@ -25,7 +25,7 @@ def prepare_loop(priority: int, cpu: int, lock_memory: bool) -> list[str]:
 
 
 def freeze_garbage() -> None:
-    """Collect garbage once and switches the collection off: a full one takes several ticks."""
+    """Collect garbage once and switch the collection off: a full one takes several ticks."""
     gc.collect()
     gc.freeze()
     gc.disable()

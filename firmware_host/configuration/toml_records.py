@@ -69,7 +69,7 @@ def parse_document(text: str, file: Path | None = None) -> dict[str, Any]:
 
 
 def rename_former_keys(document: dict[str, Any], former: Mapping[str, str]) -> list[str]:
-    """Rename keys such as `log.min_free_share` in place; returns a warning for each.
+    """Rename keys such as `log.min_free_share` in place; return a warning for each.
 
     Raises ConfigurationError where a file gives both names.
     """

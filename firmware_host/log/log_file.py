@@ -117,7 +117,7 @@ class LogFile:
             self._synchronise()
 
     def _wall_time_ns(self, stamp_s: float) -> int:
-        """A row without a usable stamp gets the time of the row before it."""
+        """Return the time of a row by the wall clock; without a usable stamp, that of the row before it."""
         if math.isfinite(stamp_s) and abs(stamp_s) < 1e9:
             self._latest_ns = min(max(0, self._wall_offset_ns + round(stamp_s * 1e9)), LATEST_NS)
         return self._latest_ns
@@ -159,7 +159,7 @@ class LogFile:
         raise FileNotFoundError(errno.ENOENT, "it was removed or moved away")
 
     def finish(self) -> Path:
-        """Write the index and synchronises everything, the file's name included; moves a file in active/ to done/."""
+        """Write the index and synchronise everything, the name included; move a file in active/ to done/."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._write_out()
         self._synchronise()
@@ -173,7 +173,7 @@ class LogFile:
         return path
 
     def abandon(self) -> None:
-        """Cut the file back to the last flush and closes it; removes a file without rows. Never raises OSError."""
+        """Cut the file back to the last flush and close it; remove a file without rows. Never raises OSError."""
         with suppress(OSError):
             os.ftruncate(self._file.fileno(), self._safe_bytes)
         if self.safe_rows == 0:

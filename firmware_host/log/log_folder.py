@@ -127,7 +127,7 @@ def _size(path: Path) -> int:
 
 
 def move_file(path: Path, target: Path) -> None:
-    """Rename a file and synchronises both folders."""
+    """Rename a file and synchronise both folders."""
     make_folder(target.parent)
     path.rename(target)
     for folder in {target.parent, path.parent}:

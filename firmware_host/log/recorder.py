@@ -131,7 +131,7 @@ class Recorder:
             self.writer_alive = False
 
     def put(self, number: int, row: bytes) -> bool:
-        """Send one row without waiting; returns False where it was lost."""
+        """Send one row without waiting; return False where it was lost."""
         if len(row) > LARGEST_ROW:
             row = _shorten(row)
         record = pack_record(number, row)
@@ -204,7 +204,7 @@ class Recorder:
         return True
 
     def close(self, timeout_s: float) -> bool:
-        """End the log; returns whether it is whole on the disk. A writer that needs longer finishes alone."""
+        """End the log; return whether it is whole on the disk. A writer that needs longer finishes alone."""
         assert self._writer.stdin is not None and self._writer.stdout is not None
         deadline_s = time.monotonic() + timeout_s
         if self._unreported and self.writer_alive:

@@ -58,7 +58,7 @@ class SocketFile:
 
 
 def _give_to(path: Path, group: int) -> bool:
-    """Give the file to a group; returns whether this was permitted: of its own files, to a group of its own.
+    """Give the file to a group; return whether this was permitted: of its own files, to a group of its own.
 
     A new file has the group of the process. The unit's filter of system calls forbids any other one.
     """

@@ -114,7 +114,7 @@ class StatusSocket:
                 return
 
     def _accept(self, listener: Listener) -> bool:
-        """Accept one client; returns whether another one may follow in this tick."""
+        """Accept one client; return whether another one may follow in this tick."""
         try:
             connection, _ = listener.file.listener.accept()
         except OSError:  # none waits, or it disconnected before it was accepted
@@ -142,7 +142,7 @@ class StatusSocket:
         return more
 
     def _make_room(self, listener: Listener, newcomer: Peer) -> bool:
-        """Drop a client for a newcomer; returns whether its user has others."""
+        """Drop a client for a newcomer; return whether its user has others."""
         descriptor, is_only = listener.choose_victim(newcomer, self.is_protected)
         self._made_room += 1
         self._drop(descriptor)
@@ -174,7 +174,7 @@ class StatusSocket:
         return None
 
     def _answer_one(self, listener: Listener, descriptor: int, now_s: float) -> bool:
-        """Answer one request of a client; returns whether it had one."""
+        """Answer one request of a client; return whether it had one."""
         client = listener.clients[descriptor]
         message: Any = None
         try:

@@ -18,7 +18,6 @@ from experiments.bench.operator import BenchOperator, PromptedBenchOperator, Sim
 from experiments.bench.rig import HardwareRig, Rig, SimulatedRig, on_channels
 from experiments.bench.test_rig import TestRig
 from experiments.robot.bench_errors import BenchError
-from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import load_configuration
 from simulation.harness.blocks import resting_drop_m
@@ -34,7 +33,6 @@ from tests.bench.staged_bench import (
 from tests.folders import EXAMPLE_CONFIGURATION
 
 INSTALLED = Path("/etc/mudskipper/mudskipper.toml")
-EXAMPLE = EXAMPLE_CONFIGURATION
 REPORT = pytest.StashKey[BenchReport]()
 NOT_ASKED_FOR = "needs a robot (--can CHANNEL, or --config FILE) or --simulated"
 
@@ -54,17 +52,23 @@ def opened(request: pytest.FixtureRequest) -> Iterator[TestRig | str]:
     options, robot = request.config.option, report_of(request.config).robot
     if not (options.simulated or options.can or options.config):
         pytest.skip(NOT_ASKED_FOR)
-    path = Path(options.config) if options.config else configuration_path(options.simulated)
+    usual = INSTALLED if INSTALLED.exists() and not options.simulated else EXAMPLE_CONFIGURATION
+    path = Path(options.config) if options.config else usual
     kind = "simulated" if options.simulated else "hardware"
     stamp = datetime.now(UTC).isoformat(timespec="seconds")
     robot |= {"rig": kind, "begun": stamp, "configuration": str(path), "warnings": []}
     try:
         configuration = load_configuration(path)
-        rig, bench_operator = open_rig(request.config, on_channels(configuration, options.can or []))
+        configuration = on_channels(configuration, options.can or [])
+        bench_operator = None if options.simulated else operator_at(request.config)
+        rig: Rig = SimulatedRig(configuration) if options.simulated else HardwareRig(configuration)
     except (ConfigurationError, BenchError) as problem:
         yield reported_of_file(path, problem.problems) if isinstance(problem, ConfigurationError) else str(problem)
         return
     robot |= {"robot": configuration.robot.name, "warnings": list(rig.warnings)}
+    if isinstance(rig, SimulatedRig):
+        bench_operator = SimulatedBenchOperator(rig)
+    assert bench_operator is not None
     test_rig = TestRig(rig, bench_operator)
     try:
         yield test_rig
@@ -72,19 +76,6 @@ def opened(request: pytest.FixtureRequest) -> Iterator[TestRig | str]:
         test_rig.force_idle()
         rig.close()
         robot["lateness"] = vars(test_rig.lateness_so_far)
-
-
-def configuration_path(simulated: bool) -> Path:
-    return INSTALLED if INSTALLED.exists() and not simulated else EXAMPLE
-
-
-def open_rig(config: pytest.Config, configuration: Configuration) -> tuple[Rig, BenchOperator]:
-    """Open the rig and its operator. Raises BenchError."""
-    if config.option.simulated:
-        simulated = SimulatedRig(configuration)
-        return simulated, SimulatedBenchOperator(simulated)
-    bench_operator = operator_at(config)
-    return HardwareRig(configuration), bench_operator
 
 
 def operator_at(config: pytest.Config) -> BenchOperator:
@@ -131,20 +122,14 @@ def ask_before_moving(what: str, test_rig: TestRig, report: BenchReport, stage: 
     """Ask only once for each stage that moves something, also if the operator refuses."""
     if stage not in report.consents:
         report.consents[stage] = False  # in case no answer comes
-        report.consents[stage] = lets_move(what, test_rig, stage)
+        lying_cm = 100.0 * resting_drop_m(test_rig.configuration.geometry)
+        question = (
+            f"{stage_name(stage).capitalize()}: {what}\nThe robot stands on blocks; idle, its flippers lie on something"
+            f" soft, {lying_cm:.0f} cm below their axes. Nobody's hands are near them, and the power switch is at hand."
+        )
+        report.consents[stage] = test_rig.operator.allows_motion(question, test_rig.run_during_prompt)
     if not report.consents[stage]:
         pytest.skip("the operator did not allow motion")
-
-
-def lets_move(what: str, test_rig: TestRig, stage: int) -> bool:
-    lying_cm = 100.0 * resting_drop_m(test_rig.configuration.geometry)
-    where = (
-        f"The robot stands on blocks; idle, its flippers lie on something soft, {lying_cm:.0f} cm below their axes."
-        " Nobody's hands are near them, and the power switch is at hand."
-    )
-    return test_rig.operator.allows_motion(
-        f"{stage_name(stage).capitalize()}: {what}\n{where}", test_rig.run_during_prompt
-    )
 
 
 @pytest.hookimpl(wrapper=True)
@@ -162,19 +147,13 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     reported = yield
     if reported.when == "teardown" or not reported.passed:
         report = report_of(item.config)
-        report.worsen(reported.outcome, why_of(reported))
+        why = reported.longreprtext
+        if isinstance(reported.longrepr, tuple):  # pytest puts a location and a prefix before why a test was skipped
+            why = reported.longrepr[2].removeprefix("Skipped: ")
+        report.worsen(reported.outcome, why)
         if reported.when == "teardown":
             report.end()
     return reported
-
-
-def why_of(reported: pytest.TestReport) -> str:
-    """Return why a test did not pass; pytest puts a location and a prefix before the reason of a skipped one."""
-    return (
-        reported.longrepr[2].removeprefix("Skipped: ")
-        if isinstance(reported.longrepr, tuple)
-        else reported.longreprtext
-    )
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

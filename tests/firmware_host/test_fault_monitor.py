@@ -233,11 +233,6 @@ def test_a_lost_pose_is_reported_until_it_returns_or_is_forgotten(bench: Bench) 
     assert not lost[-1]
 
 
-def test_a_lost_lease_names_its_holder(bench: Bench) -> None:
-    (fault,) = bench.tick(lost_lease_holder="the operator's tablet")
-    assert fault == FaultKind.LEASE_LOST.fault(holder="the operator's tablet")
-
-
 # trust in encoders
 
 

@@ -16,12 +16,7 @@ from drivers.can.mock_bus import MockPort
 from drivers.odrive.codec import SET_INPUT_TORQUE
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
-from firmware_host.log.recorder import HEALTHY
 from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
-from firmware_host.operator.operator_calls import OperatorCalls
-from firmware_host.sockets.connection import Caller
-from firmware_host.sockets.rights import Peer
-from firmware_host.sockets.socket_methods import Level
 from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError
 from simulation.devices.simulated_drive import SimulatedDrive
@@ -268,15 +263,6 @@ def test_every_tick_and_every_stride_is_recorded(robot: Lockstep) -> None:
     assert kinds.count(STRIDE_KIND) == robot.loop.learning.strides_closed == 2
     assert "request walk" in recorder_of(robot).texts
     assert "mode hold to walking" in recorder_of(robot).texts
-
-
-def test_a_dead_log_writer_is_shown_in_the_status(robot: Lockstep) -> None:
-    robot.loop.recorder.report = lambda: HEALTHY._replace(alive=False)  # type: ignore[method-assign]
-    robot.step()
-    reported = OperatorCalls(robot.loop, [], lambda: robot.now_s).methods["status"](
-        {}, Caller(1, Peer(1, 0, frozenset()), Level.DRIVE)
-    )
-    assert reported["fault"]["name"] == "recorder_dead" and not reported["log"]["writer_alive"]
 
 
 def test_a_stop_does_not_cancel_a_clear_that_waits_for_the_drives(robot: Lockstep) -> None:

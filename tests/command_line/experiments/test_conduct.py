@@ -178,26 +178,6 @@ def test_measurements_remain_however_the_experiment_ends(
     assert Notebook(tmp_path, {}).entries
 
 
-def test_without_a_measurement_no_result_is_announced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def run(session: Session) -> Result:
-        Notebook(session.folder, {})
-        raise DaemonLostError("no daemon answers")
-
-    assert conduct(options(tmp_path), run) == exit_codes.NO_DAEMON
-    assert capsys.readouterr().err.strip().endswith("no daemon answers")
-
-
-def test_another_plan_is_refused_without_advice_to_continue(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Notebook(tmp_path, {"depth_m": 0.03}).write("one", {})
-
-    def run(session: Session) -> Result:
-        Notebook(session.folder, {"depth_m": 0.05})
-        raise AssertionError("it is refused")
-
-    assert conduct(options(tmp_path), run) == exit_codes.REFUSED
-    assert "the same command" not in capsys.readouterr().err
-
-
 # finished, continued, begun again
 
 

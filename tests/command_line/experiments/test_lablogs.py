@@ -84,21 +84,6 @@ def test_the_default_method_is_at_the_top_and_the_others_are_below_methods(repor
 
 
 @measured
-def test_a_file_that_is_no_log_is_listed_and_stops_nothing(report: Any) -> None:
-    assert [each["name"] for each in report["refused"]] == ["notes.csv"]
-    assert sorted(each["name"] for each in report["logs"]) == [f"{name}.csv.gz" for name in NAMES]
-    assert all(each["in_mud"] for each in report["logs"])
-
-
-@measured
-def test_disturbances_are_reported_for_each_coefficient(report: Any) -> None:
-    found = report["sensitivity"]
-    assert found["current_late"]["k_s"]["smallest"] <= found["current_late"]["k_s"]["median"]
-    assert 0.0 <= found["rows_missing"]["k_s"]["moved"] <= 1.0
-    assert set(found["groups"]) == {"firm", "walk 15.6N"}
-
-
-@measured
 def test_the_folder_has_a_page_and_figures(written: Path) -> None:
     names = ("strokes", "scatter", "left_right", "sensitivity")
     figures = {f"{name}.{ending}" for name in names for ending in ("png", "svg", "pdf")}

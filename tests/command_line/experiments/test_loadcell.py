@@ -12,9 +12,6 @@ import pytest
 
 from command_line import exit_codes
 from command_line.main import main
-from experiments.loadcell.analysis import MudCoefficient
-from experiments.loadcell.comparison import compare_muds, load_flipper
-from experiments.study.option import OptionError
 from simulation.mud.clay import clay_of_water
 from simulation.test_rig.emulated_instruments import AmplifierParameters, EmulatedAmplifier
 from simulation.test_rig.load_cell import measure_shear
@@ -98,14 +95,6 @@ def test_another_mud_is_added_to_the_report(
     assert muds["50.3"]["k_p"]["value"] < muds["48.6"]["k_p"]["value"]
 
 
-def test_another_depth_in_the_same_folder_is_refused(
-    report: dict[str, Any], folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, _, reported = run(capsys, *SHORT, "--depth", "2", "--out", str(folder / "out"))
-    assert status == exit_codes.REFUSED
-    assert "depth_m" in reported and "--out" in reported
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -144,24 +133,6 @@ def test_a_missing_port_is_reported(tmp_path: Path, capsys: pytest.CaptureFixtur
     status, _, reported = run(capsys, "experiment", "loadcell", "--port", port, "--out", str(tmp_path / "out"))
     assert status == exit_codes.REFUSED
     assert f"there is no serial port {port}" in reported
-
-
-@pytest.mark.parametrize("text", ["", "[1]", '{"muds": 3}'])
-def test_a_file_that_is_no_summary_is_refused_by_its_name(tmp_path: Path, text: str) -> None:
-    (tmp_path / "summary.json").write_text(text)
-    with pytest.raises(OptionError, match="summary.json"):
-        load_flipper(tmp_path)
-
-
-def test_muds_are_compared_by_the_meaning_of_their_names() -> None:
-    reported = MudCoefficient(value=1.0e6, trials_error=1e4, trials=(1.0e6,), repeatability=0.0)
-    muds = {"48.6": dict.fromkeys(("k_p", "k_s", "k_e"), reported), "Pond": {"k_p": reported}}
-    flipper = {
-        "muds": [{"mud": "48.60 %", "k_p": {"value": 2e6, "std_error": 0}}, {"mud": "pond", "k_p": {"value": -1}}]
-    }
-    (row,) = compare_muds(flipper, muds)
-    assert (row["mud"], row["coefficient"], row["ratio"]) == ("48.6", "k_p", 2.0)
-    assert row["ratio_std_error"] == pytest.approx(0.02)
 
 
 def test_a_simulated_manual_stage_with_an_encoder_finds_the_mud_as_well(

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
 import pytest
 
 from command_line import exit_codes
@@ -18,12 +16,10 @@ from experiments.campaign.points import with_values
 from experiments.campaign.walk_trial import run_walk
 from experiments.studies import campaign as campaign_module
 from experiments.study.notebook import NAME, Notebook
-from experiments.study.results_folder import PAGE
 from firmware_host.configuration.file_problems import ConfigurationError
-from logs.catalogue.catalogue import Catalogue, CatalogueError
+from logs.catalogue.catalogue import Catalogue
 from logs.catalogue.entry import COLUMNS, TRIALS
 from tests.folders import ROOT
-from tests.logs.test_parquet import files_of_at_most
 
 SHORT = """
 seeds = 2
@@ -241,60 +237,6 @@ def test_an_interrupted_campaign_continues_where_it_was(
     assert len(rows(tmp_path)) == 4 and len(lines) == 5  # the plan, and each trial once
 
 
-def test_without_a_folder_each_campaign_has_its_own(
-    tmp_path: Path, walked: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for _ in range(2):
-        assert main(["experiment", "campaign", str(written(tmp_path, SHORT))]) == exit_codes.OK
-    for folder in ("mudskipper-mud", "mudskipper-mud-2"):
-        metadata = pq.read_schema(tmp_path / folder / TRIALS).metadata
-        (digest,) = set(rows(tmp_path / folder, "sources"))
-        assert metadata[b"sources"].decode() == digest[0] and {b"version", b"date", b"python"} <= metadata.keys()
-
-
-def test_a_full_disk_keeps_what_was_computed(
-    command: Callable[..., int], tmp_path: Path, walked: None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    text = SHORT.replace("seeds = 2", "seeds = 20")
-    with files_of_at_most(4000):
-        assert command("--workers", "1", text=text) == exit_codes.UNHEALTHY
-    said = capsys.readouterr().err
-    assert "File too large" in said and "the same command" in said and "Traceback" not in said
-    before = (tmp_path / "out" / NAME).read_text(encoding="utf-8").count("\n")
-    assert before > 2
-    assert command("--workers", "1", text=text) == exit_codes.OK
-    assert [row[0] for row in rows(tmp_path, "speed_m_s")] == [
-        seed / strength for strength in (1000.0, 3000.0) for seed in range(1, 21)
-    ]
-
-
-def test_a_cluster_that_cannot_be_reached_is_one_sentence_and_costs_nothing(
-    command: Callable[..., int],
-    tmp_path: Path,
-    walked: None,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    pytest.importorskip("distributed", reason="needs the extra cluster")
-    monkeypatch.setattr("experiments.study.cluster_workers.CONNECT_S", 0.5)
-    assert command("--cluster", "tcp://127.0.0.1:1") == exit_codes.UNHEALTHY
-    said = capsys.readouterr().err
-    assert said.startswith("mudskipper: no cluster answers at tcp://127.0.0.1:1") and said.count("\n") == 1
-    assert command("--workers", "1") == exit_codes.OK
-
-
-def test_a_damaged_result_is_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / TRIALS).write_bytes(b"PAR1 garbage PAR1")
-    with pytest.raises(CatalogueError, match="the results of the campaigns cannot be read"):
-        rows(tmp_path)
-    assert Catalogue(tmp_path).query("SELECT count(*) FROM logs").rows == [(0,)]
-
-
-def test_without_a_campaign_the_table_is_empty(tmp_path: Path) -> None:
-    assert Catalogue(tmp_path).query("SELECT file FROM trials").rows == []
-
-
 def test_a_changed_file_and_a_changed_program_are_refused_in_the_same_folder(
     command: Callable[..., int],
     tmp_path: Path,
@@ -325,13 +267,3 @@ def test_a_robot_that_does_not_start_is_a_row_with_its_reason(tmp_path: Path) ->
     )
     entry = run_walk(tables_of(campaign)[0], 1)
     assert entry["state"] == "broken" and entry["reason"] and entry["strides"] == 0
-
-
-def test_a_lost_line_of_the_notebook_costs_one_trial(command: Callable[..., int], tmp_path: Path, walked: None) -> None:
-    assert command() == exit_codes.OK
-    notebook = tmp_path / "out" / NAME
-    notebook.write_bytes(notebook.read_bytes()[:-20])
-    (tmp_path / "out" / PAGE).unlink()
-    assert command() == exit_codes.OK
-    assert len(rows(tmp_path)) == 4
-    assert all(first < second for first, second in pairwise(rows(tmp_path, "point, seed")))

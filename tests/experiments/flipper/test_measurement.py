@@ -15,8 +15,8 @@ from control.records import Phase, Rig
 from experiments.flipper import measurement as flipper
 from experiments.flipper.measurement import FlipperTrials, require_fixed_base, require_mud
 from experiments.flipper.report import Report, report_of
-from experiments.flipper.simulation import DRIVE, SECTIONS, bench_configuration, flipper_bench
-from experiments.flipper.text import COEFFICIENTS, COMPARISON, KNOWN_BIAS, WRONG_CONSTANTS, result_of
+from experiments.flipper.simulation import bench_configuration, flipper_bench
+from experiments.flipper.text import COMPARISON, result_of
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
@@ -25,7 +25,6 @@ from experiments.trials.estimation_methods import DEFAULT, PAPER
 from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from experiments.trials.simulated_bed import CarriedBed
 from experiments.trials.stride_profile import profile_from_row
-from experiments.trials.trial import SINGLE, configuration_of
 from tests.experiments.synthetic_strides import make_estimate, make_profile, make_stride
 from tests.scripted_operator import ScriptedOperator
 
@@ -79,19 +78,6 @@ def test_a_robot_that_is_set_up_to_walk_is_refused_with_what_to_set() -> None:
         require_fixed_base(simulated_configuration())
     with pytest.raises(BenchError, match=r"set estimation\.fixed_base = true in"):
         require_fixed_base(simulated_configuration('[gait]\nprotocol = "single_flipper"\n'))
-
-
-def test_the_simulated_bench_is_what_the_experiment_needs() -> None:
-    require_fixed_base(bench_configuration())
-    assert simulated_configuration(SECTIONS, DRIVE) == bench_configuration()
-
-
-def test_the_simulated_bench_is_that_of_the_other_experiments() -> None:
-    bench, single = bench_configuration(), configuration_of(SINGLE)
-    assert (bench.gait, bench.geometry, bench.limits) == (single.gait, single.geometry, single.limits)
-    assert {drive.current_limit_a for drive in bench.drive.values()} == {
-        drive.current_limit_a for drive in single.drive.values()
-    }
 
 
 # invalid trials
@@ -216,16 +202,6 @@ def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
     reported = report_of(FlipperTrials(("47.6",), strides=2), entries, bench_configuration(), None)
     assert reported["later_strokes"]["k_p"] == pytest.approx([0.8])
     assert reported["muds"][0]["k_p"].value == 2e6
-
-
-def test_errors_that_scatter_does_not_show_are_explained_next_to_the_coefficients() -> None:
-    configuration, entries, reported = bench_configuration(), entries_of(w47_6=[2e6]), {}
-    for simulated in (False, True):
-        plan = FlipperTrials(("47.6",), simulated=simulated)
-        report = report_of(plan, entries, configuration, None)
-        reported[simulated] = result_of(report, plan, entries, configuration, []).texts[COEFFICIENTS]
-    assert KNOWN_BIAS in reported[False] and WRONG_CONSTANTS not in reported[False]
-    assert WRONG_CONSTANTS in reported[True]
 
 
 def test_without_a_load_cell_there_are_no_errors() -> None:

@@ -96,22 +96,11 @@ def test_a_stride_that_begins_stuck_is_chosen_only_where_there_is_no_other() -> 
     assert [stride["index"] for stride in choose_strides(walk)] == [1]
 
 
-def test_the_other_flippers_strides_are_not_chosen() -> None:
-    walk = walk_of([stride_row(0, 0.11), stride_row(0, 0.01, flipper=0)])
-    assert choose_strides(walk) == walk.strides[:1]
-
-
 def test_a_stride_lasts_until_the_next_insertion() -> None:
     walk = walk_of([stride_row(0, 0.11), stride_row(1, 0.11)])
     assert rows_of(walk, walk.strides[0]) == range(40)
     assert rows_of(walk, walk.strides[1]) == range(40, 80)
     assert duration_s(walk, walk.strides[1]) == pytest.approx(3.9)
-
-
-def test_rest_ends_a_stride() -> None:
-    phases = [phase for phase in STROKES for _ in range(ROWS)] + [Phase.REST] * ROWS
-    walk = walk_of([stride_row(0, 0.11)], phases)
-    assert rows_of(walk, walk.strides[0]) == range(40)
 
 
 def test_moments_are_seven_in_the_order_of_the_gait() -> None:
@@ -121,10 +110,3 @@ def test_moments_are_seven_in_the_order_of_the_gait() -> None:
     assert [Phase(walk.phase[row]).name.lower() for row in rows] == [
         moment.caption.split()[0] for moment in moments_of(walk, walk.strides[1])
     ]
-
-
-def test_a_log_that_breaks_off_has_fewer_moments() -> None:
-    phases = [phase for phase in STROKES[:3] for _ in range(ROWS)]
-    walk = walk_of([stride_row(0, 0.11)], phases)
-    assert moments_of(walk, walk.strides[0])[-1].row == 29
-    assert len(moments_of(walk, walk.strides[0])) == 5

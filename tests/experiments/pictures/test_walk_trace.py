@@ -11,9 +11,6 @@ from experiments.pictures import walk_trace
 from experiments.pictures.recorded_walk import RecordedWalk, read_walk
 from experiments.pictures.stride_choice import choose_strides, duration_s, moments_of, with_strides
 from experiments.pictures.walk_trace import DRAWN, WalkTraces, rows_drawn, rows_of_curve
-from experiments.run_report.results import headline_of
-from experiments.run_report.run import read_runs
-from logs.files.log_error import unwatched
 from logs.files.log_reader import read_log
 
 BIN = 64
@@ -66,16 +63,6 @@ def test_blocks_of_any_size_give_the_same_walks(two_walks: Path) -> None:
     assert len(found[0]) == 2 and found[0] == found[1] == found[2]
 
 
-def test_only_the_rows_of_the_chosen_walk_are_kept(two_walks: Path) -> None:
-    ticks = read_log(two_walks).ticks
-    lengths = {}
-    for number in (0, 1, 2, None):
-        traces = WalkTraces(len(ticks), number)
-        traces.add(ticks)
-        lengths[number] = [len(walk.parts) > 0 for walk in traces.walks]
-    assert lengths == {0: [False, True], 1: [True, False], 2: [False, True], None: [True, True]}
-
-
 def test_a_long_log_has_hardly_more_rows_than_a_picture_needs(two_walks: Path) -> None:
     ticks, traces = read_log(two_walks).ticks.copy(), WalkTraces(1_000_000)
     for _ in range(1_000_000 // len(ticks)):
@@ -111,15 +98,6 @@ def test_strides_of_a_trace_are_those_of_the_walk(
     for side, same in zip(whole.sides, detailed.sides, strict=True):
         rows = np.isin(side.time_s, same.time_s)
         assert side.flipper == same.flipper and side.force_z_n[rows].tobytes() == same.force_z_n.tobytes()
-
-
-def test_the_figures_of_a_report_do_not_depend_on_the_trace(two_walks: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def headline() -> object:
-        return headline_of(read_runs([two_walks], None, unwatched)[0])
-
-    whole = headline()
-    monkeypatch.setattr(walk_trace, "MOST_ROWS", 1000)
-    assert headline() == whole
 
 
 def test_a_curve_has_its_extremes_and_its_gaps(rows: walk_trace.Rows, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.strokes.fit_samples import FitSamples
-from experiments.run_report.figures import MOST_DRAWN, MOST_MUDS, draw_fits, drawn_muds
+from experiments.run_report.figures import draw_fits
 from experiments.run_report.page import estimate_rows, group_events, quality_rows
 from experiments.run_report.run import Run, read_runs
-from logs.fault_history import read_causes
 from logs.files.log_error import unwatched
 from tests.experiments.run_report.synthetic_runs import run_of, stride
 
@@ -71,12 +70,6 @@ def test_a_fit_is_drawn_next_to_its_residuals_in_units_of_its_coefficient(run: R
         assert left.get_xlim() == right.get_xlim() and left.get_ylim() == right.get_ylim()
 
 
-def test_a_long_walk_draws_few_strides_of_each_mud() -> None:
-    strides = [stride("a", samples=BY_HAND) for _ in range(300)] + [stride("b", samples=BY_HAND) for _ in range(3)]
-    marks = draw_fits(run_of(strides)).axes[0].lines[::2]
-    assert [len(np.asarray(line.get_xdata())) for line in marks[:2]] == [3 * MOST_DRAWN, 3 * 3]
-
-
 def test_a_sample_far_off_is_counted_and_not_drawn() -> None:
     moments = np.linspace(1e-8, 3e-7, 60)
     torques = K * moments + 0.002 * np.cos(np.arange(60.0))
@@ -86,23 +79,6 @@ def test_a_sample_far_off_is_counted_and_not_drawn() -> None:
     for panel in (fit, residuals):
         assert panel.get_ylim()[0] > -900.0
         assert [text.get_text() for text in panel.texts] == ["1 beyond"]
-
-
-def test_a_run_with_hundreds_of_muds_draws_those_with_the_most_strides() -> None:
-    muds = [f"mud {number}" for number in range(300)]
-    run = run_of([stride(mud, samples=BY_HAND) for mud in muds + muds[100 : 100 + MOST_MUDS]])
-    assert drawn_muds(run) == muds[100 : 100 + MOST_MUDS]
-    legend, *_ = draw_fits(run).legends
-    assert [text.get_text() for text in legend.get_texts()] == drawn_muds(run)
-
-
-@pytest.mark.parametrize("flippers", [("left", "right"), ("right",)])
-def test_the_legend_fits_into_the_picture_of_one_and_of_two_flippers(flippers: tuple[str, ...]) -> None:
-    muds = [f"k_p 1.7 N/cm³, from {number} s" for number in range(2000, 2000 + MOST_MUDS)]
-    figure = draw_fits(run_of([stride(mud, samples=BY_HAND) for mud in muds], flippers=flippers))
-    figure.draw_without_rendering()
-    outline = figure.legends[0].get_window_extent()
-    assert outline.x0 >= 0.0 and outline.x1 <= figure.bbox.width
 
 
 # events
@@ -119,14 +95,6 @@ def test_events_that_differ_in_numbers_are_one_group_with_their_ranges() -> None
         (1.0, "", 1, "mode hold to walking"),
     ]
     assert len(group_events(events("robot R1 held", "robot R2 held"), 0.0)) == 2  # names with digits are no numbers
-
-
-def test_two_hundred_overruns_are_one_cause() -> None:
-    texts = [f"fault loop_overrun (warn): The loop missed {1 + i % 3} of its ticks." for i in range(200)]
-    logged = events(*(event for text in texts for event in (text, "over: loop_overrun")))
-    assert group_events(logged, 0.0) == []  # faults have a table of their own
-    (cause,) = read_causes(logged, "")
-    assert (cause.first_s, cause.times) == (0.0, 200)
 
 
 @given(st.lists(st.sampled_from(["a 1", "a 2", "b", "c 1.5 x 2", "c 3 x 4"]), max_size=30))

@@ -201,8 +201,3 @@ def test_muds_are_compared_by_name_however_it_is_written_and_bounds_are_not() ->
     assert set(between(first, run_with([1.0e6, 1.1e6], mud="48.50"))) == {SPEED, "k_p", "k_s", "k_e"}
     assert between(first, run_with([1.0e6, 1.1e6], mud="pond")) == {}
     assert set(between(first, run_of([stride("48.5", step_m=0.1, duration_s=1.0, at_least=True)]))) == {SPEED}
-
-
-def test_a_single_stride_has_a_difference_without_an_uncertainty_of_its_speed() -> None:
-    found = between(run_with([1.0e6, 1.1e6]), run_of([stride("48.5", step_m=0.05, duration_s=1.0)]))[SPEED]
-    assert found["std_error"] is None and is_shown(found) is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,12 +11,10 @@ from control.records import Estimate
 from experiments.reports.error_table import COEFFICIENTS, error_rows, evaluation_of
 from experiments.studies import estimation
 from experiments.studies.estimation import (
-    FIELD_OF_LAYER,
     LATENCY,
     LAYERS,
     REPEATS,
     TORQUE,
-    disturbances_of,
     draw_errors,
     methods_of,
     parse_layers,
@@ -29,7 +26,7 @@ from experiments.study.option import OptionError
 from experiments.trials.latency import LATENCY_S
 from experiments.trials.trial import SINGLE, TORQUE_ERROR, WALKING
 from simulation.mud.clay import clay_of_water
-from simulation.mud.disturbances import LAB, NONE
+from simulation.mud.disturbances import NONE
 from tests.experiments.studies.synthetic_trials import SyntheticTrials
 
 STRONG = clay_of_water(47.6)
@@ -84,13 +81,6 @@ def test_wrong_muds_and_layers_are_refused() -> None:
     with pytest.raises(OptionError):
         study(SyntheticTrials(synthetic), mud=(STRONG,), strength=(1500.0,))
     assert parse_layers("none") == parse_layers("") == () and parse_layers("noise,torque") == ("noise", "torque")
-
-
-@pytest.mark.parametrize("layer", LAYERS)
-def test_one_layer_is_that_layer_alone(layer: str) -> None:
-    field = FIELD_OF_LAYER.get(layer)
-    assert disturbances_of((layer,)) == (replace(NONE, **{field: getattr(LAB, field)}) if field else NONE)
-    assert disturbances_of(LAYERS) == LAB
 
 
 def test_a_walk_is_also_evaluated_with_the_papers_drag_and_without_a_pose() -> None:
@@ -196,10 +186,3 @@ def test_the_summary_has_errors_plates_boundaries_and_settings() -> None:
     assert report["settings"]["torque_error"] == TORQUE_ERROR
     assert "Mud boundaries" in result.text()
     assert len(draw_errors(report["errors"]).axes) == 3 * len(COEFFICIENTS)
-
-
-def test_muds_without_a_value_are_marked_as_bounds_in_the_picture() -> None:
-    bound = Estimate(0.9e6, 1e4, 10, True, "it held", True)
-    rows = error_rows(DataFrame([evaluation_of("walking", "49.5", "k_s", "default", bound, 1e6, 1e6)]))
-    panel = draw_errors(rows).axes[1]
-    assert [text.get_text() for text in panel.texts] == ["bounds"]

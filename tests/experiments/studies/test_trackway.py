@@ -10,7 +10,6 @@ from experiments.studies.trackway import gaits_of, study
 from experiments.study.result import Result
 from experiments.trackway.one_mud import DEPTHS_M, best_depth, speed_cm_s
 from experiments.trackway.plots import draw_trackway
-from experiments.trackway.table_one import PAPER_TABLE, Speed
 from experiments.trackway.track_walk import end_of, is_over, walk_trackway
 from experiments.trackway.walk import Walk, WalkedStride, walk_of
 from simulation.mud.clay import MUDS
@@ -63,12 +62,6 @@ def test_a_walk_is_over_after_90_s_in_one_mud_and_not_in_all_muds() -> None:
     assert is_over(1.83, [*slow, stride("b", 0.7, 0.0, 2.0)])
 
 
-def test_the_end_of_a_walk_is_described() -> None:
-    assert end_of(Walk([stride("45.3", 1.80)], ""), 1.83) == "past the end"
-    assert end_of(Walk([stride("53.1", 0.80)], ""), 1.83) == "stuck in 53.1"
-    assert end_of(Walk([], "a drive is silent"), 1.83) == "a drive is silent"
-
-
 def test_the_first_stride_of_a_constant_depth_does_not_count() -> None:
     walk = Walk([stride("firm", 0.0, step_m) for step_m in (0.02, 0.10, 0.14)], "")
     assert speed_cm_s(walk) == pytest.approx(6.0) and speed_cm_s(walk, skipped=2) == pytest.approx(7.0)
@@ -92,15 +85,6 @@ def test_each_gait_has_its_ratio_to_the_best_constant_depth() -> None:
     assert report["constant_depth_cm_s"]["48.5"]["2"] == 7.0
 
 
-def test_only_fixed_depths_are_compared_with_the_papers_sd() -> None:
-    report = reported().summary
-    assert report["within_one_sd"] == {
-        rule: {mud: abs(6.0 - paper.mean) <= paper.sd for mud, paper in PAPER_TABLE[rule].items()}
-        for rule in ("3 cm", "5 cm")
-    }
-    assert report["paper"]["adaptive"]["53.1"] == Speed(5.1, 0.3)
-
-
 def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
     result = reported(Walk([stride("48.5")] * 3 + [stride("53.1", 0.7, 0.001)] * 2, ""))
     report = result.summary
@@ -110,15 +94,6 @@ def test_a_gait_that_got_stuck_has_no_speed_in_later_muds() -> None:
     assert report["over_best"]["3 cm"]["45.3"] is None
     assert report["ends"]["3 cm"] == {"stuck in 53.1": 2}
     assert result.notes and result.notes[0].endswith("8 times.")  # two trials of four gaits had two strides there
-
-
-def test_the_screen_shows_table_one_next_to_the_papers() -> None:
-    speeds, failed, best = reported().text().split("\n\n")
-    lines = [" ".join(line.split()) for line in speeds.splitlines()]
-    assert lines[2] == "3 cm 6.00 ± 0.00 6.00 ± 0.00 6.00 ± 0.00 6.00"
-    assert lines[4] == "paper 7.6 ± 0.5, ours outside 2.1 ± 0.8, ours outside 7.2 ± 0.5, ours outside 5.63"
-    assert "none of 6" in failed and "2 past the end" in failed
-    assert best.splitlines()[2].split()[:3] == ["depth", "2.75", "cm"]
 
 
 def test_the_picture_has_a_line_for_each_gait_and_a_dot_for_each_speed() -> None:

@@ -116,10 +116,6 @@ def test_a_push_back_during_lost_poses_is_unknown() -> None:
     assert isnan(unseen.pushed_back_m) and unseen.step_m == pytest.approx(0.10)
 
 
-def test_a_recovery_is_reported() -> None:
-    assert one_stride(POSITIONS_M, (*PHASES[:3], Phase.RECOVERY, *PHASES[4:])).recovered
-
-
 @pytest.mark.parametrize("strides", [(-1,) * 6, (0, 0, 0, 0, 2, 2), (0, 0, 0, 0, -1, -1)])
 def test_a_stride_whose_end_is_unknown_is_left_out(strides: Sequence[int]) -> None:
     with pytest.raises(ValueError, match="not enough values"):
@@ -176,13 +172,6 @@ def test_the_log_gives_the_strides_that_the_plant_made(walks: LoggedWalks) -> No
         assert stride.failure(ARM_M) == true.failure(ARM_M)
 
 
-def test_the_walks_have_both_muds_and_both_depths_and_a_failure(walks: LoggedWalks) -> None:
-    """Otherwise the comparison would not cover them."""
-    assert {stride.mud for stride in walks.truth} == {"soft", "firm"}
-    assert EXTRACTION in {stride.failure(ARM_M) for stride in walks.truth}
-    assert {stride.depth_m for stride in walks.truth} == set(DEPTHS_M)
-
-
 def test_drop_outs_of_motion_capture_lose_strides_but_never_invent_one(walks: LoggedWalks) -> None:
     """Poses are missing for 0.5 s in every 2.3 s."""
     ticks = walks.log.ticks.copy()
@@ -201,12 +190,6 @@ def test_drop_outs_of_motion_capture_lose_strides_but_never_invent_one(walks: Lo
 def walked(depth_m: float, strength_pa: float, strides: int = 3) -> Walk:
     track = Track([(100.0, Clay("mud", strength_pa))])
     return walk_by(constant_depth(depth_m), track, 1, lambda made: len(made) >= strides)
-
-
-def test_a_walk_has_the_ordered_length_and_is_deterministic() -> None:
-    first = walked(0.03, 3000.0)
-    assert (len(first.strides), first.fault) == (3, "")
-    assert walked(0.03, 3000.0, strides=1).strides == first.strides[:1]
 
 
 def test_strides_join_without_gaps() -> None:

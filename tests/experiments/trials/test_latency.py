@@ -8,7 +8,7 @@ import pytest
 
 from control.rate import PERIOD_S
 from control.records import BodyPose, DriveState, Phase, same_for_all
-from experiments.trials.latency import LATENCY_S, Sample, drawn_latency_s, with_latency
+from experiments.trials.latency import Sample, with_latency
 from experiments.trials.trial import WALKING, Trial, run_trial
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import NONE
@@ -43,11 +43,6 @@ def test_the_latency_is_found_again(ticks: int) -> None:
     assert latency_of(late) == pytest.approx(ticks * PERIOD_S, rel=0.01, abs=1e-9)
 
 
-def test_without_latency_the_samples_are_the_same() -> None:
-    assert with_latency(swinging(), 0.0) == swinging()
-    assert with_latency(swinging(), 0.4 * PERIOD_S) == swinging()  # to the nearest tick
-
-
 @pytest.mark.parametrize(("late_s", "late", "prompt"), [(0.005, (3, 4), (0, 1, 2)), (-0.005, (0, 1, 2), (3, 4))])
 def test_late_signals_have_the_time_of_their_arrival_and_the_others_stay(
     late_s: float, late: tuple[int, ...], prompt: tuple[int, ...]
@@ -64,23 +59,6 @@ def test_late_signals_have_the_time_of_their_arrival_and_the_others_stay(
         assert after[number][:2] == before[number][:2]
 
 
-def test_each_trial_has_its_own_latency_in_either_direction() -> None:
-    drawn_s = [drawn_latency_s(LATENCY_S, seed) for seed in range(1000)]
-    assert drawn_s == [drawn_latency_s(LATENCY_S, seed) for seed in range(1000)]
-    assert fmean(drawn_s) == pytest.approx(0.0, abs=4e-4)  # four standard errors
-    assert -LATENCY_S <= min(drawn_s) < -0.98 * LATENCY_S
-    assert 0.98 * LATENCY_S < max(drawn_s) <= LATENCY_S
-    assert drawn_latency_s(0.0, 1) == 0.0
-
-
 @cache
 def trial(latency_s: float) -> Trial:
     return run_trial(WALKING, Track([(5.0, clay_of_water(47.6))]), NONE, 1, 1, latency_s=latency_s)
-
-
-def test_the_robot_does_the_same_and_only_the_samples_differ() -> None:
-    assert abs(drawn_latency_s(0.02, 1)) > PERIOD_S
-    assert trial(0.02).truths == trial(0.0).truths
-    assert repr(trial(0.02).samples) != repr(trial(0.0).samples)
-    for late, prompt in zip(trial(0.02).samples, trial(0.0).samples, strict=True):
-        assert (late.now_s, late.phase, late.body) == (prompt.now_s, prompt.phase, prompt.body)

@@ -115,21 +115,10 @@ def test_a_trial_that_is_left_out_is_written_down_and_not_asked_for_again(tmp_pa
     assert again.bed.prepared == [] and again.notebook.left_out == {ALL[1]: {"skipped": True, "why": []}}
 
 
-def test_one_that_was_left_out_by_mistake_is_the_last_one_too(tmp_path: Path) -> None:
-    session = Session(tmp_path, bed=ScriptedBed(SKIP, REDO)).conduct()
-    assert session.measured == ALL and not session.notebook.left_out
-
-
 def test_the_last_trial_can_be_measured_again(tmp_path: Path) -> None:
     session = Session(tmp_path, bed=ScriptedBed(GO_ON, REDO)).conduct()
     assert session.measured == [ALL[0], ALL[0], ALL[1], ALL[2]]
     assert session.notebook.entries[ALL[0]]["count"] == 2
-
-
-def test_before_the_first_there_is_none_to_measure_again(tmp_path: Path) -> None:
-    session = Session(tmp_path, bed=ScriptedBed(REDO)).conduct()
-    assert session.measured == ALL
-    assert "nothing was measured" in session.operator.reported[0]
 
 
 def test_a_fault_is_reported_and_the_trial_repeated_on_fresh_mud(tmp_path: Path) -> None:
@@ -155,24 +144,6 @@ def test_the_operator_decides_on_a_fault_before_levelling_the_mud(tmp_path: Path
         "Torque stays off until this is cleared."
     )
     assert robot.called.count("clear") == (answer == CLEAR) and len(operator.asked) == 1 + (answer == CLEAR)
-
-
-def test_an_invalid_trial_can_be_left_out_and_clears_no_fault(tmp_path: Path) -> None:
-    session = Session(tmp_path, ScriptedOperator(SKIP))
-    session.robot.blocked = True
-    session.outcomes = [InvalidTrialError("no mud")]
-    session.conduct()
-    assert list(counted_entries(session.notebook)) == ALL[1:]
-    assert session.notebook.left_out[ALL[0]]["why"] == ["no mud"]
-    assert KEEP not in session.operator.offered[0] and "clear" not in session.robot.called
-
-
-def test_no_repetition_is_offered_after_the_operator_ends_the_experiment(tmp_path: Path) -> None:
-    session = Session(tmp_path)
-    session.outcomes = [{"remarks": []}, EndedError("the fault stands")]
-    with pytest.raises(EndedError):
-        session.conduct()
-    assert session.operator.asked == [] and list(session.notebook.entries) == ALL[:1]
 
 
 @pytest.mark.parametrize(("answer", "measured"), [(GO_ON, [ALL[0], *ALL]), (KEEP, ALL)])

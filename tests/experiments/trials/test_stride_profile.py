@@ -9,10 +9,8 @@ import pytest
 from control.modes import Mode
 from control.records import Phase
 from experiments.trials.stride_profile import (
-    WALK_PERIOD,
     profile_from_row,
     profile_of,
-    profile_of_walk,
     profile_row,
     slip_m,
     thinned,
@@ -46,10 +44,6 @@ def test_rows_outside_of_a_stride_are_not_in_its_profile() -> None:
     assert len(profile.time_s) == len(STROKE)
 
 
-def test_after_the_last_stride_there_is_no_profile() -> None:
-    assert len(profile_of(make_log(make_ticks(STROKE)), "left", 99.0).time_s) == 0
-
-
 def test_slip_is_the_plates_travel_backwards_in_the_world_not_on_the_robot() -> None:
     """The plate sweeps back by 6 cm while the body advances by 2 cm; then it moves forward with the body."""
     swept = make_profile(Phase.STANCE, [30.0, 0.0, 0.0], [0.03] * 3, body_m=[1.0, 1.02, 1.05])
@@ -76,8 +70,3 @@ def test_a_profile_is_the_same_when_read_from_the_notebook() -> None:
     for column, again in zip(profile, read, strict=True):
         assert np.allclose(column, again, atol=1e-6, equal_nan=True)
     assert np.isnan(read.force_x_n).all()
-
-
-def test_a_walk_has_the_rows_of_all_its_strides_thinned() -> None:
-    log = make_log(make_ticks(STROKE, 0, 0.0), make_ticks(STROKE, 1, 2.0))
-    assert len(profile_of_walk(log, "left").time_s) == 2 * len(STROKE) // WALK_PERIOD

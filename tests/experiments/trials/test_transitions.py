@@ -120,12 +120,3 @@ def test_the_next_border_ends_a_transition(monkeypatch: pytest.MonkeyPatch) -> N
     walk = Walk(("soft", "firm", "firm", "soft", "soft"), (1e6, 1e6, 1e6, 1e6, 1e6))
     left = [each for each in walk.transitions(monkeypatch) if each.flipper == "left"]
     assert left == [transition(None), transition(1, before="firm", after="soft")]
-
-
-def test_a_walk_in_one_mud_has_no_transition(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert Walk(("soft", "soft"), (1e6, 1e6)).transitions(monkeypatch) == []
-
-
-def test_a_stride_without_an_estimate_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The walk ended before its last stride closed."""
-    assert Walk(("soft", "soft", "firm"), (1e6, 1e6)).transitions(monkeypatch) == []

@@ -7,14 +7,11 @@ from math import isfinite
 
 import pytest
 
-from control.records import FLIPPERS, Phase
+from control.records import FLIPPERS
 from estimation.estimation_parameters import EstimationParameters
 from estimation.mud import MudEstimator
 from experiments.trials.latency import Sample
 from experiments.trials.trial import (
-    BENCH_CURRENT_A,
-    BENCH_TORQUE_NM,
-    SINGLE,
     WALKING,
     Setup,
     Trial,
@@ -46,16 +43,6 @@ def readings(sample: Sample) -> tuple[object, ...]:
     return sample[2:]
 
 
-def test_a_trial_can_be_repeated() -> None:
-    first, again = trial(), trial.__wrapped__()
-    assert repr(again.samples) == repr(first.samples)
-    assert again.truths == first.truths
-    assert again.drives == first.drives
-    other = trial(seed=2)
-    assert repr(other.samples) != repr(first.samples)
-    assert other.truths != first.truths and other.drives != first.drives
-
-
 def test_rows_repeat_as_asked() -> None:
     """A row lasts its period in whole ticks of 2.6 ms: two for 5 ms, eight for 20 ms, one if every row is new."""
     for repeated, ticks in ((trial_of_new_rows(), 1), (trial(), 2), (trial(replace(WALKING, row_period_s=0.02)), 8)):
@@ -71,12 +58,6 @@ def test_repeating_rows_does_not_affect_the_loop() -> None:
     assert len(new) > 20
     for i in new:
         assert repr(seldom[i]) == repr(often[i])
-
-
-def test_each_row_has_the_phase_of_its_own_tick() -> None:
-    phases = [sample.phase for sample in trial().samples]
-    assert phases == [sample.phase for sample in trial_of_new_rows().samples]
-    assert {Phase.INSERTION, Phase.STANCE, Phase.EXTRACTION} <= set(phases)
 
 
 def test_messages_are_at_most_two_milliseconds_old() -> None:
@@ -103,17 +84,6 @@ def test_a_fixed_base_stays_where_it_is_and_a_free_one_does_not() -> None:
 
 
 # how the robot is set up
-
-
-def test_a_single_flipper_hangs_from_a_bench_with_its_own_drives() -> None:
-    configuration = configuration_of(SINGLE)
-    assert configuration.estimation.fixed_base
-    assert configuration.gait == SINGLE.gait
-    assert configuration.limits.torque_nm == BENCH_TORQUE_NM
-    assert {drive.current_limit_a for drive in configuration.drive.values()} == {BENCH_CURRENT_A}
-    walking = configuration_of(WALKING)
-    assert not walking.estimation.fixed_base and walking.limits.torque_nm != BENCH_TORQUE_NM
-    assert walking.geometry == configuration.geometry
 
 
 def test_torque_constants_are_known_as_wrongly_as_asked() -> None:

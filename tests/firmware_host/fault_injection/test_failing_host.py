@@ -100,14 +100,18 @@ class KeepingRecorder(EventRecorder):
         return True
 
 
+def failing_log() -> tuple[KeepingRecorder, Failures, FailingRecorder]:
+    kept, failures = KeepingRecorder(), Failures(())
+    return kept, failures, FailingRecorder(kept, failures)
+
+
 def put_numbers(recorder: FailingRecorder, numbers: range) -> list[bool]:
     return [recorder.put(EVENT_KIND, EVENT.encode(float(number), str(number))) for number in numbers]
 
 
 @pytest.mark.parametrize(("kind", "alive"), [("off", False), ("stuck", True)])
 def test_a_failing_log_refuses_rows_and_then_logs_their_number(kind: str, alive: bool) -> None:
-    kept, failures = KeepingRecorder(), Failures(())
-    recorder = FailingRecorder(kept, failures)
+    kept, failures, recorder = failing_log()
     assert recorder.report() == kept.reported
     assert put_numbers(recorder, range(2)) == [True, True]
     failures.begin("log", kind, 2.0, 3.0)
@@ -122,8 +126,7 @@ def test_a_failing_log_refuses_rows_and_then_logs_their_number(kind: str, alive:
 
 
 def test_a_log_that_ends_while_it_fails_reports_its_last_loss() -> None:
-    kept, failures = KeepingRecorder(), Failures(())
-    recorder = FailingRecorder(kept, failures)
+    kept, failures, recorder = failing_log()
     failures.begin("log", "off", 0.0, 9.0)
     put_numbers(recorder, range(3))
     assert recorder.close(2.5) and kept.closed_in_s == 2.5
@@ -131,8 +134,7 @@ def test_a_log_that_ends_while_it_fails_reports_its_last_loss() -> None:
 
 
 def test_an_intermittent_log_loses_about_half_and_logs_each_gap() -> None:
-    kept, failures = KeepingRecorder(), Failures(())
-    recorder = FailingRecorder(kept, failures)
+    kept, failures, recorder = failing_log()
     failures.begin("log", "intermittent", 0.0)
     taken = put_numbers(recorder, range(200))
     failures.end_all()
@@ -143,7 +145,7 @@ def test_an_intermittent_log_loses_about_half_and_logs_each_gap() -> None:
 
 
 def test_a_writer_that_died_by_itself_stays_dead() -> None:
-    kept, failures = KeepingRecorder(), Failures(())
+    kept, failures, recorder = failing_log()
     kept.reported = HEALTHY._replace(alive=False)
     failures.begin("log", "stuck", 0.0)
-    assert not FailingRecorder(kept, failures).report().alive
+    assert not recorder.report().alive

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from control.modes import Mode
 from firmware_host.log.rest_thinning import RestThinning
 from firmware_host.log.rows import TICK
@@ -14,18 +16,18 @@ def numbers(rows: list[tuple[int, bytes]]) -> list[int]:
     return [TICK.decode(payload)["tick"] for _, payload in rows]
 
 
-def make_thinning() -> RestThinning:
+@pytest.fixture
+def thinning() -> RestThinning:
     return RestThinning(REST_HZ, FULL_S)
 
 
-def test_a_rest_is_written_ten_times_a_second_after_a_time_in_full() -> None:
-    thinned = make_thinning().thin(make_ticks(0, 3800, Mode.IDLE))
+def test_a_rest_is_written_ten_times_a_second_after_a_time_in_full(thinning: RestThinning) -> None:
+    thinned = thinning.thin(make_ticks(0, 3800, Mode.IDLE))
     assert numbers(thinned.rows) == [*range(381), *range(418, 3800, 38)]
     assert thinned.notice == "at rest: of the ticks, one in 38 is written from here on"
 
 
-def test_the_time_before_torque_is_written_after_all_and_nothing_twice() -> None:
-    thinning = make_thinning()
+def test_the_time_before_torque_is_written_after_all_and_nothing_twice(thinning: RestThinning) -> None:
     rows = thinning.thin(make_ticks(0, 3800, Mode.IDLE)).rows
     thinned = thinning.thin(make_ticks(3800, 3801, Mode.ARMING))
     written = numbers(rows + thinned.rows)
@@ -35,8 +37,7 @@ def test_the_time_before_torque_is_written_after_all_and_nothing_twice() -> None
     assert written[-1] == 3800
 
 
-def test_all_of_torque_and_of_the_time_after_it_is_written() -> None:
-    thinning = make_thinning()
+def test_all_of_torque_and_of_the_time_after_it_is_written(thinning: RestThinning) -> None:
     thinning.thin(make_ticks(0, 1000, Mode.IDLE))
     for mode, first in ((Mode.ARMING, 1000), (Mode.WALKING, 1100), (Mode.STOPPING, 2000), (Mode.FAULT, 2500)):
         rows = thinning.thin(make_ticks(first, first + 300, mode)).rows
@@ -45,22 +46,19 @@ def test_all_of_torque_and_of_the_time_after_it_is_written() -> None:
     assert numbers(rows) == [*range(2800, 2881), *range(2888, 3600, 38)]
 
 
-def test_a_change_of_mode_without_torque_ends_a_rest() -> None:
-    thinning = make_thinning()
+def test_a_change_of_mode_without_torque_ends_a_rest(thinning: RestThinning) -> None:
     thinning.thin(make_ticks(0, 1000, Mode.IDLE))
     rows = thinning.thin(make_ticks(1000, 1100, Mode.FAULT)).rows
     assert set(range(1000, 1100)) <= set(numbers(rows)) and len(rows) > 400
 
 
-def test_what_is_held_back_comes_out_at_the_end() -> None:
-    thinning = make_thinning()
+def test_what_is_held_back_comes_out_at_the_end(thinning: RestThinning) -> None:
     written = numbers(thinning.thin(make_ticks(0, 600, Mode.IDLE)).rows) + numbers(thinning.release())
     assert sorted(written) == list(range(600))
     assert thinning.release() == []
 
 
-def test_events_are_never_thinned() -> None:
-    thinning = make_thinning()
+def test_events_are_never_thinned(thinning: RestThinning) -> None:
     thinning.thin(make_ticks(0, 1000, Mode.IDLE))
     assert thinning.thin([make_event("request arm")]).rows == [make_event("request arm")]
 

@@ -88,12 +88,6 @@ def test_a_line_shows_its_blocking_faults_and_each_advice_once(ready: Lockstep) 
     assert line["fix"] == "; ".join(fault.kind.what_to_do for fault in blocking[:2])
 
 
-def test_one_mandatory_fault_makes_its_line_mandatory(ready: Lockstep) -> None:
-    lines = lines_of(ready, "watchdog_unknown", "watchdog_off")
-    assert lines["watchdog.left_sweep"]["mandatory"]
-    assert not lines_of(ready, "watchdog_unknown")["watchdog.left_sweep"]["mandatory"]
-
-
 def test_warnings_of_the_computer_are_lines_that_block_nothing(ready: Lockstep) -> None:
     line = lines_of(ready, warnings=("no real-time priority",))["realtime"]
     assert (line["ok"], line["text"]) == (True, "warning: no real-time priority")

@@ -32,18 +32,12 @@ def test_every_user_may_connect_under_every_umask(short_folder: Path, umask: int
     assert not made.path.exists()
 
 
-def test_a_second_daemon_is_refused(short_folder: Path) -> None:
-    first = SocketFile(short_folder / "s", 4)
-    with pytest.raises(AlreadyServedError, match="already running"):
-        SocketFile(short_folder / "s", 4)
-    first.close()
-
-
-def test_a_hanging_daemon_with_a_full_queue_is_not_replaced(short_folder: Path) -> None:
-    first = SocketFile(short_folder / "s", 0)
+@pytest.mark.parametrize("backlog", [4, 0])
+def test_a_daemon_is_not_replaced_even_if_it_hangs_with_a_full_queue(short_folder: Path, backlog: int) -> None:
+    first = SocketFile(short_folder / "s", backlog)
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as waiting:
         waiting.connect(str(first.path))
-        with pytest.raises(AlreadyServedError):
+        with pytest.raises(AlreadyServedError, match="already running"):
             SocketFile(short_folder / "s", 4)
     first.close()
 
