@@ -46,16 +46,13 @@ class Pulses:
         self._tick = 0
 
     def __call__(self, held: Torques, states: DriveStates) -> Torques:
-        pulse_nm = self._pulse_nm(self._tick)
+        pulse_nm = 0.0
+        for begins, sign in self.schedule:
+            if 0 <= self._tick - begins < 4 * QUARTER_TICKS:
+                quarter = (self._tick - begins) // QUARTER_TICKS
+                pulse_nm = sign * PULSE_NM * (1.0 if quarter in (0, 3) else -1.0)
         self._tick += 1
         return torque_on(held, self.index, pulse_nm)
-
-    def _pulse_nm(self, tick: int) -> float:
-        for begins, sign in self.schedule:
-            quarter, before = divmod(tick - begins, QUARTER_TICKS)[0], tick < begins
-            if not before and quarter < 4:
-                return sign * PULSE_NM * (1.0 if quarter in (0, 3) else -1.0)
-        return 0.0
 
 
 def check_step_response(test_rig: TestRig, joint: str, seed: int = 1) -> Readings:

@@ -44,11 +44,14 @@ BRAKES = "raise the damping in [gains], and see what drives the joints on"
 def check_soft_stop(test_rig: TestRig) -> Readings:
     """Check the soft stop. The robot is idle before and after, as in all checks."""
     rig = test_rig.configuration.rig
+    full_rad_s = test_rig.configuration.gait.stance_speed_m_s / test_rig.configuration.geometry.flipper_length_m
     with test_rig.flippers_raised():
         order_strides(test_rig, 2)
-        last = test_rig.run_until(lambda sample: _in_full_stance(test_rig, sample), 20.0, "The full speed of a stance")[
-            -1
-        ]
+        last = test_rig.run_until(
+            lambda sample: test_rig.loop.target.phase is Phase.STANCE and _is_fast(sample, FULL_FRACTION * full_rad_s),
+            20.0,
+            "The full speed of a stance",
+        )[-1]
         begun = measured_angles(test_rig.loop.states)
         test_rig.loop.request(Request.STOP, test_rig.rig.now_s)
         samples = test_rig.run_until(
@@ -58,12 +61,6 @@ def check_soft_stop(test_rig: TestRig) -> Readings:
     whole_s = PERIOD_S * ticks_until(samples[-1], last)
     advice = "something holds the flippers down: see that they hang free"
     yield Reading("soft stop: until the flippers are up", whole_s, "s", 0.0, SOFT_WHOLE_S, advice)
-
-
-def _in_full_stance(test_rig: TestRig, sample: Sample) -> bool:
-    full_rad_s = test_rig.configuration.gait.stance_speed_m_s / test_rig.configuration.geometry.flipper_length_m
-    in_stance = test_rig.loop.target.phase is Phase.STANCE
-    return in_stance and _is_fast(sample, FULL_FRACTION * full_rad_s)
 
 
 def check_damping(test_rig: TestRig) -> Readings:

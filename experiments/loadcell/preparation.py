@@ -16,7 +16,6 @@ from drivers.load_cell.calibration import (
     write_calibration,
 )
 from drivers.load_cell.line_formats import AUTO, COUNTS, LineFormat, find_format
-from drivers.load_cell.load_cell_port import LoadCellPort
 from drivers.serial.serial_line import SerialLine, text_fraction
 from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.strokes import StageSettings
@@ -123,7 +122,10 @@ def _require_text(recorder: CellRecorder, line: SerialLine, device: str, option:
 
 def find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibration:
     """Take the given file, the unit's own scale or the folder's file, or calibrate now. Raises BenchError."""
-    unit = cell.unit or _unit_of_lines(bench.recorder.port)
+    port = bench.recorder.port
+    readings = filter(None, (port.line_format.decode(line) for line in port.line.recent))
+    units = Counter(reading.unit for reading in readings if reading.unit)
+    unit = cell.unit or max(units, key=units.__getitem__, default=COUNTS)  # that of most lines
     file = bench.folder / CALIBRATION
     try:
         if cell.calibration is not None:
@@ -137,13 +139,6 @@ def find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibrati
     except CalibrationError as problem:
         raise BenchError(str(problem)) from problem
     return _calibrate_now(bench, unit, file)
-
-
-def _unit_of_lines(port: LoadCellPort) -> str:
-    """Return the unit in most lines, or counts."""
-    readings = [port.line_format.decode(line) for line in port.line.recent]
-    units = Counter(reading.unit for reading in readings if reading is not None and reading.unit)
-    return units.most_common(1)[0][0] if units else COUNTS
 
 
 def _calibrate_now(bench: TrialBench, unit: str, file: Path) -> LoadCellCalibration:
