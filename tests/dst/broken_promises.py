@@ -1,7 +1,6 @@
 """Robots that break a promise on purpose, to prove that the oracle notices it.
 
-Each one is a patch of the product, applied while the context lasts. `python -m tests.dst.broken_promises` reports after
-how many random seeds each one is noticed.
+Each one is a patch of the product, applied while the context lasts.
 """
 
 from __future__ import annotations
@@ -22,11 +21,6 @@ from firmware_host import loop
 from firmware_host.log.segments import LogSegments
 from firmware_host.loop import Loop
 from firmware_host.loop_events import LoopEvents
-from tests.dst.drawing import draw_scenario
-from tests.dst.run import run_scenario
-from tests.dst.starts import sound_walk
-
-MOST_SEEDS = 200
 
 Break = Callable[[], AbstractContextManager[Any]]
 
@@ -151,19 +145,3 @@ BREAKS: dict[str, Break] = {  # by the promise that must notice
     "BackToIdle": fault_stays,
     "WholeLog": rows_vanish,
 }
-
-
-def seeds_until_noticed(promise: str) -> int | None:
-    """Return how many random seeds show a break, or None where none of MOST_SEEDS does."""
-    for seed in range(MOST_SEEDS):
-        scenario = draw_scenario(seed)
-        sound_walk(scenario.surroundings).robot_at(scenario.start)  # whole until the schedule begins
-        with BREAKS[promise]():
-            if run_scenario(scenario).promise == promise:
-                return seed + 1
-    return None
-
-
-if __name__ == "__main__":
-    for each in BREAKS:
-        print(f"{each}: noticed after {seeds_until_noticed(each)} seeds", flush=True)

@@ -112,13 +112,6 @@ def test_every_command_counts_but_a_stop_and_a_reading(
     assert ("foreign_commands" in present(robot)) == counts
 
 
-def test_a_command_to_an_unknown_node_id_is_ignored(armed: Lockstep) -> None:
-    robot = copy_of(armed)
-    robot.buses["left"].open().send(Frame(arbitration_id(9, SET_INPUT_TORQUE), bytes(4)))
-    robot.step()
-    assert present(robot) == set()
-
-
 def test_the_right_drive_arms(configuration: Configuration) -> None:
     robot = Lockstep(with_serial_number(configuration, SERIAL), TRACK)
     robot.arm()

@@ -197,17 +197,6 @@ def test_flippers_that_stay_in_the_mud_are_reported(configuration: Configuration
     assert robot.loop.events.notice == "the flippers did not come out of the mud"
 
 
-def test_requests_that_do_not_fit_the_mode_are_refused_with_advice(configuration: Configuration) -> None:
-    robot = Lockstep(configuration, FIRM)
-    robot.run_for(0.5)
-    assert "arm" in (robot.loop.request(Request.WALK, robot.now_s) or "")
-    robot.arm()
-    assert "holds" in (robot.loop.request(Request.ARM, robot.now_s) or "")
-    robot.walk(WalkOrder(0.03))
-    robot.run_for(1.0)
-    assert "stop" in (robot.loop.request(Request.WALK, robot.now_s, WalkOrder(0.03)) or "")
-
-
 def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:
     robot.loop.controller.gains = replace(robot.loop.controller.gains, sweep_stiffness_nm_rad=float("nan"))
     listener = open_peer(robot, "left")

@@ -37,14 +37,15 @@ def run_cell(mode_name: str, phase: str, seed: int, drive: str = DEFAULT) -> Cel
     """Run one cell, which depends on nothing but its arguments; `drive` is the type of the robot's drives."""
     mode, random = mode_of(mode_name, drive), Random(f"{mode_name} {phase} {seed}")
     joint = random.choice(mode.joints(phase))
+    reaction, bound_ticks = _demanded(mode)
     cell = Cell(
         fault=mode.fault,
         mode_name=mode_name,
         phase=phase,
         seed=seed,
         joint=joint,
-        reaction=_reaction_text(mode),
-        bound_ticks=_bound_ticks(mode),
+        reaction=reaction,
+        bound_ticks=bound_ticks,
     )
     try:
         _inject_and_measure(mode, cell, random, drive)
@@ -65,18 +66,13 @@ def _inject_and_measure(mode: FailureMode, cell: Cell, random: Random, drive: st
     measurement.run_on()
 
 
-def _reaction_text(mode: FailureMode) -> str:
+def _demanded(mode: FailureMode) -> tuple[str, int | None]:
+    """Return the reaction that the failure demands, and the ticks within which it must come."""
     if mode.fault_kind and not mode.waived:
-        return mode.fault_kind.reaction.name.lower()
-    return "drives_idle" if mode.ends_loop else "none"
-
-
-def _bound_ticks(mode: FailureMode) -> int | None:
-    if mode.fault_kind and not mode.waived:
-        return mode.bound_ticks or mode.fault_kind.bound_ticks
-    if not mode.ends_loop:
-        return None
-    return BUG_BOUND_TICKS if mode.raises else WATCHDOG_TICKS
+        return mode.fault_kind.reaction.name.lower(), mode.bound_ticks or mode.fault_kind.bound_ticks
+    if mode.ends_loop:
+        return "drives_idle", BUG_BOUND_TICKS if mode.raises else WATCHDOG_TICKS
+    return "none", None
 
 
 class Measurement:

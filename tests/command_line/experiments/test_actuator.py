@@ -91,12 +91,6 @@ def test_options_without_a_valid_plan_are_wrong_usage(options: list[str], capsys
     assert options[0] in capsys.readouterr().err
 
 
-def test_a_missing_daemon_is_reported_with_how_to_start_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command = ["experiment", "actuator", "--socket", str(tmp_path / "none.sock"), "--out", str(tmp_path)]
-    assert main(command) == exit_codes.NO_DAEMON
-    assert "no daemon answers" in capsys.readouterr().err
-
-
 def test_an_operator_at_a_terminal_is_prompted_and_may_skip_weights(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -237,10 +237,6 @@ def test_an_interrupted_campaign_continues_where_it_was(
     assert len(rows(tmp_path)) == 4 and len(lines) == 5  # the plan, and each trial once
 
 
-def test_without_a_campaign_the_table_is_empty(tmp_path: Path) -> None:
-    assert Catalogue(tmp_path).query("SELECT file FROM trials").rows == []
-
-
 def test_a_changed_file_and_a_changed_program_are_refused_in_the_same_folder(
     command: Callable[..., int],
     tmp_path: Path,

@@ -72,12 +72,6 @@ def test_an_unknown_coefficient_gives_no_force() -> None:
     assert np.isnan(modelled_forces(profile, GEOMETRY, 0.0, K | {"k_p": None}, "default").force_z_n).all()
 
 
-def test_rows_without_a_load_have_no_force() -> None:
-    profile = lawful(Phase.INSERTION, [30.0] * 5, DEPTHS_M)
-    profile.sweep_nm[3] = np.nan
-    assert np.isnan(modelled_forces(profile, GEOMETRY, 0.0, K, "default").force_z_n[3])
-
-
 def test_the_misfit_is_the_root_mean_square_where_the_law_is_evaluated() -> None:
     assert misfit_n(np.array([1.0, 5.0, 0.0]), np.array([4.0, 1.0, np.nan])) == pytest.approx(np.sqrt(12.5))
     assert misfit_n(np.array([1.0]), np.array([np.nan])) is None

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimation.strokes.fit_samples import FitSamples
-from experiments.run_report.figures import MOST_DRAWN, draw_fits
+from experiments.run_report.figures import draw_fits
 from experiments.run_report.page import estimate_rows, group_events, quality_rows
 from experiments.run_report.run import Run, read_runs
 from logs.files.log_error import unwatched
@@ -68,12 +68,6 @@ def test_a_fit_is_drawn_next_to_its_residuals_in_units_of_its_coefficient(run: R
         np.testing.assert_allclose(np.asarray(marks.get_xdata())[of_first], 1e8 * np.array(samples.moments_m4))
     for left, right in ((axes[0], axes[2]), (axes[1], axes[3])):
         assert left.get_xlim() == right.get_xlim() and left.get_ylim() == right.get_ylim()
-
-
-def test_a_long_walk_draws_few_strides_of_each_mud() -> None:
-    strides = [stride("a", samples=BY_HAND) for _ in range(300)] + [stride("b", samples=BY_HAND) for _ in range(3)]
-    marks = draw_fits(run_of(strides)).axes[0].lines[::2]
-    assert [len(np.asarray(line.get_xdata())) for line in marks[:2]] == [3 * MOST_DRAWN, 3 * 3]
 
 
 def test_a_sample_far_off_is_counted_and_not_drawn() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.study.provenance import PACKAGES, identity, provenance
+from experiments.study.provenance import PACKAGES, identity
 from tests.folders import ROOT
 
 STUDY = "experiments.studies.sweep"
@@ -49,12 +49,6 @@ def test_an_import_within_a_function_counts(copy: Path) -> None:
     with (copy / "experiments/study/cluster_workers.py").open("a") as module:
         module.write("ANOTHER = 1\n")
     assert digest_of(copy, "command_line.experiments.studies") != before
-
-
-def test_the_record_says_what_computed_and_when() -> None:
-    record = provenance(STUDY)
-    assert record.keys() == {"version", "sources", "commit", "python", "machine", "date"}
-    assert record | identity(STUDY) == record
 
 
 def test_two_modules_have_the_digest_of_all_that_they_import() -> None:

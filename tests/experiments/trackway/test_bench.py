@@ -23,10 +23,9 @@ from experiments.trackway.bench import (
     measure,
     report_of,
     run,
-    summary_of,
 )
 from experiments.trackway.plots import draw_trackway
-from experiments.trackway.walk import Walk, WalkedStride
+from experiments.trackway.walk import Walk
 from experiments.trials.mud_trials import Bench, InvalidTrialError, counted_entries
 from experiments.trials.simulated_bed import simulated_bench
 from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, MotionCaptureParameters
@@ -165,9 +164,3 @@ def test_a_walk_that_arrives_or_gets_stuck_is_not_marked_as_stopped(
 ) -> None:
     end = Progress(SHORT, 0.0, 0.0).evaluate({"now_s": now_s, "body_x_m": body_m, "phase": "insertion"})
     assert end and end.why.startswith(why) and end.stopped is stopped
-
-
-def test_a_trial_is_summarised_in_one_line() -> None:
-    stride = WalkedStride("48.5", 0.0, 0.03, 0.1, 2.0, 0.0)
-    assert summary_of(Walk([stride], "")) == "1 stride, 5.0 cm/s"
-    assert summary_of(Walk([stride, stride], "stuck in 48.5")) == "2 strides, 5.0 cm/s; stuck in 48.5"

@@ -116,10 +116,6 @@ def test_a_push_back_during_lost_poses_is_unknown() -> None:
     assert isnan(unseen.pushed_back_m) and unseen.step_m == pytest.approx(0.10)
 
 
-def test_a_recovery_is_reported() -> None:
-    assert one_stride(POSITIONS_M, (*PHASES[:3], Phase.RECOVERY, *PHASES[4:])).recovered
-
-
 @pytest.mark.parametrize("strides", [(-1,) * 6, (0, 0, 0, 0, 2, 2), (0, 0, 0, 0, -1, -1)])
 def test_a_stride_whose_end_is_unknown_is_left_out(strides: Sequence[int]) -> None:
     with pytest.raises(ValueError, match="not enough values"):
@@ -174,13 +170,6 @@ def test_the_log_gives_the_strides_that_the_plant_made(walks: LoggedWalks) -> No
         assert stride.position_m == pytest.approx(true.position_m, abs=1e-3)  # a joint angle is 1 ms old
         assert stride.pushed_back_m == pytest.approx(true.pushed_back_m, abs=1e-9)
         assert stride.failure(ARM_M) == true.failure(ARM_M)
-
-
-def test_the_walks_have_both_muds_and_both_depths_and_a_failure(walks: LoggedWalks) -> None:
-    """Otherwise the comparison would not cover them."""
-    assert {stride.mud for stride in walks.truth} == {"soft", "firm"}
-    assert EXTRACTION in {stride.failure(ARM_M) for stride in walks.truth}
-    assert {stride.depth_m for stride in walks.truth} == set(DEPTHS_M)
 
 
 def test_drop_outs_of_motion_capture_lose_strides_but_never_invent_one(walks: LoggedWalks) -> None:
