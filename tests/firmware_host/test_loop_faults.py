@@ -314,7 +314,15 @@ def test_a_disarmed_request_by_force_leaves_no_trace(unread: Robot) -> None:
     assert mode_of(unread) is Mode.IDLE
 
 
-@pytest.mark.parametrize("name", ["drive_silent", "voltage_under", "joint_position"])
+def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
+    robot = at("idle")
+    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
+    assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
+    assert not robot.loop.forced
+    assert not any("despite" in text for text in robot.recorder.texts)
+
+
+@pytest.mark.parametrize("name", ["drive_silent", "voltage_under", "motor_hot", "current_stale", "joint_position"])
 def test_mandatory_faults_are_never_overruled(at: Copied, name: str) -> None:
     robot = at("idle")
     fail(robot, name)
