@@ -234,4 +234,5 @@ class WatchApp(App[int]):
         if is_alarm:
             self.notify(message, severity="error", timeout=ALARM_S)
         style = BADGES["fault"] if is_alarm else ""
-        self.query_one(RichLog).write(Text.assemble((f"{time.strftime('%H:%M:%S')} ", "dim"), (message, style)))
+        line = Text.assemble((f"{time.strftime('%H:%M:%S')} ", "dim"), (message, style))
+        self.query_one(RichLog).write(line, shrink=False)  # a log that a question hides is 0 columns wide

@@ -37,10 +37,14 @@ async def until(app: WatchApp, pilot: Pilot[int], done: Callable[[], bool]) -> N
 
 
 def drive(
-    path: Path, script: Callable[[WatchApp, Pilot[int]], Awaitable[None]], width: int = 80, height: int = 24
+    path: Path,
+    script: Callable[[WatchApp, Pilot[int]], Awaitable[None]],
+    width: int = 80,
+    height: int = 24,
+    send: Callable[[str], str] | None = None,
 ) -> WatchApp:
     """Run the app with a script that presses keys and reads the screen."""
-    app = WatchApp(Feed(path, PERIOD_S), ["left", "right"], PERIOD_S, partial(send_order, path))
+    app = WatchApp(Feed(path, PERIOD_S), ["left", "right"], PERIOD_S, send or partial(send_order, path))
 
     async def run() -> None:
         async with app.run_test(size=(width, height)) as pilot:
@@ -114,6 +118,17 @@ def test_a_disarm_that_a_drive_cannot_confirm_leaves_the_torque_unknown(
 
     with walked.served(short_folder / "s"):
         drive(short_folder / "s", script)
+
+
+def test_an_answer_that_comes_at_once_is_shown(resting: ServedRobot, short_folder: Path) -> None:
+    """A question hides the answers, and has not given their place back by then."""
+
+    async def script(app: WatchApp, pilot: Pilot[int]) -> None:
+        await pilot.press("c", "y")
+        await until(app, pilot, lambda: "clear refused" in shown(app))
+
+    with resting.served(short_folder / "s"):
+        drive(short_folder / "s", script, send=lambda method: f"{method} refused")
 
 
 def test_arming_walking_and_clearing_ask_first(resting: ServedRobot, short_folder: Path) -> None:
