@@ -31,6 +31,6 @@ class Meaning(NamedTuple):
 
 
 def unit_of(name: str, meaning: Meaning) -> str:
-    """Returns a field's unit; empty for a field that is no number."""
+    """Return a field's unit; empty for a field that is no number."""
     suffixes = [suffix for suffix in UNIT_OF_SUFFIX if name.endswith(suffix)]
     return meaning.unit or UNIT_OF_SUFFIX.get(max(suffixes, key=len, default=""), "")

@@ -23,7 +23,7 @@ def exit_statuses() -> Iterator[str]:
 
 
 def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:
-    """Yields the section of every command, those of a group after each other."""
+    """Yield the section of every command, those of a group after each other."""
     for group in parser._actions:
         if not isinstance(group, argparse._SubParsersAction):
             continue

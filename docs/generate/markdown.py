@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    """Yields the lines of a table, with an empty line on either side."""
+    """Yield the lines of a table, with an empty line on either side."""
     yield ""
     yield _line(head)
     yield _line(["---"] * len(head))
@@ -17,5 +17,5 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def code(text: object) -> str:
-    """Returns `text` as code, or nothing where it is empty."""
+    """Return `text` as code, or nothing where it is empty."""
     return f"`{text}`" if str(text) else ""

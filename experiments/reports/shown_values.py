@@ -4,7 +4,7 @@ from typing import Any
 
 
 def value_shown(value: Any) -> str:
-    """Returns yes or no, lists without brackets, floats with four digits or two decimals, and a dash for nothing."""
+    """Return yes or no, lists without brackets, floats with four digits or two decimals, and a dash for nothing."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list | tuple):

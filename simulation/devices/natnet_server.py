@@ -158,7 +158,7 @@ class NatNetServer:
         self.identity, self._models_changed = identity, True
 
     def step(self, now_s: float) -> int:
-        """Answers requests and sends the frames that are due; returns the number of frames."""
+        """Answer requests and send the frames that are due; return the number of frames."""
         self._answer()
         sent = 0
         while self._poses and self._poses[0].time_s + self.latency_s <= now_s:

@@ -57,7 +57,7 @@ class Machine:
         self._received = b""
 
     def boot(self) -> None:
-        """Boots, and returns when the guest takes commands."""
+        """Boot, and return when the guest takes commands."""
         port = self._folder / "commands"
         port.unlink(missing_ok=True)
         with (self._folder / "console").open("ab") as console:

@@ -68,7 +68,7 @@ class SimulatedMit(SimulatedDrive):
         return self._send(Frame(self._feedback_id, data, stamp_s=now_s))
 
     def _answer(self, frame: Frame, now_s: float) -> bytes:
-        """Answers with the values of before, and executes the frame."""
+        """Answer with the values of before, and execute the frame."""
         parameters = self.parameters
         if parameters.any_frame_feeds:
             self._fed_s = now_s

@@ -64,7 +64,7 @@ class SimulatedMoteus(SimulatedDrive):
         return self._send(answer_frame(self.parameters.node_id, data, now_s))
 
     def _any_answer(self, data: bytes, now_s: float) -> bytes:
-        """Answers with the values of before, as a drive does, and executes the frame."""
+        """Answer with the values of before, as a drive does, and execute the frame."""
         subframes = list(registers.decode_frame(data))
         answer = registers.padded(b"".join(map(self._answer, subframes)))
         self._execute(subframes, now_s)
@@ -109,7 +109,7 @@ class SimulatedMoteus(SimulatedDrive):
             self._follow({Register(each): value for each, value in written.items() if each in DEFAULTS}, now_s)
 
     def _follow(self, written: Mapping[Register, float], now_s: float) -> None:
-        """Enters position mode, or stays there; a fault or an expired watchdog ends with a stop only."""
+        """Enter position mode, or stay there; a fault or an expired watchdog ends with a stop only."""
         if self.mode not in (Mode.STOPPED, Mode.POSITION):
             return
         if self.mode is Mode.STOPPED:

@@ -60,7 +60,7 @@ class SimulatedOdrive05(SimulatedOdrive):
             super()._execute(command, data, now_s)
 
     def _read_parameter(self, data: bytes) -> list[Frame]:
-        """Answers nothing: a data frame with this id means nothing here."""
+        """Answer nothing: a data frame with this id means nothing here."""
         return []
 
     def _trip_if_due(self, now_s: float) -> None:
