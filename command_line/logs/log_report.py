@@ -33,6 +33,17 @@ TERMINAL = 80  # letters in a line
 FIT = ("r_squared", "r_squared_about_mean", "rms_residual_nm")
 
 
+Muds = Annotated[
+    tuple[tuple[str, float], ...],
+    Option(
+        "mud and its length (default: 61), in the order of the track",
+        metavar="NAME[=CM]",
+        parse=mud_length,
+        alternative="mud",
+    ),
+]
+
+
 def log_report(
     files: Annotated[
         tuple[Path, ...],
@@ -40,15 +51,7 @@ def log_report(
     ],
     *,
     out: Annotated[Path | None, Option("(default: a folder named after the log)", metavar="DIR", parse=folder)] = None,
-    mud: Annotated[
-        tuple[tuple[str, float], ...],
-        Option(
-            "mud and its length (default: 61), repeatable, in the order of the track",
-            metavar="NAME[=CM]",
-            parse=mud_length,
-            alternative="mud",
-        ),
-    ] = (),
+    mud: Muds = (),
     world: Annotated[Path | None, Option("of the simulated robot: names the muds", alternative="mud")] = None,
     vertical: Vertical = None,
     json: Json = False,

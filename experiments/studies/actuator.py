@@ -38,17 +38,19 @@ def parse_weights(text: str) -> tuple[float, ...]:
     return weights_g
 
 
+Lever = Annotated[
+    float | None, Option("axle to weight (default: the flipper's length)", low=1.0, high=100.0, unit="cm")
+]
+Weights = Annotated[Any, Option("in grams (default: the paper's)", metavar="G,G,...", parse=parse_weights)]
+
+
 def study(
     session: Session,
     *,
     joint: Annotated[tuple[str, ...], Option("to calibrate", choices=JOINTS)] = ("right_adduction", "right_sweep"),
-    lever: Annotated[
-        float | None, Option("axle to weight (default: the flipper's length)", low=1.0, high=100.0, unit="cm")
-    ] = None,
+    lever: Lever = None,
     lever_tolerance: Annotated[float, Option("of the lever", low=0.0, high=50.0, unit="mm")] = 1.0,
-    weights: Annotated[
-        Any, Option("in grams (default: the paper's)", metavar="G,G,...", parse=parse_weights)
-    ] = PAPER_WEIGHTS_G,
+    weights: Weights = PAPER_WEIGHTS_G,
     weight_tolerance: Annotated[float, Option("of the weights", low=0.0, high=10.0, unit="%", metavar="PERCENT")] = 0.1,
     trials: Annotated[int, Option("passes through them", low=1, high=100)] = PAPER_TRIALS,
     gravity: Annotated[float, Option("local gravity", low=9.7, high=9.9, unit="m/s²", metavar="M/S2")] = GRAVITY_M_S2,

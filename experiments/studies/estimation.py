@@ -78,6 +78,12 @@ def parse_water(text: str) -> Clay:
         raise OptionError(str(problem)) from None
 
 
+Layers = Annotated[
+    tuple[str, ...],
+    Option("disturbances, separated by commas, or none (default: all)", metavar="A,B", parse=parse_layers, joined=True),
+]
+
+
 def study(
     trials: Trials,
     *,
@@ -92,12 +98,7 @@ def study(
     strength: Annotated[
         tuple[float, ...], Option("of muds, instead of their water", low=50, high=50000, unit="Pa")
     ] = (),
-    layers: Annotated[
-        tuple[str, ...],
-        Option(
-            "disturbances, separated by commas, or none (default: all)", metavar="A,B", parse=parse_layers, joined=True
-        ),
-    ] = LAYERS,
+    layers: Layers = LAYERS,
 ) -> Result:
     """Estimated coefficients against a load cell."""
     if mud and strength:

@@ -28,18 +28,21 @@ FIGURES = {
 }
 
 
+Groups = Annotated[
+    tuple[GroupRule, ...],
+    Option(
+        "put logs with such a file name into one group (default: the label in the name, as 12.5N)",
+        metavar="PATTERN=NAME",
+        parse=parse_rule,
+    ),
+]
+
+
 def study(
     trials: Trials,
     folders: Annotated[tuple[Path, ...], Option("with logs: .csv, .csv.gz or .mcap", metavar="DIR")],
     *,
-    group: Annotated[
-        tuple[GroupRule, ...],
-        Option(
-            "put logs with such a file name into one group (default: the label in the name, as 12.5N)",
-            metavar="PATTERN=NAME",
-            parse=parse_rule,
-        ),
-    ] = (),
+    group: Groups = (),
     air: Annotated[tuple[str, ...], Option("logs without mud (default: detected)", metavar="PATTERN")] = (),
     vertical: Annotated[
         CaptureAxis, Option("axis of a CSV log's motion capture that points up", metavar="AXIS")

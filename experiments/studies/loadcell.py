@@ -52,6 +52,15 @@ def parse_plate(text: str) -> Plate:
 Baud = Annotated[int, Option("of its port", low=300, high=4_000_000)]
 
 
+PAPER_PLATE_CM = (3.0, 3.5, 0.4)
+PlateSizes = Annotated[Plate, Option("or WxHxT, in cm (default: 3x3.5x0.4)", metavar="WxH", parse=parse_plate)]
+PositionStep = Annotated[float | None, Option("travel per count, of either sign", low=0.01, high=10000.0, unit="um")]
+PositionPort = Annotated[
+    str | None,
+    Option("port of an encoder of the stage, which may be pushed by hand then", metavar="PATH", without_value=""),
+]
+
+
 def study(
     session: Session,
     *,
@@ -67,19 +76,10 @@ def study(
     trials: Annotated[int, Option("of shear and of insertion", low=1, high=1000)] = 5,
     depth: Annotated[float, Option("of the plate's edge", above=0.0, high=20.0, unit="cm")] = 3.0,
     depth_error: Annotated[float, Option("one standard error of the set depth", low=0.0, high=20.0, unit="mm")] = 0.5,
-    plate: Annotated[Plate, Option("or WxHxT, in cm (default: 3x3.5x0.4)", metavar="WxH", parse=parse_plate)] = (
-        3.0,
-        3.5,
-        0.4,
-    ),
+    plate: PlateSizes = PAPER_PLATE_CM,
     speed: Annotated[float, Option("of the stage", low=0.001, high=1.0, unit="m/s")] = 0.1,
-    position: Annotated[
-        str | None,
-        Option("port of an encoder of the stage, which may be pushed by hand then", metavar="PATH", without_value=""),
-    ] = None,
-    position_step: Annotated[
-        float | None, Option("travel per count, of either sign", low=0.01, high=10000.0, unit="um")
-    ] = None,
+    position: PositionPort = None,
+    position_step: PositionStep = None,
     position_baud: Baud = 115200,
     position_label: Annotated[str, Option("at the beginning of each of its lines", metavar="TEXT")] = "",
     compare: Annotated[Path | None, Option("summary.json of the flipper experiment")] = None,
