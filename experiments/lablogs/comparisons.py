@@ -50,13 +50,13 @@ def contradictions(recorded: DataFrame) -> dict[str, int]:
     own = recorded[recorded["coefficient"] == "k_e"]
     strides = own.groupby(["log", "flipper", "walk"])[["value", "std_error", "kind"]]
     bound = own["kind"] == "bound"
-    beside, above = ~bound & bound, ~bound & bound
+    neighbouring, above = ~bound & bound, ~bound & bound
     for neighbour in (strides.shift(1), strides.shift(-1)):
         known = bound & (neighbour["kind"] == "value")
         margin = CONTRADICTING * np.hypot(own["std_error"], neighbour["std_error"])
-        beside |= known
+        neighbouring |= known
         above |= known & (own["value"] - neighbour["value"] > margin)
-    return {"bounds": int(bound.sum()), "with_neighbour": int(beside.sum()), "contradicting": int(above.sum())}
+    return {"bounds": int(bound.sum()), "with_neighbour": int(neighbouring.sum()), "contradicting": int(above.sum())}
 
 
 def disturbed_values(estimates: DataFrame) -> DataFrame:
