@@ -146,7 +146,7 @@ def _describe_strides(
         for row in sorted(walk.strides, key=lambda row: int(row["index"])):
             by_index.setdefault(row["index"], {})[FLIPPERS[row["flipper"]]] = row
         first_rows = [next(iter(rows.values())) for rows in by_index.values()]
-        ends_s = [*(first["t_start_s"] for first in first_rows[1:]), UNKNOWN]
+        ends_s = [*(first["t_start_s"] for first in first_rows), UNKNOWN][1:]
         for (index, rows), first, end_s in zip(by_index.items(), first_rows, ends_s, strict=True):
             mud = _mud_of(walk, layout, regions, first)
             stride = {"walk": number, "index": index, "mud": mud}

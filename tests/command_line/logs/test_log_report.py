@@ -12,6 +12,7 @@ import pytest
 from command_line import exit_codes
 from command_line.logs import log_report
 from command_line.main import main
+from control.controller import WalkOrder
 from experiments.run_report import run as run_module
 from experiments.study.result import Result
 from firmware_host.configuration.configuration import Configuration
@@ -109,6 +110,20 @@ def test_a_log_without_a_walk_says_so(
     assert capsys.readouterr().out == "rest-report/report.html\n"
     page = Path("rest-report/report.html").read_text(encoding="utf-8")
     assert "The robot did not walk." in page and "No complete stride." in page
+
+
+def test_a_walk_that_is_cut_off_before_its_first_stride_ends_has_no_stride(
+    configuration: Configuration, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorder = FileRecorder(tmp_path / "cut.mcap", configuration)
+    robot = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=recorder)
+    robot.arm()
+    robot.walk(WalkOrder(0.03, True, 1))
+    robot.run_for(0.3)
+    recorder.close()
+    assert main(["log", "report", str(recorder.path), "--out", str(tmp_path / "page"), "--json"]) == exit_codes.OK
+    report = json.loads(capsys.readouterr().out)
+    assert report["strides"] == [] and (tmp_path / "page" / "walk-1.svg").exists()
 
 
 def record_rest(path: Path, configuration: Configuration) -> None:
