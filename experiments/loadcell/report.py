@@ -92,7 +92,7 @@ def list_remarks(trials: Sequence[AnalysedTrial], settings: StageSettings) -> li
         remarks.append(f"in {len(by_trial)} trials {next(iter(by_trial.values()))}")
     else:
         remarks += [f"{key}: {remark}" for key, remark in by_trial.items()]
-    turned = sum(trial.profile is not None and trial.profile.turned for trial in trials)
+    turned = sum(trial.profile.turned for trial in trials)
     if turned:
         remarks.append(f"in {turned} trials the cell measured with the opposite sign; their forces are turned")
     return remarks

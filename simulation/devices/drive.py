@@ -28,6 +28,11 @@ class SimulatedDriveParameters:
     encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # reported minus true angle of the joint
     encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
     encoder_frozen: bool = False  # the last angle for ever, and exactly zero velocity: a magnet that came off
+    encoder_slip_rad_s: Annotated[float, Bounds(-10.0, 10.0)] = (
+        0.0  # rate at which the reported angle leaves the true one
+    )
+    velocity_slip_rad_s: Annotated[float, Bounds(-10.0, 10.0)] = 0.0  # reported minus true speed of the joint
+    velocity_error: Annotated[float, Bounds(-0.9, 5.0)] = 0.0  # fraction by which the reported speed is larger
     watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
     any_frame_feeds: bool = False  # its watchdog, as in firmware 0.5
     encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
