@@ -315,7 +315,7 @@ class FaultKind(StrEnum):
         "check the drive's limits, its torque constant and cables, then 'mudskipper clear'",
     )
     ZERO_SHIFTED = (
-        "zero_shifted", "joint", NONE, ALWAYS, BY_HAND, 580,
+        "zero_shifted", "joint", NONE, ALWAYS, WHEN_GONE, 580,
         "A drive reports another angle after a restart, a silence or a jump, so its zero may have shifted.",
         "The {subject} joint was at {before_deg:.1f} and is reported at {now_deg:.1f} degrees, and its drive saw no"
         " motion between.",
