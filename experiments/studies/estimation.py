@@ -68,6 +68,7 @@ LAYERS = (*FIELD_OF_LAYER, REPEATS, TORQUE, LATENCY)
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
 HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 Row = dict[str, Any]
+Columns = Mapping[str, tuple[str, Callable[[Any], str]]]  # by head: the key in a row, and how its value is shown
 
 
 def parse_layers(text: str) -> tuple[str, ...]:
@@ -222,7 +223,6 @@ def _evaluate_method(
 def _table(
     name: str, title: str, rows: Sequence[Row], columns: Mapping[str, tuple[str, Callable[[Any], str]]]
 ) -> Table:
-    """Return a table with these columns: the key of each in a row, and how its value is shown."""
     shown = [{head: show(row[key]) for head, (key, show) in columns.items()} for row in rows]
     return Table(name, title, {}, DataFrame(shown))
 
@@ -231,7 +231,7 @@ def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100.0 * value:.1f} %"
 
 
-ERROR_COLUMNS = {
+ERROR_COLUMNS: Columns = {
     "setup": ("setup", str),
     "mud": ("mud", mud_text),
     "": ("coefficient", str),
@@ -245,7 +245,7 @@ ERROR_COLUMNS = {
     "hold": ("bounds_hold", _percent),
     "not valid": ("not_valid", str),
 }
-PLATE_COLUMNS = {
+PLATE_COLUMNS: Columns = {
     "setup": ("setup", str),
     "mud": ("mud", mud_text),
     "": ("coefficient", str),
@@ -253,7 +253,7 @@ PLATE_COLUMNS = {
     "estimate / upright": ("estimate_over_upright", number),
     "fraction due to the lean": ("lean_fraction", _percent),
 }
-BOUNDARY_COLUMNS = {
+BOUNDARY_COLUMNS: Columns = {
     "from": ("from", mud_text),
     "to": ("to", mud_text),
     "transitions": ("transitions", str),

@@ -25,7 +25,7 @@ def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]
     """
     replayed = replay_trial(trial, trial.configuration.estimation)
     estimates = {stride.index: estimate for stride, estimate in replayed}
-    transitions = []
+    transitions: list[dict[str, Any]] = []
     for flipper in trial.configuration.rig.flippers:
         strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in estimates]
         muds = [stride.clay.name for stride in strides]
@@ -33,8 +33,9 @@ def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]
         for start, end in pairwise([*starts, len(strides)]):
             close = [_is_close(stride, truths, estimates) for stride in strides[start:end]]
             followed = close.index(True) + 1 if True in close else None
-            between = {"before": muds[start - 1], "after": muds[start]}
-            transitions.append(between | {"flipper": flipper, "strides": followed})
+            transitions.append(
+                {"before": muds[start - 1], "after": muds[start], "flipper": flipper, "strides": followed}
+            )
     return transitions
 
 
