@@ -80,13 +80,6 @@ def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None
     assert robot.mode == "idle" and robot.closed
 
 
-def test_an_idle_robot_makes_no_prompt(tmp_path: Path) -> None:
-    robot, operator = HoldingRobot(), ScriptedOperator()
-    robot.mode = "idle"
-    bench_of(robot, operator, tmp_path).leave()
-    assert not operator.asked and robot.closed
-
-
 def test_the_torque_of_a_robot_that_was_taken_over_stays_on(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(RobotInUseError("taken over: uid 1")), ScriptedOperator()
     with pytest.raises(RobotInUseError):
