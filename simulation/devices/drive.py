@@ -71,3 +71,6 @@ class DriveError(Enum):
     OVERCURRENT = auto()
     WATCHDOG = auto()
     OVERSPEED = auto()
+    OVERVOLTAGE = auto()  # of the supply, while the motor brakes
+    UNDERVOLTAGE = auto()
+    BRAKE_RESISTOR = auto()  # disarmed
