@@ -79,7 +79,9 @@ class StatusParameters:
     anyone_may_stop: Annotated[
         bool, Meaning("every local account may stop and disarm; false: the two groups below")
     ] = True
-    read_group: Annotated[str, Meaning("may see the status; empty: the daemon's own group")] = ""
+    read_group: Annotated[
+        str, Meaning("may see the status; empty: mudskipper-view, or without that the daemon's own group")
+    ] = ""
     drive_group: Annotated[str, Meaning("may operate the robot, and see; empty: the daemon's own group")] = ""
 
 

@@ -28,7 +28,7 @@ class Bench:
         self.reported: list[tuple[float, str, bool]] = []  # time, text, and whether a failure was active
         self.failures = failures
         self.failing_at_disarm: list[str] = []
-        self.methods = with_failures(self._plain(), failures, self._report, lambda: self.now_s)
+        self.methods = with_failures(self._plain(), failures, self._report, lambda: self.now_s, lambda caller: None)
 
     def _plain(self) -> Methods:
         return {"status": self._status, "disarm": self._disarm}
