@@ -152,6 +152,8 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         status.on_hang_up = loop.lease.hang_up
         status.is_protected = lambda caller: caller == loop.lease.holder
         status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
+        for warning in configuration.warnings:
+            loop.events.report(time.monotonic(), f"warning: {warning}")
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
         processors = AwakeProcessors(configuration.loop.stay_awake)

@@ -96,7 +96,7 @@ class OperatorCalls:
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
-            "warnings": self._warnings,
+            "warnings": [*loop.configuration.warnings, *self._warnings],
             "bus": _bus_report(loop),
             "log": _log_report(loop),
         }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,9 @@ from drivers.odrive.codec import SET_AXIS_STATE
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
+from firmware_host.log.log_folder import DONE, log_files
 from firmware_host.ticker import Tick
+from logs.files.log_reader import read_log
 from operator_client.status_client import StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
@@ -170,7 +173,11 @@ def test_a_daemon_in_the_foreground_prints_when_and_where_it_can_be_operated(sho
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as daemon:
         assert daemon.stdout is not None
         line = daemon.stdout.readline()
-        StatusClient(short_folder / "mudskipper.sock").close()
+        with closing(StatusClient(short_folder / "mudskipper.sock")) as client:
+            warnings = client.call("status")["warnings"]
         daemon.send_signal(signal.SIGTERM)
         assert daemon.wait(LONGEST_S) == 0
+    assert warnings[0].startswith("protection is weakened (")
+    (log,) = log_files(short_folder / "logs" / DONE)
+    assert f"warning: {warnings[0]}" in [event["text"] for event in read_log(log).events]
     assert "ready" in line and str(short_folder / "mudskipper.sock") in line
