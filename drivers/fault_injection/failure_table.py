@@ -166,6 +166,25 @@ def _wrong_motor(
     yield from _rows("JOINT.motor", kind, "", *expected, bounded, drive=drive, scheduled=scheduled)
 
 
+SLIPS_RAD_S = (0.05, 0.1, 0.3, 0.5, 1.0)
+WRONG_RANGES = {"25.64 for 50": 50.0 / 25.64, "65 for 50": 50.0 / 65.0, "45 for 50": 50.0 / 45.0}  # rad/s
+
+
+def _slipping() -> Iterator[FailureMode]:
+    """Yield encoders that slip in both directions, alone and together with the reported speed."""
+    for rate_rad_s in (sign * rate for rate in SLIPS_RAD_S for sign in (1.0, -1.0)):
+        drive = {"encoder_slip_rad_s": rate_rad_s}
+        yield from _rows("JOINT.encoder", f"slipping at {rate_rad_s:+g} rad/s", drive=drive)
+        drive = drive | {"velocity_slip_rad_s": rate_rad_s}
+        yield from _rows("JOINT.encoder", f"slipping with its speed at {rate_rad_s:+g} rad/s", drive=drive)
+
+
+def _wrong_speeds() -> Iterator[FailureMode]:
+    """Yield drives whose range of velocity codes is another than the configured one."""
+    for ranges, factor in WRONG_RANGES.items():
+        yield from _rows("JOINT.encoder", f"speed in {ranges} rad/s", drive={"velocity_error": factor - 1.0})
+
+
 BUGGY_METHODS = {  # of the loop, by the part of the tick in which the method is called
     "reading drives": "drives.read",
     "reading pose": "pose.read",
@@ -270,6 +289,7 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
            scheduled=True),
     *_rows("JOINT.encoder", "frozen", "", expects("encoder_stuck", 1.0, PHASES, how="at zero speed", any_reaction=True),
            drive={"encoder_frozen": True}, scheduled=True),
+    *_slipping(), *_wrong_speeds(),
     *_rows("JOINT.encoder", "noisy", drive={"encoder_noise_rad": 0.005, "velocity_noise_rad_s": 1.0}, scheduled=True),
 
     # the joint and the flipper

@@ -28,6 +28,11 @@ class SimulatedDriveParameters:
     encoder_offset_rad: Annotated[float, Bounds(-pi, pi)] = 0.0  # reported minus true angle of the joint
     encoder_noise_rad: Annotated[float, Bounds(0.0, 0.1)] = 0.0
     encoder_frozen: bool = False  # the last angle for ever, and exactly zero velocity: a magnet that came off
+    encoder_slip_rad_s: Annotated[float, Bounds(-10.0, 10.0)] = (
+        0.0  # rate at which the reported angle leaves the true one
+    )
+    velocity_slip_rad_s: Annotated[float, Bounds(-10.0, 10.0)] = 0.0  # reported minus true speed of the joint
+    velocity_error: Annotated[float, Bounds(-0.9, 5.0)] = 0.0  # fraction by which the reported speed is larger
     watchdog_s: Annotated[float, Bounds(0.0, 60.0)] = 0.1  # 0: off, as ODrives are delivered
     any_frame_feeds: bool = False  # its watchdog, as in firmware 0.5
     encoder_period_s: Annotated[float, Bounds(0.001, 1.0)] = 0.002
@@ -47,6 +52,7 @@ class SimulatedDriveParameters:
     serial_number: str = ""
     type: str = "odrive"
     model: str = ""  # of the motor, where the ranges of the drive's codes depend on it
+    velocity_range_rad_s: Annotated[float, Bounds(-1.0, 500.0)] = -1.0  # of these codes; -1: that of the model
     torque_range_nm: Annotated[float, Bounds(0.0, 500.0)] = 0.0  # of these codes; 0: that of the model
 
 
@@ -66,3 +72,6 @@ class DriveError(Enum):
     OVERCURRENT = auto()
     WATCHDOG = auto()
     OVERSPEED = auto()
+    OVERVOLTAGE = auto()  # of the supply, while the motor brakes
+    UNDERVOLTAGE = auto()
+    BRAKE_RESISTOR = auto()  # disarmed

@@ -3,8 +3,8 @@
 Between the drive and the joint lie imperfections that no drive reports, each off at 0. The motor's true torque constant
 differs from the drive's value, and an error of its commutation weakens or inverts the torque; current follows its
 command with a first-order lag; magnets pull towards detents at any current. The encoder has steps, noise and an offset,
-and may freeze; the current has noise. Messages arrive in order, late by uniformly drawn times, and some repeat their
-old values.
+and may freeze or slip; the speed may slip with it, or be reported in another range; the current has noise. Messages
+arrive in order, late by uniformly drawn times, and some repeat their old values.
 
 Cogging is the torque of a motor's magnets, which pull the rotor towards detents at any current. It is the slope of an
 energy that repeats n times a turn, so over a turn it does no work. It is no pure sine:
@@ -47,6 +47,7 @@ class SimulatedDrive(ABC):
         self._fed_s = self._stepped_s = now_s
         self._current_a = 0.0  # the motor's
         self._angle = self._speed = self._reported_angle = 0.0  # of the motor
+        self._slipped_rad = 0.0  # of the encoder, and there it stays
         self._boots_until_s = self._next_due_s = NEVER_S
         self._forged_a = nan  # the current that the next answer reports
         self._given: list[Frame] = []  # answers that are still to be sent
@@ -55,9 +56,9 @@ class SimulatedDrive(ABC):
 
     def restart(self, now_s: float) -> None:
         """Restart as after a supply dip: ignore and send nothing for `boot_s`; the angle stays."""
-        angle, speed = self._angle, self._speed
+        angle, speed, slipped_rad = self._angle, self._speed, self._slipped_rad
         self.reset(now_s + self.boot_s)
-        self._angle, self._speed, self._stepped_s = angle, speed, now_s
+        self._angle, self._speed, self._slipped_rad, self._stepped_s = angle, speed, slipped_rad, now_s
         self._boots_until_s = now_s + self.boot_s
 
     @property
@@ -108,6 +109,7 @@ class SimulatedDrive(ABC):
         """Return the torque that the motor exerts at the joint now."""
         parameters = self.parameters
         torque_nm = self._motor_nm(now_s) * (1.0 + parameters.torque_constant_error)
+        self._slipped_rad += parameters.encoder_slip_rad_s * (now_s - self._stepped_s)
         self._stepped_s = now_s
         if parameters.commutation_error_deg:
             torque_nm *= cos(radians(parameters.commutation_error_deg))
@@ -158,7 +160,7 @@ class SimulatedDrive(ABC):
     def _measured_angle(self) -> float:
         parameters, units_per_turn = self.parameters, self.units_per_turn
         if not parameters.encoder_frozen:
-            error_rad = parameters.encoder_offset_rad
+            error_rad = parameters.encoder_offset_rad + self._slipped_rad
             if parameters.encoder_noise_rad:
                 error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
             turns = self._angle / units_per_turn + parameters.sign * error_rad / TURN_RAD
@@ -167,7 +169,10 @@ class SimulatedDrive(ABC):
         return self._reported_angle
 
     def _measured_speed(self) -> float:
-        if self.parameters.encoder_frozen:
+        parameters = self.parameters
+        if parameters.encoder_frozen:
             return 0.0
-        noise_rad_s = self.parameters.velocity_noise_rad_s
-        return self._speed + self._random.gauss(0.0, noise_rad_s) / self._unit_rad if noise_rad_s else self._speed
+        slip = parameters.sign * parameters.velocity_slip_rad_s / self._unit_rad
+        speed = (self._speed + slip) * (1.0 + parameters.velocity_error)
+        noise_rad_s = parameters.velocity_noise_rad_s
+        return speed + self._random.gauss(0.0, noise_rad_s) / self._unit_rad if noise_rad_s else speed

@@ -38,7 +38,7 @@ def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
 
 def examine(laboratory: Laboratory) -> None:
     laboratory.recorder.listen(2.0)
-    examine_encoder(laboratory.recorder, laboratory.operator, SETTINGS)
+    examine_encoder(laboratory.recorder, SETTINGS)
 
 
 def test_the_known_coefficients_are_found_on_a_manual_stage(make: Make) -> None:

@@ -122,10 +122,6 @@ def profile_n(depths_m: Array) -> Array:
     return np.asarray(1.5 + 60.0 * depths_m)
 
 
-def nowhere() -> Recorded:
-    return Recorded("lawful/shear/1", "lawful", SHEAR, np.empty(0), np.empty(0), 0.0)
-
-
 def one(recorded: Recorded) -> AnalysedTrial:
     return analyse_trial(recorded, SETTINGS, wide_pace(SETTINGS))
 
@@ -138,7 +134,7 @@ def insertion() -> Recorded:
 def test_a_cell_of_the_opposite_sign_gives_the_same_coefficients(insertion: Recorded) -> None:
     turned = one(insertion._replace(forces_n=-insertion.forces_n))
     straight = one(insertion)
-    assert turned.profile is not None and turned.profile.turned
+    assert turned.profile.turned
     assert turned.coefficients == {name: pytest.approx(reported) for name, reported in straight.coefficients.items()}
 
 
@@ -172,7 +168,8 @@ def test_a_drifting_zero_is_no_contact() -> None:
     times_s = np.arange(0.0, 40.0, 0.0125)
     ramp_n = np.where(times_s > 35.0, np.minimum((times_s - 35.0) * 10.0, 2.0), 0.0)
     noise_n = np.random.default_rng(1).normal(0.0, 0.005, len(times_s))
-    profile = find_contact(times_s, 0.004 * times_s + ramp_n + noise_n)
+    forces_n = 0.004 * times_s + ramp_n + noise_n
+    profile = find_contact(Recorded("a/insertion/1", "a", INSERTION, times_s, forces_n, 0.0))
     assert times_s[profile.begin] == pytest.approx(35.0, abs=0.05)
     assert profile.level_n == pytest.approx(0.14, abs=0.01)
 
