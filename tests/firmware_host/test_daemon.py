@@ -18,7 +18,7 @@ from drivers.odrive.codec import SET_AXIS_STATE
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
-from firmware_host.log.log_folder import DONE, log_files
+from firmware_host.log.log_folder import DONE
 from firmware_host.ticker import Tick
 from logs.files.log_reader import read_log
 from operator_client.status_client import StatusClient
@@ -178,6 +178,6 @@ def test_a_daemon_in_the_foreground_prints_when_and_where_it_can_be_operated(sho
         daemon.send_signal(signal.SIGTERM)
         assert daemon.wait(LONGEST_S) == 0
     assert warnings[0].startswith("protection is weakened (")
-    (log,) = log_files(short_folder / "logs" / DONE)
+    (log,) = (short_folder / "logs" / DONE).glob("*.mcap")
     assert f"warning: {warnings[0]}" in [event["text"] for event in read_log(log).events]
     assert "ready" in line and str(short_folder / "mudskipper.sock") in line
