@@ -25,7 +25,7 @@ from simulation.devices.drive_types import make_simulated_drive
 from simulation.devices.simulated_drive import SimulatedDrive
 
 STEP_S = 0.001
-FLYWHEEL_KG_M2 = 0.02
+FLYWHEEL_KG_M2 = 0.2
 PATIENCE_S = 5.0
 
 
