@@ -98,7 +98,7 @@ class OperatorCalls:
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
-            "warnings": self._warnings,
+            "warnings": [*loop.configuration.warnings, *self._warnings],
             "bus": _bus_report(loop),
             "log": _log_report(loop),
         }
@@ -207,6 +207,7 @@ class OperatorCalls:
         """Clear faults; with `zero`, also accept the angles of joints whose zero may have shifted."""
         loop = self._loop
         if params["zero"]:
+            self.require_own_robot(caller)
             for joint, state in zip(self._rig.joints, loop.states, strict=True):
                 if not abs(state.velocity_rad_s) <= RESTING_RAD_S:
                     raise RefusedError(
@@ -221,7 +222,15 @@ class OperatorCalls:
                 )
         return answer
 
+    def require_own_robot(self, caller: Caller) -> None:
+        """Raise RefusedError while a program of another user holds the lease."""
+        holder = self._lease.holder
+        if self._lease.held and isinstance(holder, Caller) and holder.peer.uid != caller.peer.uid:
+            ways = "wait until that program has ended; 'mudskipper stop' and 'disarm' are always allowed"
+            raise RefusedError(f"{holder} operates the robot: {ways}")
+
     def reset_timing(self, params: dict[str, Any], caller: Caller) -> str:
+        self.require_own_robot(caller)
         self._loop.timing.reset()
         return "accepted"
 
