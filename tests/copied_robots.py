@@ -8,9 +8,12 @@ from struct import Struct
 from typing import TypeVar
 
 from drivers.odrive import codec
+from drivers.odrive05 import codec as codec05
 from simulation.harness.lockstep import Lockstep
 
-MESSAGES = [each for each in vars(codec).values() if isinstance(each, codec.Message)]  # keys of tables, by identity
+MESSAGES = [
+    each for names in (vars(codec), vars(codec05)) for each in names.values() if isinstance(each, codec.Message)
+]  # keys of tables, by identity
 
 Robot = TypeVar("Robot", bound=Lockstep)
 copyreg.pickle(Struct, lambda layout: (Struct, (layout.format,)))  # the layouts of rows, which refuse to be copied

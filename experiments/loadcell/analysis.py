@@ -29,7 +29,6 @@ from experiments.loadcell.strokes import (
     StageSettings,
     StrokeError,
     find_contact,
-    without_spikes,
 )
 from experiments.study.session import Show
 
@@ -110,7 +109,7 @@ def _common(values: Sequence[float], uncertainties: Sequence[float]) -> tuple[fl
 
 def analyse_trial(trial: Recorded, settings: StageSettings, expected: Pace, aligned: Alignment = WIDE) -> AnalysedTrial:
     try:
-        profile = find_contact(trial.times_s, without_spikes(trial.forces_n))
+        profile = find_contact(trial)
     except StrokeError as problem:
         return AnalysedTrial(trial, problem=str(problem))
     if trial.positions is None:

@@ -215,7 +215,7 @@ def depths_of(trial: AnalysedTrial, settings: StageSettings) -> Array:
     """Return the depth of each sample of an insertion, measured or found from the force."""
     if trial.positions_m is not None:
         return trial.positions_m
-    assert trial.profile is not None and trial.pace is not None
+    assert trial.pace is not None
     times_s, pace = trial.profile.times_s, trial.pace
     down_m, _ = pace.descend(times_s - trial.strokes["k_p"].begin_s, settings.depth_m)
     if "k_e" not in trial.strokes:
@@ -225,7 +225,7 @@ def depths_of(trial: AnalysedTrial, settings: StageSettings) -> Array:
 
 def analyse_shear(trial: Recorded, profile: Profile, settings: StageSettings) -> AnalysedTrial:
     """Evaluate the second half of the travel, shorter where the stage stopped early. Raises StrokeError."""
-    forces_n = profile.forces_n - profile.zero_n(trial)
+    forces_n = profile.forces_n - profile.zero_n
     stroke, speed_m_s = _find_shear(profile, forces_n, settings)
     steady_n = forces_n[(profile.times_s >= stroke.steady_s) & (profile.times_s <= stroke.end_s)]
     error_n, remark = steadiness(steady_n)

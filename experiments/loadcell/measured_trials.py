@@ -287,7 +287,7 @@ def _analyse_shear(trial: Recorded, stroke: PositionedProfile, expected: Alignme
     profile, travels_m = stroke.profile, stroke.mean_positions_m(expected.lag_s)
     speeds_m_s = stroke.speeds_m_s(expected.lag_s)
     motion, steady = _find_shear(stroke, travels_m, speeds_m_s)
-    felt_n = (profile.forces_n - profile.zero_n(trial))[steady]
+    felt_n = (profile.forces_n - profile.zero_n)[steady]
     speed_terms = stroke.speed_terms(expected.lag_s)[steady]
     weights = np.clip(np.gradient(travels_m[steady]), 1e-9, None)
     forces_n = felt_n / (1.0 + expected.rate_fraction * speed_terms)

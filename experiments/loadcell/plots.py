@@ -34,9 +34,8 @@ def draw_mud(
         _plot_vertical_model(vertical, curve, strokes[-1], coefficients, settings)
     drags = [(trial, trial.strokes["k_s"]) for trial in trials if "k_s" in trial.strokes]
     for i, (trial, stroke) in enumerate(drags):
-        assert trial.profile is not None
         since_s = trial.profile.times_s - stroke.begin_s
-        forces_n, shown = trial.profile.forces_n - trial.profile.zero_n(trial.recorded), since_s > -BEFORE_S
+        forces_n, shown = trial.profile.forces_n - trial.profile.zero_n, since_s > -BEFORE_S
         look = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.0}
         shear.plot(since_s[shown], forces_n[shown], label=f"trial {i + 1}", **look)
     if drags:
@@ -52,7 +51,6 @@ def _plot_insertion(
 ) -> None:
     """Plot force and depth against time, and force against depth."""
     profile, depths_m, down = trial.profile, depths_of(trial, settings), trial.strokes["k_p"]
-    assert profile is not None
     end_s = trial.strokes["k_e"].end_s if "k_e" in trial.strokes else profile.times_s[-1]
     shown = (profile.times_s > down.begin_s - BEFORE_S) & (profile.times_s < end_s + AFTER_S)
     since_s, forces_n = profile.times_s[shown] - down.begin_s, profile.forces_n[shown] - down.level_n
@@ -73,7 +71,6 @@ def _plot_vertical_model(
 ) -> None:
     """Plot the model against time, along the depths of the trial."""
     profile, trial_m = trial.profile, depths_of(trial, settings)
-    assert profile is not None
     times_s, even_m = profile.times_s, np.linspace(0.0, settings.depth_m, 40)
     for name, stroke in trial.strokes.items():
         sign, fraction = (1.0, 1.0) if name == "k_p" else (-1.0, 1.0 - REVERSAL_FRACTION)

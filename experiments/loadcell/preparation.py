@@ -16,12 +16,13 @@ from drivers.load_cell.calibration import (
     write_calibration,
 )
 from drivers.load_cell.line_formats import AUTO, COUNTS, LineFormat, find_format
+from drivers.load_cell.stage_encoder import StageEncoderSettings
 from drivers.serial.serial_line import SerialLine, text_fraction
 from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.strokes import StageSettings
 from experiments.loadcell.trials import TrialBench
 from experiments.robot.bench_errors import BenchError
-from experiments.study.prompt import GO_ON, Operator
+from experiments.study.prompt import GO_ON
 
 CALIBRATION = "calibration.json"
 WEIGHING_S = 2.0
@@ -39,22 +40,26 @@ OR_WITHOUT = "or continue without --position"
 
 @dataclass(frozen=True)
 class CellSettings:
-    """The options for the amplifier; an empty unit is that of the lines."""
+    """The options for the devices; an empty unit is that of the lines. Without a port the devices are emulated."""
 
+    port: str | None = None
+    baud: int = 115200
     format_name: str = AUTO
     unit: str = ""
     scale_n: float | None = None  # newtons per unit
     calibration: Path | None = None
+    encoder: StageEncoderSettings | None = None
+    seed: int = 1  # of the emulated devices
 
 
-def prepare_cell(bench: TrialBench, settings: StageSettings, cell: CellSettings) -> None:
+def prepare_cell(bench: TrialBench, cell: CellSettings) -> None:
     """Find the format of the lines, check the encoder, calibrate, check the rate. Raises BenchError."""
-    port, operator = bench.recorder.port, bench.operator
-    operator.report(f"listening to {port.line.path} at {port.line.baud} baud")
-    port.line_format = LineFormat(examine_lines(bench.recorder, cell.format_name))
-    examine_encoder(bench.recorder, operator, settings)
-    port.calibration = find_calibration(bench, cell)
-    check_rate(bench.recorder, operator, settings)
+    recorder, port = bench.recorder, bench.recorder.port
+    recorder.report(f"listening to {port.line.path} at {port.line.baud} baud")
+    port.line_format = LineFormat(examine_lines(recorder, cell.format_name))
+    examine_encoder(recorder, bench.plan.settings)
+    port.calibration = _find_calibration(bench, cell)
+    _check_rate(recorder, bench.plan.settings)
 
 
 # lines
@@ -75,7 +80,7 @@ def examine_lines(recorder: CellRecorder, name: str) -> str:
     raise BenchError(f"{read} such as {_quote(lines)}. {f'--format {found.name} does' if found else CHOOSE}")
 
 
-def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
+def examine_encoder(recorder: CellRecorder, settings: StageSettings) -> None:
     """Check that counts arrive, and often enough for the stroke. Raises BenchError."""
     encoder = recorder.encoder
     if encoder is None:
@@ -91,7 +96,7 @@ def examine_encoder(recorder: CellRecorder, operator: Operator, settings: StageS
     rate_hz = encoder.line.clock.rate_hz or 0.0
     between_m = settings.speed_m_s / (rate_hz or 1.0)
     if LEAST_POSITIONS * between_m > settings.depth_m:
-        operator.report(
+        recorder.report(
             f"the encoder sends {rate_hz:.0f} lines/s, one per {1000.0 * between_m:.1f} mm of travel: "
             f"make it send faster, for at least {LEAST_POSITIONS} lines in an insertion"
         )
@@ -120,7 +125,7 @@ def _require_text(recorder: CellRecorder, line: SerialLine, device: str, option:
 # calibration
 
 
-def find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibration:
+def _find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibration:
     """Take the given file, the unit's own scale or the folder's file, or calibrate now. Raises BenchError."""
     port = bench.recorder.port
     readings = filter(None, (port.line_format.decode(line) for line in port.line.recent))
@@ -134,7 +139,7 @@ def find_calibration(bench: TrialBench, cell: CellSettings) -> LoadCellCalibrati
         if known is not None:
             return known
         if file.exists():
-            bench.operator.report(f"calibration from {file}; remove it to calibrate again")
+            bench.recorder.report(f"calibration from {file}; remove it to calibrate again")
             return read_calibration(file)
     except CalibrationError as problem:
         raise BenchError(str(problem)) from problem
@@ -150,14 +155,14 @@ def _calibrate_now(bench: TrialBench, unit: str, file: Path) -> LoadCellCalibrat
             weighings = [weigh(bench.stage.weigh(which), _read_weight(recorder)) for which in (0, 1)]
             calibration = calibrate(unit, *weighings)
         except CalibrationError as problem:
-            bench.operator.report(str(problem))
-            if bench.operator.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+            bench.recorder.report(str(problem))
+            if recorder.ask("Calibrate again?", {GO_ON: "yes", STOP: "stop"}) == STOP:
                 raise BenchError("the load cell is not calibrated") from problem
             continue
         for remark in remarks_about(calibration, *weighings):
-            bench.operator.report(remark)
+            bench.recorder.report(remark)
         write_calibration(file, calibration)
-        bench.operator.report(
+        bench.recorder.report(
             f"calibrated: {calibration.per_newton:.6g} {unit} per N, ± {100.0 * calibration.relative_error:.2g} %; "
             f"saved in {file}"
         )
@@ -174,7 +179,7 @@ def _read_weight(recorder: CellRecorder) -> list[float]:
     return readings
 
 
-def check_rate(recorder: CellRecorder, operator: Operator, settings: StageSettings) -> None:
+def _check_rate(recorder: CellRecorder, settings: StageSettings) -> None:
     """Warn of an amplifier that is too slow for the stroke. Raises BenchError where the operator stops."""
     rate_hz = recorder.port.line.clock.rate_hz
     if rate_hz is None:
@@ -183,9 +188,9 @@ def check_rate(recorder: CellRecorder, operator: Operator, settings: StageSettin
     samples = rate_hz * duration_s
     if samples < LEAST_SAMPLES:
         slower_m_s = settings.speed_m_s * samples / LEAST_SAMPLES
-        operator.report(
+        recorder.report(
             f"the amplifier sends {rate_hz:.0f} lines/s: an insertion of {duration_s:.2g} s has {samples:.0f} samples "
             f"and needs {LEAST_SAMPLES}. Choose a faster rate (an HX711's RATE pin high), or --speed {slower_m_s:.2g}"
         )
-        if operator.ask("Continue with this amplifier?", {GO_ON: "yes", STOP: "stop"}, recorder.drain) == STOP:
+        if recorder.ask("Continue with this amplifier?", {GO_ON: "yes", STOP: "stop"}) == STOP:
             raise BenchError("stopped: the amplifier is too slow for the stroke")

@@ -4,13 +4,13 @@ All samples come through serial ports and all times from a clock, so that emulat
 own bytes, only faster than real ones. The notebook's entry of a trial names its files.
 """
 
-import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from pandas import read_csv
 
 from drivers.load_cell.load_cell_port import LoadCellPort, Sample
 from drivers.load_cell.stage_encoder import StageEncoder, StagePosition
@@ -18,6 +18,7 @@ from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.strokes import CONTACT_NOISES, LEAST_FORCE_N, QUIET_S, Recorded, StagePositions, noise_of
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Entry, Notebook
+from experiments.study.prompt import Operator
 from simulation.test_rig.load_cell_bench import EmulatedBench
 
 POLL_S = 0.005
@@ -28,6 +29,9 @@ AVERAGED_CORRELATION = 0.6  # of successive samples, each a mean over three conv
 LEAST_CORRELATED, LEAST_VALUES = 40, 8  # samples, and different values, for a correlation
 AVERAGED = "the amplifier averages several conversions, which smears the strokes: set its filter to the fastest"
 FOLLOWING = 0.01  # gain per sample of the tracking of a drifting zero
+RAW = "raw"
+FORCES = {"t_s": "%.6f", "force_n": "%.6f", "overloaded": "%d"}  # columns and formats, as in earlier files
+POSITIONS = {"t_s": "%.6f", "place_m": "%.8f"}
 
 
 class WallClock:
@@ -40,21 +44,12 @@ class WallClock:
         time.sleep(duration_s)
 
 
-BenchClock = WallClock | EmulatedBench
-
-
 class Tare(NamedTuple):
     """The zero of the force, with the plate clear of the mud."""
 
     force_n: float
     noise_n: float
-    samples: int
-    correlation: float = 0.0  # correlation of successive samples
-
-    @property
-    def is_averaged(self) -> bool:
-        """Whether a filter averages the samples, or something slow shakes the cell."""
-        return self.samples >= LEAST_CORRELATED and self.correlation > AVERAGED_CORRELATION
+    is_averaged: bool  # a filter averages the samples, or something slow shakes the cell
 
 
 Counts = dict[str, int]  # of the problems of a serial line, by their keys in the notebook
@@ -70,30 +65,26 @@ class StrokeRecording(NamedTuple):
 
 
 class CellRecorder:
-    """Reads the ports. `report` shows a message to the operator at once."""
+    """Reads the ports, also while the operator is asked. An `encoder` belongs to the stage."""
 
     def __init__(
-        self, port: LoadCellPort, clock: BenchClock, report: Callable[[str], None], encoder: StageEncoder | None = None
+        self,
+        port: LoadCellPort,
+        clock: WallClock | EmulatedBench,
+        operator: Operator,
+        encoder: StageEncoder | None = None,
     ) -> None:
-        """`encoder` belongs to the stage; recording goes on without its lines."""
-        self.port, self.clock, self.report, self.encoder = port, clock, report, encoder
+        self.port, self.clock, self.operator, self.encoder = port, clock, operator, encoder
+        self.report = operator.report
         self._positions: list[StagePosition] = []
+
+    def ask(self, question: str, answers: Mapping[str, str]) -> str:
+        return self.operator.ask(question, answers, self.drain)
 
     def drain(self) -> None:
         """Discard everything that has arrived."""
         self._read()
         self._positions = []
-
-    def listen(self, duration_s: float) -> list[Sample]:
-        self.await_port()
-        samples, end_s = list[Sample](), self.clock.now_s() + duration_s
-        while self.clock.now_s() < end_s:
-            samples += self.poll()
-        return samples
-
-    def poll(self) -> list[Sample]:
-        self.clock.pass_time(POLL_S)
-        return self._read()
 
     def _read(self) -> list[Sample]:
         now_s = self.clock.now_s()
@@ -101,16 +92,27 @@ class CellRecorder:
             self._positions += self.encoder.read(now_s)
         return self.port.read(now_s)
 
-    def await_port(self) -> None:
+    def listen(self, duration_s: float) -> list[Sample]:
+        self._await_port()
+        samples, end_s = list[Sample](), self.clock.now_s() + duration_s
+        while self.clock.now_s() < end_s:
+            samples += self._poll()
+        return samples
+
+    def _poll(self) -> list[Sample]:
+        self.clock.pass_time(POLL_S)
+        return self._read()
+
+    def _await_port(self) -> None:
         """Wait for an adapter that was unplugged. Raises BenchError after ABSENCE_S."""
-        if self.port.line.is_there:
+        line, end_s = self.port.line, self.clock.now_s() + ABSENCE_S
+        if line.is_there:
             return
-        self.report(f"the load cell is unplugged ({self.port.line.problem}): plug {self.port.line.path} in again")
-        end_s = self.clock.now_s() + ABSENCE_S
-        while not self.port.line.is_there:
+        self.report(f"the load cell is unplugged ({line.problem}): plug {line.path} in again")
+        while not line.is_there:
             if self.clock.now_s() > end_s:
-                raise BenchError(f"the load cell did not come back: {self.port.line.problem}")
-            self.poll()
+                raise BenchError(f"the load cell did not come back: {line.problem}")
+            self._poll()
         self.report("the load cell is connected again")
 
     def tare(self) -> Tare:
@@ -122,34 +124,34 @@ class CellRecorder:
             raise BenchError("the load cell reports an overload with nothing on it: check its mounting and its wires")
         if len(forces_n) < 4:
             raise BenchError(f"no samples arrive from {self.port.line.path}: check the amplifier's power and cable")
-        return Tare(float(np.mean(forces_n)), noise_of(np.array(forces_n)), len(forces_n), correlation(forces_n))
+        is_averaged = len(forces_n) >= LEAST_CORRELATED and correlation(forces_n) > AVERAGED_CORRELATION
+        return Tare(float(np.mean(forces_n)), noise_of(forces_n), is_averaged)
 
-    def _steady_forces_n(self) -> list[float]:
+    def _steady_forces_n(self) -> Array:
         self.drain()
-        return [sample.force_n for sample in self.listen(TARE_S) if not sample.overloaded]
+        return np.array([sample.force_n for sample in self.listen(TARE_S) if not sample.overloaded])
 
     def record(self, noise_n: float, patience_s: float, stroke_s: float) -> StrokeRecording:
         """Record until `stroke_s` after the contact, or until the patience ends without a contact."""
-        self.await_port()
+        self._await_port()
         self.drain()
-        before = self._problems()
-        samples, contact = list[Sample](), _Contact(noise_n)
-        end_s = self.clock.now_s() + patience_s
+        before, contact, has_touched = self._counts(), _Contact(noise_n), False
+        samples, end_s = list[Sample](), self.clock.now_s() + patience_s
         while self.clock.now_s() < end_s and self.port.line.is_there:
-            fresh = self.poll()
+            fresh = self._poll()
             samples += fresh
-            if contact.handle(fresh):
-                end_s = self.clock.now_s() + stroke_s
+            if not has_touched and any(contact.is_reached_by(sample) for sample in fresh):
+                has_touched, end_s = True, self.clock.now_s() + stroke_s
         positions, self._positions = self._positions, []
         problems, of_positions = (
             {name: count - old[name] for name, count in new.items()}
-            for new, old in zip(self._problems(), before, strict=True)
+            for new, old in zip(self._counts(), before, strict=True)
         )
-        self.await_port()
+        self._await_port()
         problems["overloads"] = sum(sample.overloaded for sample in samples)
         return StrokeRecording(samples, problems, positions, of_positions)
 
-    def _problems(self) -> tuple[Counts, Counts]:
+    def _counts(self) -> tuple[Counts, Counts]:
         """Return the counts of both lines so far. Positions before and after a break have different zeros."""
         line, encoder = self.port.line, self.encoder
         problems = {
@@ -166,12 +168,12 @@ class CellRecorder:
         }
 
 
-def correlation(forces_n: Sequence[float]) -> float:
+def correlation(forces_n: Array) -> float:
     """Return the correlation of successive samples, without their drift; 0 where the resolution is too coarse."""
-    if len(set(forces_n)) < LEAST_VALUES:
+    if len(np.unique(forces_n)) < LEAST_VALUES:
         return 0.0
     order = np.arange(len(forces_n))
-    apart_n = np.asarray(forces_n) - np.polyval(np.polyfit(order, forces_n, 1), order)
+    apart_n = forces_n - np.polyval(np.polyfit(order, forces_n, 1), order)
     return float(apart_n[1:] @ apart_n[:-1] / (apart_n @ apart_n))
 
 
@@ -180,26 +182,16 @@ class _Contact:
 
     def __init__(self, noise_n: float) -> None:
         self._bound_n = max(2.0 * CONTACT_NOISES * noise_n, LEAST_FORCE_N)
-        self._quiet_n: list[float] = []
-        self._first_s: float | None = None
+        self._quiet: list[Sample] = []
         self._level_n: float | None = None
         self._away = 0
-        self._touched = False
 
-    def handle(self, samples: Sequence[Sample]) -> bool:
-        """Return whether these samples contain the first contact."""
-        if self._touched:
-            return False
-        self._touched = any(self._is_away(sample) for sample in samples)
-        return self._touched
-
-    def _is_away(self, sample: Sample) -> bool:
-        if self._first_s is None:
-            self._first_s = sample.stamp_s
+    def is_reached_by(self, sample: Sample) -> bool:
         if self._level_n is None:
-            self._quiet_n += [] if sample.overloaded else [sample.force_n]
-            if sample.stamp_s > self._first_s + QUIET_S and self._quiet_n:
-                self._level_n = float(np.median(self._quiet_n))
+            self._quiet.append(sample)
+            quiet_n = [each.force_n for each in self._quiet if not each.overloaded]
+            if sample.stamp_s > self._quiet[0].stamp_s + QUIET_S and quiet_n:
+                self._level_n = float(np.median(quiet_n))
             return False
         far = sample.overloaded or abs(sample.force_n - self._level_n) > self._bound_n
         self._away = self._away + 1 if far else 0
@@ -208,26 +200,17 @@ class _Contact:
         return self._away >= CONTACT_SAMPLES
 
 
-RAW = "raw"
-FORCES = {"t_s": "%.6f", "force_n": "%.6f", "overloaded": "%d"}  # columns and formats, as in earlier files
-POSITIONS = {"t_s": "%.6f", "place_m": "%.8f"}
-
-
-def raw_name(key: str, attempt: int, what: str = "") -> str:
-    plain = re.sub(r"[^\w.]+", "_", key)
-    return f"{RAW}/{plain}_{attempt}{what}.csv"
+# files
 
 
 def write_rows(path: Path, columns: Mapping[str, str], rows: Sequence[tuple[float, ...]]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(exist_ok=True)
     table, head = np.reshape(rows, (-1, len(columns))), ",".join(columns)
     np.savetxt(path, table, [*columns.values()], delimiter=",", newline="\r\n", header=head, comments="")
 
 
 def _read_columns(path: Path) -> Array:
-    head, *lines = path.read_text(encoding="utf-8").splitlines()
-    rows = [[float(value) for value in line.split(",")] for line in lines]
-    return np.array(rows).reshape(-1, len(head.split(","))).T
+    return np.asarray(read_csv(path), dtype=np.float64).T
 
 
 def load_recorded(folder: Path, key: str, entry: Entry) -> Recorded:

@@ -4,14 +4,15 @@ The experiment asks for each motion and cannot tell which stage it has. Neither 
 that is found from the force.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from random import Random
 from typing import NamedTuple
 
 from control.records import UNKNOWN
 from drivers.load_cell.line_formats import GRAVITY_M_S2
+from experiments.loadcell.recording import CellRecorder
 from experiments.loadcell.strokes import INSERTION, SHEAR, StageSettings
-from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
+from experiments.study.prompt import GO_ON, REDO, SKIP
 from experiments.trials.load_cell_truth import TrueCoefficients, true_coefficients
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import clay_of_water
@@ -21,7 +22,6 @@ from simulation.test_rig.plate_stage import CarriedPlate
 HEAVIEST_G = 50000.0
 SIMULATED_WEIGHTS_G = (0.0, 500.0)
 SETTLING_S = 0.5
-PAPER_HOLD_S = 3.0
 
 
 class Trial(NamedTuple):
@@ -35,34 +35,33 @@ class Trial(NamedTuple):
 
 
 class ManualStage:
-    """A stage that the operator moves. `meanwhile` reads the load cell during each prompt."""
+    """A stage that the operator moves."""
 
     patience_s = 60.0  # longest time until a stroke has begun
 
-    def __init__(self, settings: StageSettings, operator: Operator, meanwhile: Callable[[], None]) -> None:
-        self._settings, self._operator, self._meanwhile = settings, operator, meanwhile
+    def __init__(self, settings: StageSettings, recorder: CellRecorder) -> None:
+        self._settings, self._recorder = settings, recorder
 
     def weigh(self, which: int) -> float:
         """Hang the lighter (0) or the heavier (1) weight on the cell; return its force in newtons."""
         name = ("lighter one, or nothing", "heavier one, near the largest force that you expect")[which]
         question = f"Calibration: hang a known weight on the cell, the {name}, and let it rest. How many grams is it?"
-        grams = self._operator.ask_number(question, 0.0, HEAVIEST_G, self._meanwhile)
-        return grams / 1000.0 * GRAVITY_M_S2
+        recorder = self._recorder
+        return recorder.operator.ask_number(question, 0.0, HEAVIEST_G, recorder.drain) / 1000.0 * GRAVITY_M_S2
 
     def prepare(self, trial: Trial, trials: int) -> str:
         """Level fresh mud with the plate clear above it; return GO_ON, SKIP, or REDO for the trial before."""
         along = "along the drag" if trial.kind == SHEAR else "upright, along the stroke"
-        question = (
+        return self._recorder.ask(
             f"Mud {trial.mud}, {trial.kind} {trial.number} of {trials}: re-mix and level the mud, wipe the plate, hang "
-            f"it 2 cm above the mud, the cell {along}. Ready?"
+            f"it 2 cm above the mud, the cell {along}. Ready?",
+            {GO_ON: "tare and start", SKIP: "skip this trial", REDO: "repeat the trial before"},
         )
-        answers = {GO_ON: "tare and start", SKIP: "skip this trial", REDO: "repeat the trial before"}
-        return self._operator.ask(question, answers, self._meanwhile)
 
     def lower(self) -> None:
         """Bring the plate to the depth of a shear."""
         depth_cm = 100.0 * self._settings.depth_m
-        self._operator.ask(f"Lower the plate {depth_cm:g} cm into the mud. Ready?", {GO_ON: "yes"}, self._meanwhile)
+        self._recorder.ask(f"Lower the plate {depth_cm:g} cm into the mud. Ready?", {GO_ON: "yes"})
 
     def start(self, trial: Trial) -> None:
         """Order the stroke, which begins after an unknown delay."""
@@ -70,14 +69,13 @@ class ManualStage:
         stroke = f"drag it {100.0 * settings.shear_path_m:g} cm"
         if trial.kind == INSERTION:
             stroke = f"down to {100.0 * settings.depth_m:g} cm, hold {settings.hold_s:g} s, and up until it is clear"
-        self._operator.report(
+        self._recorder.report(
             f"Recording. Start the stage in a second or two: {stroke}, at {settings.speed_m_s:g} m/s."
         )
 
     def lift(self) -> None:
         """Bring the plate clear of the mud and clean it."""
-        question = "Lift the plate clear of the mud, wipe it, and take your hands off. Ready?"
-        self._operator.ask(question, {GO_ON: "yes"}, self._meanwhile)
+        self._recorder.ask("Lift the plate clear of the mud, wipe it, and take your hands off. Ready?", {GO_ON: "yes"})
 
 
 class SimulatedStage:
@@ -86,9 +84,8 @@ class SimulatedStage:
     patience_s = 5.0
 
     def __init__(self, settings: StageSettings, bench: EmulatedBench, muds: Sequence[str], seed: int) -> None:
-        self._settings, self._bench = settings, bench
+        self._settings, self._bench, self._random = settings, bench, Random(seed)
         self.plates: dict[str, CarriedPlate] = {mud: clay_plate(water_of(mud), settings.plate) for mud in muds}
-        self._random = Random(seed)
 
     def weigh(self, which: int) -> float:
         self._bench.stage.hung_weight_n = SIMULATED_WEIGHTS_G[which] / 1000.0 * GRAVITY_M_S2
@@ -124,9 +121,6 @@ class SimulatedStage:
 Stage = ManualStage | SimulatedStage
 
 
-# simulated muds
-
-
 def water_of(mud: str) -> float:
     """Return the water content that names a simulated mud. Raises ValueError for a name that is none."""
     try:
@@ -142,4 +136,4 @@ def clay_truth(mud: str, settings: StageSettings) -> TrueCoefficients:
     depth_m = settings.depth_m
     stroke = StrokeTruth(0.0, 0.0, depth_m, settings.speed_m_s, UNKNOWN, depth_m)
     stride = StrideTruth("", 0, clay_of_water(water_of(mud)), 0.0, stroke, stroke, stroke)
-    return true_coefficients(stride, settings.plate, RELAXATION, PAPER_HOLD_S, upright=True)
+    return true_coefficients(stride, settings.plate, RELAXATION, settings.hold_s, upright=True)

@@ -110,10 +110,12 @@ class Profile(NamedTuple):
     level_n: float
     noise_n: float
     turned: bool
+    zero_n: float  # with the plate clear of the mud
 
-    def zero_n(self, trial: Recorded) -> float:
-        """Return the zero of the trial with the profile's sign."""
-        return -trial.zero_n if self.turned else trial.zero_n
+
+NO_PROFILE = Profile(
+    times_s=np.empty(0), forces_n=np.empty(0), begin=0, level_n=nan, noise_n=nan, turned=False, zero_n=nan
+)
 
 
 class Pace(NamedTuple):
@@ -169,7 +171,7 @@ class AnalysedTrial:
     """The results of one trial. An insertion has the stroke and the coefficient k_p, and k_e of the way up."""
 
     recorded: Recorded
-    profile: Profile | None = None
+    profile: Profile = NO_PROFILE  # where there is no contact
     strokes: Mapping[str, Stroke] = field(default_factory=dict)  # by the coefficient that they show
     coefficients: Mapping[str, Coefficient] = field(default_factory=dict)
     problem: str = ""  # why there is no coefficient
@@ -191,8 +193,9 @@ def noise_of(forces_n: Array) -> float:
     return max(NORMAL_MAD * float(np.median(np.abs(forces_n - np.median(forces_n)))), LEAST_NOISE_N)
 
 
-def find_contact(times_s: Array, forces_n: Array) -> Profile:
+def find_contact(trial: Recorded) -> Profile:
     """Find the first sample in contact. Raises StrokeError where there is none, or the stroke had begun before."""
+    times_s, forces_n = trial.times_s, _without_spikes(trial.forces_n)
     if len(times_s) < 8 or times_s[-1] - times_s[0] < 2.0 * QUIET_S:
         raise StrokeError("hardly any sample was recorded")
     quiet_n = forces_n[times_s < times_s[0] + QUIET_S]
@@ -214,6 +217,7 @@ def find_contact(times_s: Array, forces_n: Array) -> Profile:
         level_n=sign * level_n,
         noise_n=noise_n,
         turned=turned,
+        zero_n=sign * trial.zero_n,
     )
 
 
@@ -233,7 +237,7 @@ def _leaves_zero(times_s: Array, forces_n: Array, bound_n: float) -> tuple[int, 
     raise StrokeError("the stage was moving already when the recording began, or only single samples left the zero")
 
 
-def without_spikes(forces_n: Array) -> Array:
+def _without_spikes(forces_n: Array) -> Array:
     """Replace single samples far from two neighbours that agree, such as a garbled digit or a knock."""
     if len(forces_n) < 5:
         return forces_n

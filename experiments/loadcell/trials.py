@@ -4,6 +4,7 @@ Samples are on the disk before they are evaluated, and the files of a repeated t
 file that counts. The same command continues an interrupted experiment.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.load_cell.stage_encoder import StageEncoder
 from experiments.loadcell.analysis import analyse_trial, speed_remark
 from experiments.loadcell.curve_fit import Array
 from experiments.loadcell.force_trials import wide_pace
@@ -20,18 +20,17 @@ from experiments.loadcell.recording import (
     AVERAGED,
     FORCES,
     POSITIONS,
+    RAW,
     CellRecorder,
     StrokeRecording,
-    Tare,
     load_recorded,
-    raw_name,
     write_rows,
 )
 from experiments.loadcell.stage import Stage, Trial
 from experiments.loadcell.strokes import INSERTION, KINDS, AnalysedTrial, Mask, StageSettings
 from experiments.robot.steps import OperatorStep, conduct_steps
 from experiments.study.notebook import Entry, Notebook
-from experiments.study.prompt import GO_ON, REDO, SKIP, Operator
+from experiments.study.prompt import GO_ON, REDO, SKIP
 from experiments.study.session import Show
 
 KEEP, WITHOUT = "k", "w"
@@ -64,61 +63,65 @@ class TrialPlan:
 
 @dataclass(frozen=True)
 class TrialBench:
-    """The devices, the operator and the files of the trials."""
+    """The devices, the plan and the files of the trials."""
 
     recorder: CellRecorder
     stage: Stage
-    operator: Operator
+    plan: TrialPlan
     notebook: Notebook
     folder: Path
     show: Show
 
 
-def measure_all(bench: TrialBench, plan: TrialPlan) -> None:
+def measure_all(bench: TrialBench) -> None:
     """Measure every trial that is not in the notebook."""
     steps = [
-        OperatorStep(trial.key, partial(bench.stage.prepare, trial, plan.trials), partial(measure, bench, trial, plan))
-        for trial in plan.list_trials()
+        OperatorStep(trial.key, partial(bench.stage.prepare, trial, bench.plan.trials), partial(measure, bench, trial))
+        for trial in bench.plan.list_trials()
     ]
-    conduct_steps(steps, bench.notebook, bench.operator, bench.show, {"skipped": True})
+    conduct_steps(steps, bench.notebook, bench.recorder.operator, bench.show, {"skipped": True})
 
 
-def measure(bench: TrialBench, trial: Trial, plan: TrialPlan) -> Entry:
+def measure(bench: TrialBench, trial: Trial) -> Entry:
     """Measure a prepared trial, again where the operator wants it so. Return its entry for the notebook."""
     for attempt in count(1):
-        entry, problems = record(bench, trial, plan, attempt)
+        entry, problems = record(bench, trial, attempt)
         if not problems:
             return entry
         for problem in problems:
-            bench.operator.report(f"{trial.key}: {problem}")
+            bench.recorder.report(f"{trial.key}: {problem}")
         offered = OFFERED_OFTEN if attempt >= MOST_ATTEMPTS else OFFERED
-        answer = bench.operator.ask(f"{trial.key} may be invalid. What now?", offered, bench.recorder.drain)
+        answer = bench.recorder.ask(f"{trial.key} may be invalid. What now?", offered)
         if answer == KEEP:
             return entry | {"kept_in_spite_of": problems}
         given_up = answer == SKIP or (answer == GO_ON and attempt >= MOST_ATTEMPTS)
-        if given_up or bench.stage.prepare(trial, plan.trials) == SKIP:
+        if given_up or bench.stage.prepare(trial, bench.plan.trials) == SKIP:
             break
     return entry | {"skipped": True, "why": problems}
 
 
-def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tuple[Entry, list[str]]:
+def record(bench: TrialBench, trial: Trial, attempt: int) -> tuple[Entry, list[str]]:
     """Record one stroke; return its entry for the notebook, and its problems."""
-    recorder, stage = bench.recorder, bench.stage
-    await_encoder(bench)
+    recorder, stage, settings = bench.recorder, bench.stage, bench.plan.settings
+    _await_encoder(recorder)
     before = recorder.tare()
     if before.is_averaged and trial.number == attempt == 1:
-        bench.operator.report(f"{trial.key}: {AVERAGED}")
-    if trial.kind != INSERTION:
+        recorder.report(f"{trial.key}: {AVERAGED}")
+    slow = SLOW_BY_HAND if recorder.encoder else SLOW
+    longest_s = slow * settings.shear_path_m / settings.speed_m_s
+    if trial.kind == INSERTION:
+        longest_s = 2.0 * slow * settings.depth_m / settings.speed_m_s + settings.hold_s + RESERVE_S
+    else:
         stage.lower()
     stage.start(trial)
-    longest_s = stroke_s(trial.kind, plan.settings, bool(recorder.encoder))
     stroke = recorder.record(before.noise_n, stage.patience_s, longest_s)
-    name = raw_name(trial.key, attempt)
-    write_rows(bench.folder / name, FORCES, stroke.samples)
+    plain_key = re.sub(r"[^\w.]+", "_", trial.key)
+    name = f"{RAW}/{plain_key}_{attempt}"
+    write_rows(bench.folder / f"{name}.csv", FORCES, stroke.samples)
     stage.lift()
     after = recorder.tare()
     entry: Entry = trial._asdict() | {
-        "file": name,
+        "file": f"{name}.csv",
         "zero_before_n": before.force_n,
         "zero_after_n": after.force_n,
         "noise_n": before.noise_n,
@@ -128,62 +131,49 @@ def record(bench: TrialBench, trial: Trial, plan: TrialPlan, attempt: int) -> tu
         "calibration": recorder.port.calibration._asdict(),
     }
     if recorder.encoder is not None:
-        entry["position"] = {
-            "file": raw_name(trial.key, attempt, "_position"),
-            "places": len(stroke.positions),
-            "rate_hz": recorder.encoder.line.clock.rate_hz,
-            **stroke.position_problems,
-        }
-        write_rows(bench.folder / entry["position"]["file"], POSITIONS, stroke.positions)
+        rate_hz = recorder.encoder.line.clock.rate_hz
+        counts = {"places": len(stroke.positions), "rate_hz": rate_hz, **stroke.position_problems}
+        entry["position"] = {"file": f"{name}_position.csv", **counts}
+        write_rows(bench.folder / f"{name}_position.csv", POSITIONS, stroke.positions)
     recorded = load_recorded(bench.folder, trial.key, entry)
-    analysed = analyse_trial(recorded, plan.settings, wide_pace(plan.settings))
-    if analysed.pace and (remark := speed_remark(analysed.pace, plan.settings, SINGLE_SPEED_BOUND)):
-        bench.operator.report(f"{trial.key}: {remark}")  # the trial is valid; the stage can be set for the next one
-    return entry, list_problems(analysed, stroke, before, after)
+    analysed = analyse_trial(recorded, settings, wide_pace(settings))
+    if analysed.pace and (remark := speed_remark(analysed.pace, settings, SINGLE_SPEED_BOUND)):
+        recorder.report(f"{trial.key}: {remark}")  # the trial is valid; the stage can be set for the next one
+    return entry, list_problems(analysed, stroke, abs(after.force_n - before.force_n))
 
 
-def stroke_s(kind: str, settings: StageSettings, is_measured: bool = False) -> float:
-    """Return the time to record after the contact; a stage with an encoder may be pushed by hand."""
-    slow = SLOW_BY_HAND if is_measured else SLOW
-    if kind == INSERTION:
-        return 2.0 * slow * settings.depth_m / settings.speed_m_s + settings.hold_s + RESERVE_S
-    return slow * settings.shear_path_m / settings.speed_m_s
-
-
-def await_encoder(bench: TrialBench) -> None:
+def _await_encoder(recorder: CellRecorder) -> None:
     """Wait for an encoder that is unplugged or silent, or go on without it."""
-    recorder, attempts = bench.recorder, 0
-    while recorder.encoder is not None and (problem := _encoder_problem(recorder.encoder, recorder.clock.now_s())):
-        bench.operator.report(problem)
+    for attempt in count(1):
+        encoder = recorder.encoder
+        if encoder is None:
+            return
+        if not encoder.line.is_there:
+            path = encoder.settings.path
+            recorder.report(f"the stage's encoder is unplugged ({encoder.last_problem}): plug {path} in again")
+        elif encoder.silent_for_s(recorder.clock.now_s()) > SILENT_S:
+            path = encoder.settings.path
+            recorder.report(f"no count arrives from the stage's encoder on {path}: check its power and cable")
+        else:
+            return
         answers = {GO_ON: "check again", WITHOUT: "use the force alone"}
-        question = "Does the encoder send again?"
-        answer = bench.operator.ask(question, answers, recorder.drain) if attempts < MOST_ATTEMPTS else WITHOUT
-        if answer == WITHOUT:
-            recorder.encoder.close()
+        if attempt > MOST_ATTEMPTS or recorder.ask("Does the encoder send again?", answers) == WITHOUT:
+            encoder.close()
             recorder.encoder = None
-            bench.operator.report(
+            recorder.report(
                 "going on without the position: the next trials need a stage of one speed, not one pushed by hand"
             )
         recorder.listen(LISTENING_S)
-        attempts += 1
-
-
-def _encoder_problem(encoder: StageEncoder, now_s: float) -> str:
-    if not encoder.line.is_there:
-        return f"the stage's encoder is unplugged ({encoder.last_problem}): plug {encoder.settings.path} in again"
-    if encoder.silent_for_s(now_s) > SILENT_S:
-        return f"no count arrives from the stage's encoder on {encoder.settings.path}: check its power and cable"
-    return ""
 
 
 # checks
 
 
-def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, before: Tare, after: Tare) -> list[str]:
-    """Return messages on everything that may make a trial invalid."""
+def list_problems(analysed: AnalysedTrial, stroke: StrokeRecording, moved_n: float) -> list[str]:
+    """Return messages on everything that may make a trial invalid. `moved_n` is the motion of the zero."""
     recorded, problems = analysed.recorded, stroke.problems
     garbled, lines = problems["garbled_lines"], len(stroke.samples) + problems["garbled_lines"]
-    moved_n, missing = abs(after.force_n - before.force_n), _missing_fraction(analysed)
+    missing = max((fraction for _, fraction in _strokes(analysed)), default=0.0)
     largest_n = float(np.max(np.abs(recorded.forces_n - recorded.zero_n), initial=0.0))
     checks = [
         (problems["unpluggings"], "the load cell was unplugged during the trial"),
@@ -229,20 +219,9 @@ def is_clipped(forces_n: Array) -> bool:
     return any(np.all(ends[i : i + FLAT_SAMPLES]) for i in np.flatnonzero(ends))
 
 
-def _missing_fraction(analysed: AnalysedTrial) -> float:
-    """Return the fraction of missing samples in the worst stroke."""
-    if analysed.profile is None:
-        return 0.0
-    period_s = float(np.median(np.diff(analysed.profile.times_s)))
-    return max(
-        (1.0 - (np.count_nonzero(inside) + 1) * period_s / duration_s for inside, duration_s in _strokes(analysed)),
-        default=0.0,
-    )
-
-
 def _strokes(analysed: AnalysedTrial) -> Iterator[tuple[Mask, float]]:
-    """Yield which samples belong to each stroke, and its duration."""
+    """Yield which samples belong to each stroke, and the fraction that is missing."""
+    times_s = analysed.profile.times_s
     for stroke in analysed.strokes.values():
-        assert analysed.profile is not None
-        times_s = analysed.profile.times_s
-        yield (times_s >= stroke.begin_s) & (times_s < stroke.end_s), stroke.end_s - stroke.begin_s
+        inside, period_s = (times_s >= stroke.begin_s) & (times_s < stroke.end_s), float(np.median(np.diff(times_s)))
+        yield inside, 1.0 - (np.count_nonzero(inside) + 1) * period_s / (stroke.end_s - stroke.begin_s)

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from drivers.load_cell.line_formats import AUTO, UNITS, LineFormat
 from drivers.load_cell.stage_encoder import StageEncoderSettings
 from experiments.loadcell.comparison import load_flipper
-from experiments.loadcell.devices import DeviceSettings, describe_cell, open_bench
+from experiments.loadcell.devices import describe_cell, open_bench
 from experiments.loadcell.preparation import CellSettings, prepare_cell
 from experiments.loadcell.recording import RAW
 from experiments.loadcell.report import evaluate_muds, make_result
@@ -99,12 +99,18 @@ def study(
         muds = _checked_muds(mud, session.simulated)
     except ValueError as problem:
         raise OptionError(str(problem)) from problem
-    encoder = _encoder(port, position, position_step, position_baud, position_label)
-    cell = CellSettings(format, unit.lower(), scale, calibration)
-    devices = DeviceSettings(port=port, baud=baud, cell=cell, encoder=encoder, seed=seed)
+    cell = CellSettings(
+        port=port,
+        baud=baud,
+        format_name=format,
+        unit=unit.lower(),
+        scale_n=scale,
+        calibration=calibration,
+        encoder=_encoder(port, position, position_step, position_baud, position_label),
+        seed=seed,
+    )
     plan = TrialPlan(muds, trials, _stage_settings(plate, depth, speed), depth_error / 1000.0)
-    flipper = {} if compare is None else load_flipper(compare)
-    return _run(session, plan, devices, flipper)
+    return _run(session, plan, cell, {} if compare is None else load_flipper(compare))
 
 
 def _checked_muds(muds: tuple[str, ...], simulated: bool) -> tuple[str, ...]:
@@ -145,38 +151,32 @@ def _encoder(
     return StageEncoderSettings(path, step_um * 1e-6, baud, label)
 
 
-def _run(session: Session, plan: TrialPlan, devices: DeviceSettings, flipper: dict[str, Any]) -> Result:
+def _run(session: Session, plan: TrialPlan, cell: CellSettings, flipper: dict[str, Any]) -> Result:
     """Measure the missing trials and evaluate all of them. Raises BenchError with what to do."""
-    seed = {"simulated_seed": devices.seed} if session.simulated else {}
-    notebook = Notebook(
-        session.folder, {**notebook_plan(plan.settings), "bench": devices.bench, **seed, **session.program}
-    )
+    bench = {"bench": "simulated" if session.simulated else "load cell"}
+    seed = {"simulated_seed": cell.seed} if session.simulated else {}
+    notebook = Notebook(session.folder, {**notebook_plan(plan.settings), **bench, **seed, **session.program})
     missing = [trial for trial in plan.list_trials() if trial.key not in notebook.entries]
-    _report_progress(session, notebook, len(missing), devices.encoder is not None)
-    cell = {"bench": devices.bench, "port": devices.port, "baud": devices.baud, "format": devices.cell.format_name}
+    if notebook.entries:
+        report, done = session.operator.report, notebook.entries.values()
+        report(f"{len(done)} trials are in {session.folder} already, {len(missing)} are left")
+        without = sum("file" in entry and "position" not in entry for entry in done)
+        if cell.encoder and without:
+            report(f"{without} of them have no measured position; their depth is found from the force")
+    used = {**bench, "port": cell.port, "baud": cell.baud, "format": cell.format_name}
     if missing:
-        with open_bench(session, plan, devices, notebook) as bench:
-            prepare_cell(bench, plan.settings, devices.cell)
-            measure_all(bench, plan)
-            cell |= describe_cell(bench.recorder.port, bench.recorder.encoder)
+        with open_bench(session, plan, cell, notebook) as trial_bench:
+            prepare_cell(trial_bench, cell)
+            measure_all(trial_bench)
+            used |= describe_cell(trial_bench.recorder)
     results = evaluate_muds(session.folder, notebook, plan, session.show)
     if not results.trials:
         raise BenchError("no trial counts, so there is nothing to evaluate")
     truths = {mud: clay_truth(mud, plan.settings) for mud in results.muds} if session.simulated else {}
-    result = make_result(results, notebook, plan, cell, flipper, truths)
+    result = make_result(results, notebook, plan, used, flipper, truths)
     return replace(result, logs=[session.folder / RAW])
 
 
 def notebook_plan(settings: StageSettings) -> dict[str, Any]:
     """Return the options that must be the same in all trials of one folder; muds and trials may be added."""
     return {"experiment": "loadcell", **to_json(settings)}
-
-
-def _report_progress(session: Session, notebook: Notebook, missing: int, has_encoder: bool) -> None:
-    if not notebook.entries:
-        return
-    report = session.operator.report
-    report(f"{len(notebook.entries)} trials are in {session.folder} already, {missing} are left")
-    without = sum("file" in entry and "position" not in entry for entry in notebook.entries.values())
-    if has_encoder and without:
-        report(f"{without} of them have no measured position; their depth is found from the force")

@@ -18,9 +18,11 @@ from control.records import Torques
 from drivers.drives import Drives
 from drivers.transmit_gate import TransmitGate
 from firmware_host import loop
+from firmware_host.lease import Lease
 from firmware_host.log.segments import LogSegments
 from firmware_host.loop import Loop
 from firmware_host.loop_events import LoopEvents
+from simulation.devices.odrive.device import SimulatedOdrive
 
 Break = Callable[[], AbstractContextManager[Any]]
 
@@ -131,6 +133,16 @@ def rows_vanish() -> AbstractContextManager[Any]:
     return mock.patch.object(LogSegments, "write", write)
 
 
+def leases_ignored() -> AbstractContextManager[Any]:
+    """Any operator may move the robot, whoever holds the lease."""
+    return mock.patch.object(Lease, "refusal", lambda *arguments, **options: None)
+
+
+def no_watchdogs() -> AbstractContextManager[Any]:
+    """The drives follow their last command for ever."""
+    return mock.patch.object(SimulatedOdrive, "_trip_if_due", lambda *arguments: None)
+
+
 BREAKS: dict[str, Break] = {  # by the promise that must notice
     "LimitedMotors": no_limits,
     "LittleEnergy": damping_pushes,
@@ -138,6 +150,9 @@ BREAKS: dict[str, Break] = {  # by the promise that must notice
     "StopInTime": stop_ignored,
     "ArmedByRequest": arms_by_itself,
     "NoTorqueWithoutMode": silent_without_torque,
+    "LeaseHeld": leases_ignored,
+    "SilentLoop": no_watchdogs,
+    "TrueTorque": joints_unwatched,
     "WithinStops": joints_unwatched,
     "BoundedEnergy": unwatched_and_unlimited,
     "NoFalseAlarm": false_encoder_fault,

@@ -3,6 +3,7 @@
     make dst SEEDS=200                     the seeds 0 to 199
     make dst SEEDS=5000:25000              from 5000 up to 24999
     make dst SEEDS=17 ARGS=--only          the seed 17 alone, with its schedule
+    make dst SEEDS=1000 ARGS="--style slow"    only schedules in which something drifts for up to a minute
 
 Each broken promise is shrunk to a short schedule, which is printed as text and as Python for the regression list.
 With `--progress FILE` finished blocks of seeds are recorded there, and another call continues after them; Ctrl-C and
@@ -23,7 +24,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.dst.drawing import SHARED, draw_scenario
+from tests.dst.drawing import SHARED, Style, draw_scenario
 from tests.dst.run import Outcome, run_scenario
 from tests.dst.scenario import Scenario, describe
 from tests.dst.shrinking import shrink
@@ -52,14 +53,14 @@ class Campaign:
                 self.broken.append(outcome)
 
 
-def run_block(first: int, last: int) -> list[Outcome]:
+def run_block(first: int, last: int, style: Style | None = None) -> list[Outcome]:
     """Run consecutive seeds, most of which share their surroundings."""
-    return [run_seed(seed) for seed in range(first, last)]
+    return [run_seed(seed, style) for seed in range(first, last)]
 
 
-def run_seed(seed: int) -> Outcome:
+def run_seed(seed: int, style: Style | None = None) -> Outcome:
     try:
-        return run_scenario(draw_scenario(seed))
+        return run_scenario(draw_scenario(seed, style))
     except Exception as problem:  # noqa: BLE001 - a harness that fails is a finding too, and the others go on
         return Outcome(seed, f"{type(problem).__name__}: {problem}", "Harness")
 
@@ -72,12 +73,14 @@ def blocks(first: int, last: int) -> Iterator[tuple[int, int]]:
         first = end
 
 
-def shrunk(seed: int, promise: str) -> Scenario:
+def shrunk(seed: int, promise: str, style: Style | None = None) -> Scenario:
     """Return a short scenario that breaks the same promise."""
-    return shrink(draw_scenario(seed), lambda scenario: run_scenario(scenario).promise == promise)
+    return shrink(draw_scenario(seed, style), lambda scenario: run_scenario(scenario).promise == promise)
 
 
-def run_campaign(first: int, last: int, workers: int, until_s: float, progress: Path | None) -> Campaign:
+def run_campaign(
+    first: int, last: int, workers: int, until_s: float, progress: Path | None, style: Style | None = None
+) -> Campaign:
     """Run the seeds in processes of their own until all are done, the time is over, or Ctrl-C."""
     campaign, begun_s = Campaign(first, last), time.monotonic()
     done = _read_progress(progress)
@@ -90,7 +93,7 @@ def run_campaign(first: int, last: int, workers: int, until_s: float, progress: 
                 block = next(waiting, None)
                 if block is None:
                     break
-                pending[pool.submit(run_block, *block)] = block
+                pending[pool.submit(run_block, *block, style)] = block
             if not pending:
                 break
             finished, _ = wait(pending, SHOWN_S, FIRST_COMPLETED)
@@ -157,6 +160,7 @@ def span_of(text: str) -> tuple[int, int]:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="make dst", description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("seeds", help="a count, or FIRST:LAST without the last one")
+    parser.add_argument("--style", type=Style, choices=list(Style), help="draw only schedules of this style")
     parser.add_argument("--only", action="store_true", help="run this one seed, and print its schedule")
     parser.add_argument("--workers", type=int, default=WORKERS)
     parser.add_argument("--for-s", type=float, default=float("inf"), help="begin no seed after this time")
@@ -166,14 +170,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     first, last = (int(options.seeds), int(options.seeds) + 1) if options.only else span_of(options.seeds)
     begun_s = time.monotonic()
-    campaign = run_campaign(first, last, options.workers, begun_s + options.for_s, options.progress)
+    campaign = run_campaign(first, last, options.workers, begun_s + options.for_s, options.progress, options.style)
     duration_s = time.monotonic() - begun_s
     if options.json:
         print(json.dumps(report_of(campaign, duration_s)))
     else:
         if options.only:
-            print(describe(draw_scenario(first)))
-        print_result(campaign, duration_s, shrinks=not options.no_shrink)
+            print(describe(draw_scenario(first, options.style)))
+        print_result(campaign, duration_s, not options.no_shrink, options.style)
     return 1 if campaign.broken else 0
 
 
@@ -183,12 +187,14 @@ def report_of(campaign: Campaign, duration_s: float) -> dict[str, Any]:
     return {**vars(campaign), "covered": dict(campaign.covered), "broken": broken, "duration_s": duration_s}
 
 
-def print_result(campaign: Campaign, duration_s: float, shrinks: bool) -> None:
+def print_result(campaign: Campaign, duration_s: float, shrinks: bool, style: Style | None = None) -> None:
     for outcome in campaign.broken:
         print(f"seed {outcome.seed} breaks {outcome.promise} at {outcome.at_s:.3f} s: {outcome.problem}")
+        print(describe(draw_scenario(outcome.seed, style)))
+        print(f"  again with: make dst SEEDS={outcome.seed} ARGS='--only{f' --style {style}' if style else ''}'")
         if shrinks and outcome.promise != "Harness":
-            scenario = shrunk(outcome.seed, outcome.promise)
-            print(f"{describe(scenario)}\n{scenario!r}")
+            scenario = shrunk(outcome.seed, outcome.promise, style)
+            print(f"as short as it gets, for tests/dst/regressions.py:\n{describe(scenario)}\n{scenario!r}")
     kinds = Counter(kind.split()[0] for kind in campaign.covered)
     coverage = ", ".join(f"{count} of {kind}" for kind, count in sorted(kinds.items()))
     print(f"{campaign.seeds} seeds in {duration_s:.0f} s, {campaign.ticks} ticks, {len(campaign.broken)} broken")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import socket
 from collections import deque
-from contextlib import AbstractContextManager, redirect_stderr, suppress
+from contextlib import AbstractContextManager, ExitStack, redirect_stderr, suppress
 from io import StringIO
 from math import inf
 from pathlib import Path
@@ -27,18 +27,22 @@ from firmware_host.sockets.rpc import REQUEST, RefusedError
 from firmware_host.sockets.socket_file import operators_path
 from firmware_host.sockets.status_socket import StatusSocket
 from simulation.harness.joint_energy import JointEnergy
-from tests.dst.scenario import Call, Event, Failure, HangUp, Terminate
+from tests.dst.scenario import HARMING, Call, Drift, Event, Failure, HangUp, Restart, Send, Suspend, Terminate
+from tests.dst.suspension import Suspension
 from verification.faults.failing_robot import FailingRobot
 from verification.faults.injection import inject
 
 RIGHTS = Rights(readers=Group("viewers", 70), operators=Group("pilots", 71), own_uid=1)
+INTRUDERS = 12  # connections of one operator who wants all of them
 PEERS = {
     "pilot": Peer(500, 1000, frozenset({1000, 71})),
     "second": Peer(501, 1001, frozenset({1001, 71})),
     "steward": Peer(504, 1001, frozenset({1001, 71})),
     "viewer": Peer(502, 1002, frozenset({1002, 70})),
     "guest": Peer(503, 1003, frozenset({1003})),
+    **{f"intruder{number}": Peer(600 + number, 1001, frozenset({1001, 71})) for number in range(INTRUDERS)},
 }
+LEASED = ("arm", "walk", "move", "lease", "release")  # refused to others than the holder of the lease
 WARNINGS: list[str] = []
 
 
@@ -47,15 +51,47 @@ class Executed(NamedTuple):
 
     method: str
     refused: bool
+    against_lease: bool = False  # another program holds the lease, which the call did not ask to take over
 
 
 class ActiveFailure(NamedTuple):
     """A failure that lasts, of those that the daemon does not cause itself."""
 
-    mode: FailureMode
+    mode: FailureMode | None  # of the table; None: a drift or a restart
     joint: str
     until_s: float
     injection: AbstractContextManager[None]
+
+
+class ActiveDrift:
+    """Owns the changes of one drive while its parameters drift."""
+
+    def __init__(self, lockstep: FailingRobot, drift: Drift, begun_s: float) -> None:
+        self._lockstep, self._drift, self._begun_s = lockstep, drift, begun_s
+        sound = lockstep.drive(drift.joint).parameters
+        self._from = {name: getattr(sound, name) for name in drift.values}
+        self._changed = ExitStack()
+        self.moves = True
+        self.update(begun_s)
+
+    def update(self, now_s: float) -> None:
+        """Apply the values of this time, until the last ones are reached."""
+        drift = self._drift
+        done = (now_s - self._begun_s) / drift.over_s if drift.over_s else 1.0
+        self.moves = done < 1.0
+        values = {
+            name: start + done * (drift.values[name] - start) if self.moves else drift.values[name]
+            for name, start in self._from.items()
+        }
+        self._changed.close()
+        self._changed.enter_context(self._lockstep.drive_changed(drift.joint, **values))
+
+    def __enter__(self) -> None:
+        """Do nothing: it has begun."""
+
+    def __exit__(self, *problem: object) -> None:
+        self.moves = False
+        self._changed.close()
 
 
 class Client:
@@ -66,9 +102,9 @@ class Client:
         self._socket.connect(str(path))
         self._socket.setblocking(False)
 
-    def call(self, method: str, params: dict[str, Any]) -> None:
-        with suppress(OSError):  # the daemon has closed the connection
-            self._socket.send(msgpack.packb([REQUEST, 1, method, params]))
+    def send(self, data: bytes) -> None:
+        with suppress(OSError):  # the daemon has closed the connection, or reads none of it
+            self._socket.send(data)
 
     def read(self) -> None:
         with suppress(OSError):
@@ -85,16 +121,21 @@ class OperatedRobot:
         self.lockstep = lockstep
         self.loop = lockstep.loop
         self.active: list[ActiveFailure] = []
+        self._drifts: list[ActiveDrift] = []
+        self._suspension = Suspension(lockstep)
         self.work = JointEnergy(lockstep.robot, self.loop.configuration.joint_ranges)
         self.harmed = False  # something has failed since the start
         self.calls: list[Executed] = []
         self.bug = ""  # the exception that ended the loop, or a report of one in the socket
         self.ended = False  # whether the daemon has ended
+        self.heard_s = lockstep.now_s  # when the loop last may have sent a command
         self._clients: dict[str, Client] = {}
         self._coming: deque[Peer] = deque()
         self._shutdown = Shutdown()
         calls = OperatorCalls(self.loop, WARNINGS, self._clock)
-        methods = with_failures(calls.methods, lockstep.failures, self.loop.events.report, self._clock)
+        methods = with_failures(
+            calls.methods, lockstep.failures, self.loop.events.report, self._clock, calls.require_own_robot
+        )
         noted = {name: self._noted(name, method) for name, method in methods.items()}
         self._status = StatusSocket(folder / "s", noted, RIGHTS, lambda _: self._coming.popleft(), self._clock)
         self._status.on_hang_up = self.loop.lease.hang_up
@@ -110,7 +151,7 @@ class OperatedRobot:
 
     def apply(self, event: Event) -> None:
         """Let an event happen before the next tick."""
-        self.harmed = self.harmed or isinstance(event, Failure)
+        self.harmed = self.harmed or isinstance(event, HARMING)
         match event:
             case Call(client=client, method=method, params=params):
                 self.call(client, method, **params)
@@ -118,6 +159,15 @@ class OperatedRobot:
                 self._clients.pop(client).close()
             case Failure():
                 self._begin(event)
+            case Drift(joint=joint, for_s=for_s):
+                self._drifts.append(ActiveDrift(self.lockstep, event, self.now_s))
+                self.active.append(ActiveFailure(None, joint, self.now_s + for_s, self._drifts[-1]))
+            case Restart():
+                self._restart(event)
+            case Suspend() if not self.ended:
+                self._suspension.begin(event)
+            case Send(client=client, data=data):
+                self._client(client).send(data)
             case Terminate():
                 self._shutdown.request(0, None)
 
@@ -132,24 +182,41 @@ class OperatedRobot:
         injection.__enter__()
         self.active.append(ActiveFailure(mode, joint, self.now_s + failure.for_s, injection))
 
+    def _restart(self, event: Restart) -> None:
+        drive = self.lockstep.drive(event.joint)
+        vars(drive)["boot_s"] = event.boot_s
+        drive.restart(self.lockstep.robot.now_s)
+        if event.shift_rad:
+            shifted = self.lockstep.drive_changed(
+                event.joint, encoder_offset_rad=drive.parameters.encoder_offset_rad + event.shift_rad
+            )
+            shifted.__enter__()
+            self.active.append(ActiveFailure(None, event.joint, inf, shifted))
+
     def end_failures(self, until_s: float = inf) -> None:
         """End the failures that last no longer than this."""
         for each in [each for each in self.active if each.until_s <= until_s]:
             self.active.remove(each)
             each.injection.__exit__(None, None, None)
+        self._drifts = [drift for drift in self._drifts if drift.moves]
 
     def call(self, client: str, method: str, **params: Any) -> None:
+        self._client(client).send(msgpack.packb([REQUEST, 1, method, params]))
+
+    def _client(self, client: str) -> Client:
         if client not in self._clients:
             self._coming.append(PEERS[client])
             path = self._status.path
             self._clients[client] = Client(
                 operators_path(path) if RIGHTS.operators.gid in PEERS[client].groups else path
             )
-        self._clients[client].call(method, params)
+        return self._clients[client]
 
     def begin_tick(self) -> None:
         """End the failures that are over, before the next tick."""
         self.end_failures(self.now_s)
+        for drift in self._drifts:
+            drift.update(self.now_s)
         self.calls.clear()
 
     def step(self) -> None:
@@ -161,7 +228,8 @@ class OperatedRobot:
         try:
             self.ended = self._shutdown.step(self.loop, self.now_s)
             if not self.ended:
-                self.lockstep.step()
+                self._suspension.step()
+                self.heard_s = self.now_s
                 self._status.serve(self.now_s)
         except Exception as problem:  # noqa: BLE001 - as in the daemon
             self._report_bug(f"{type(problem).__name__}: {problem}")
@@ -175,12 +243,15 @@ class OperatedRobot:
         """Return the method, which also notes its calls."""
 
         def call(params: dict[str, Any], caller: Caller) -> Any:
+            lease = self.loop.lease
+            against_lease = lease.held and caller != lease.holder and not params.get("take_over")
             try:
                 answer = method(params, caller)
             except RefusedError:
                 self.calls.append(Executed(name, refused=True))
                 raise
-            self.calls.append(Executed(name, refused=False))
+            self.harmed = self.harmed or name == "fail"
+            self.calls.append(Executed(name, refused=False, against_lease=against_lease and name in LEASED))
             return answer
 
         return call

@@ -13,8 +13,11 @@ from control.faults import Clears, FaultKind, Reaction
 from control.modes import ENERGISED, HELD, Mode
 from control.monitors.encoder_monitor import YIELDING_NM
 from control.records import JOINTS, NEVER_S, Torques
+from drivers.fault_injection.failures import MOST_DELAY_S
+from simulation.body.plant import END_STOPS_RAD
+from simulation.harness.joint_energy import AT_STOP_RAD
 from tests.dst.operated_robot import OperatedRobot
-from tests.dst.reachability import Reachability
+from tests.dst.reachability import AFTERMATH_S, WATCHDOG_S, Reachability
 from verification.faults.energy_bounds import energy_bounds
 
 ROUNDING_NM = 1e-6  # also of a current that decays exponentially and never is zero
@@ -179,26 +182,121 @@ class ArmedByRequest(Promise):
                 yield f"the drive of {JOINTS[index]} stays in closed loop in mode {self.loop.mode.name.lower()}"
 
 
+class LeaseHeld(Promise):
+    """While a program holds the lease, no other one moves the robot, unless it takes the robot over."""
+
+    def update(self) -> Iterator[str]:
+        for call in self.robot.calls:
+            if call.against_lease and not call.refused:
+                yield f"{call.method} is accepted under another program's lease"
+
+
+class SilentLoop(Promise):
+    """No motor drives its joint any longer than its watchdog lasts once no command can reach it, as with SIGSTOP.
+
+    A drive may brake on: a moteus whose watchdog has expired damps.
+    """
+
+    LONGEST_S = WATCHDOG_S + MOST_DELAY_S + AFTERMATH_S
+
+    def begin(self) -> None:
+        self._late: dict[int, float] = {}
+        self.robot.lockstep.robot.observers.append(self._measure)
+
+    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+        robot = self.robot.lockstep.robot
+        if robot.now_s - self.robot.heard_s < self.LONGEST_S:
+            return
+        velocities_rad_s, least_nm = robot.plant.velocities_rad_s, self.reach.cogging_nm + ROUNDING_NM
+        for index, torque_nm in enumerate(torques_nm):
+            drives = abs(torque_nm) > least_nm and torque_nm * velocities_rad_s[index] > 0.0
+            if drives and not self.reach.is_foreign(index):
+                self._late[index] = torque_nm
+
+    def update(self) -> Iterator[str]:
+        for index, torque_nm in self._late.items():
+            yield f"{JOINTS[index]} is driven with {torque_nm:.3f} N·m although the loop is silent"
+        self._late.clear()
+
+
+class TrueTorque(Promise):
+    """A motor that is at least STRONG times as strong as configured is found before it does much work of its own.
+
+    What a right motor would have done with the same commands is its command's work along the true path. The rest is
+    bounded for each time that torque is on, and so is the time for which the true torque exceeds what any command of a
+    right motor may be: a stride, in which every joint moves through air once.
+    """
+
+    STRONG = 2.0
+    MOST_J = 0.5
+
+    def begin(self) -> None:
+        self._limit_nm = self.STRONG * self.loop.configuration.limits.torque_nm
+        self._longest_s = energy_bounds(self.loop.configuration).stride_s
+        self._reset()
+        self.robot.lockstep.robot.observers.append(self._measure)
+
+    def _reset(self) -> None:
+        self._excess_j, self._lowest_j = [0.0] * len(JOINTS), [0.0] * len(JOINTS)
+        self._beyond_s = [0.0] * len(JOINTS)
+
+    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+        if max(self.reach.gains) < self.STRONG:
+            return
+        velocities_rad_s = self.robot.lockstep.robot.plant.velocities_rad_s
+        for index, (torque_nm, gain) in enumerate(zip(torques_nm, self.reach.gains, strict=True)):
+            if gain < self.STRONG or self.reach.is_foreign(index):
+                continue
+            self._excess_j[index] += (1.0 - 1.0 / gain) * torque_nm * velocities_rad_s[index] * dt_s
+            self._lowest_j[index] = min(self._lowest_j[index], self._excess_j[index])
+            self._beyond_s[index] += dt_s if abs(torque_nm) > self._limit_nm else 0.0
+
+    def update(self) -> Iterator[str]:
+        if self.loop.mode not in ENERGISED:
+            self._reset()
+            return
+        for index, joint in enumerate(JOINTS):
+            excess_j = self._excess_j[index] - self._lowest_j[index]
+            if excess_j > self.MOST_J:
+                yield f"{joint} received {excess_j:.2f} J more than from a right motor"
+            if self._beyond_s[index] > self._longest_s:
+                yield f"{joint} had more than {self._limit_nm:.2f} N·m for {self._beyond_s[index]:.2f} s"
+
+
 class WithinStops(Promise):
-    """Our torque does not press a joint against its mechanical stop.
+    """No motor presses its joint against the mechanical stop, by its true torque and the joint's true angle.
 
     An encoder that freezes at zero speed shows only in a torque that changes by more than YIELDING_NM: until then the
     robot cannot distinguish it from a joint that mud holds, and less torque than that may press the joint.
     """
 
-    LONGEST_S = 0.5  # a stuck encoder is detected within 120 ticks, then braking takes as long as the slew
+    PRESSING_NM = 0.3
+    LONGEST_S = 0.5
+    RELEASED_S = 0.1  # a joint that was free for this long begins again
 
     def begin(self) -> None:
         self._pressed_s = [0.0] * len(JOINTS)
-        self._before_s = [0.0] * len(JOINTS)  # in all, one tick ago
+        self._free_s = [0.0] * len(JOINTS)
+        self.robot.lockstep.robot.observers.append(self._measure)
+
+    def _measure(self, dt_s: float, torques_nm: Torques) -> None:
+        if max(torques_nm) < self.PRESSING_NM and min(torques_nm) > -self.PRESSING_NM and not any(self._pressed_s):
+            return
+        angles_rad = self.robot.lockstep.robot.plant.angles_rad
+        for index, (torque_nm, angle_rad) in enumerate(zip(torques_nm, angles_rad, strict=True)):
+            inwards_nm = torque_nm if angle_rad > 0.0 else -torque_nm
+            pressed = inwards_nm >= self.PRESSING_NM and abs(angle_rad) > END_STOPS_RAD[index % 2] - AT_STOP_RAD
+            if pressed and not self.reach.is_foreign(index) and not self._is_hidden(index):
+                self._pressed_s[index] += dt_s
+                self._free_s[index] = 0.0
+            elif self._pressed_s[index]:
+                self._free_s[index] += dt_s
+                self._pressed_s[index] = self._pressed_s[index] if self._free_s[index] < self.RELEASED_S else 0.0
 
     def update(self) -> Iterator[str]:
-        for index, joint in enumerate(self.robot.work.joints):
-            newly_s, self._before_s[index] = joint.pushed_s - self._before_s[index], joint.pushed_s
-            ours = newly_s > 0.0 and not self.reach.is_foreign(index) and not self._is_hidden(index)
-            self._pressed_s[index] = self._pressed_s[index] + newly_s if ours else 0.0
-            if self._pressed_s[index] > self.LONGEST_S:
-                yield f"{JOINTS[index]} is pressed against its stop for {self._pressed_s[index]:.2f} s"
+        for joint, pressed_s in zip(JOINTS, self._pressed_s, strict=True):
+            if pressed_s > self.LONGEST_S:
+                yield f"{joint} is pressed against its stop for {pressed_s:.2f} s"
 
     def _is_hidden(self, index: int) -> bool:
         is_frozen = self.robot.lockstep.robot.drives[index].parameters.encoder_frozen
@@ -251,21 +349,31 @@ class BoundedEnergy(Promise):
     def begin(self) -> None:
         self._bounds = energy_bounds(self.loop.configuration)
         self._rise = EnergyRise(self.robot, self.reach)
-        self._held_s = self._stopping_j = 0.0
+        self._held_s = self._stopping_j = self._excess_j = 0.0
+        self._strongest, self._was_on = 1.0, False
 
     def update(self) -> Iterator[str]:
         if not self.robot.harmed:
             self._rise.reset()
             return
+        self._allow_strong_motors()
         if self.loop.mode in HELD:
             self._held_s += self.loop.period_s
         for fault in self.loop.faults.begun:
             if fault.kind.reaction >= Reaction.SOFT_STOP:
                 self._stopping_j = max(self._stopping_j, self._bounds.fault_j(fault.kind))
-        most_j = self._bounds.walking_j(self._held_s) + self._stopping_j
+        most_j = self._strongest * (self._bounds.walking_j(self._held_s) + self._stopping_j) + self._excess_j
         energy_j, joint = self._rise.largest_j()
         if energy_j > most_j:
             yield f"{joint} received {energy_j:.2f} J since the first failure, the bound is {most_j:.2f} J"
+
+    def _allow_strong_motors(self) -> None:
+        """Scale the bound with motors that are stronger than configured; what is found has its own bound."""
+        strongest, is_on = max(self.reach.gains), self.loop.mode in ENERGISED
+        self._strongest = max(self._strongest, min(strongest, TrueTorque.STRONG))
+        if strongest >= TrueTorque.STRONG and is_on and not self._was_on:
+            self._excess_j += TrueTorque.MOST_J
+        self._was_on = is_on and strongest >= TrueTorque.STRONG
 
 
 class NoFalseAlarm(Promise):
@@ -305,6 +413,9 @@ PROMISES: tuple[type[Promise], ...] = (
     StopInTime,
     DisarmAtOnce,
     ArmedByRequest,
+    LeaseHeld,
+    SilentLoop,
+    TrueTorque,
     WithinStops,
     LittleEnergy,
     BoundedEnergy,

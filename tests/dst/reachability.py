@@ -34,7 +34,6 @@ class Reachability:
         self._missed = robot.loop.missed_ticks
         drive = robot.loop.configuration.drive
         self._paths = [(f"bus.{drive[joint].bus}", joint, f"{joint}.command") for joint in JOINTS]
-        self.cogging_nm = 2.0 * max(each.parameters.cogging_nm for each in robot.lockstep.robot.drives)
         self._lags_s = self._current_lags_s()
         self._hastened_s = [float("-inf")] * len(JOINTS)  # when a motor's current lost its lag
         self.stalled_s = 0.0  # since the start
@@ -46,6 +45,7 @@ class Reachability:
         if missed != self._missed:
             self.stalled_s += (missed - self._missed) * self._period_s
             self._missed, self._late_s = missed, now_s
+        self.cogging_nm = 2.0 * max(each.parameters.cogging_nm for each in self._robot.lockstep.robot.drives)
         lags_s = self._current_lags_s()
         for index, (before_s, lag_s) in enumerate(zip(self._lags_s, lags_s, strict=True)):
             if lag_s < before_s:
@@ -55,7 +55,8 @@ class Reachability:
         for index, joint in enumerate(JOINTS):
             if self._failures.failing and any(self._cuts(component) for component in self._paths[index]):
                 self._disturbed_s[index] = now_s
-            if any(active.joint == joint and active.mode.component == MASTER for active in self._robot.active):
+            own = [each.mode.component for each in self._robot.active if each.mode and each.joint == joint]
+            if MASTER in own:
                 self._foreign_s[index] = now_s
 
     def _current_lags_s(self) -> list[float]:

@@ -16,7 +16,7 @@ from tests.dst.log_check import log_problems
 from tests.dst.operated_robot import OperatedRobot
 from tests.dst.promises import PROMISES, Promise, StopInTime
 from tests.dst.reachability import Reachability
-from tests.dst.scenario import Call, Event, Failure, HangUp, Scenario, Terminate
+from tests.dst.scenario import Call, Drift, Event, Failure, Scenario, Terminate
 from tests.dst.starts import RecordedRobot, sound_walk
 
 STEWARD = "steward"  # the client that brings the robot to rest and arms it again
@@ -74,6 +74,7 @@ class Run:
 
     def _run_schedule(self) -> None:
         self.outcome.covered[f"start {self._scenario.start}"] += 1
+        self.outcome.covered[f"drives {self._scenario.surroundings.drive_type}"] += 1
         waiting = list(self._scenario.events)
         end_s = self._begun_s + self._scenario.for_s
         while self._robot.now_s < end_s:
@@ -123,7 +124,8 @@ class Run:
 
     def _is_ready(self) -> bool:
         """Return whether the robot may be armed, or waits for its windings to cool."""
-        return self._cools() or self._loop.mode is Mode.IDLE and not self._loop.faults.blocking()
+        faults, forced = self._loop.faults, self._robot.lockstep.forced
+        return self._cools() or self._loop.mode is Mode.IDLE and not faults.blocking(forced)
 
     def _cools(self) -> bool:
         return any(fault.kind in COOLING for fault in self._loop.faults.present)
@@ -136,7 +138,7 @@ class Run:
             if self._loop.mode is Mode.HOLD:
                 break
             if tick % CLEARING_TICKS == 0:  # a joint may have been moving
-                self._robot.call(STEWARD, "arm", take_over=True)
+                self._robot.call(STEWARD, "arm", take_over=True, force=self._robot.lockstep.forced)
             self._step()
         else:
             names = ", ".join(fault.name for fault in self._loop.faults.present) or "no fault"
@@ -185,8 +187,11 @@ class Run:
                 for joint in JOINTS:
                     component = component.replace(joint, "JOINT")
                 self.outcome.covered[f"failure {component} {kind}"] += 1
-            case HangUp() | Terminate():
-                self.outcome.covered[f"{type(event).__name__.lower()}"] += 1
+            case Drift(values=values):
+                for name in values:
+                    self.outcome.covered[f"drift {name}"] += 1
+            case _:
+                self.outcome.covered[f"event {type(event).__name__.lower()}"] += 1
 
     def check_log(self, folder: Path, lockstep: RecordedRobot) -> None:
         lockstep.loop.recorder.close(0.0)

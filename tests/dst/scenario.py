@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from drivers.drive_types import DEFAULT
+
 
 class Call(NamedTuple):
     """A client of the operator socket calls a method."""
@@ -34,13 +36,51 @@ class Failure(NamedTuple):
     for_s: float
 
 
+class Drift(NamedTuple):
+    """Parameters of a simulated drive go linearly to other values and stay there, whatever the operators do."""
+
+    at_s: float
+    joint: str
+    values: dict[str, Any]  # fields of SimulatedDriveParameters
+    for_s: float
+    over_s: float = 0.0  # until the values are reached
+
+
+class Restart(NamedTuple):
+    """The supply of a drive dips. Its angle may have another zero afterwards, which lasts until every failure ends."""
+
+    at_s: float
+    joint: str
+    boot_s: float
+    shift_rad: float = 0.0
+
+
+class Suspend(NamedTuple):
+    """The daemon gets SIGSTOP, between two ticks or inside of one, and SIGCONT after a while."""
+
+    at_s: float
+    for_s: float
+    inside: str = ""  # method of the loop before which it stops, or "bus.NAME": before that bus gets the next command
+
+
+class Send(NamedTuple):
+    """A client sends bytes to the operator socket, which may be no request."""
+
+    at_s: float
+    client: str
+    data: bytes
+
+
 class Terminate(NamedTuple):
     """The service is stopped with SIGTERM."""
 
     at_s: float
 
 
-Event = Call | HangUp | Failure | Terminate
+Event = Call | HangUp | Failure | Drift | Restart | Suspend | Send | Terminate
+Harm = Failure | Drift | Restart | Suspend
+LASTING = (Failure, Drift, Suspend)
+HARMING = (*LASTING, Restart)
 
 
 class Surroundings(NamedTuple):
@@ -52,6 +92,7 @@ class Surroundings(NamedTuple):
     stone_m: float | None = None  # where along the track a buried stone begins
     disturbed: bool = False  # the mud clings, remoulds and relaxes as in the authors' logs
     free_body: bool = False
+    drive_type: str = DEFAULT  # or with a model of motor, as "mit:AK80-9"
     drives: tuple[tuple[str, float], ...] = ()  # fields of SimulatedDriveParameters
     configuration: tuple[tuple[str, Any], ...] = ()  # keys that differ from the example: ("limits.torque_nm", 0.5)
 
@@ -66,7 +107,7 @@ class Scenario(NamedTuple):
 
 def end_s(event: Event) -> float:
     """Return when the event is over."""
-    return event.at_s + event.for_s if isinstance(event, Failure) else event.at_s
+    return event.at_s + event.for_s if isinstance(event, LASTING) else event.at_s
 
 
 def describe(scenario: Scenario) -> str:
@@ -86,5 +127,15 @@ def _text_of(event: Event) -> str:
             return f"{event.client} hangs up"
         case Failure():
             return f"{event.component} {event.kind} for {event.for_s:g} s"
+        case Drift():
+            values = ", ".join(f"{name} goes to {value}" for name, value in event.values.items())
+            return f"{event.joint}: {values} within {event.over_s:g} s, for {event.for_s:g} s"
+        case Restart():
+            shift = f", its zero shifted by {event.shift_rad:g} rad" if event.shift_rad else ""
+            return f"{event.joint} restarts and boots for {event.boot_s:g} s{shift}"
+        case Suspend():
+            return f"SIGSTOP {f'inside of {event.inside}' if event.inside else 'between ticks'} for {event.for_s:g} s"
+        case Send():
+            return f"{event.client} sends {len(event.data)} bytes: {event.data[:16].hex(' ')}"
         case Terminate():
             return "SIGTERM"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from tests.dst.scenario import Event, Failure, Scenario, Surroundings, end_s
+from tests.dst.scenario import LASTING, Event, Scenario, Surroundings, end_s
 
 SHORTEST_S = 0.01
 AFTER_S = 0.05  # of the run, after its last event
@@ -57,5 +57,5 @@ def _with_fewer(events: tuple[Event, ...]) -> Iterator[tuple[Event, ...]]:
 
 def _with_shorter(events: tuple[Event, ...]) -> Iterator[tuple[Event, ...]]:
     for index, event in enumerate(events):
-        if isinstance(event, Failure) and event.for_s > 2.0 * SHORTEST_S:
+        if isinstance(event, LASTING) and event.for_s > 2.0 * SHORTEST_S:
             yield (*events[:index], event._replace(for_s=round(event.for_s / 2.0, 3)), *events[index + 1 :])

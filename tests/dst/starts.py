@@ -17,6 +17,7 @@ from control.modes import ENERGISED, Mode, Request
 from control.records import Phase
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.configuration.loading import parse_configuration
+from simulation.harness.drive_presets import with_drive_type
 from simulation.harness.world import World
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE
@@ -69,7 +70,7 @@ def _example() -> str:
 
 def configuration_of(surroundings: Surroundings) -> Configuration:
     """Return the configuration; raises ConfigurationError where the changed keys contradict each other."""
-    document = tomllib.loads(_example())
+    document = tomllib.loads(with_drive_type(_example(), surroundings.drive_type))
     for key, value in (("failures.allowed", True), *surroundings.configuration):
         section, _, name = key.rpartition(".")
         document.setdefault(section, {})[name] = value
@@ -108,9 +109,9 @@ class SoundWalk:
     def _go_to(self, start: str) -> None:
         robot, loop = self._robot, self._robot.loop
         if start == "idle":
-            self._reach(start, lambda: loop.mode is Mode.IDLE and not loop.faults.blocking())
+            self._reach(start, lambda: loop.mode is Mode.IDLE and not loop.faults.blocking(robot.forced))
         elif start == "hold":
-            loop.request(Request.ARM, robot.now_s)
+            loop.request(Request.ARM, robot.now_s, forced=robot.forced)
             self._reach(start, lambda: loop.mode is Mode.HOLD)
         elif start == "path":
             depth_m = self._surroundings.depth_m

@@ -8,17 +8,22 @@ import json
 from collections import Counter
 from math import inf
 from pathlib import Path
+from random import Random
+from typing import get_args
 
 import pytest
 
+from control.records import JOINTS
+from drivers.drive_types import DRIVE_TYPES
 from drivers.fault_injection.failure_table import SCHEDULED
-from tests.dst.campaign import Campaign, blocks, main, run_campaign, span_of
-from tests.dst.drawing import FAMILIES, draw_scenario
+from tests.dst.campaign import Campaign, blocks, main, print_result, run_campaign, span_of
+from tests.dst.drawing import DRAWN, FAMILIES, LARGEST_SHIFT_RAD, Style, draw_scenario
 from tests.dst.regressions import REGRESSIONS, Regression
-from tests.dst.run import run_scenario
-from tests.dst.scenario import Call, Failure
+from tests.dst.run import Outcome, run_scenario
+from tests.dst.scenario import Call, Drift, Event, Failure, Restart, describe
 
 CI_SEEDS = 200
+DRAWN_VALUES = {name for draw in DRAWN for name in draw(Random(1))}
 
 
 @pytest.mark.parametrize("regression", REGRESSIONS, ids=lambda regression: regression.text)
@@ -27,13 +32,33 @@ def test_a_promise_that_was_broken_is_kept(regression: Regression) -> None:
 
 
 def test_two_hundred_seeds_draw_every_kind_of_failure_and_call() -> None:
-    events = [event for seed in range(CI_SEEDS) for event in draw_scenario(seed).events]
-    drawn = {
-        (event.component.replace("left_sweep", "JOINT"), event.kind) for event in events if isinstance(event, Failure)
-    }
-    assert {name for name, _ in drawn} >= {name for name, _ in SCHEDULED}
-    assert len({name.replace("left", "") for name, _ in drawn}) >= len(FAMILIES)
+    scenarios = [draw_scenario(seed) for seed in range(CI_SEEDS)]
+    events = [event for scenario in scenarios for event in scenario.events]
+    drawn = {_family(event.component) for event in events if isinstance(event, Failure)}
+    assert drawn >= {component for component, _ in SCHEDULED} and drawn >= {_family(each) for each in FAMILIES}
     assert {event.method for event in events if isinstance(event, Call)} >= {"arm", "walk", "move", "stop", "disarm"}
+    assert {type(event) for event in events} == set(get_args(Event))
+    assert {name for event in events if isinstance(event, Drift) for name in event.values} >= DRAWN_VALUES
+    assert any(event.shift_rad for event in events if isinstance(event, Restart)) or not LARGEST_SHIFT_RAD
+    assert {scenario.surroundings.drive_type.partition(":")[0] for scenario in scenarios} == set(DRIVE_TYPES)
+    assert max(scenario.for_s for scenario in scenarios) > 15.0  # something slow
+
+
+def _family(component: str) -> str:
+    for joint in JOINTS:
+        component = component.replace(joint, "JOINT")
+    return component.replace("left", "NAME").replace("right", "NAME")
+
+
+def test_a_broken_seed_prints_its_schedule_and_the_command_that_repeats_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = Outcome(17, "left_sweep has 3 N·m", "LimitedMotors", 0.1)
+    monkeypatch.setattr("tests.dst.campaign.shrunk", lambda *given: draw_scenario(17, Style.SLOW))
+    print_result(Campaign(17, 18, broken=[broken]), 1.0, shrinks=True, style=Style.SLOW)
+    shown = capsys.readouterr().out
+    assert describe(draw_scenario(17, Style.SLOW)) in shown
+    assert "make dst SEEDS=17 ARGS='--only --style slow'" in shown
 
 
 def test_a_campaign_goes_on_where_it_ended(tmp_path: Path) -> None:

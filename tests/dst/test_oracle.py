@@ -8,7 +8,7 @@ from tests.dst.broken_promises import BREAKS
 from tests.dst.drawing import draw_scenario
 from tests.dst.promises import PROMISES
 from tests.dst.run import run_scenario
-from tests.dst.scenario import Call, Event, Failure, Scenario, Surroundings
+from tests.dst.scenario import Call, Drift, Event, Failure, Scenario, Surroundings, Suspend
 from tests.dst.shrinking import shrink
 from tests.dst.starts import sound_walk
 
@@ -21,6 +21,9 @@ SCHEDULES: dict[str, tuple[str, tuple[Event, ...], float]] = {  # start, events 
     "StopInTime": ("hold", (Call(0.0, "pilot", "walk"), Call(0.1, "guest", "stop")), SHORT_S),
     "ArmedByRequest": ("stance", (Call(0.05, "guest", "disarm"),), 0.8),
     "NoTorqueWithoutMode": ("stance", (Failure(0.05, "left_sweep.error", "stuck", 0.05),), SHORT_S),
+    "LeaseHeld": ("hold", (Call(0.0, "pilot", "lease", {"for_s": 1.0}), Call(0.1, "second", "walk")), SHORT_S),
+    "SilentLoop": ("stance", (Suspend(0.05, 0.4, "drives.send"),), 0.6),
+    "TrueTorque": ("path", (Drift(0.0, "left_sweep", {"torque_constant_error": 4.0}, 1.5),), 1.5),
     "WithinStops": ("stance", (Failure(0.0, "left_sweep.motor", "inverted", 1.2),), 1.2),
     "BoundedEnergy": ("stance", (Failure(0.0, "left_sweep.motor", "inverted", 0.6),), SHORT_S),
     "NoFalseAlarm": ("stance", (), SHORT_S),

@@ -76,28 +76,33 @@ class Laboratory:
         if encoder is not None:
             settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count, encoder_baud)
             self.encoder = StageEncoder(settings)
-        self.recorder = CellRecorder(self.port, self.bench, operator.report, self.encoder)
+        self.recorder = CellRecorder(self.port, self.bench, operator, self.encoder)
         self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
         self.notebook = Notebook(folder, notebook_plan(SETTINGS))
         stage_of_it = SimulatedStage(SETTINGS, self.bench, (), seed)
         stage_of_it.plates = dict(muds)
         self.trial_bench = TrialBench(
-            self.recorder, stage_of_it, operator, self.notebook, folder, lambda done, total: None
+            recorder=self.recorder,
+            stage=stage_of_it,
+            plan=self.plan,
+            notebook=self.notebook,
+            folder=folder,
+            show=lambda done, total: None,
         )
 
     def at(self, after_s: float, happen: Callable[[], None]) -> None:
         self.bench.events.append((self.bench.now_s() + after_s, happen))
 
     def measure(self, cell: CellSettings | None = None) -> None:
-        prepare_cell(self.trial_bench, SETTINGS, cell or CellSettings())
-        measure_all(self.trial_bench, self.plan)
+        prepare_cell(self.trial_bench, cell or CellSettings())
+        measure_all(self.trial_bench)
 
     def try_once(self, kind: str = INSERTION) -> list[str]:
         """Measure one trial and return the reported messages."""
         trial = Trial("lawful", kind, 1)
         self.recorder.listen(1.0)
         self.trial_bench.stage.prepare(trial, 1)
-        self.notebook.write(trial.key, measure(self.trial_bench, trial, self.plan))
+        self.notebook.write(trial.key, measure(self.trial_bench, trial))
         return self.operator.reported
 
     def evaluate_muds(self) -> Results:
