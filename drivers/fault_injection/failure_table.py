@@ -406,13 +406,14 @@ CONSEQUENCES: Mapping[str, tuple[str, ...]] = {  # faults that may be reported w
     # the second drive reports another angle, and its own set-points
     "duplicate_node_id": (
         *("encoder_jump", "joint_moving", "drive_disarmed", "joint_position", "encoder_stuck", "setpoint_mismatch"),
+        *("encoder_slips", "speed_wrong"),
     ),
     "setpoint_mismatch": ("joint_runaway",),  # in that torque's direction
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version", "wrong_drive"),
     "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
     "bus_refuses": (*IDLE_DRIVE, "joint_runaway"),  # at the last torque
     "joint_position": ("encoder_jump",),
-    "encoder_stuck": ("encoder_jump",),  # when it reports angles again
+    "encoder_stuck": ("encoder_jump", "encoder_slips", "speed_wrong"),  # when it reports angles again, or meanwhile
     "encoder_jump": ("joint_moving",),
     # it drifts on, and bends the line that shows a wrong speed
     "encoder_slips": ("joint_moving", "joint_position", "encoder_stuck", "speed_wrong"),

@@ -192,7 +192,8 @@ def test_a_speed_that_no_joint_has_is_no_energy() -> None:
 @pytest.mark.parametrize("rate_rad_s", [0.05, 0.3, 1.0])
 def test_a_joint_at_its_stop_whose_encoder_slips_with_its_speed_is_found(sign: float, rate_rad_s: float) -> None:
     """From 0.3 N·m on the motor presses for at most 0.5 s."""
-    monitor, pressed_s, now_s, found = MotionMonitor("left_sweep", DYNAMICS, TORQUE_NM), 0.0, 0.0, []
+    monitor, pressed_s, now_s = MotionMonitor("left_sweep", DYNAMICS, TORQUE_NM), 0.0, 0.0
+    found: list[Fault] = []
     while not found and now_s < 10.0:
         now_s += PERIOD_S
         angle_rad = -sign * rate_rad_s * now_s
