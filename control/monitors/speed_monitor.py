@@ -15,6 +15,7 @@ time constant of the leak, 0.08 rad. A slip of 0.05 rad/s gathers up to 0.25 rad
 from control.faults import Fault, FaultKind
 
 INTERVAL_S = 0.1
+SURE_ERRORS = 3.0  # standard errors of the slope: messages that repeat old values scatter it
 LEAK_S = 5.0
 SLIPPED_RAD = 0.125
 LEAST_RAD2 = 0.05  # variance of W that determines the slope: four intervals at 1 rad/s in each direction
@@ -32,6 +33,7 @@ class SpeedMonitor:
     def reset(self) -> None:
         self._wrong_intervals = 0
         self._count = self._path_rad = self._turned_rad = self._path_rad2 = self._product_rad2 = 0.0
+        self._turned_rad2 = 0.0
         self.begin_interval()
 
     def begin_interval(self) -> None:
@@ -51,14 +53,26 @@ class SpeedMonitor:
         self._turned_rad = kept * self._turned_rad + turned_rad
         self._path_rad2 = kept * self._path_rad2 + path_rad * path_rad
         self._product_rad2 = kept * self._product_rad2 + path_rad * turned_rad
+        self._turned_rad2 = kept * self._turned_rad2 + turned_rad * turned_rad
         self.begin_interval()
+        fault = self._judge()
+        if fault:  # the next one needs new evidence: an operator may clear this one
+            self.reset()
+        return fault
+
+    def _judge(self) -> Fault | None:
         variance_rad2 = self._path_rad2 - self._path_rad * self._path_rad / self._count
-        known = variance_rad2 > LEAST_RAD2
-        slope = (self._product_rad2 - self._path_rad * self._turned_rad / self._count) / variance_rad2 if known else 1.0
+        slope, error = 1.0, 0.0
+        if variance_rad2 > LEAST_RAD2:
+            product_rad2 = self._product_rad2 - self._path_rad * self._turned_rad / self._count
+            slope = product_rad2 / variance_rad2
+            scatter_rad2 = self._turned_rad2 - self._turned_rad * self._turned_rad / self._count - slope * product_rad2
+            error = (max(scatter_rad2, 0.0) / variance_rad2 / max(self._count - 2.0, 1.0)) ** 0.5
         slipped_rad = self._turned_rad - slope * self._path_rad
         if abs(slipped_rad) > SLIPPED_RAD:
             return FaultKind.ENCODER_SLIPS.fault(self._joint, slipped_rad=slipped_rad)
-        self._wrong_intervals = self._wrong_intervals + 1 if abs(slope - 1.0) > WRONG_FRACTION else 0
+        is_wrong = abs(slope - 1.0) > WRONG_FRACTION + SURE_ERRORS * error
+        self._wrong_intervals = self._wrong_intervals + 1 if is_wrong else 0
         if self._wrong_intervals >= WRONG_INTERVALS:
             return FaultKind.SPEED_WRONG.fault(self._joint, factor=1.0 / slope if slope else 0.0)
         return None
