@@ -10,7 +10,7 @@ from itertools import compress
 from typing import NamedTuple
 
 from control.controller import HoldLaw, measured_angles
-from control.faults import Fault, Reaction
+from control.faults import Fault, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
 from control.records import DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
@@ -55,7 +55,7 @@ class TestRig:
         self.lateness = Lateness()  # of one measurement, while torque is on
         self.lateness_so_far = Lateness()  # of all measurements
         self._unreadable = [joint for joint, drive in self.configuration.drive.items() if not drive.knows_watchdog]
-        self.forced = False  # the operator allows torque without a known watchdog
+        self.forced = ""  # the operator allows torque without a known watchdog
 
     def tick(self) -> Sample:
         aim, loop = self.controller.joint_targets, self.loop
@@ -143,7 +143,7 @@ class TestRig:
         what = f"{', '.join(self._unreadable)}: no watchdog can be read; stage 5 measures whether it ends the torque."
         if not self.operator.allows_unknown_watchdogs(what, self._tick_during_prompt):
             raise BenchError(f"The robot cannot be armed: {what} An operator at a terminal must allow it.")
-        self.forced = True
+        self.forced = FaultKind.WATCHDOG_UNKNOWN.value
 
     def _wait_until_armable(self) -> None:
         if self._is_armable_soon():

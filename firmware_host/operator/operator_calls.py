@@ -84,7 +84,7 @@ class OperatorCalls:
             "mode": loop.mode.name.lower(),
             "moving": loop.controller.moving,
             **self._fault_reports(),
-            "forced": loop.forced,
+            "forced": bool(loop.forced),
             "notice": loop.events.notice,
             "unlogged_requests": loop.events.requests.unlogged,
             "lease": str(lease.holder) if lease.held else None,
@@ -198,7 +198,7 @@ class OperatorCalls:
 
         return call
 
-    def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
+    def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: str = "") -> str:
         return _accepted(self._loop.request(request, self._clock(), order, forced, str(caller)))
 
     def require_own_robot(self, caller: Caller) -> None:
