@@ -54,7 +54,7 @@ class TestRig:
         self._rest = self.level  # joint angles in which the flippers lie without torque
         self.lateness = Lateness()  # of one measurement, while torque is on
         self.lateness_so_far = Lateness()  # of all measurements
-        self._unreadable = [joint for joint, drive in self.configuration.drive.items() if not drive.reports_settings]
+        self._unreadable = [joint for joint, drive in self.configuration.drive.items() if not drive.knows_watchdog]
         self.forced = False  # the operator allows torque without a known watchdog
 
     def tick(self) -> Sample:
