@@ -94,6 +94,23 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nvelocity_range_rad_s = 501.0', [
         "drive.left_sweep.velocity_range_rad_s = 501.0: must be at most 500.0"
     ]),
+    *[
+        ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nfirmware_date = "2026-11-01"\n'
+         f'proven_watchdog = {{ watchdog_s = 0.3, bus = "{bus}", node_id = {node_id}, model = "{model}",'
+         f' date = "{date}" }}',
+         [f"drive.left_sweep.proven_watchdog.{problem}"])
+        for bus, node_id, model, date, problem in (
+            ("right", 5, "AK80-9", "2026-11-24", "bus = 'right': must be 'left'"),
+            ("left", 6, "AK80-9", "2026-11-24", "node_id = 6: must be 5"),
+            ("left", 5, "AK80-6", "2026-11-24", "model = 'AK80-6': must be 'AK80-9'"),
+            ("left", 5, "AK80-9", "2026-10-31", "date = 2026-10-31: must be at least firmware_date = 2026-11-01"),
+            ("left", 5, "AK80-9", "24.11.2026", "date = '24.11.2026': must be a date such as 2026-11-24"),
+            ("left", 5, "AK80-9", "", "date = '': must be the date of the trial"),
+        )
+    ],
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\nproven_watchdog = { watchdog_s = 0.3 }', [
+        "drive.left_sweep.proven_watchdog.watchdog_s = 0.3: must be 0: a DM4310 reports its own"
+    ]),
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\ntorque_range_nm = 9.0', [
         "drive.left_sweep.torque_range_nm = 9: must be 0: that of an AK80-9 is fixed"
     ]),
@@ -337,3 +354,35 @@ def test_a_slow_extraction_right_after_the_stance_is_warned_of(example_text: str
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_no_protocol_is_warned_of(example_text: str, protocol: str) -> None:
     assert parse_configuration(example_text.replace('"walking"', f'"{protocol}"')).warnings == ()
+
+
+WEAK = {  # a section with a bound beyond twice its default, and the refusal without a reason
+    "faults": ("silence_s = 2.0", "faults.silence_s = 2.0: must be at most 0.0526"),
+    "faults watchdog": ("longest_watchdog_s = 10.0", "faults.longest_watchdog_s = 10.0: must be at most 0.6"),
+    "limits": ("adduction_min_deg = -180.0", "limits.adduction_min_deg = -180.0: must be at least -150"),
+    "limits margin": ("position_margin_deg = 90.0", "limits.position_margin_deg = 90.0: must be at most 20"),
+    "motion": ("longest_hold_s = 0.0", "motion.longest_hold_s = 0.0: must be more than 0 and at most 1200"),
+}
+
+
+@pytest.mark.parametrize("case", WEAK)
+def test_weak_protection_needs_a_reason_and_is_shown(case: str, tmp_path: Path, capsys: Capture) -> None:
+    given, refusal = WEAK[case]
+    path, text = tmp_path / "mudskipper.toml", f"{minimal_text()}\n[{case.split()[0]}]\n{given}\n[safety]\nweakened = "
+    for no_reason in ('""', '" "'):
+        path.write_text(text + no_reason, encoding="utf-8")
+        assert main(["--config", str(path), "--check-config"]) == 78
+        assert f"{refusal}, twice its default, or [safety] weakened" in capsys.readouterr().err
+    path.write_text(f'{text}"a bench in air"', encoding="utf-8")
+    assert main(["--config", str(path), "--check-config"]) == 0
+    shown = f"protection is weakened (a bench in air): {case.split()[0]}.{given}"
+    assert capsys.readouterr().err == f"mudskipperd: warning: {shown}\n"
+    assert load_configuration(path).warnings == (shown,)
+
+
+@pytest.mark.parametrize("reason", ["a robot", "a\\u001bb", "x" * 201])
+def test_a_reason_without_weak_protection_or_that_cannot_be_shown_is_refused(reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "mudskipper.toml"
+    path.write_text(f'{minimal_text()}\n[safety]\nweakened = "{reason}"', encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="safety.weakened = .*: must be"):
+        load_configuration(path)
