@@ -278,6 +278,8 @@ def _loop_text(report: dict[str, Any]) -> str:
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
             f"pose   {poses if pose['source'] else 'none'}",
-            f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped",
+            f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped"
+            + (f", safe up to {number(log['durable_age_s'], 1)} s ago" if log.get("durable_age_s") else "")
+            + (f", repairing {counted(log['repairing'], 'earlier log')}" if log.get("repairing") else ""),
         )
     )

@@ -98,7 +98,7 @@ class OperatorCalls:
             "loop": loop.timing.summary(),
             "warnings": [*loop.configuration.warnings, *self._warnings],
             "bus": _bus_report(loop),
-            "log": _log_report(loop),
+            "log": _log_report(loop, now_s),
         }
 
     def _fault_reports(self) -> dict[str, Any]:
@@ -266,7 +266,7 @@ def _walk_report(loop: Loop) -> dict[str, Any]:
     }
 
 
-def _log_report(loop: Loop) -> dict[str, Any]:
+def _log_report(loop: Loop, now_s: float) -> dict[str, Any]:
     log, path = loop.recorder.report(), loop.recorder.path
     return {
         "path": str(path) if path else None,
@@ -275,6 +275,8 @@ def _log_report(loop: Loop) -> dict[str, Any]:
         "problem": log.problem,
         "free_fraction": known(log.free_fraction),
         "slowest_write_s": known(log.slowest_write_s),
+        "durable_age_s": known(now_s - log.durable_stamp_s),
+        "repairing": log.repairing,
     }
 
 
