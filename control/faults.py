@@ -211,7 +211,7 @@ class FaultKind(StrEnum):
     WATCHDOG_UNKNOWN = (
         "watchdog_unknown", "watchdog", NONE, UNLESS_FORCED, WHEN_GONE, 2,
         "A drive's watchdog is unknown.", "The {subject} drive's watchdog is unknown.",
-        f"{SET_UP}, or arm with --force",
+        f"{SET_UP}, or arm with --force watchdog_unknown",
     )
     WATCHDOG_OFF = (
         "watchdog_off", "watchdog", NONE, ALWAYS, WHEN_GONE, 2,
@@ -488,3 +488,6 @@ class Fault(NamedTuple):
 
 
 FAULT_KINDS: dict[str, FaultKind] = {kind.value: kind for kind in FaultKind}
+
+
+OVERRULED_BY_FORCE = tuple(kind.value for kind in FaultKind if kind.blocks is Blocks.UNLESS_FORCED)
