@@ -174,6 +174,8 @@ class FaultMonitor:
         for joint, zero, health, state, torque_nm, target in zip(
             self.joints, self.zeros, drives, monitor_input.states, sent_nm, targets, strict=True
         ):
+            if tick.missed and health.restarts == self._restarts[health.joint]:
+                zero.skip_gap()
             shifted = zero.update(state)
             if shifted:
                 found.append(shifted)

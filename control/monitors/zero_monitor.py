@@ -31,7 +31,7 @@ class ZeroMonitor:
             step_rad = state.angle_rad - self._angle_rad
             if not -self._jump_rad <= step_rad <= self._jump_rad and self._is_unexplained(state, step_rad):
                 self.shift_rad += step_rad
-            if not abs(step_rad) > LARGEST_STEP_RAD:  # also the first angle
+            if not abs(step_rad) > LARGEST_STEP_RAD:  # also the first angle, or one after a gap of ours
                 self._angle_rad, self._velocity_rad_s, self._stamp_s = state.angle_rad, state.velocity_rad_s, stamp_s
         if -self._jump_rad <= self.shift_rad <= self._jump_rad:
             return None
@@ -43,6 +43,10 @@ class ZeroMonitor:
         gap_s = min(state.angle_stamp_s - self._stamp_s, LONGEST_GAP_S)
         fastest_rad_s = max(abs(self._velocity_rad_s), abs(state.velocity_rad_s))
         return self._jump_rad + fastest_rad_s * gap_s < abs(step_rad) <= LARGEST_STEP_RAD
+
+    def skip_gap(self) -> None:
+        """Accept the next angle: this program missed ticks, and a drive that is not asked does not answer."""
+        self._angle_rad = UNKNOWN
 
     def confirm(self) -> float:
         """Accept the present angle; return the shift that was accepted."""
