@@ -33,6 +33,7 @@ from firmware_host.log.recorder import LogReport
 from firmware_host.loop_monitor import LogMonitor, LoopMonitor
 from firmware_host.ticker import Tick
 
+STALL_S = 0.02  # of this program, in which a drive that answers only when asked was silent
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
 REFUSED_TICKS = 3  # consecutive ticks in which one bus failed to send a command
 BUS_TROUBLE_S = 2.0  # how long a bus warning outlasts the last error frame
@@ -174,7 +175,7 @@ class FaultMonitor:
         for joint, zero, health, state, torque_nm, target in zip(
             self.joints, self.zeros, drives, monitor_input.states, sent_nm, targets, strict=True
         ):
-            if tick.missed and health.restarts == self._restarts[health.joint]:
+            if tick.missed * self._period_s > STALL_S and health.restarts == self._restarts[health.joint]:
                 zero.skip_gap()
             shifted = zero.update(state)
             if shifted:
