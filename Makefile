@@ -11,7 +11,7 @@ REAL_TIME := $(addprefix tests/,command_line/operation command_line/demo command
 # Ends a test that hangs, and prints where it hangs.
 PYTEST := $(BIN)/python -m pytest -q --numprocesses 2 --dist loadfile --durations=10 -o faulthandler_timeout=1800 -o faulthandler_exit_on_timeout=true
 
-# Exact versions with hashes, for installations as root; --upgrade in ARGS takes newer versions.
+# Exact versions with hashes, for installations as root and for CI; --upgrade in ARGS takes newer versions.
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --custom-compile-command "make lock"
 
 .PHONY: help lock setup demo test test-compiled test-vm mutants dst claims lint docs docs-links man clean
@@ -46,24 +46,26 @@ dst: .venv/test  ## simulate SEEDS=200 random schedules of failures and operator
 claims: .venv/test  ## measure the figures of the documentation again; ARGS='NAME --rewrite' writes them
 	@$(BIN)/python -m verification.claims $(ARGS)
 
-lint: .venv/test .venv/docs  ## run ruff and mypy --strict
+lint: .venv/test  ## run ruff and mypy --strict
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 
-lock: .venv/setup  ## write requirements/*.txt for the installation as root, from pyproject.toml; needs the Internet
+lock: .venv/setup  ## write requirements/*.txt from pyproject.toml; needs the Internet
 	@$(PIP) "uv>=0.5"
 	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen pyproject.toml - --output-file requirements/robot.txt $(ARGS)
 	@echo "setuptools>=77" | $(LOCK) --extra serial --extra screen --extra live --extra plots --extra data pyproject.toml - --output-file requirements/robot_with_extras.txt $(ARGS)
+	@$(LOCK) --extra plots --extra screen --extra serial --extra data --extra cluster --extra test --extra docs pyproject.toml --output-file requirements/development.txt $(ARGS)
+	@printf 'mypy>=1.14,<3\nsetuptools>=77\n' | $(LOCK) - --output-file requirements/compiler.txt $(ARGS)
 
-docs: .venv/docs  ## build the documentation into build/docs; a warning is an error
+docs: .venv/test  ## build the documentation into build/docs; a warning is an error
 	@$(SPHINX) -b html docs build/docs
 	@echo "open build/docs/index.html"
 
-docs-links: .venv/docs  ## check the external links of the documentation; needs the Internet
+docs-links: .venv/test  ## check the external links of the documentation; needs the Internet
 	@$(SPHINX) -b linkcheck docs build/links
 
-man: .venv/docs  ## build the manual page build/man/mudskipper.1
+man: .venv/test  ## build the manual page build/man/mudskipper.1
 	@$(SPHINX) -b man docs build/man
 	@echo "man -l build/man/mudskipper.1"
 
@@ -76,12 +78,9 @@ clean:  ## remove the environment and everything that was built
 	@$(PIP) --editable ".[plots,screen,serial,data]"
 	@touch $@
 
-.venv/test: .venv/setup
-	@echo "Installing what the tests need ..."
-	@$(PIP) --editable ".[plots,screen,serial,data,cluster,test]"
-	@touch $@
-
-.venv/docs: .venv/setup
-	@echo "Installing what the documentation needs ..."
-	@$(PIP) --editable ".[plots,screen,serial,data,docs]"
-	@touch $@
+.venv/test: pyproject.toml requirements/development.txt
+	@echo "Installing exactly what requirements/development.txt names into .venv (about three minutes) ..."
+	@$(PYTHON) -m venv .venv
+	@$(PIP) --require-hashes --only-binary=:all: --requirement requirements/development.txt
+	@$(PIP) --no-deps --no-index --no-build-isolation --editable .
+	@touch .venv/setup $@

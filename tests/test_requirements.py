@@ -1,10 +1,11 @@
-"""The locked requirements with which root installs the robot fit pyproject.toml, completely and by hashes."""
+"""The locked requirements of installations as root, and of CI, fit pyproject.toml, completely and by hashes."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from importlib.metadata import PackageNotFoundError, requires
+from itertools import chain
 from typing import NamedTuple
 
 import pytest
@@ -16,10 +17,15 @@ from packaging.version import Version
 from tests.folders import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-NOT_ON_A_ROBOT = {"test", "docs", "cluster", "loops"}
-EXTRAS = {
-    "robot.txt": {"serial", "screen"},
-    "robot_with_extras.txt": PROJECT["project"]["optional-dependencies"].keys() - NOT_ON_A_ROBOT,
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+NOT_ON_A_ROBOT = {"test", "docs", "cluster"}
+BUILD = PROJECT["build-system"]["requires"]
+ALWAYS = [*BUILD, *PROJECT["project"]["dependencies"]]
+DIRECT = {
+    "robot.txt": [*ALWAYS, *EXTRAS["serial"], *EXTRAS["screen"]],
+    "robot_with_extras.txt": [*ALWAYS, *chain(*(EXTRAS[name] for name in EXTRAS.keys() - NOT_ON_A_ROBOT))],
+    "development.txt": [*ALWAYS, *chain(*(EXTRAS[name] for name in EXTRAS.keys() - {"live"}))],  # "test" has it
+    "compiler.txt": [*BUILD, *(text for text in EXTRAS["test"] if text.startswith("mypy>"))],
 }
 PYTHONS = ("3.11", "3.12", "3.13")
 ADVICE = "run 'make lock'"
@@ -52,29 +58,22 @@ def applying(pinned: list[Pin], python: str) -> list[Version]:
     return [pin.version for pin in pinned if pin.marker is None or pin.marker.evaluate(environment)]
 
 
-def direct_requirements(file: str) -> list[Requirement]:
-    project = PROJECT["project"]
-    texts = [*project["dependencies"], *PROJECT["build-system"]["requires"]]
-    texts += [text for extra in EXTRAS[file] for text in project["optional-dependencies"][extra]]
-    return [Requirement(text) for text in texts]
-
-
-@pytest.mark.parametrize("file", EXTRAS)
+@pytest.mark.parametrize("file", DIRECT)
 @pytest.mark.parametrize("python", PYTHONS)
 def test_every_requirement_of_the_project_is_pinned_to_a_permitted_version(file: str, python: str) -> None:
     pinned = pins(file)
-    for requirement in direct_requirements(file):
+    for requirement in map(Requirement, DIRECT[file]):
         versions = applying(pinned.get(canonicalize_name(requirement.name), []), python)
         assert len(versions) == 1, f"{requirement}: {ADVICE}"
         assert requirement.specifier.contains(versions[0], prereleases=True), f"{requirement}: {ADVICE}"
 
 
-@pytest.mark.parametrize("file", EXTRAS)
+@pytest.mark.parametrize("file", DIRECT)
 def test_every_pin_has_hashes(file: str) -> None:
     assert all(pin.hashes for each in pins(file).values() for pin in each), ADVICE
 
 
-@pytest.mark.parametrize("file", EXTRAS)
+@pytest.mark.parametrize("file", DIRECT)
 def test_what_the_pinned_packages_need_is_pinned_too(file: str) -> None:
     """The metadata of the installed packages lists what they need."""
     pinned = pins(file)

@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 from rich.text import Text
-from textual.app import App, ComposeResult
+from textual.app import App, ComposeResult, ScreenStackError
 from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.css.query import NoMatches
@@ -170,7 +170,7 @@ class WatchApp(App[int]):
     def redraw(self) -> None:
         """Show the newest history."""
         history, now_s = self.feed.history, time.monotonic()
-        with self.feed.lock, suppress(NoMatches):  # while the screen closes, its widgets are gone one after another
+        with self.feed.lock, suppress(NoMatches, ScreenStackError):  # a closing screen loses its widgets, then itself
             if history.status:
                 self._show(history, now_s)
 

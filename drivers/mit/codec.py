@@ -31,6 +31,7 @@ POSITION_CODES = 65535
 
 REGISTER_ID = 0x7FF
 READ, WRITE, STORE = 0x33, 0x55, 0xAA
+STATE = 0xCC  # asks for an answer without a command
 _REGISTER_FRAME = Struct("<HBB4s")
 
 DISABLED, ENABLED, LOST_COMMANDS = 0x0, 0x1, 0xD  # a Damiao's status

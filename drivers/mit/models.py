@@ -1,9 +1,11 @@
 """The ranges of the motors that speak MIT mode: position, velocity and torque are codes within them, so both ends must
 use the same.
 
-CubeMars: the table MIT_Params of TMotorCANControl 1.2.6 (mit_can.py). Its authors have tried only the AK80-9, and
-other sources differ (the DFKI's driver has 22.5 or 25.64 rad/s for it, by its firmware). Damiao:
-the table of damiao-motor 1.0.6 (core/motor.py), the values of delivery of the registers 21 to 23.
+CubeMars: AK Series Actuator Driver Manual V1.0.8, page 50, for the firmware of that manual (V1 and V2 of the motors;
+V3 speaks another protocol). `TMotorCANControl` 1.2.6 (MIT_Params of mit_can.py) has the same but for the AK60-6, with
+±50 rad/s. Other firmware has other ranges of velocity: the DFKI's driver 0.4.3 has ±22.5 rad/s for an AK80-9 V1.1 and
+±25.64 for a V2. The key velocity_range_rad_s sets it. Damiao: the table of damiao-motor 1.0.6 (core/motor.py), the
+values of delivery of the registers 21 to 23, which are read back.
 """
 
 from collections.abc import Mapping
@@ -18,24 +20,36 @@ class Model(NamedTuple):
     position_rad: float
     velocity_rad_s: float
     torque_nm: float
+    source: str  # the document that states them, with its page
     has_registers: bool = False  # Damiao: limits and time-out can be read, and every answer says whether it follows
 
     @property
     def torque_step_nm(self) -> float:
         return 2.0 * self.torque_nm / TORQUE_CODES
 
+    def with_ranges(self, velocity_rad_s: float, torque_nm: float) -> "Model":
+        """Return the model with ranges that are not as delivered; one that is not positive stays."""
+        return self._replace(
+            velocity_rad_s=velocity_rad_s if velocity_rad_s > 0.0 else self.velocity_rad_s,
+            torque_nm=torque_nm if torque_nm > 0.0 else self.torque_nm,
+        )
+
+
+def _cubemars(position_rad: float, velocity_rad_s: float, torque_nm: float) -> Model:
+    return Model(position_rad, velocity_rad_s, torque_nm, "CubeMars manual V1.0.8, p. 50")
+
 
 def _damiao(position_rad: float, velocity_rad_s: float, torque_nm: float) -> Model:
-    return Model(position_rad, velocity_rad_s, torque_nm, has_registers=True)
+    return Model(position_rad, velocity_rad_s, torque_nm, "damiao-motor 1.0.6, core/motor.py", has_registers=True)
 
 
 MODELS: Mapping[str, Model] = {
-    "AK10-9": Model(12.5, 50.0, 65.0),
-    "AK60-6": Model(12.5, 50.0, 15.0),
-    "AK70-10": Model(12.5, 50.0, 25.0),
-    "AK80-6": Model(12.5, 76.0, 12.0),
-    "AK80-9": Model(12.5, 50.0, 18.0),
-    "AK80-64": Model(12.5, 8.0, 144.0),
+    "AK10-9": _cubemars(12.5, 50.0, 65.0),
+    "AK60-6": _cubemars(12.5, 45.0, 15.0),
+    "AK70-10": _cubemars(12.5, 50.0, 25.0),
+    "AK80-6": _cubemars(12.5, 76.0, 12.0),
+    "AK80-9": _cubemars(12.5, 50.0, 18.0),
+    "AK80-64": _cubemars(12.5, 8.0, 144.0),
     "DM3507": _damiao(12.566, 50.0, 5.0),
     "DM4310": _damiao(12.5, 30.0, 10.0),
     "DM4310P": _damiao(12.5, 50.0, 10.0),

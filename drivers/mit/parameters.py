@@ -10,6 +10,8 @@ from drivers.drive import DriveParameters
 from drivers.mit.models import MODELS, Model
 
 LARGEST_ID = 15  # an answer has four bits for it
+AS_DELIVERED = -1.0
+SMALLEST_RAD_S, LARGEST_RAD_S = 1.0, 500.0  # the 12 bits of a velocity then have steps of 0.5 mrad/s to 0.24 rad/s
 
 
 @dataclass(frozen=True)
@@ -17,6 +19,9 @@ class MitParameters(DriveParameters):
     node_id: Annotated[int, Bounds(1, LARGEST_ID), Meaning("on that bus", "id")] = 1
     type: Annotated[str, Meaning("the protocol that the drive speaks")] = "mit"
     model: Annotated[str, Meaning("of the motor, whose ranges the codes have, such as AK80-9 or DM4310")] = "DM4310"
+    velocity_range_rad_s: Annotated[
+        float, Bounds(AS_DELIVERED, LARGEST_RAD_S), Meaning("of the drive's firmware, register VMAX; -1: as delivered")
+    ] = AS_DELIVERED
     torque_range_nm: Annotated[float, Bounds(0.0, 500.0), Meaning("register TMAX of a Damiao; 0: as delivered")] = 0.0
     reported_constant_nm_a: Annotated[
         float, Bounds(0.001, 10.0), Meaning("by which its answers state torque: current is that torque divided by it")
@@ -29,8 +34,7 @@ class MitParameters(DriveParameters):
     @cached_property
     def ranges(self) -> Model:
         """The ranges of the codes; raises KeyError for an unknown model, which the checks have refused."""
-        model = MODELS[self.model]
-        return model._replace(torque_nm=self.torque_range_nm) if self.torque_range_nm else model
+        return MODELS[self.model].with_ranges(self.velocity_range_rad_s, self.torque_range_nm)
 
     @property
     def asking_ends_torque(self) -> bool:
@@ -45,6 +49,10 @@ class MitParameters(DriveParameters):
         if self.model not in MODELS:
             yield f"model = {self.model!r}", f"must be one of {', '.join(MODELS)}"
             return
+        range_rad_s = self.velocity_range_rad_s
+        if range_rad_s != AS_DELIVERED and range_rad_s < SMALLEST_RAD_S:
+            bounds = f"{SMALLEST_RAD_S:g} to {LARGEST_RAD_S:g}"
+            yield f"velocity_range_rad_s = {range_rad_s:g}", f"must be {bounds}, or -1 for that of the model"
         if self.serial_number and not self.reports_settings:
             yield f"serial_number = {self.serial_number!r}", f"must be empty: that of an {self.model} cannot be read"
         if self.torque_range_nm and not MODELS[self.model].has_registers:

@@ -15,7 +15,11 @@ from drivers.mit.parameters import MitParameters
 
 TIMEOUT, CONTROL_MODE, SOFTWARE, SERIAL, PMAX, VMAX, TMAX = 9, 10, 14, 15, 21, 22, 23
 REGISTERS = (SOFTWARE, SERIAL, CONTROL_MODE, PMAX, VMAX, TMAX, TIMEOUT)
-FLOATS = frozenset({PMAX, VMAX, TMAX})
+UNDERVOLTAGE, TORQUE_CONSTANT, POLE_PAIRS, GEAR_RATIO = 0, 1, 16, 20
+MAX_CURRENT, SUPPLY_V, DRIVE_C, ROTOR_C = 59, 60, 61, 62
+FLOATS = frozenset(
+    {UNDERVOLTAGE, TORQUE_CONSTANT, GEAR_RATIO, PMAX, VMAX, TMAX, MAX_CURRENT, SUPPLY_V, DRIVE_C, ROTOR_C}
+)
 FLOAT, WORD = Struct("<f"), Struct("<I")
 TIMEOUT_UNIT_S = 50e-6
 MIT_MODE = 1  # of CONTROL_MODE
@@ -96,10 +100,13 @@ class MitSettings:
 
 def _problems(values: Mapping[int, float], drive: MitParameters) -> Iterator[str]:
     ranges = drive.ranges
-    torque_key = f"torque_range_nm = {drive.torque_range_nm:g}" if drive.torque_range_nm else f"model = {drive.model!r}"
+    model_key = f"model = {drive.model!r}"
+    own_range = drive.velocity_range_rad_s > 0.0
+    velocity_key = f"velocity_range_rad_s = {drive.velocity_range_rad_s:g}" if own_range else model_key
+    torque_key = f"torque_range_nm = {drive.torque_range_nm:g}" if drive.torque_range_nm else model_key
     for register, name, expected, key in (
-        (PMAX, "PMAX", ranges.position_rad, f"model = {drive.model!r}"),
-        (VMAX, "VMAX", ranges.velocity_rad_s, f"model = {drive.model!r}"),
+        (PMAX, "PMAX", ranges.position_rad, model_key),
+        (VMAX, "VMAX", ranges.velocity_rad_s, velocity_key),
         (TMAX, "TMAX", ranges.torque_nm, torque_key),
     ):
         if register in values and not abs(values[register] - expected) <= SAME_FRACTION * expected:

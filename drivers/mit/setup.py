@@ -106,12 +106,13 @@ class DamiaoSetup(AskedSetup):
     def settings(self) -> Sequence[Setting]:
         drive, longest_s = self._parameters, self._longest_watchdog_s
         ranges, torque_key = drive.ranges, "torque_range_nm" if drive.torque_range_nm else "model"
+        velocity_key = "velocity_range_rad_s" if drive.velocity_range_rad_s > 0.0 else "model"
         return (
             exactly("ESC_ID", drive.node_id, "node_id", "it answers under this id"),
             exactly("MST_ID", drive.node_id + 16, GUIDE),
             exactly("CTRL_MODE", MIT_MODE, GUIDE),
             exactly("PMAX", ranges.position_rad, "model", fraction=SAME_FRACTION),
-            exactly("VMAX", ranges.velocity_rad_s, "model", fraction=SAME_FRACTION),
+            exactly("VMAX", ranges.velocity_rad_s, velocity_key, fraction=SAME_FRACTION),
             exactly("TMAX", ranges.torque_nm, torque_key, fraction=SAME_FRACTION),
             Setting(
                 key="TIMEOUT",

@@ -28,6 +28,7 @@ from drivers.setpoint_monitor import SetpointMonitor
 LARGEST_FLOAT = 3.4e38  # of binary32
 TURN_RAD = 2.0 * pi
 STOPPING_S = 0.1  # for which a drive that another program commanded is stopped in every tick
+FOREIGN_MODES = (Mode.CURRENT, Mode.STAY_WITHIN)  # with torque; this program never commands them
 QUIET_MODES = (Mode.STOPPED, Mode.FAULT, Mode.POSITION, Mode.TIMEOUT)  # in which nothing runs by itself
 
 
@@ -165,9 +166,14 @@ class MoteusAxis(AnsweringAxis):
     def _is_disturbed(self) -> bool:
         """Return whether a drive that is to be idle follows torque, or soon may: another program commands it.
 
-        Its next command starts the drive again between two ticks. In the other modes a drive obeys none until a stop.
+        Its next command starts the drive again between two ticks. After a fault a drive obeys none until a stop.
         """
-        return self.closed_loop or self._mode == Mode.STOPPED and self._read_s - self._disturbed_s < STOPPING_S
+        return (
+            self.closed_loop
+            or self._mode in FOREIGN_MODES
+            or self._mode == Mode.STOPPED
+            and self._read_s - self._disturbed_s < STOPPING_S
+        )
 
     def prepare(self) -> None:
         """Does nothing: every torque command states the mode and all that it depends on."""

@@ -25,9 +25,11 @@ HOST = 0  # the id of this program
 class Mode(IntEnum):
     STOPPED = 0
     FAULT = 1
+    CURRENT = 9
     POSITION = 10
     TIMEOUT = 11
     ZERO_VELOCITY = 12
+    STAY_WITHIN = 13
     BRAKE = 15
 
 

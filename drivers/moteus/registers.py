@@ -43,6 +43,8 @@ class Register(IntEnum):
     VOLTAGE = 0x00D
     BOARD_TEMPERATURE = 0x00E
     FAULT = 0x00F
+    COMMAND_Q_CURRENT = 0x01C
+    COMMAND_D_CURRENT = 0x01D
     COMMAND_POSITION = 0x020
     COMMAND_VELOCITY = 0x021
     COMMAND_TORQUE = 0x022
@@ -73,6 +75,8 @@ SCALES = {  # of int8, int16, int32; registers without a line are plain integers
     Register.MOTOR_TEMPERATURE: _TEMPERATURE,
     Register.VOLTAGE: _VOLTAGE,
     Register.BOARD_TEMPERATURE: _TEMPERATURE,
+    Register.COMMAND_Q_CURRENT: _CURRENT,
+    Register.COMMAND_D_CURRENT: _CURRENT,
     Register.COMMAND_POSITION: _POSITION,
     Register.COMMAND_VELOCITY: _VELOCITY,
     Register.COMMAND_TORQUE: _TORQUE,
@@ -112,6 +116,11 @@ def encode_values(kind: int, resolution: Resolution, register: int, values: Sequ
     """Encode a write or a reply of consecutive registers."""
     codes = (_encode_value(resolution, register + index, value) for index, value in enumerate(values))
     return _head(kind, resolution, register, len(values)) + b"".join(codes)
+
+
+def encode_read_error(register: int) -> bytes:
+    """Encode the answer to the reading of a register that the drive does not have."""
+    return bytes([READ_ERROR]) + _varuint(register) + _varuint(1)
 
 
 def encode_console(kind: int, text: bytes) -> bytes:

@@ -24,6 +24,10 @@ class Message:
     def encode(self, *values: Any) -> bytes:
         return self._struct.pack(*values)
 
+    def decode_padded(self, data: bytes) -> tuple[Any, ...]:
+        """Return the values of a payload with any bytes after them, as a drive reads commands: the makers' DBC pads."""
+        return self.decode(data[: self._struct.size])
+
     def decode(self, data: bytes) -> tuple[Any, ...]:
         """Return the values; raises MalformedMessageError for a payload that is shorter or longer than the layout."""
         try:
@@ -59,6 +63,7 @@ class AxisState(IntEnum):
 
 
 LAST_COMMAND = 0x1F
+BROADCAST_NODE = 0x3F  # firmware from 0.6.9 on: all drives, and one that has no id yet
 FIRST_WITH_ADDRESS = (0, 6, 9)  # older firmware may take a request for the Address message for a new node id
 SERIAL_NUMBER_LOW_BITS = 32
 # Everything that a drive obeys: besides the above, positions and velocities, their limits and gains, reboot, a new
@@ -114,9 +119,9 @@ def arbitration_id(node_id: int, message: Message) -> int:
 
 
 def encode_address(node_id: int, serial_number: int) -> bytes:
-    return ADDRESS.encode(
-        node_id, serial_number & (1 << SERIAL_NUMBER_LOW_BITS) - 1, serial_number >> SERIAL_NUMBER_LOW_BITS
-    )
+    """Encode what firmware 0.6.11 reports: the last byte numbers the connection."""
+    low = serial_number & (1 << SERIAL_NUMBER_LOW_BITS) - 1
+    return ADDRESS.encode(node_id, low, serial_number >> SERIAL_NUMBER_LOW_BITS) + bytes(1)
 
 
 def decode_serial_number(data: bytes) -> str:

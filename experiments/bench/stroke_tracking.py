@@ -28,6 +28,8 @@ FAST_RAD_S = 4.0  # of the stance of a usual walk
 SLOW_RAD_S = 0.5
 STROKES = 2  # there and back
 MOST_LAG_TICKS = 15
+SLOPE_TICKS = 20  # in which a fast stroke turns by 0.2 rad: a code of 0.4 mrad and the noise are 1 % of it
+SLOPE_FRACTION = 0.03  # of a mean over a stroke; ranges of two firmwares differ by 10 % and more
 SLOW_DEG = 2.0  # largest error: dry friction of 0.2 N·m against the stiffness causes 1.4
 FAST_DEG = 6.0  # error to accelerate an arm with the usual gains
 LAG_MS = 20.0  # with more, the flipper lags the gait by 2 cm
@@ -58,6 +60,15 @@ def _fit(commanded: Vector, measured: Vector, lag: int) -> float:
     return float(np.dot(a, b)) / size if size else float("nan")
 
 
+def slope_by_velocity(angles_rad: Vector, velocities_rad_s: Vector, times_s: Vector) -> float:
+    """Return the slope of the angle divided by the reported velocity, by least squares over SLOPE_TICKS at a time."""
+    steps_rad = 0.5 * (velocities_rad_s[1:] + velocities_rad_s[:-1]) * np.diff(times_s)
+    integrals_rad = np.concatenate(([0.0], np.cumsum(steps_rad)))
+    turned_rad, reported_rad = (each[SLOPE_TICKS:] - each[:-SLOPE_TICKS] for each in (angles_rad, integrals_rad))
+    size = float(np.dot(reported_rad, reported_rad))
+    return float(np.dot(turned_rad, reported_rad)) / size if size else float("nan")
+
+
 def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: float) -> Readings:
     """Check a motion of all joints to and fro about level. The robot is idle before and after."""
     front: JointAngles = same_for_each(*STROKE, test_rig.configuration.rig)
@@ -67,6 +78,22 @@ def check_stroke(test_rig: TestRig, name: str, speed_rad_s: float, most_deg: flo
         test_rig.run_for(0.3)
     gains = "check stiffness and damping in [gains], the drives' limits, and friction of the joint"
     yield from _tracking_readings(test_rig.configuration.rig, f"{name} stroke", samples, most_deg, gains)
+    if speed_rad_s >= FAST_RAD_S:
+        yield from _velocity_readings(test_rig.configuration.rig, samples)
+
+
+def _velocity_readings(rig: Rig, samples: Sequence[Sample]) -> Readings:
+    """Compare each reported velocity with the slope of the reported angle: its scale may be another firmware's."""
+    low, high = 1.0 - SLOPE_FRACTION, 1.0 + SLOPE_FRACTION
+    advice = "its velocity has another scale than its angle: correct velocity_range_rad_s or the drive's own setting"
+    for index, joint in enumerate(rig.joints):
+        states = [sample.states[index] for sample in samples]
+        angles_rad, velocities_rad_s, times_s = (
+            np.array([getattr(state, name) for state in states])
+            for name in ("angle_rad", "velocity_rad_s", "angle_stamp_s")
+        )
+        slope = slope_by_velocity(angles_rad, velocities_rad_s, times_s)
+        yield Reading(f"{joint}: slope of its angle by its velocity", slope, "1", low, high, advice)
 
 
 def _tracking_readings(rig: Rig, motion: str, samples: Sequence[Sample], most_deg: float, advice: str) -> Readings:

@@ -9,7 +9,6 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from control.modes import Mode
 from control.records import Phase
@@ -24,50 +23,33 @@ SURFACE_M = 0.01
 WINDOW_S = 0.1
 
 
-def pose_remarks(before_m: float | None, after_m: float | None) -> list[str]:
-    moved = moved_text(before_m, after_m, POSE_M)
-    return [moved] if moved else []
-
-
-def moved_text(before_m: float | None, after_m: float | None, bound_m: float) -> str:
+def pose_remarks(before_m: float | None, after_m: float | None, bound_m: float = POSE_M) -> list[str]:
     """Describe a motion of the base beyond the bound; return nothing where it is smaller or unknown."""
     if before_m is None or after_m is None or abs(after_m - before_m) <= bound_m:
-        return ""
-    return f"the base moved by {1000.0 * (after_m - before_m):.1f} mm: clamp it, and measure again"
+        return []
+    return [f"the base moved by {1000.0 * (after_m - before_m):.1f} mm: clamp it, and measure again"]
 
 
 def load_remarks(log: Log, configuration: Configuration, flipper: str) -> list[str]:
     """Compare the loads before the first insertion and at the end of the log, when the robot holds its pose."""
-    before, after = _before_insertion(log), _at_the_end(log)
+    ticks, stamps_s = log.ticks, log.ticks["stamp_s"]
+    inserting = (ticks["mode"] == Mode.WALKING) & (ticks["phase"] == Phase.INSERTION)
+    inserted_s = stamps_s[inserting].min(initial=np.inf)
+    before = ticks[(stamps_s >= inserted_s - WINDOW_S) & (stamps_s < inserted_s)]
+    after = ticks[(ticks["mode"] == Mode.HOLD) & (stamps_s >= stamps_s[-1] - WINDOW_S)]
     if not (len(before) and len(after)):
         return []
     remarks = []
     sweep = log.rig.joints_of(flipper).start
     for joint, bound_nm in ((sweep, SWEEP_NM), (sweep + 1, ADDUCTION_NM)):
-        constant_nm_a = configuration.torque_constants_nm_a[joint]
-        change_nm = constant_nm_a * float(after["current_a"][:, joint].mean() - before["current_a"][:, joint].mean())
-        if isfinite(change_nm) and abs(change_nm) > bound_nm:
+        change_a = float(after["current_a"][:, joint].mean() - before["current_a"][:, joint].mean())
+        change_nm = abs(configuration.torque_constants_nm_a[joint] * change_a)
+        if isfinite(change_nm) and change_nm > bound_nm:
             remarks.append(
-                f"the load of {log.rig.joints[joint]} in free air changed by {abs(change_nm):.2f} N·m during the"
+                f"the load of {log.rig.joints[joint]} in free air changed by {change_nm:.2f} N·m during the"
                 " stride: clean the flipper, check that the base is firm, and measure again"
             )
     return remarks
-
-
-def _before_insertion(log: Log) -> NDArray[np.void]:
-    ticks = log.ticks
-    inserting = np.flatnonzero((ticks["mode"] == Mode.WALKING) & (ticks["phase"] == Phase.INSERTION))
-    if not len(inserting):
-        return ticks[:0]
-    end_s = ticks["stamp_s"][inserting[0]]
-    rows: NDArray[np.void] = ticks[(ticks["stamp_s"] >= end_s - WINDOW_S) & (ticks["stamp_s"] < end_s)]
-    return rows
-
-
-def _at_the_end(log: Log) -> NDArray[np.void]:
-    held = log.ticks[log.ticks["mode"] == Mode.HOLD]
-    late: NDArray[np.void] = held[held["stamp_s"] >= log.ticks["stamp_s"][-1] - WINDOW_S]
-    return late
 
 
 def surface_remarks(stride: dict[str, Any]) -> list[str]:

@@ -13,6 +13,7 @@ from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from control.geometry import FlipperGeometry
 from control.plate_integrals import (
@@ -27,8 +28,7 @@ from control.records import Phase
 from estimation.force_map import smallest_force_n
 from estimation.strokes.shear import MOBILISED_M
 from estimation.strokes.stroke_fit import REVERSAL_FRACTION
-from experiments.reports.error_table import COEFFICIENTS
-from experiments.trials.stride_profile import Floats, StrideProfile
+from experiments.trials.stride_profile import Floats, StrideProfile, profile_from_row
 
 COEFFICIENT_OF = {Phase.INSERTION: "k_p", Phase.STANCE: "k_s", Phase.EXTRACTION: "k_e"}
 
@@ -41,12 +41,21 @@ class ModelledForces(NamedTuple):
 
 
 class _Row(NamedTuple):
-    phase: Phase
     sweep_rad: float
     adduction_rad: float
     submerged_m: float
     sweep_nm: float
     adduction_nm: float
+
+
+def laws_of(
+    trial: Mapping[str, Any], geometry: FlipperGeometry, method: str
+) -> tuple[StrideProfile, float, ModelledForces]:
+    """Return a trial's first stride, its surface, and the forces by its values and its lower bounds."""
+    profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
+    surface_m = stride["surface_m"] or 0.0
+    known = {name: stride[name]["value"] if stride[name]["valid"] else None for name in COEFFICIENT_OF.values()}
+    return profile, surface_m, modelled_forces(profile, geometry, surface_m, known, method)
 
 
 def modelled_forces(
@@ -58,30 +67,22 @@ def modelled_forces(
 ) -> ModelledForces:
     """`coefficients` are in N/m³ by name; the law of a coefficient that is None is not evaluated."""
     law = _paper_force if method == "paper" else _default_force
-    forces = ModelledForces(np.full(len(profile.time_s), nan), np.full(len(profile.time_s), nan))
-    for i in np.flatnonzero(_fitted_rows(profile, geometry, surface_m)).tolist():
-        phase = Phase(int(profile.phase[i]))
-        k_n_m3 = coefficients.get(COEFFICIENT_OF[phase])
-        if k_n_m3 is None:
-            continue
-        row = _Row(
-            phase=phase,
-            sweep_rad=float(profile.sweep_rad[i]),
-            adduction_rad=float(profile.adduction_rad[i]),
-            submerged_m=float(profile.depth_m[i]) - surface_m,
-            sweep_nm=float(profile.sweep_nm[i]),
-            adduction_nm=float(profile.adduction_nm[i]),
-        )
-        force_n = law(row, geometry, surface_m, k_n_m3)
-        (forces.force_x_n if phase is Phase.STANCE else forces.force_z_n)[i] = force_n
+    submerged_m = profile.depth_m - surface_m
+    columns = profile.sweep_rad, profile.adduction_rad, submerged_m, profile.sweep_nm, profile.adduction_nm
+    rows = np.column_stack(columns).tolist()
+    fitted = _fitted_rows(profile, geometry, submerged_m)
+    forces = ModelledForces(*np.full((2, len(rows)), nan))
+    for phase, name in COEFFICIENT_OF.items():
+        force_n = forces.force_x_n if phase is Phase.STANCE else forces.force_z_n
+        if (k_n_m3 := coefficients[name]) is not None:
+            for i in np.flatnonzero(fitted & profile.during(phase)):
+                force_n[i] = law(phase, _Row(*rows[i]), geometry, surface_m, k_n_m3)
     return forces
 
 
-def _fitted_rows(profile: StrideProfile, geometry: FlipperGeometry, surface_m: float) -> Floats:
+def _fitted_rows(profile: StrideProfile, geometry: FlipperGeometry, submerged_m: Floats) -> NDArray[np.bool_]:
     """Return the rows in which a coefficient is fitted, the flipper is in the mud, and the loads are known."""
-    submerged_m = profile.depth_m - surface_m
-    fitted = np.isin(profile.phase, list(COEFFICIENT_OF)) & (submerged_m > 0.0)
-    fitted &= np.isfinite(profile.sweep_nm) & np.isfinite(profile.adduction_nm)
+    fitted = (submerged_m > 0.0) & np.isfinite(profile.sweep_nm) & np.isfinite(profile.adduction_nm)
     stance, extraction = profile.during(Phase.STANCE), profile.during(Phase.EXTRACTION)
     if stance.any():
         positions_m = geometry.flipper_length_m * np.sin(profile.sweep_rad)
@@ -91,24 +92,24 @@ def _fitted_rows(profile: StrideProfile, geometry: FlipperGeometry, surface_m: f
     return np.asarray(fitted)
 
 
-def _default_force(row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m3: float) -> float:
-    plate = submerged_plate(geometry, row.sweep_rad, row.adduction_rad, surface_m)
-    sweep_nm, adduction_nm = row.sweep_nm, row.adduction_nm
-    if row.phase is Phase.STANCE:
+def _default_force(phase: Phase, row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m3: float) -> float:
+    sweep_rad, adduction_rad, _, sweep_nm, adduction_nm = row
+    plate = submerged_plate(geometry, sweep_rad, adduction_rad, surface_m)
+    if phase is Phase.STANCE:
         sweep_nm = k_n_m3 * stance_moment_m4(geometry, plate)
     else:
-        sign = 1.0 if row.phase is Phase.INSERTION else -1.0
-        across_nm = cross_coupling(geometry, plate, row.sweep_rad) * sweep_nm
-        adduction_nm = sign * k_n_m3 * stroke_moment_m4(geometry, plate, row.sweep_rad) + across_nm
-    force_x_n, force_z_n = smallest_force_n(geometry, row.sweep_rad, row.adduction_rad, sweep_nm, adduction_nm)
-    return force_x_n if row.phase is Phase.STANCE else force_z_n
+        sign = 1.0 if phase is Phase.INSERTION else -1.0
+        across_nm = cross_coupling(geometry, plate, sweep_rad) * sweep_nm
+        adduction_nm = sign * k_n_m3 * stroke_moment_m4(geometry, plate, sweep_rad) + across_nm
+    force_x_n, force_z_n = smallest_force_n(geometry, sweep_rad, adduction_rad, sweep_nm, adduction_nm)
+    return force_x_n if phase is Phase.STANCE else force_z_n
 
 
-def _paper_force(row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m3: float) -> float:
-    if row.phase is Phase.STANCE:
+def _paper_force(phase: Phase, row: _Row, geometry: FlipperGeometry, surface_m: float, k_n_m3: float) -> float:
+    if phase is Phase.STANCE:
         return k_n_m3 * moment_width_m(geometry, row.submerged_m) * row.submerged_m**2 / 2.0
     edge_m2 = mean_width_m(geometry, row.submerged_m) * geometry.plate_thickness_m
-    return (1.0 if row.phase is Phase.INSERTION else -1.0) * k_n_m3 * edge_m2 * row.submerged_m
+    return (1.0 if phase is Phase.INSERTION else -1.0) * k_n_m3 * edge_m2 * row.submerged_m
 
 
 def misfit_n(measured_n: Floats, modelled_n: Floats) -> float | None:
@@ -116,8 +117,3 @@ def misfit_n(measured_n: Floats, modelled_n: Floats) -> float | None:
     differences_n = measured_n - modelled_n
     differences_n = differences_n[np.isfinite(differences_n)]
     return float(np.sqrt(np.mean(differences_n**2))) if len(differences_n) else None
-
-
-def drawn_coefficients(stride: Mapping[str, Any]) -> dict[str, float | None]:
-    """Return the coefficients with a law to draw: values, and lower bounds by the load that the mud withstood."""
-    return {name: stride[name]["value"] if stride[name]["valid"] else None for name in COEFFICIENTS}

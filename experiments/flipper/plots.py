@@ -1,6 +1,6 @@
 """The single flipper's trials as pictures, after the paper's figures 4 and 5."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from control.geometry import FlipperGeometry
 from control.records import Phase
-from experiments.flipper.modelled_force import ModelledForces, drawn_coefficients, modelled_forces
+from experiments.flipper.modelled_force import laws_of
 from experiments.reports.coefficient_table import PER_CM3
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.reports.mud_names import mud_text
@@ -25,88 +25,71 @@ from experiments.reports.mud_styles import (
     waters_of,
 )
 from experiments.study.notebook import Entry
-from experiments.trials.stride_profile import Floats, StrideProfile, profile_from_row
+from experiments.trials.stride_profile import StrideProfile, profile_from_row
 
 Muds = Sequence[Mapping[str, Any]]  # of the summary
 THIN: dict[str, Any] = {"linewidth": 1.1}
+DASHED: dict[str, Any] = THIN | {"linestyle": "--"}
 MODELLED: dict[str, Any] = {"linewidth": 2.0, "linestyle": (0, (3, 1.5))}
+STRIDE_PANELS: tuple[tuple[str, dict[str, Any]], ...] = (  # label and legend
+    ("depth (cm)", {"loc": "center", "bbox_to_anchor": (0.82, 0.62)}),
+    ("joint angle (°)", {"loc": "center left", "bbox_to_anchor": (0.06, 0.5)}),
+    ("$f_z$ up (N)", {"ncols": 3, "loc": "upper right"}),
+    ("$f_x$ forward (N)", {"ncols": 2, "loc": "upper right"}),
+)
 
 
 def draw_stride(trial: Entry, geometry: FlipperGeometry, method: str) -> Figure:
     """Draw depth, angles and forces of one stride against time, with the forces by the laws: figure 4."""
-    profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
-    laws = modelled_forces(profile, geometry, stride["surface_m"] or 0.0, drawn_coefficients(stride), method)
+    profile, surface_m, laws = laws_of(trial, geometry, method)
+    upward_n = np.where(profile.during(Phase.STANCE), np.nan, profile.force_z_n)
+    inserting_n, extracting_n = (
+        np.where(profile.during(phase), laws.force_z_n, np.nan) for phase in (Phase.INSERTION, Phase.EXTRACTION)
+    )
     figure = Figure(figsize=(7.0, 8.2))
     panels = figure.subplots(4, 1, sharex=True)
-    _draw_depths(panels[0], profile, stride["surface_m"] or 0.0)
-    _draw_angles(panels[1], profile)
-    _draw_upward(panels[2], profile, laws)
-    _draw_forward(panels[3], profile, laws)
-    for letter, panel in zip("BCDE", panels, strict=True):  # the paper's A is a drawing
+    for number, values, colour, label, style in (
+        (0, 100.0 * profile.depth_command_m, GREY, "$z_c$ commanded", DASHED),
+        (0, 100.0 * profile.depth_m, INK, "$z$ actual", THIN),
+        (1, np.degrees(profile.sweep_rad), "tab:blue", "sweep $\\alpha$", THIN),
+        (1, np.degrees(profile.adduction_rad), "tab:red", "adduction $\\beta$", DASHED),
+        (2, upward_n, "tab:green", "$f_z$ measured", THIN),
+        (2, inserting_n, "tab:red", "by $k_p$", MODELLED),
+        (2, extracting_n, "navy", "by $k_e$", MODELLED),
+        (3, profile.force_x_n, "tab:blue", "$f_x$ measured", THIN),
+        (3, laws.force_x_n, "tab:red", "by $k_s$", MODELLED),
+    ):
+        panels[number].plot(profile.time_s, values, color=colour, label=label, **style)
+    panels[0].axhline(100.0 * surface_m, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
+    panels[0].invert_yaxis()
+    for panel in panels[2:]:
+        panel.axhline(0.0, color=GREY, linewidth=0.6)
+    for letter, panel, (label, legend) in zip("BCDE", panels, STRIDE_PANELS, strict=True):  # the paper's A is a drawing
+        panel.set_ylabel(label)
+        panel.legend(fontsize="small", **legend)
         panel.text(0.006, 0.94, letter, transform=panel.transAxes, va="top", fontweight="bold")
-        _shade(panel, profile)
         panel.margins(x=0.0)
-    for phase, name in PHASE_NAMES.items():
-        times_s = profile.time_s[profile.during(phase)]
-        if len(times_s):
-            panels[0].annotate(name, (float(times_s.mean()), 1.02), xycoords=("data", "axes fraction"), ha="center",
-                               va="bottom", fontsize="small")  # fmt: skip
+    _mark_phases(panels, profile)
     panels[0].set_title(f"mud {mud_text(trial['mud'])}, trial {trial['trial']}\n", fontsize="medium", loc="left")
     panels[-1].set_xlabel("time (s)")
     return figure
 
 
-def _shade(panel: Axes, profile: StrideProfile) -> None:
+def _mark_phases(panels: Sequence[Axes], profile: StrideProfile) -> None:
+    """Shade the strokes in every panel, and name them above the first."""
     for phase, colour in PHASE_SHADES.items():
         times_s = profile.time_s[profile.during(phase)]
         if len(times_s):
-            panel.axvspan(float(times_s[0]), float(times_s[-1]), color=colour, linewidth=0.0, zorder=0)
-
-
-def _draw_depths(panel: Axes, profile: StrideProfile, surface_m: float) -> None:
-    panel.plot(profile.time_s, 100.0 * profile.depth_command_m, "--", color=GREY, label="$z_c$ commanded", **THIN)
-    panel.plot(profile.time_s, 100.0 * profile.depth_m, color=INK, label="$z$ actual", **THIN)
-    panel.axhline(100.0 * surface_m, color=GREY, linewidth=0.8, linestyle=":", label="surface found")
-    panel.invert_yaxis()
-    panel.set_ylabel("depth (cm)")
-    panel.legend(fontsize="small", loc="center", bbox_to_anchor=(0.82, 0.62))
-
-
-def _draw_angles(panel: Axes, profile: StrideProfile) -> None:
-    panel.plot(profile.time_s, np.degrees(profile.sweep_rad), color="tab:blue", label="sweep $\\alpha$", **THIN)
-    panel.plot(
-        profile.time_s, np.degrees(profile.adduction_rad), "--", color="tab:red", label="adduction $\\beta$", **THIN
-    )
-    panel.set_ylabel("joint angle (°)")
-    panel.legend(fontsize="small", loc="center left", bbox_to_anchor=(0.06, 0.5))
-
-
-def _draw_upward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
-    measured_n = np.where(profile.during(Phase.STANCE), np.nan, profile.force_z_n)
-    panel.plot(profile.time_s, measured_n, color="tab:green", label="$f_z$ measured", **THIN)
-    for phase, colour, label in (
-        (Phase.INSERTION, "tab:red", "by $k_p$"),
-        (Phase.EXTRACTION, "navy", "by $k_e$"),
-    ):
-        modelled_n = np.where(profile.during(phase), laws.force_z_n, np.nan)
-        panel.plot(profile.time_s, modelled_n, color=colour, label=label, **MODELLED)
-    panel.axhline(0.0, color=GREY, linewidth=0.6)
-    panel.set_ylabel("$f_z$ up (N)")
-    panel.legend(fontsize="small", ncols=3, loc="upper right")
-
-
-def _draw_forward(panel: Axes, profile: StrideProfile, laws: ModelledForces) -> None:
-    panel.plot(profile.time_s, profile.force_x_n, color="tab:blue", label="$f_x$ measured", **THIN)
-    panel.plot(profile.time_s, laws.force_x_n, color="tab:red", label="by $k_s$", **MODELLED)
-    panel.axhline(0.0, color=GREY, linewidth=0.6)
-    panel.set_ylabel("$f_x$ forward (N)")
-    panel.legend(fontsize="small", ncols=2, loc="upper right")
+            for panel in panels:
+                panel.axvspan(float(times_s[0]), float(times_s[-1]), color=colour, linewidth=0.0, zorder=0)
+            panels[0].annotate(PHASE_NAMES[phase], (float(times_s.mean()), 1.02), xycoords=("data", "axes fraction"),
+                               ha="center", va="bottom", fontsize="small")  # fmt: skip
 
 
 # figure 5
 
 
-def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry], geometry: FlipperGeometry) -> Figure:
+def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry]) -> Figure:
     """Draw the forces of one trial in each mud, the coefficients, and their comparison with a load cell: figure 5."""
     compared = any(mud["truth"] for mud in muds)
     rows = 3 if compared else 2
@@ -125,26 +108,26 @@ def draw_coefficients(muds: Muds, firsts: Mapping[str, Entry], geometry: Flipper
     return figure
 
 
-Curve = Callable[[StrideProfile], tuple[Floats, Floats]]
-
-
 def _draw_curves(panels: Sequence[Axes], firsts: Mapping[str, Entry], looks: Mapping[str, dict[str, Any]]) -> None:
     """Draw f_z against depth in insertion, f_x against sweep in stance, and f_z against depth in extraction."""
-    wanted: tuple[tuple[Phase, Curve, str, str], ...] = (
-        (Phase.INSERTION, lambda c: (100.0 * c.depth_m, c.force_z_n), "depth $z$ (cm)", "$f_z$ in insertion (N)"),
-        (Phase.STANCE, lambda c: (np.degrees(c.sweep_rad), c.force_x_n), "sweep $\\alpha$ (°)", "$f_x$ in stance (N)"),
-        (Phase.EXTRACTION, lambda c: (100.0 * c.depth_m, c.force_z_n), "depth $z$ (cm)", "$f_z$ in extraction (N)"),
-    )
-    for panel, (phase, curve, across, up) in zip(panels, wanted, strict=True):
-        for mud, trial in firsts.items():
-            profile = profile_from_row(trial["course"])
-            x, y = (column[profile.during(phase)] for column in curve(profile))
-            panel.plot(x, y, label=mud_text(mud), **line_of(looks[mud]))
+    for mud, trial in firsts.items():
+        profile = profile_from_row(trial["course"])
+        depth_cm, sweep_deg = 100.0 * profile.depth_m, np.degrees(profile.sweep_rad)
+        for panel, (phase, name), x, y in zip(
+            panels,
+            PHASE_NAMES.items(),
+            (depth_cm, sweep_deg, depth_cm),
+            (profile.force_z_n, profile.force_x_n, profile.force_z_n),
+            strict=True,
+        ):
+            during, force = profile.during(phase), "$f_x$" if phase is Phase.STANCE else "$f_z$"
+            panel.plot(x[during], y[during], label=mud_text(mud), **line_of(looks[mud]))
+            panel.set_xlabel("sweep $\\alpha$ (°)" if phase is Phase.STANCE else "depth $z$ (cm)")
+            panel.set_ylabel(f"{force} in {name} (N)")
+    for panel in panels:
         panel.axhline(0.0, color=GREY, linewidth=0.6)
-        panel.set_xlabel(across)
-        panel.set_ylabel(up)
-        if phase is not Phase.INSERTION:
-            panel.invert_xaxis()  # in the direction of the motion
+    for panel in panels[1:]:
+        panel.invert_xaxis()  # in the direction of the motion
 
 
 def _draw_by_mud(panel: Axes, muds: Muds, name: str, looks: Mapping[str, dict[str, Any]]) -> None:

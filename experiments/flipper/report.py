@@ -1,38 +1,76 @@
 """The report of the single flipper's trials: coefficients by mud, their errors, the largest forces, and the misfit."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from math import nan
+from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 from pandas import DataFrame
 
 from control.records import Phase
-from experiments.flipper.measurement import FlipperTrials
-from experiments.flipper.modelled_force import drawn_coefficients, misfit_n, modelled_forces
+from experiments.flipper.modelled_force import laws_of, misfit_n
+from experiments.flipper.plots import draw_coefficients, draw_stride
 from experiments.reports.coefficient_table import compared_frame, compared_rows, error_table, mud_summaries
 from experiments.reports.error_table import COEFFICIENTS
+from experiments.reports.mud_names import mud_text
+from experiments.reports.mud_styles import file_name, waters_of
+from experiments.reports.text_tables import number
 from experiments.study.notebook import Entry
+from experiments.study.result import Figure, Result, Table
+from experiments.trials.coefficient_page import (
+    COMPARISON,
+    TRUTHS,
+    coefficient_tables,
+    error_paragraphs,
+    remark_texts,
+    truth_settings,
+)
 from experiments.trials.estimation_methods import configured_method
-from experiments.trials.stride_profile import profile_from_row
-from experiments.trials.truth_file import TruthOfMud, truth_in, truth_settings
+from experiments.trials.truth_file import TruthOfMud, truth_in
 from firmware_host.configuration.configuration import Configuration
 
 STROKES = {"insertion": Phase.INSERTION, "stance": Phase.STANCE, "extraction": Phase.EXTRACTION}
+# Least and largest force of first strokes in N, from the authors' raw logs in the mud that they call 12.5N.
+AUTHORS_MUD, AUTHORS_N = "12.5N", {"insertion": (2.5, 2.8), "stance": (7.4, 8.3), "extraction": (1.9, 2.3)}
+MUDS, FORCES, STRIDES = "Coefficients of the muds", "Forces", "Strides"  # the parts of the page
+FORCES_TEXT = (
+    "Largest forces of first strides, mean over the trials, and in brackets the misfit of the laws in one trial (root "
+    f"mean square). The authors' forces are from their raw logs in the mud that they call {AUTHORS_MUD}, whose water "
+    "content they do not report."
+)
+MODELLED = (
+    "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients, where each is fitted. The "
+    "default method's laws give the torque of one joint; it replaces the measured torque, and with the other joint's "
+    "measured torque goes through the same map from torques to forces as the measurement. f_z is not drawn in stance, "
+    "where two torques cannot separate it from the sideways force."
+)
+MODELLED_PAPER = (
+    "B to E as in the paper's figure 4. Dashed: the forces by the fitted coefficients and the paper's laws."
+)
 Report = dict[str, Any]  # the summary, as it is in JSON
+Trials = dict[str, list[Entry]]  # by mud
+
+
+def trials_by_mud(muds: Sequence[str], entries: Mapping[str, Entry]) -> Trials:
+    """Return the trials in their order; other muds that were measured before follow those of this command."""
+    trials = sorted(entries.values(), key=lambda entry: int(entry["trial"]))
+    names = dict.fromkeys([*muds, *(entry["mud"] for entry in entries.values())])
+    by_mud = {mud: [trial for trial in trials if trial["mud"] == mud] for mud in names}
+    return {mud: own for mud, own in by_mud.items() if own}
 
 
 def report_of(
-    plan: FlipperTrials,
-    entries: Mapping[str, Entry],
+    settings: Mapping[str, Any],
+    by_mud: Trials,
     configuration: Configuration,
     truth: TruthOfMud | None,
-    left_out: Mapping[str, Entry] | None = None,
+    left_out: Mapping[str, Entry],
 ) -> Report:
     """Report the trials that count. `truth` is another experiment's; without it the bed's own load cell is used."""
     method, geometry = configured_method(configuration.estimation), configuration.geometry
-    by_mud = {mud: trials for mud in muds_of(plan, entries) if (trials := trials_of(mud, entries))}
     rows = compared_frame(  # the first stride of each trial
         row
         for mud, trials in by_mud.items()
@@ -42,39 +80,26 @@ def report_of(
         for row in (compared_rows(strides[0], known, mud=mud, method=name) if strides else ())
     )
     muds = mud_summaries(rows, by_mud, method, fmean)
-    remarks = {mud: [each for trial in trials for each in trial["remarks"]] for mud, trials in by_mud.items()}
-    plate_m = {
-        "width": geometry.plate.width_m,
-        "height": geometry.plate.height_m,
-        "thickness": geometry.plate_thickness_m,
-    }
+    for mud in muds:
+        mud["remarks"] = [remark for trial in by_mud[mud["mud"]] for remark in trial["remarks"]]
+    plate = geometry.plate
     return {
         "experiment": "flipper",
-        "muds": [mud | {"remarks": remarks[mud["mud"]]} for mud in muds],
+        "muds": muds,
         "errors": error_table(rows, "single flipper"),
         "falls_with_water": {name: _falls_with_water(muds, name) for name in COEFFICIENTS},
         "largest_forces_n": {mud: _largest_forces_n(trials, method) for mud, trials in by_mud.items()},
         "misfit_n": {mud: _misfits_n(trials[0], configuration, method) for mud, trials in by_mud.items()},
-        "later_strokes": _later_strokes(by_mud, method),
-        "plate_m": plate_m,
-        "left_out": left_out or {},
-    } | truth_settings(plan.identity, method, truth, by_mud)
-
-
-def muds_of(plan: FlipperTrials, entries: Mapping[str, Entry]) -> list[str]:
-    return list(dict.fromkeys([*plan.muds, *(entry["mud"] for entry in entries.values())]))
-
-
-def trials_of(mud: str, entries: Mapping[str, Entry]) -> list[Entry]:
-    return sorted((entry for entry in entries.values() if entry["mud"] == mud), key=lambda entry: int(entry["trial"]))
+        "later_strokes": _later_strokes([each["strides"][method] for trials in by_mud.values() for each in trials]),
+        "plate_m": {"width": plate.width_m, "height": plate.height_m, "thickness": geometry.plate_thickness_m},
+        "left_out": left_out,
+    } | truth_settings(settings, method, truth, by_mud)
 
 
 def _falls_with_water(muds: Sequence[Mapping[str, Any]], name: str) -> bool | None:
     """Return whether the coefficient falls with water, as in the paper; None where the names are no water contents."""
-    try:
-        known = sorted((float(mud["mud"]), mud[name].value) for mud in muds if mud[name].value is not None)
-    except ValueError:
-        return None
+    waters = waters_of([mud["mud"] for mud in muds]) or ()
+    known = sorted((water, mud[name].value) for water, mud in zip(waters, muds, strict=False) if mud[name].trials)
     return all(drier > wetter for (_, drier), (_, wetter) in pairwise(known)) if len(known) > 1 else None
 
 
@@ -86,25 +111,83 @@ def _largest_forces_n(trials: Sequence[Entry], method: str) -> dict[str, float]:
 
 def _misfits_n(trial: Entry, configuration: Configuration, method: str) -> dict[str, float | None]:
     """Return the root mean square difference between the measured forces of one stride and the laws, by stroke."""
-    profile, stride = profile_from_row(trial["course"]), trial["strides"][method][0]
-    surface_m = stride["surface_m"] or 0.0
-    laws = modelled_forces(profile, configuration.geometry, surface_m, drawn_coefficients(stride), method)
+    profile, _, laws = laws_of(trial, configuration.geometry, method)
     rows = {name: profile.during(STROKES[name]) for name in ("insertion", "extraction")}
     upward = {name: misfit_n(profile.force_z_n[each], laws.force_z_n[each]) for name, each in rows.items()}
     return upward | {"stance": misfit_n(profile.force_x_n, laws.force_x_n)}
 
 
-def _later_strokes(by_mud: Mapping[str, Sequence[Entry]], method: str) -> dict[str, list[float]]:
+def _later_strokes(trials: Sequence[Sequence[Mapping[str, Any]]]) -> dict[str, list[float]]:
     """Compare each stride with the first one in the same hole: the mean ratio over the trials that have both."""
-    trials = [trial["strides"][method] for trials in by_mud.values() for trial in trials]
     rows = [
-        {"trial": trial, "number": number, "coefficient": name, "value": each["value"] if each["valid"] else nan}
+        {"trial": trial, "number": number}
+        | {name: stride[name]["value"] if stride[name]["valid"] else nan for name in COEFFICIENTS}
         for trial, strides in enumerate(trials)
         for number, stride in enumerate(strides)
-        for name, each in ((name, stride[name]) for name in COEFFICIENTS)
     ]
-    if not rows:
-        return {name: [] for name in COEFFICIENTS}
-    values = DataFrame(rows).pivot(index=["trial", "coefficient"], columns="number", values="value")
-    ratios = values.div(values[0], axis=0).drop(columns=[0]).groupby("coefficient").mean()
-    return {name: ratios.loc[name].dropna().tolist() for name in COEFFICIENTS}
+    values = DataFrame(rows).set_index(["trial", "number"])
+    ratios = values.div(values.xs(0, level="number"), level="trial").groupby("number").mean().drop(index=0)
+    return {name: ratios[name].dropna().tolist() for name in COEFFICIENTS}
+
+
+# the page
+
+
+def result_of(report: Report, by_mud: Trials, configuration: Configuration, logs: Sequence[Path]) -> Result:
+    """Return the tables, figures and explanations of all trials."""
+    method, geometry = report["settings"]["method"], configuration.geometry
+    caption = (
+        "Figure 5 of the paper. A to C: force of one trial in each mud. D to F: coefficients, mean and standard "
+        "deviation over the trials; each grey dash is a trial."
+    )
+    if any(mud["truth"] for mud in report["muds"]):
+        caption += " G to I: against the load cell, with two standard errors; on the grey line both are equal."
+    firsts = {mud: trials[0] for mud, trials in by_mud.items()}
+    strides = [
+        Figure(f"figure4_{file_name(mud)}", f"Figure 4 of the paper, mud {mud_text(mud)}.",
+               partial(draw_stride, trial, geometry, method), STRIDES)
+        for mud, trial in firsts.items()
+    ]  # fmt: skip
+    remarks = [f"{mud_text(mud['mud'])}: {remark}" for mud in report["muds"] for remark in mud["remarks"]]
+    return Result(
+        tables=[*coefficient_tables(report, MUDS), _force_table(report)],
+        figures=[Figure("figure5", caption, partial(draw_coefficients, report["muds"], firsts), MUDS), *strides],
+        summary=report,
+        title="A single flipper through muds",
+        texts={
+            MUDS: _explanation(report),
+            COMPARISON: TRUTHS[report["settings"]["truth"]] if report["errors"] else "",
+            FORCES: FORCES_TEXT,
+            STRIDES: MODELLED_PAPER if method == "paper" else MODELLED,
+        }
+        | remark_texts(remarks, report["left_out"]),
+        logs=logs,
+    )
+
+
+def _explanation(report: Report) -> str:
+    paragraphs = [report["missing_truth"]] if report["missing_truth"] else []
+    falls = {name: falls for name, falls in report["falls_with_water"].items() if falls is not None}
+    if falls:
+        answers = ", ".join(f"{name} {'yes' if each else 'no'}" for name, each in falls.items())
+        paragraphs.append(f"Does a coefficient fall with water from mud to mud, as in the paper? {answers}.")
+    for name, fractions in report["later_strokes"].items():
+        if fractions:
+            percent = ", ".join(f"{100.0 * fraction:.0f} %" for fraction in fractions)
+            paragraphs.append(f"{name} of later strides in the same hole, relative to the first: {percent}.")
+    return "\n\n".join([*paragraphs, *error_paragraphs(report["settings"])])
+
+
+def _force_table(report: Report) -> Table:
+    rows = [
+        {"mud": mud_text(mud)}
+        | {
+            stroke: number(forces_n[stroke], 2) + (f" ({misfit:.2f})" if misfit is not None else "")
+            for stroke, misfit in report["misfit_n"][mud].items()
+        }
+        for mud, forces_n in report["largest_forces_n"].items()
+    ]
+    authors = {stroke: f"{low:g} to {high:g}" for stroke, (low, high) in AUTHORS_N.items()}
+    frame = DataFrame([*rows, {"mud": "authors' logs"} | authors], columns=["mud", *STROKES])
+    title = "Largest forces, in brackets the misfit of the laws"
+    return Table("forces", title, dict.fromkeys(STROKES, "N"), frame, FORCES)

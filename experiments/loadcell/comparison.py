@@ -10,14 +10,6 @@ from experiments.loadcell.analysis import MudCoefficient
 from experiments.reports.mud_names import mud_key
 from experiments.study.option import OptionError
 
-OTHER_PLATE = (
-    "A load cell's plate is upright and goes down straight; a flipper's leans and moves along an arc, and in clay a "
-    "coefficient belongs to plate, path, depth and speed. In the simulator's clay at 3 cm the flipper's trials have 8 "
-    "to 12 % more true k_p than the paper's plate reads, 3 to 8 % less k_s, and k_e within 2 %. At equal depth and "
-    "speed that is 5 to 6 % more k_p and 1 % of the others; the rest is 2 mm of depth and an edge that goes down and "
-    "up at 0.14 to 0.16 m/s."
-)
-
 
 def load_flipper(path: Path) -> dict[str, Any]:
     """Read the summary of a flipper experiment, or the one in a folder. Raises OptionError, OSError."""

@@ -21,7 +21,7 @@ from experiments.loadcell.analysis import (
     gather_trials,
     speed_remark,
 )
-from experiments.loadcell.comparison import OTHER_PLATE, compare_muds
+from experiments.loadcell.comparison import compare_muds
 from experiments.loadcell.plots import draw_coefficients, draw_mud
 from experiments.loadcell.recording import load_counted
 from experiments.loadcell.stage_track import common_alignment
@@ -32,7 +32,7 @@ from experiments.reports.value_text import N_CM3, miss_text, repeatability_text,
 from experiments.study.notebook import Notebook
 from experiments.study.result import Figure, Result, Table, to_json
 from experiments.study.session import Show
-from experiments.trials.load_cell_truth import TrueCoefficients
+from experiments.trials.load_cell_truth import OTHER_PLATE, TrueCoefficients
 
 TITLE = "Ground truth of mud from a load cell"
 ACCURACY = "docs/explanation/bench_accuracy.md"

@@ -19,6 +19,7 @@ from experiments.study.option import Option
 from experiments.study.result import Figure, Result, Table
 from experiments.study.session import Session
 from experiments.study.trials import Trials
+from experiments.study.values import mud_length
 from experiments.trackway import bench
 from experiments.trackway.depth_rule import arm_m, walking_world
 from experiments.trackway.figures import walk_figures
@@ -51,7 +52,7 @@ SCHEMA = 2
 TITLE = "The trackway: Table I of the paper"
 TRIALS = 3  # of each gait, as in the paper
 CONSTANT_SEEDS = 1
-PAPERS_MUDS = tuple(bench.Mud(name, COMPARTMENT_M) for name in PAPER_TABLE[ADAPTIVE])
+PAPERS_MUDS = tuple((name, COMPARTMENT_M) for name in PAPER_TABLE[ADAPTIVE])
 INSTRUCTIONS = (
     "Torque is off: level the mud, and put the sweep axes over the beginning of the first mud. Take your hands away: "
     "the robot walks next"
@@ -149,21 +150,19 @@ def robot(
     *,
     trials: Number = TRIALS,
     mud: Annotated[
-        tuple[bench.Mud, ...],
+        tuple[tuple[str, float], ...],
         Option(
             "of a real trackway, and its length (default: 61), one after the other (default: the paper's)",
             metavar="NAME[=CM]",
-            parse=bench.parse_mud,
+            parse=mud_length,
         ),
-    ] = PAPERS_MUDS,
+    ] = (),
 ) -> Result:
     """Walk the real trackway. Raises BenchError."""
-    bench.require_own_names(mud)
-    trackway = bench.Trackway(mud, trials)
+    trackway = bench.Trackway(bench.muds_of(mud) or PAPERS_MUDS, trials)
     robot_bench = open_bench(session, trackway.identity, lambda trial: INSTRUCTIONS)
-    configuration, entries, logs = run_trials(
-        robot_bench, session, lambda: bench.run(robot_bench, trackway, session.show)
-    )
+    measure = partial(bench.measure, robot_bench, trackway)
+    configuration, entries, logs = run_trials(robot_bench, session, trackway.planned, measure)
     report = bench.report_of(trackway, entries, configuration.geometry.flipper_length_m)
     notes = [f"Trials left out: {report['left_out']}."] if report["left_out"] else []
     if without := report["strides_without_position"]:

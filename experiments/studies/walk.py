@@ -1,20 +1,35 @@
-"""The walking robot over several muds, and in soft mud at two depths, after the paper's section III-C."""
+"""The walking robot over several muds, and in soft mud at two depths, after the paper's section III-C.
+
+Its simulated bench has fresh copies of the trackway along one track, and then the soft muds.
+"""
 
 from functools import partial
+from math import fsum
 from pathlib import Path
 from typing import Annotated, Literal
 
 from experiments.reports.mud_names import mud_name
+from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
 from experiments.study.option import Option
 from experiments.study.result import Result
 from experiments.study.session import Session
-from experiments.trackway.bench import Mud, parse_mud, require_own_names
-from experiments.trials.mud_trials import SEED, PlannedTrial, open_bench, require_named, run_trials
+from experiments.study.values import mud_length
+from experiments.trackway.bench import muds_of
+from experiments.trials.mud_trials import (
+    MOST_ATTEMPTS,
+    SEED,
+    PlannedTrial,
+    open_bench,
+    require_named,
+    run_trials,
+)
+from experiments.trials.simulated_bed import CarriedBed, simulated_bench
 from experiments.trials.truth_file import load_truth
-from experiments.walk.measurement import MUDS, SOFT, WalkTrials, run
-from experiments.walk.report import report_of
-from experiments.walk.simulation import walking_bench
-from experiments.walk.text import result_of
+from experiments.walk.measurement import MUDS, SOFT, WalkTrials, measure
+from experiments.walk.report import report_of, result_of
+from simulation.mud.clay import clay_of_water
+from simulation.mud.disturbances import LAB
+from simulation.mud.track import Track
 
 TRACKWAY_INSTRUCTIONS = (
     "Torque is off. Re-mix the surface of all muds and level it to its nominal height, and put the robot so that the "
@@ -24,17 +39,20 @@ SOFT_INSTRUCTIONS = (
     "Torque is off. Re-mix and level the soft mud, and put the robot where it has at least 80 cm of it ahead. Take "
     "your hands away: the robot walks next"
 )
+TAIL_M = 0.5  # the last simulated mud is longer, so that no stride meets the next copy
+SOFT_WALK_M, STRIP_M = 2.0, 1000.0  # length for a walk in soft mud, length of each soft mud
+SECTIONS = f"[estimation]\nsurface_error_m = {LAB.surface_error_m:.4g}  # as an operator would see it\n"
 
 
 def study(
     session: Session,
     *,
     mud: Annotated[
-        tuple[Mud, ...],
+        tuple[tuple[str, float], ...],
         Option(
             "as its water in percent, and its length (default: 61), in the order of the trackway",
             metavar="NAME[=CM]",
-            parse=parse_mud,
+            parse=mud_length,
         ),
     ] = (),
     trials: Annotated[int, Option("over the muds", low=1, high=100)] = 3,
@@ -44,20 +62,38 @@ def study(
     truth: Annotated[Path | None, Option("summary.json of a loadcell experiment")] = None,
 ) -> Result:
     """The walking robot over several muds: their coefficients."""
-    muds = mud or (MUDS if session.simulated else ())
+    muds = muds_of(mud) or (MUDS if session.simulated else ())
     softs = tuple(dict.fromkeys(map(mud_name, soft))) or (SOFT if session.simulated else ())
-    names = [each.name for each in muds]
+    names = [name for name, _ in muds]
     require_named(names + list(softs if names else ()), session, "of the track in order, --mud 47.6=61 --mud 49.5=61")
-    require_own_names(muds)
     plan = WalkTrials(
         muds=muds, trials=trials, depth_m=depth / 100.0, soft=softs, flipper=flipper, simulated=session.simulated
     )
     known = load_truth(truth) if truth else None
     bench = open_bench(session, plan.identity, _instructions, partial(walking_bench, session.folder, plan, SEED))
-    configuration, entries, logs = run_trials(bench, session, lambda: run(bench, plan, session.show))
+    configuration, entries, logs = run_trials(bench, session, plan.planned, partial(measure, bench, plan))
     report = report_of(plan, entries, configuration, known, bench.notebook.left_out)
     return result_of(report, plan, entries, configuration, known, logs)
 
 
 def _instructions(trial: PlannedTrial) -> str:
     return TRACKWAY_INSTRUCTIONS if trial.key.startswith("walk/") else SOFT_INSTRUCTIONS
+
+
+def walking_bench(folder: Path, plan: WalkTrials, seed: int) -> tuple[LockstepRobot, CarriedBed]:
+    """Make a robot over the plan's muds, named after their water content. Raises ValueError for an unknown mud."""
+    lengths_m = [length_m for _, length_m in plan.muds]
+    lengths_m[-1] += TAIL_M
+    trackway = [
+        (length_m, clay_of_water(float(name))) for length_m, (name, _) in zip(lengths_m, plan.muds, strict=True)
+    ]
+    copies = MOST_ATTEMPTS * plan.trials
+    soft = [(STRIP_M, clay_of_water(float(mud))) for mud in plan.soft]
+    strips = {name: plan.soft.index(mud) for name, mud, _ in plan.soft_walks}
+
+    def position_m(trial: PlannedTrial, prepared: int) -> float:
+        if trial.key.startswith("walk/"):
+            return prepared * fsum(lengths_m)
+        return copies * fsum(lengths_m) + STRIP_M * strips[trial.group] + SOFT_WALK_M * (prepared + 1)
+
+    return simulated_bench(folder, simulated_configuration(SECTIONS), Track(trackway * copies + soft), seed, position_m)

@@ -9,9 +9,9 @@ The strides are read from the log, and the table is the same as for the simulate
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import accumulate
-from math import isfinite, nan, radians, sin
+from math import isfinite, radians, sin
 from typing import NamedTuple
 
 from experiments.reports.counted_nouns import counted
@@ -30,46 +30,29 @@ from experiments.robot.bench_robot import (
 )
 from experiments.study.notebook import Entry
 from experiments.study.option import OptionError
-from experiments.study.session import Show
 from experiments.trackway.depth_rule import DepthRule, constant_depth
 from experiments.trackway.table_one import ADAPTIVE, FIXED_DEPTHS_M, Summary, table_one
 from experiments.trackway.track_walk import STUCK_S
 from experiments.trackway.walk import Walk, WalkedStride, logged_strides, speed_m_s, walk_of
-from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
+from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from firmware_host.configuration.configuration import Configuration
-from simulation.mud.track import COMPARTMENT_M
 
 PATIENCE_S = 900.0  # longest time of a whole walk
 UNSEEN_S = 2.0  # longest time without a pose, before or during a walk: the end of the track is unknown then
 BACKWARDS_M = 0.2  # distance before the start; no mud pushes the body back so far
 POLL_S = 0.05  # interval at which the status is checked
+Muds = tuple[tuple[str, float], ...]  # names, which differ, and lengths in m
 PAST_END = ""  # name of the mud past the end of the trackway
 UNSEEN = "the pose of the body is lost: check that the cameras see the robot's markers"
 BACKWARDS = "the measured position falls while the robot walks: reverse pose.axis, or the sign of metres_per_count"
 
 
-@dataclass(frozen=True)
-class Mud:
-    name: str
-    length_m: float
-
-
-def parse_mud(text: str) -> Mud:
-    """Parse NAME or NAME=CM; the default length is that of the paper."""
-    name, _, length_cm = text.partition("=")
-    try:
-        value = float(length_cm or 100.0 * COMPARTMENT_M)
-    except ValueError:
-        value = nan
-    if not (name and 20.0 <= value <= 10000.0):
-        raise OptionError(f"{text}: must be a mud and its length from 20 to 10000 cm, such as 47.6=61")
-    return Mud(mud_name(name), value / 100.0)
-
-
-def require_own_names(muds: Sequence[Mud]) -> None:
-    """Raises OptionError where two muds have the same name."""
-    if len({mud.name for mud in muds}) < len(muds):
+def muds_of(typed: Sequence[tuple[str, float]]) -> Muds:
+    """Return muds whose lengths were typed in cm. Raises OptionError where two have the same name."""
+    muds = tuple((mud_name(name), length_cm / 100.0) for name, length_cm in typed)
+    if len(dict(muds)) < len(muds):
         raise OptionError("--mud: two muds have the same name; give each its own")
+    return muds
 
 
 class LoggedTime(NamedTuple):
@@ -89,7 +72,7 @@ class End(NamedTuple):
 class Trackway:
     """The muds of a real trackway, and the trials on it."""
 
-    muds: tuple[Mud, ...]
+    muds: Muds
     trials: int = 3  # of each gait, as in the paper
     depths_m: tuple[float, ...] = tuple(FIXED_DEPTHS_M.values())
 
@@ -98,7 +81,7 @@ class Trackway:
         """The settings that must not change when an experiment is continued."""
         return {
             "experiment": "trackway",
-            "muds": [[mud.name, mud.length_m] for mud in self.muds],
+            "muds": self.muds,
             "depths_m": list(self.depths_m),
         }
 
@@ -118,13 +101,8 @@ class Trackway:
 
     def mud_at(self, position_m: float) -> str:
         """Name the mud at a position of the plates: PAST_END after the last, and the first also before the start."""
-        ends_m = accumulate(mud.length_m for mud in self.muds)
-        return next((mud.name for mud, end_m in zip(self.muds, ends_m, strict=True) if position_m < end_m), PAST_END)
-
-
-def run(bench: Bench, trackway: Trackway, show: Show) -> None:
-    """Walk every trial that is not in the notebook yet. Raises BenchError."""
-    conduct_trials(bench, trackway.planned, lambda trial: measure(bench, trackway, trial), show)
+        ends_m = accumulate(length_m for _, length_m in self.muds)
+        return next((name for (name, _), end_m in zip(self.muds, ends_m, strict=True) if position_m < end_m), PAST_END)
 
 
 def measure(bench: Bench, trackway: Trackway, trial: PlannedTrial) -> Entry:
@@ -180,7 +158,7 @@ class Progress:
     def __init__(self, trackway: Trackway, zero_m: float, now_s: float) -> None:
         """`zero_m` is the position of the body at which the plates go down at the beginning of the trackway."""
         self._trackway, self._zero_m = trackway, zero_m
-        self._mud = trackway.muds[0].name
+        self._mud = trackway.muds[0][0]
         self._begun_s = self._entered_s = self._seen_s = now_s
 
     def evaluate(self, status: Status) -> End | None:
@@ -237,8 +215,8 @@ def report_of(trackway: Trackway, entries: Mapping[str, Entry], arm_m: float) ->
         ends[trial.group][walk.fault or "past the end"] += 1
     settings = {
         "seeds": trackway.trials,
-        "mud_length_cm": {mud.name: 100.0 * mud.length_m for mud in trackway.muds},
-        "muds": [asdict(mud) for mud in trackway.muds],
+        "mud_length_cm": {name: 100.0 * length_m for name, length_m in trackway.muds},
+        "muds": [{"name": name, "length_m": length_m} for name, length_m in trackway.muds],
     }
     return table_one(walks, arm_m, ends, settings) | {
         "left_out": len(trackway.planned) - len(counting),

@@ -168,11 +168,13 @@ def open_bench(
     plan: Entry,
     instructions: Callable[[PlannedTrial], str],
     simulated: Callable[[], tuple[BenchRobot, MudBed]] | None = None,
+    check: Callable[[Configuration], None] = lambda configuration: None,
 ) -> Bench:
     """Connect to the daemon's robot, or make a simulated one in a session without a daemon.
 
     `plan` has the options that must be the same when an experiment continues; so must be the program, and the daemon's
-    version and configuration. `instructions` say how the operator prepares a trial.
+    version and configuration. `instructions` say how the operator prepares a trial. `check` raises BenchError for a
+    daemon's configuration that does not fit.
     """
     plan = {**plan, **session.program}
     if session.socket is None:
@@ -181,6 +183,7 @@ def open_bench(
         return Bench(*simulated(), session.operator, notebook)
     robot = DaemonRobot(session.socket)
     try:
+        check(robot.configuration)
         daemon = {"version": robot.call("hello")["version"]}
         configuration = parse_document(robot.configuration.text)
         notebook = Notebook(session.folder, plan | {"daemon": daemon, "configuration": configuration})
@@ -191,15 +194,15 @@ def open_bench(
 
 
 def run_trials(
-    bench: Bench, session: Session, run: Callable[[], None]
+    bench: Bench, session: Session, planned: Sequence[PlannedTrial], measure: Measure
 ) -> tuple[Configuration, dict[str, Entry], list[Path]]:
-    """Run trials; return the robot's configuration, the entries that count, and the logs.
+    """Run the trials; return the robot's configuration, the entries that count, and the logs.
 
     The robot is left at rest, however they end. Raises BenchError where no entry counts.
     """
     try:
         configuration = bench.robot.configuration
-        run()
+        conduct_trials(bench, planned, measure, session.show)
     finally:
         logs = leave(bench.robot, session.operator, session.folder)
     return configuration, counted_entries(bench.notebook), logs
@@ -207,12 +210,7 @@ def run_trials(
 
 def counted_entries(notebook: Notebook) -> dict[str, Entry]:
     """Return the trials that count. Raises BenchError where none does."""
-    left_out = notebook.left_out
-    measured = {key: entry for key, entry in notebook.entries.items() if key not in left_out}
+    measured = {key: entry for key, entry in notebook.entries.items() if not entry.get("skipped")}
     if not measured:
         raise BenchError("nothing was measured: every trial was left out")
     return measured
-
-
-def left_out_texts(left_out: Mapping[str, Entry]) -> list[str]:
-    return [": ".join([f"{key} was left out", *entry["why"]]) for key, entry in left_out.items()]

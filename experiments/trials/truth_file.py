@@ -1,34 +1,27 @@
 """True coefficients of muds, taken from the summary of another experiment, such as a load cell's."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from experiments.reports.error_table import COEFFICIENTS
-from experiments.reports.mud_names import mud_key, mud_text
+from experiments.reports.mud_names import mud_key
 from experiments.robot.bench_errors import BenchError
 
 TruthOfMud = dict[str, dict[str, float]]  # N/m³ by the mud's key and coefficient
 
 
-def truth_by_mud(muds: Sequence[Mapping[str, Any]]) -> TruthOfMud:
-    """Return the known coefficients of each mud of a summary. A lower bound is no truth."""
-    return {
-        mud_key(mud["mud"]): {
-            name: known["value"]
-            for name in COEFFICIENTS
-            if (known := mud.get(name)) and known.get("value") and not known.get("at_least")
-        }
-        for mud in muds
-    }
-
-
 def load_truth(path: Path) -> TruthOfMud:
-    """Read another experiment's summary.json, or the one in a folder. Raises BenchError."""
+    """Read another experiment's summary.json, or the one in a folder. A lower bound is no truth. Raises BenchError."""
     path = path / "summary.json" if path.is_dir() else path
     try:
-        truth = truth_by_mud(json.loads(path.read_text(encoding="utf-8"))["muds"])
+        truth = {
+            mud_key(mud["mud"]): {
+                name: known["value"]
+                for name in COEFFICIENTS
+                if (known := mud.get(name)) and known.get("value") and not known.get("at_least")
+            }
+            for mud in json.loads(path.read_text(encoding="utf-8"))["muds"]
+        }
         numbers = [value for mud in truth.values() for value in mud.values()]
         if not all(isinstance(value, int | float) and value > 0.0 for value in numbers):
             raise ValueError("coefficients must be numbers above 0")
@@ -45,16 +38,3 @@ def load_truth(path: Path) -> TruthOfMud:
 def truth_in(truth: TruthOfMud, mud: str) -> dict[str, float]:
     """Return the coefficients of one mud, however its name is written; nothing for an unknown mud."""
     return truth.get(mud_key(mud), {})
-
-
-def truth_settings(
-    identity: Mapping[str, Any], method: str, truth: TruthOfMud | None, muds: Iterable[str]
-) -> dict[str, Any]:
-    """Return the part of a summary with the settings, and a sentence with the muds that a truth file lacks."""
-    missing = [mud for mud in muds if truth is not None and mud_key(mud) not in truth]
-    return {
-        "settings": {**identity, "method": method, "truth": "file" if truth else "bed"},
-        "missing_truth": f"The file given with --truth says nothing of {', '.join(map(mud_text, missing))}."
-        if missing
-        else "",
-    }

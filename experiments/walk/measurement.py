@@ -7,12 +7,12 @@ drag and not the mud's strength while the body moves. Every method of estimation
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import accumulate, chain
-from math import ceil, fsum
+from dataclasses import asdict, dataclass
+from itertools import chain
+from math import ceil
 from typing import Any
 
-from experiments.pictures.mud_layout import layout_of_lengths
+from experiments.pictures.mud_layout import MudLayout, layout_of_lengths
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.bench_robot import (
     RAISING_S,
@@ -28,15 +28,14 @@ from experiments.robot.bench_robot import (
     walk,
 )
 from experiments.study.notebook import Entry
-from experiments.study.session import Show
-from experiments.trackway.bench import UNSEEN, UNSEEN_S, Mud, reach_of
+from experiments.trackway.bench import UNSEEN, UNSEEN_S, Muds, reach_of
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, configured_method, strides_by_method
-from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
+from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
 from experiments.trials.stride_profile import profile_of, profile_of_walk, profile_row, slip_m, thinned
 from experiments.walk.known_surface import strides_with_known_surface
 from logs.files.log_reader import Log
 
-MUDS = tuple(Mud(name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
+MUDS: Muds = tuple((name, 0.61) for name in ("47.6", "49.5", "51.2"))  # figure 6 of the paper
 # The first is that of figure 7, called 53.8 % there; in simulation the second yields at 3 cm and not at 5 cm.
 SOFT = ("53.1", "51.2")
 SOFT_DEPTHS_M = (0.03, 0.05)
@@ -48,7 +47,7 @@ DRAWN_STRIDE = 2  # of a walk in soft mud, counted from 0: the first ones start 
 
 @dataclass(frozen=True)
 class WalkTrials:
-    muds: tuple[Mud, ...] = MUDS
+    muds: Muds = MUDS
     trials: int = 3  # as in the paper
     depth_m: float = 0.03
     soft: tuple[str, ...] = ()  # muds in which to walk at SOFT_DEPTHS_M
@@ -58,108 +57,76 @@ class WalkTrials:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """The settings that must not change when an experiment is continued."""
-        return {
-            "experiment": "walk",
-            "muds": [[mud.name, mud.length_m] for mud in self.muds],
-            "depth_m": self.depth_m,
-            "soft": list(self.soft),
-            "soft_strides": self.soft_strides,
-            "flipper": self.flipper,
-            "simulated": self.simulated,
-        }
+        """The settings that must not change when an experiment is continued; trials may be added."""
+        return {"experiment": "walk"} | {key: value for key, value in asdict(self).items() if key != "trials"}
 
     @property
     def planned(self) -> list[PlannedTrial]:
-        over = " ".join(mud.name for mud in self.muds)
-        walks = [PlannedTrial(f"walk/{number}", over, number, self.trials) for number in range(1, self.trials + 1)]
-        return walks + [
-            PlannedTrial(soft_key(mud, depth_m, number), soft_name(mud, depth_m), number, self.trials)
-            for mud in self.soft
-            for depth_m in SOFT_DEPTHS_M
-            for number in range(1, self.trials + 1)
+        """The walks over all muds, then those at both depths in each soft mud."""
+        over = {"walk": " ".join(name for name, _ in self.muds)}
+        groups = over | {f"soft {name}": name for name, *_ in self.soft_walks}
+        numbers = range(1, self.trials + 1)
+        return [
+            PlannedTrial(f"{key}/{number}", group, number, self.trials)
+            for key, group in groups.items()
+            for number in numbers
         ]
 
     @property
-    def length_m(self) -> float:
-        return fsum(mud.length_m for mud in self.muds)
+    def soft_walks(self) -> list[tuple[str, str, float]]:
+        """The name of each group of walks in soft mud, its mud and its depth."""
+        return [(soft_name(mud, depth_m), mud, depth_m) for mud in self.soft for depth_m in SOFT_DEPTHS_M]
 
     @property
-    def borders_m(self) -> list[float]:
-        """The ends of all muds except the last."""
-        return list(accumulate(mud.length_m for mud in self.muds))[:-1]
-
-    def mud_at(self, plates_m: float, slip_m: float = 0.0) -> str:
-        """Name the mud in which a plate goes down and slips back; empty past the last mud and near a border."""
-        return layout_of_lengths([(mud.name, mud.length_m) for mud in self.muds]).mud_at(plates_m, slip_m)
+    def layout(self) -> MudLayout:
+        return layout_of_lengths(self.muds)
 
 
 def soft_name(mud: str, depth_m: float) -> str:
     return f"{mud} at {100.0 * depth_m:g} cm"
 
 
-def soft_key(mud: str, depth_m: float, number: int) -> str:
-    return f"soft {soft_name(mud, depth_m)}/{number}"
-
-
-def run(bench: Bench, plan: WalkTrials, show: Show) -> None:
-    """Make every trial that is not in the notebook yet. Raises BenchError."""
-    conduct_trials(bench, plan.planned, lambda trial: measure(bench, plan, trial), show)
-
-
 def measure(bench: Bench, plan: WalkTrials, trial: PlannedTrial) -> Entry:
     """Make one walk. Raises InvalidTrialError, BenchError."""
-    depths = {soft_key(mud, depth_m, trial.number): depth_m for mud in plan.soft for depth_m in SOFT_DEPTHS_M}
-    if trial.key in depths:
-        return _walk_in_soft(bench, plan, trial, depths[trial.key])
+    depths_m = {name: depth_m for name, _, depth_m in plan.soft_walks}
+    if trial.group in depths_m:
+        return _walk_in_soft(bench, plan, trial, depths_m[trial.group])
     return _walk_over(bench, plan, trial)
 
 
 def _walk_over(bench: Bench, plan: WalkTrials, trial: PlannedTrial) -> Entry:
+    """Walk until the plates go down past the last mud."""
     robot = bench.robot
     arm(robot, bench.operator)
     before: Status = robot.call("status")
-    start_m = before["body_x_m"]
-    remarks = [] if start_m is not None else ["no pose arrives: strides are assigned to the muds by their order"]
-    ordered, end = _follow(bench, plan, start_m)
+    start_m, reach_m = before["body_x_m"], reach_of(robot.configuration)
+    length_m = plan.layout.ends_m[-1]
+    ordered = ceil(length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
+    ordered *= 1 if start_m is None else SLIP_ALLOWANCE
+    robot.call("walk", depth_m=plan.depth_m, strides=ordered)
+    end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m - reach_m, now_s).evaluate)
     after = wait_until(robot, lambda now: now["mode"] not in UNDER_WAY, RAISING_S, "raising the flippers")
     if after["mode"] != "hold":
         raise InvalidTrialError(mode_reason(after))
     made = count_strides(fetch_strides(robot, before["strides_closed"]))
     log = robot.record(before["now_s"], after["now_s"])
-    entry = _entry(bench, plan, trial, log, before["strides_closed"])
-    profile = profile_of_walk(log, plan.flipper)
-    entry |= {"start_m": start_m, "course": profile_row(profile), "remarks": remarks + [end] * bool(end)}
-    _add_slips(entry, log, plan.flipper, robot.configuration.geometry.flipper_length_m)
+    remarks = [] if start_m is not None else ["no pose arrives: strides are assigned to the muds by their order"]
+    entry = _entry(bench, plan, trial, log, before["strides_closed"]) | {
+        "start_m": start_m,
+        "course": profile_row(profile_of_walk(log, plan.flipper)),
+        "remarks": remarks + [end] * bool(end),
+    }
+    arm_m = robot.configuration.geometry.flipper_length_m
+    strides = list(chain.from_iterable(entry["strides"].values()))  # of all methods, which begin at the same times
+    starts_s = {stride["t_start_s"] for stride in strides}
+    slips_m = {start_s: slip_m(profile_of(log, plan.flipper, start_s), arm_m) for start_s in starts_s}
+    for stride in strides:
+        stride["slip_m"] = slips_m[stride["t_start_s"]]
     if after["notice"]:
         raise InvalidTrialError(after["notice"], entry)
     if end is None and made < ordered:
         raise InvalidTrialError(f"the walk was stopped by another client in stride {made + 1}", entry)
     return entry
-
-
-def _add_slips(entry: Entry, log: Log, flipper: str, arm_m: float) -> None:
-    """Add the slip to the strides of all methods, which begin at the same times."""
-    strides = list(chain.from_iterable(entry["strides"].values()))
-    starts_s = {stride["t_start_s"] for stride in strides}
-    slips_m = {start_s: slip_m(profile_of(log, flipper, start_s), arm_m) for start_s in starts_s}
-    for stride in strides:
-        stride["slip_m"] = slips_m[stride["t_start_s"]]
-
-
-def _follow(bench: Bench, plan: WalkTrials, start_m: float | None) -> tuple[int, str | None]:
-    """Walk until the plates go down past the last mud. Return the ordered strides and why the walk was stopped.
-
-    The reason is empty at the proper end, and None where the walk was not stopped from here.
-    """
-    robot = bench.robot
-    reach_m = reach_of(robot.configuration)
-    strides = ceil(plan.length_m / (2.0 * reach_m))  # without a pose no more: they cannot lead beyond the end
-    ordered = strides if start_m is None else SLIP_ALLOWANCE * strides
-    robot.call("walk", depth_m=plan.depth_m, strides=ordered)
-    length_m = plan.length_m - reach_m
-    end, _ = follow_walk(robot, lambda now_s: Advance(start_m, length_m, now_s).evaluate)
-    return ordered, end
 
 
 class Advance:

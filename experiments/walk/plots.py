@@ -66,7 +66,7 @@ def draw_walk_over(plan: WalkTrials, walk: Entry, strides: DataFrame, reach_m: f
 def _borders_s(plan: WalkTrials, walk: Entry, profile: StrideProfile, own: DataFrame, reach_m: float) -> list[float]:
     """Return when the plates first went down past each border; by the order of the strides where there is no pose."""
     found = []
-    for border_m in plan.borders_m:
+    for border_m in plan.layout.ends_m[:-1]:
         if walk["start_m"] is None:
             beyond = own.loc[own["plates_m"] >= border_m, "t_start_s"].tolist()
         else:
@@ -77,9 +77,9 @@ def _borders_s(plan: WalkTrials, walk: Entry, profile: StrideProfile, own: DataF
 
 
 def _name_muds(panel: Axes, plan: WalkTrials, edges_s: Sequence[float], begun_s: float) -> None:
-    for mud, start_s, end_s in zip(plan.muds, edges_s, edges_s[1:], strict=False):
+    for (mud, _), start_s, end_s in zip(plan.muds, edges_s, edges_s[1:], strict=False):
         middle_s = (start_s + end_s) / 2.0 - begun_s
-        panel.annotate(mud_text(mud.name), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
+        panel.annotate(mud_text(mud), (middle_s, 1.02), xycoords=("data", "axes fraction"), ha="center")
 
 
 def _draw_position(panel: Axes, walk: Entry, profile: StrideProfile, begun_s: float) -> None:
@@ -132,8 +132,8 @@ def _draw_coefficient(panel: Axes, plan: WalkTrials, name: str, own: DataFrame, 
 def _draw_truth(panel: Axes, plan: WalkTrials, own: DataFrame, begun_s: float) -> None:
     """Draw the load cell's values over each mud, from its first stride to its last."""
     label = "load cell"
-    for mud in plan.muds:
-        there = own[(own["mud"] == mud.name) & own["truth"].notna()]
+    for mud, _ in plan.muds:
+        there = own[(own["mud"] == mud) & own["truth"].notna()]
         if len(there):
             level = PER_CM3 * there["truth"].median()
             start_s, end_s = there["t_start_s"].min() - begun_s, there["t_end_s"].max() - begun_s

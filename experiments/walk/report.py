@@ -6,7 +6,9 @@ and that this drag was about 2.5 N.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import isfinite
+from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
@@ -24,26 +26,69 @@ from experiments.reports.coefficient_table import (
     gather_rows,
     mud_summaries,
 )
+from experiments.reports.counted_nouns import counted
 from experiments.reports.mud_names import mud_text
+from experiments.reports.mud_styles import file_name
+from experiments.reports.text_tables import number
 from experiments.study.notebook import Entry
+from experiments.study.result import Figure, Result, Table
 from experiments.trackway.bench import reach_of
+from experiments.trials.coefficient_page import (
+    COMPARISON,
+    TRUTHS,
+    coefficient_tables,
+    error_paragraphs,
+    remark_texts,
+    truth_settings,
+)
 from experiments.trials.estimation_methods import configured_method
 from experiments.trials.stride_profile import profile_from_row
-from experiments.trials.truth_file import TruthOfMud, truth_in, truth_settings
+from experiments.trials.truth_file import TruthOfMud, truth_in
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
-from experiments.walk.measurement import SOFT_DEPTHS_M, WalkTrials, soft_key, soft_name
+from experiments.walk.measurement import SOFT_DEPTHS_M, WalkTrials, soft_name
+from experiments.walk.plots import draw_soft, draw_walk_over
 from firmware_host.configuration.configuration import Configuration
 
+TRACK = "Coefficients along the track"
+SIMULATED_DRAG = (
+    "The drag on the simulated body grows with speed, to more than twice the paper's 2.5 N. So the mud that yields at "
+    "3 cm and does not yield at 5 cm is firmer here than the paper's. Part of the difference between these depths is "
+    "the mud's, whose coefficients fall with depth: at 5 cm the load cell reads 0.6 of the k_s and 0.75 of the k_p "
+    "that it reads at 3 cm. So each stride is compared with a load cell at its own depth."
+)
+TRIALS = (
+    "The trials here are the strides of all walks. A mud in which more strides give a lower bound than a value has a "
+    "bound as well, the median of all strides: the few strides that slip in such a mud met less resistance or pushed "
+    "harder than is known, and give too low a value (by 12 % in simulated mud)."
+)
+DRAG_NOT_STRENGTH = (
+    "Where the mud withstands more than the drag on the body, the flipper measures that drag and not the strength of "
+    "the mud."
+)
+METHODS = (
+    "The brackets also hold how many strides gave a bound (≥) or nothing. default: the daemon's own method. paper: the "
+    "published method, which finds the surface where f_z passes 0.5 N; compensated: with half of the body's drag added "
+    "while the body advances. paper's law: the published law of shear below the surface that the default method finds, "
+    "and the same with that drag."
+)
+FIGURE_6 = (
+    "Figure 6 of the paper, trial {}. A: position of the body; at a vertical line the plates first go down past a "
+    "border. B, C: forces of the {} flipper. D to F: coefficients by stride; bars are two standard errors, triangles "
+    "lower bounds, arrows values beyond the picture, grey dashes the load cell."
+)
+FIGURE_7 = (
+    "Figure 7 of the paper. A: forward force in one stance. B: k_s by method, mean and standard deviation over "
+    "strides; hatched: a lower bound. The paper's law is used with the default method's surface, because its own "
+    "trigger at 0.5 N finds the surface of soft mud too deep."
+)
+FINDINGS = "The paper's findings, and ours by its law below the default method's surface"
 Report = dict[str, Any]  # the summary, as it is in JSON
 
 
-def walks_of(plan: WalkTrials, entries: Mapping[str, Entry]) -> list[Entry]:
-    return [entries[trial.key] for trial in plan.planned if trial.key in entries and trial.key.startswith("walk/")]
-
-
-def soft_walks_of(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, depth_m: float) -> list[Entry]:
-    keys = [soft_key(mud, depth_m, number) for number in range(1, plan.trials + 1)]
-    return [entries[key] for key in keys if key in entries]
+def walks_of(plan: WalkTrials, entries: Mapping[str, Entry], group: str = "") -> list[Entry]:
+    """Return the walks in a soft mud at one depth, or those over all muds."""
+    own = [trial.key for trial in plan.planned if trial.group == (group or plan.planned[0].group)]
+    return [entries[key] for key in own if key in entries]
 
 
 def located_strides(
@@ -53,16 +98,16 @@ def located_strides(
 
     `truth` of another experiment replaces the bed's.
     """
-    rows = []
+    rows, layout, reach_m = [], plan.layout, reach_of(configuration)
     for walk in walks_of(plan, entries):
         for method, strides in walk["strides"].items():
-            for number, stride in enumerate(strides):
+            for index, stride in enumerate(strides):
                 position_m, start_m = stride["place_m"], walk["start_m"]
                 if position_m is None or start_m is None:
-                    plates_m = plan.length_m * (number + 0.5) / len(strides)
+                    plates_m = layout.ends_m[-1] * (index + 0.5) / len(strides)
                 else:
-                    plates_m = position_m - start_m + reach_of(configuration)
-                mud = plan.mud_at(plates_m, stride.get("slip_m", 0.0))
+                    plates_m = position_m - start_m + reach_m
+                mud = layout.mud_at(plates_m, stride.get("slip_m", 0.0))
                 known = _truth_of(mud, walk, stride, truth)
                 keys = {"mud": mud, "method": method, "trial": walk["trial"], "plates_m": plates_m}
                 rows += compared_rows(stride, known, **keys)
@@ -73,14 +118,11 @@ def soft_strides(plan: WalkTrials, entries: Mapping[str, Entry], truth: TruthOfM
     """Return the strides in soft muds, without the first of each walk, which starts from a standing body."""
     return compared_frame(
         row
-        for mud in plan.soft
-        for depth_m in SOFT_DEPTHS_M
-        for walk in soft_walks_of(plan, entries, mud, depth_m)
+        for group, mud, _ in plan.soft_walks
+        for walk in walks_of(plan, entries, group)
         for method, strides in walk["strides"].items()
         for stride in strides[1:]
-        for row in compared_rows(
-            stride, _truth_of(mud, walk, stride, truth), mud=soft_name(mud, depth_m), method=method
-        )
+        for row in compared_rows(stride, _truth_of(mud, walk, stride, truth), mud=group, method=method)
     )
 
 
@@ -96,13 +138,13 @@ def report_of(
     entries: Mapping[str, Entry],
     configuration: Configuration,
     truth: TruthOfMud | None,
-    left_out: Mapping[str, Entry] | None = None,
+    left_out: Mapping[str, Entry],
 ) -> Report:
     method = configured_method(configuration.estimation)
     located, soft = located_strides(plan, entries, configuration, truth), soft_strides(plan, entries, truth)
     certain = located[located["mud"] != ""]
     uncertain = located[(located["mud"] == "") & (located["method"] == method)]
-    muds = [mud.name for mud in plan.muds]
+    muds = [name for name, _ in plan.muds]
     return {
         "experiment": "walk",
         "muds": mud_summaries(certain, muds, method, median),
@@ -112,22 +154,22 @@ def report_of(
         "without_pose": sum(walk["start_m"] is None for walk in walks_of(plan, entries)),
         "at_a_border": len(_k_s_of(uncertain)),  # strides that belong to no mud
         "remarks": [f"{key}: {remark}" for key, entry in entries.items() for remark in entry["remarks"]],
-        "left_out": left_out or {},
+        "left_out": left_out,
     } | truth_settings(plan.identity, method, truth, dict.fromkeys([*muds, *plan.soft]))
 
 
 def _soft_depths(plan: WalkTrials, entries: Mapping[str, Entry], mud: str, strides: DataFrame) -> list[dict[str, Any]]:
     """Gather k_s by depth and method, with the load cell's."""
-    depths = {depth_m: strides[strides["mud"] == soft_name(mud, depth_m)] for depth_m in SOFT_DEPTHS_M}
+    groups = [(name, depth_m) for name, own, depth_m in plan.soft_walks if own == mud]
     return [
         {
             "depth_cm": 100.0 * depth_m,
             "k_s": {method: gather_rows(k_s) for method, k_s in _k_s_of(own).groupby("method", sort=False)},
             "truth": average_truth(own, median).get("k_s"),
-            "thrust_n": _thrust_n(soft_walks_of(plan, entries, mud, depth_m)),  # of both flippers
+            "thrust_n": _thrust_n(walks_of(plan, entries, name)),  # of both flippers
         }
-        for depth_m, own in depths.items()
-        if len(own)
+        for name, depth_m in groups
+        if len(own := strides[strides["mud"] == name])
     ]
 
 
@@ -155,13 +197,13 @@ def _findings(
     """Pair each finding in the paper's text with ours, by its law with a known surface."""
     over = "k_s over the load cell's"
     rows: list[tuple[str, str, float | None]] = [
-        (f"{over}, {mud_text(mud.name)}", "well below 1", _ratio(certain, mud.name)) for mud in plan.muds
+        (f"{over}, {mud_text(mud)}", "well below 1", _ratio(certain, mud)) for mud, _ in plan.muds
     ]
     for mud in plan.soft:
         at_3, at_5 = (soft_name(mud, depth_m) for depth_m in SOFT_DEPTHS_M)
         text_3, text_5 = mud_text(at_3), mud_text(at_5)
         cell = average_truth(soft[soft["mud"] == at_3], median).get("k_s")  # the paper's load cell measured at 3 cm
-        thrust_n = _thrust_n(soft_walks_of(plan, entries, mud, SOFT_DEPTHS_M[1]))
+        thrust_n = _thrust_n(walks_of(plan, entries, at_5))
         rows += [
             (f"{over} at 3 cm, {text_3}", "close to 1", _ratio(soft, at_3, cell=cell)),
             (f"{over} at 3 cm, {text_5}", "0.5", _ratio(soft, at_5, cell=cell)),
@@ -177,3 +219,74 @@ def _ratio(strides: DataFrame, mud: str, method: str = KNOWN, cell: float | None
     own = _k_s_of(strides[(strides["mud"] == mud) & (strides["method"] == method) & strides["valid"].astype(bool)])
     ratios = (own["value"] / (cell or own["truth"])).dropna()
     return float(ratios.median()) if len(ratios) else None
+
+
+# the page
+
+
+def result_of(
+    report: Report,
+    plan: WalkTrials,
+    entries: Mapping[str, Entry],
+    configuration: Configuration,
+    truth: TruthOfMud | None,
+    logs: Sequence[Path],
+) -> Result:
+    """Return the tables, figures and explanations of all walks."""
+    findings = DataFrame(report["beside_paper"]).rename(columns={"what": ""})
+    findings["ours"] = [number(ours, 2) for ours in findings["ours"]]
+    walked = [soft for soft in report["soft"] if soft["depths"]]
+    drag = f"{DRAG_NOT_STRENGTH} {SIMULATED_DRAG}" if plan.simulated else DRAG_NOT_STRENGTH
+    strides, reach_m = located_strides(plan, entries, configuration, truth), reach_of(configuration)
+    return Result(
+        tables=[*coefficient_tables(report, TRACK), Table("findings", FINDINGS, {}, findings, "Findings")],
+        figures=[
+            *(
+                Figure(
+                    f"figure6_trial{walk['trial']}",
+                    FIGURE_6.format(walk["trial"], plan.flipper),
+                    partial(draw_walk_over, plan, walk, strides, reach_m),
+                    TRACK,
+                )
+                for walk in walks_of(plan, entries)
+            ),
+            *(_soft_figure(soft, plan, entries) for soft in walked),
+        ],
+        summary=report,
+        title="The walking robot over several muds",
+        texts={
+            TRACK: _explanation(report, configuration),
+            **{_soft_section(soft): drag for soft in walked[:1]},  # the first one explains what all have in common
+            COMPARISON: METHODS if report["errors"] else "",
+        }
+        | remark_texts(report["remarks"], report["left_out"]),
+        logs=logs,
+    )
+
+
+def _explanation(report: Report, configuration: Configuration) -> str:
+    gait, settings = configuration.gait, report["settings"]
+    paragraphs = [
+        f"All strides of all trials by method {settings['method']}, as the daemon reported them. Its gait: insertion "
+        f"at {gait.insertion_speed_m_s:g} m/s, stance at {gait.stance_speed_m_s:g} m/s, pauses of {gait.pause_s:g} s.",
+        "Left out of the tables, because the plate came too near to a border or went down past the last mud: "
+        f"{counted(report['at_a_border'], 'stride')}.",
+    ]
+    if report["without_pose"]:
+        paragraphs.append(
+            f"{counted(report['without_pose'], 'walk')} had no pose: strides are assigned to muds by their order."
+        )
+    paragraphs += [TRIALS, *error_paragraphs(settings), TRUTHS[settings["truth"]]]
+    return "\n\n".join([*paragraphs, report["missing_truth"]])
+
+
+def _soft_section(soft: Mapping[str, Any]) -> str:
+    return f"Soft mud, {mud_text(soft['mud'])}"
+
+
+def _soft_figure(soft: Mapping[str, Any], plan: WalkTrials, entries: Mapping[str, Entry]) -> Figure:
+    own = {
+        100.0 * depth_m: walks_of(plan, entries, name) for name, mud, depth_m in plan.soft_walks if mud == soft["mud"]
+    }
+    draw = partial(draw_soft, soft, {depth_cm: made for depth_cm, made in own.items() if made})
+    return Figure(f"figure7_{file_name(soft['mud'])}", FIGURE_7, draw, _soft_section(soft))

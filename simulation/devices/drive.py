@@ -52,6 +52,7 @@ class SimulatedDriveParameters:
     serial_number: str = ""
     type: str = "odrive"
     model: str = ""  # of the motor, where the ranges of the drive's codes depend on it
+    velocity_range_rad_s: Annotated[float, Bounds(-1.0, 500.0)] = -1.0  # of these codes; -1: that of the model
     torque_range_nm: Annotated[float, Bounds(0.0, 500.0)] = 0.0  # of these codes; 0: that of the model
 
 
@@ -71,3 +72,6 @@ class DriveError(Enum):
     OVERCURRENT = auto()
     WATCHDOG = auto()
     OVERSPEED = auto()
+    OVERVOLTAGE = auto()  # of the supply, while the motor brakes
+    UNDERVOLTAGE = auto()
+    BRAKE_RESISTOR = auto()  # disarmed

@@ -34,7 +34,15 @@ from simulation.mud.track import Track
 def drives_of(configuration: Configuration, **changes: Any) -> dict[str, SimulatedDriveParameters]:
     """Return simulated drives with the configuration's ids, signs, zeros, models and torque constants."""
     of_all = ("type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a", "serial_number")
-    given = (*of_all, "model", "torque_range_nm", "encoder_counts", "encoder_direction", "watchdog_s")
+    given = (
+        *of_all,
+        "model",
+        "velocity_range_rad_s",
+        "torque_range_nm",
+        "encoder_counts",
+        "encoder_direction",
+        "watchdog_s",
+    )
     return {
         joint: SimulatedDriveParameters(
             **({name: getattr(drive, name) for name in given if hasattr(drive, name)} | changes)

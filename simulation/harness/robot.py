@@ -15,6 +15,7 @@ from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
 from simulation.devices.drive_types import make_simulated_drive
 from simulation.devices.foreign_master import ForeignMaster
+from simulation.devices.odrive05.device import join_boards
 from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.mud.track import Track
 
@@ -41,6 +42,8 @@ class SimulatedRobot:
             (port, [drive for drive, own in zip(self.drives, self._port_of_drive, strict=True) if own is port])
             for port in ports.values()
         ]
+        for _, drives_on_bus in self._drives_on:
+            join_boards(drives_on_bus)
         self.now_s = start_s
         self.observers: list[Callable[[float, Torques], None]] = []  # of each step's length and the motors' torques
         self.foreign_masters: list[ForeignMaster] = []  # other programs that command the drives

@@ -36,7 +36,17 @@ SAME_POSITION_M = 1e-9
 
 FIXED_OF_ROBOT = frozenset({"rig", "geometry", "arm_mass", "disturbances", "fixed_base"})
 FIXED_OF_DRIVE = frozenset(
-    {"type", "node_id", "sign", "zero_turn", "torque_constant_nm_a", "current_limit_a", "model", "torque_range_nm"}
+    {
+        "type",
+        "node_id",
+        "sign",
+        "zero_turn",
+        "torque_constant_nm_a",
+        "current_limit_a",
+        "model",
+        "velocity_range_rad_s",
+        "torque_range_nm",
+    }
 )
 
 

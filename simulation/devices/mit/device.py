@@ -2,11 +2,13 @@
 
 In the mode it follows kp, kd and torque of the newest command within its ranges and the motor's current; outside of it
 the motor is without torque and the command is only remembered, to be followed as soon as the mode is entered. Its
-watchdog runs in the mode only and is fed by commands alone. Once it expires, a Damiao leaves the mode with the status
-"lost commands" until its errors are cleared; a CubeMars here remains in the mode without torque, as the motors of
-the mini cheetah do, and reports nothing. Sources: Core/Src/can.c and fsm.c of bgkatz/motorcontrol; damiao-motor 1.0.6.
+watchdog runs in the mode only and is fed by commands alone, that of a CubeMars by torque alone. Once it expires, a
+Damiao leaves the mode with the status "lost commands" until its errors are cleared; a CubeMars here remains in the mode
+without torque, as the motors of the mini cheetah do, and reports nothing. Sources: Core/Src/can.c and fsm.c of
+bgkatz/motorcontrol; damiao-motor 1.0.6.
 
-It sends nothing but the answer to a command, with the values of before. Its angles are radians.
+It sends nothing but the answer to a command, with the values of before; a Damiao also answers the question for its
+state. Its angles are radians. A new zero outlasts a restart in a Damiao only.
 """
 
 from math import isnan, nan
@@ -43,15 +45,18 @@ class SimulatedMit(SimulatedDrive):
 
     def __init__(self, parameters: SimulatedDriveParameters, random: Random) -> None:
         model = MODELS[parameters.model or DEFAULT_MODEL]
-        self._model = model._replace(torque_nm=parameters.torque_range_nm or model.torque_nm)
+        self._model = model.with_ranges(parameters.velocity_range_rad_s, parameters.torque_range_nm)
         self._feedback_id = codec.feedback_id(parameters.node_id, self._model)
         self.stored: dict[int, float] = {}  # registers that outlast a restart
+        self._zero_rad = 0.0  # the encoder's angle that counts as zero
         super().__init__(parameters, random)
 
     def reset(self, now_s: float) -> None:
         super().reset(now_s)
         self.registers = first_values(self.parameters, self._model) | self.stored
         self.status = codec.DISABLED
+        if not self._model.has_registers:
+            self._zero_rad = 0.0
         self._command = AT_REST
         self._limp = False  # a CubeMars whose watchdog has expired: in the mode, without torque
         self._torque_nm = 0.0  # of the motor, by the drive's own torque constant
@@ -73,6 +78,8 @@ class SimulatedMit(SimulatedDrive):
         if parameters.any_frame_feeds:
             self._fed_s = now_s
         if frame.arbitration_id == codec.REGISTER_ID and self._model.has_registers:
+            if frame.data[:3] == codec.encode_read(parameters.node_id, 0)[:2] + bytes([codec.STATE]):
+                return self._state()
             return answer_register(self.registers, self.stored, parameters.node_id, frame.data)
         if frame.arbitration_id != parameters.node_id or len(frame.data) != codec.ANSWER_BYTES:
             return b""
@@ -82,14 +89,17 @@ class SimulatedMit(SimulatedDrive):
         return answer
 
     def _execute(self, data: bytes, now_s: float) -> None:
-        self._fed_s = now_s
+        if self._model.has_registers or data[:7] != codec.LEAVE[:7]:
+            self._fed_s = now_s
         if data == codec.ENTER:
             self.status = codec.ENABLED if self.status == codec.DISABLED else self.status
         elif data == codec.LEAVE:
             self.status = codec.DISABLED if self.status == codec.ENABLED else self.status
         elif data == codec.CLEAR:
             self.status = codec.DISABLED
-        elif data != codec.SET_ZERO:
+        elif data == codec.SET_ZERO:
+            self._zero_rad = self._angle
+        else:
             self._command = decode_command(data, self.registers[PMAX], self.registers[VMAX], self.registers[TMAX])
 
     def _state(self) -> bytes:
@@ -97,7 +107,7 @@ class SimulatedMit(SimulatedDrive):
         answer = Answer(
             parameters.node_id,
             0 if not model.has_registers else self.status,
-            self._measured_angle(),
+            self._measured_angle() - self._zero_rad,
             self._measured_speed(),
             self._measured_nm(),
             parameters.temperature_c,
@@ -156,7 +166,7 @@ class SimulatedMit(SimulatedDrive):
             self._torque_nm = 0.0
             return 0.0
         parameters, command = self.parameters, self._command
-        torque_nm = command.torque_nm + command.kp_nm_rad * (command.position_rad - self._angle)
+        torque_nm = command.torque_nm + command.kp_nm_rad * (command.position_rad - (self._angle - self._zero_rad))
         torque_nm += command.kd_nm_s_rad * (command.velocity_rad_s - self._speed)
         largest_nm = min(self.registers[TMAX], parameters.motor_current_limit_a * parameters.torque_constant_nm_a)
         torque_nm = max(-largest_nm, min(largest_nm, torque_nm))

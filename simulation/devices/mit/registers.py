@@ -5,15 +5,23 @@ from drivers.mit import codec
 from drivers.mit.models import Model
 from drivers.mit.settings import (
     CONTROL_MODE,
+    DRIVE_C,
     FLOAT,
     FLOATS,
+    GEAR_RATIO,
+    MAX_CURRENT,
     MIT_MODE,
     PMAX,
+    POLE_PAIRS,
+    ROTOR_C,
     SERIAL,
     SOFTWARE,
+    SUPPLY_V,
     TIMEOUT,
     TIMEOUT_UNIT_S,
     TMAX,
+    TORQUE_CONSTANT,
+    UNDERVOLTAGE,
     VMAX,
     WORD,
 )
@@ -21,11 +29,20 @@ from drivers.mit.setup import ESC_ID, MST_ID
 from simulation.devices.drive import SimulatedDriveParameters
 
 FIRMWARE = 5013
+READ_ONLY = frozenset({SOFTWARE, SERIAL, POLE_PAIRS, GEAR_RATIO, MAX_CURRENT, SUPPLY_V, DRIVE_C, ROTOR_C})
 
 
 def first_values(parameters: SimulatedDriveParameters, model: Model) -> dict[int, float]:
     """Return the registers after delivery, with the watchdog and the serial number that are asked for."""
     return {
+        UNDERVOLTAGE: 15.0,
+        TORQUE_CONSTANT: parameters.torque_constant_nm_a,
+        POLE_PAIRS: 14,
+        GEAR_RATIO: 1.0,
+        MAX_CURRENT: parameters.current_limit_a,
+        SUPPLY_V: parameters.bus_voltage_v,
+        DRIVE_C: parameters.temperature_c,
+        ROTOR_C: parameters.temperature_c,
         MST_ID: parameters.node_id + 16,
         ESC_ID: parameters.node_id,
         TIMEOUT: round(parameters.watchdog_s / TIMEOUT_UNIT_S),
@@ -50,7 +67,7 @@ def answer_register(values: dict[int, float], stored: dict[int, float], node_id:
         return codec.encode_register(node_id, kind, register, bytes(4))
     if addressed != node_id or register not in values or kind not in (codec.READ, codec.WRITE):
         return b""
-    if kind == codec.WRITE:
+    if kind == codec.WRITE and register not in READ_ONLY:
         values[register] = (FLOAT if register in FLOATS else WORD).unpack(value)[0]
     return codec.encode_register(node_id, kind, register, encode_value(register, values[register]))
 

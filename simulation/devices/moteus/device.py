@@ -1,12 +1,14 @@
 """Simulates a motor drive on the bus: a moteus on CAN FD, byte for byte, with the registers that this program uses.
 
-It has the modes stopped, fault, position and timeout. In position mode it adds the feed-forward torque to a PD law of
-position and velocity, scaled as the command says, within the commanded torque and the configured current. Its watchdog
-runs in position mode only and is fed by commands alone. Once it expires, the mode timeout is latched until a stop, and
-the drive does what `servo.timeout_mode` says: 12 damps with the scale of kd of the last command, as the firmware does
-(ISR_DoZeroVelocity of fw/bldc_servo_control.h), 15 shorts the windings, 10 holds the position, 0 lets go.
+It has the modes stopped, fault, current, position, timeout, zero velocity and brake. In position mode it adds the
+feed-forward torque to a PD law of position and velocity, scaled as the command says, within the commanded torque and
+the configured current. Its watchdog runs in position mode only and is fed by commands alone. Once it expires, the mode
+timeout is latched until a stop, and the drive does what `servo.timeout_mode` says: 12 damps with the scale of kd of the
+last command, as the firmware does (ISR_DoZeroVelocity of fw/bldc_servo_control.h), 15 shorts the windings, 10 holds the
+position, 0 lets go.
 
-It sends nothing unless it is asked. An answer has the current, mode and torque of before the frame's command.
+It sends nothing unless it is asked, and answers a register that it does not have with an error. An answer has the
+current, mode and torque of before the frame's command.
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,6 +28,11 @@ from simulation.devices.moteus.torque import DEFAULTS, PURE_TORQUE, position_mod
 from simulation.devices.simulated_drive import SimulatedDrive
 
 FIRMWARE = 0x010100  # 1.1.0
+SERIAL_WORDS = range(Register.SERIAL_NUMBER, Register.SERIAL_NUMBER + 3)
+UNUSED_REGISTERS = (0x006, 0x007, 0x00B, 0x00C)  # absolute position, power, trajectory, homing: always 0 here
+REGISTERS = frozenset({*Register, *SERIAL_WORDS, *UNUSED_REGISTERS})
+RUNNING = (Mode.STOPPED, Mode.CURRENT, Mode.POSITION, Mode.ZERO_VELOCITY, Mode.BRAKE)  # in which it obeys every command
+DAMPING = (Mode.ZERO_VELOCITY, Mode.BRAKE)
 FAULTS = {DriveError.OVERCURRENT: 33, DriveError.OVERSPEED: 50}
 
 
@@ -43,6 +50,7 @@ class SimulatedMoteus(SimulatedDrive):
         self.fault = 0
         self._command = dict(DEFAULTS)
         self._setpoint_nm = self._held_turns = 0.0  # the torque that the current follows, the angle at position mode
+        self._q_current_a = 0.0  # the command of current mode
 
     def restart(self, now_s: float) -> None:
         """Restart with the settings that are stored."""
@@ -107,12 +115,16 @@ class SimulatedMoteus(SimulatedDrive):
             self.mode, self.fault = Mode.STOPPED, 0
         elif mode == Mode.POSITION:
             self._follow({Register(each): value for each, value in written.items() if each in DEFAULTS}, now_s)
+        elif mode in RUNNING and self.mode in RUNNING:
+            self.mode = Mode(int(mode))
+            self._q_current_a = written.get(Register.COMMAND_Q_CURRENT, 0.0)
+            self._command = {**self._command, Register.KD_SCALE: written.get(Register.KD_SCALE, 1.0)}
 
     def _follow(self, written: Mapping[Register, float], now_s: float) -> None:
         """Enter position mode, or stay there; a fault or an expired watchdog ends with a stop only."""
-        if self.mode not in (Mode.STOPPED, Mode.POSITION):
+        if self.mode not in RUNNING:
             return
-        if self.mode is Mode.STOPPED:
+        if self.mode is not Mode.POSITION:
             self._held_turns = self._angle
         self._command = {**DEFAULTS, **written}
         self.mode, self._fed_s = Mode.POSITION, now_s
@@ -123,7 +135,11 @@ class SimulatedMoteus(SimulatedDrive):
             return registers.encode_console(registers.CONSOLE_OUTPUT, self.console.read(subframe.length))
         if subframe.kind != registers.READ:
             return b""
-        values = [self._value(subframe.register + index) for index in range(subframe.length)]
+        asked = range(subframe.register, subframe.register + subframe.length)
+        for register in asked:
+            if register not in REGISTERS:
+                return registers.encode_read_error(register)
+        values = [self._value(register) for register in asked]
         return registers.encode_values(registers.REPLY, subframe.resolution, subframe.register, values)
 
     def _value(self, register: int) -> float:
@@ -135,6 +151,8 @@ class SimulatedMoteus(SimulatedDrive):
                 return self._measured_angle()
             case Register.VELOCITY:
                 return self._measured_speed() + 0.0  # without a negative zero
+            case Register.TORQUE:
+                return self._measured_a() * parameters.torque_constant_nm_a
             case Register.Q_CURRENT:
                 return self._measured_a()
             case Register.MOTOR_TEMPERATURE | Register.BOARD_TEMPERATURE:
@@ -158,7 +176,7 @@ class SimulatedMoteus(SimulatedDrive):
 
     @property
     def energised(self) -> bool:
-        return self.mode is Mode.POSITION
+        return self.mode in (Mode.POSITION, Mode.CURRENT)
 
     @energised.setter
     def energised(self, energised: bool) -> None:
@@ -196,6 +214,10 @@ class SimulatedMoteus(SimulatedDrive):
             torque_nm = position_mode_nm(self._command, *motion)
         elif self.mode is Mode.TIMEOUT:
             torque_nm = timeout_nm(self.console.settings[TIMEOUT_MODE], self._command[Register.KD_SCALE], *motion)
+        elif self.mode is Mode.CURRENT:
+            torque_nm = self._q_current_a * self.parameters.torque_constant_nm_a
+        elif self.mode in DAMPING:
+            torque_nm = timeout_nm(self.mode, self._command[Register.KD_SCALE], *motion)
         else:
             self._current_a = self._setpoint_nm = 0.0
             return 0.0

@@ -1,8 +1,10 @@
 """Simulates a motor drive on the bus: ODrive CANSimple 0.6, byte for byte. The folder odrive05 has what differs in 0.5.
 
 It has the axis state machine (idle, closed loop), the error word with the disarm reason, the watchdog, torque mode with
-the velocity-limit clamp, the current limits and, where it is on, the overspeed trip, cyclic messages, and requests by
-remote frame. It can forge frames of its own, and from a firmware other than its type says (OLD_FIRMWARE).
+the velocity-limit clamp, the current limits, the trips of the supply and, where it is on, of overspeed, cyclic
+messages, and requests by remote frame or by an empty data frame, to its own id or to all. A command may have more bytes
+than it needs, as the makers' DBC has. It can forge frames of its own, and from a firmware other than its type says
+(OLD_FIRMWARE).
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -44,7 +46,12 @@ class SimulatedOdrive(SimulatedDrive):
         DriveError.OVERCURRENT: 0x400,
         DriveError.WATCHDOG: codec.ERROR_WATCHDOG,
         DriveError.OVERSPEED: 0x8000,
+        DriveError.OVERVOLTAGE: 0x100,
+        DriveError.UNDERVOLTAGE: 0x200,
+        DriveError.BRAKE_RESISTOR: 0x8000000,
     }
+    trip_voltages_v = (10.5, 60.0)  # dc_bus_undervoltage_trip_level and dc_bus_overvoltage_trip_level, as delivered
+    broadcast_node = codec.BROADCAST_NODE
     estop_flag = codec.ERROR_ESTOP
     heartbeat = codec.HEARTBEAT
     slow_messages: tuple[Message, ...] = (codec.GET_ERROR, codec.GET_TEMPERATURE, codec.GET_BUS_VOLTAGE_CURRENT)
@@ -90,13 +97,16 @@ class SimulatedOdrive(SimulatedDrive):
 
     def receive(self, frame: Frame, now_s: float) -> list[Frame]:
         node_id, command = frame.arbitration_id >> 5, frame.arbitration_id & 0x1F
-        if frame.is_extended or node_id != self.parameters.node_id or now_s < self._boots_until_s:
+        if frame.is_extended or node_id not in (self.parameters.node_id, self.broadcast_node):
+            return []
+        if now_s < self._boots_until_s:
             return []
         if self.parameters.any_frame_feeds:
             self._fed_s = now_s
-        if frame.is_remote:
+        if frame.is_remote or not frame.data:
             asked = [message for message in self._payloads if message.command == command]
-            return [Frame(self._ids[message], self._payloads[message]()) for message in asked]
+            if asked or frame.is_remote:
+                return [Frame(self._ids[message], self._payloads[message]()) for message in asked]
         if command == codec.RX_SDO.command:
             return self._read_parameter(frame.data)
         with suppress(MalformedMessageError):  # a drive ignores malformed messages
@@ -105,22 +115,22 @@ class SimulatedOdrive(SimulatedDrive):
 
     def _execute(self, command: int, data: bytes, now_s: float) -> None:
         if command == codec.SET_INPUT_TORQUE.command:
-            (self._setpoint_nm,) = finite(codec.SET_INPUT_TORQUE.decode(data))
+            (self._setpoint_nm,) = finite(codec.SET_INPUT_TORQUE.decode_padded(data))
             self._fed_s = now_s
         elif command == codec.SET_AXIS_STATE.command:
-            self._change_state(codec.SET_AXIS_STATE.decode(data)[0], now_s)
+            self._change_state(codec.SET_AXIS_STATE.decode_padded(data)[0], now_s)
         elif command == codec.SET_CONTROLLER_MODE.command:
-            self._modes = codec.SET_CONTROLLER_MODE.decode(data)
+            self._modes = codec.SET_CONTROLLER_MODE.decode_padded(data)
         elif command == codec.SET_LIMITS.command:
-            self._set_limits(*finite(codec.SET_LIMITS.decode(data)))
+            self._set_limits(*finite(codec.SET_LIMITS.decode_padded(data)))
         elif command == codec.SET_VEL_GAINS.command:
-            (self._velocity_gain_nm_s_turn,) = finite(codec.SET_VEL_GAINS.decode(data)[:1])
+            (self._velocity_gain_nm_s_turn,) = finite(codec.SET_VEL_GAINS.decode_padded(data)[:1])
         elif command == codec.CLEAR_ERRORS.command:
             self.errors = 0
         elif command == codec.ESTOP.command:
             self._disarm(self.estop_flag)
         elif command == codec.REBOOT.command:
-            if codec.REBOOT.decode(data)[0] == SAVE:
+            if codec.REBOOT.decode_padded(data)[0] == SAVE:
                 self._settings.save()
             self.restart(now_s)
 
@@ -177,6 +187,10 @@ class SimulatedOdrive(SimulatedDrive):
         return self._named(codec.SET_INPUT_TORQUE, self.parameters.sign * torque_nm)
 
     def _trip_if_due(self, now_s: float) -> None:
+        lowest_v, highest_v = self.trip_voltages_v
+        if not lowest_v <= self.parameters.bus_voltage_v <= highest_v:
+            low = self.parameters.bus_voltage_v < lowest_v
+            self.trip(DriveError.UNDERVOLTAGE if low else DriveError.OVERVOLTAGE)
         if self.axis_state is AxisState.CLOSED_LOOP:
             fastest_turn_s = self.parameters.overspeed_fraction * self._velocity_limit_turn_s
             if 0.0 < self.parameters.watchdog_s < now_s - self._fed_s:

@@ -50,6 +50,7 @@ def drive(
         async with app.run_test(size=(width, height)) as pilot:
             await until(app, pilot, lambda: bool(app.query_one("#drives", Rows).row_count))
             await script(app, pilot)
+        app.redraw()  # as a timer does that ends after the screen
 
     asyncio.run(run())
     return app

@@ -110,6 +110,15 @@ def test_a_drive_that_alternates_between_stops_and_torque_counts_as_in_closed_lo
     assert all(state.closed_loop for state in states[3:])
 
 
+@pytest.mark.parametrize("mode", [Mode.CURRENT, Mode.STAY_WITHIN])
+def test_an_idle_drive_that_another_program_gives_torque_in_another_mode_is_stopped(mode: Mode) -> None:
+    bench = Bench()
+    bench.run(0.05, NO_TORQUE)
+    bench.devices[0].mode = mode
+    bench.run(0.05, NO_TORQUE)
+    assert bench.devices[0].mode is Mode.STOPPED
+
+
 def test_a_latched_watchdog_is_not_cleared_by_the_stops_of_a_disturbed_drive() -> None:
     """A drive in this mode ignores the torque of others until a stop."""
     bench = Bench()

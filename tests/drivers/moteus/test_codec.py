@@ -155,8 +155,11 @@ def test_random_commands_of_the_package_are_read_as_by_itself() -> None:
         assert asked == {int(each[0]) for each in moteus.parse_registers(command.data).query}
 
 
+UNSCALED = (Register.COMMAND_Q_CURRENT, Register.COMMAND_D_CURRENT)  # the package scales them where it writes them only
+
+
 def test_random_replies_of_any_resolution_are_read_as_by_the_package() -> None:
-    random, known = Random(4), [each for each in Register if each in registers.SCALES]
+    random, known = Random(4), [each for each in Register if each in registers.SCALES and each not in UNSCALED]
     for _ in range(RANDOM_FRAMES // 2):
         parts = [
             registers.encode_values(

@@ -10,6 +10,7 @@ from experiments.bench.operator import BenchOperator, SimulatedBenchOperator
 from experiments.bench.reading import Reading
 from experiments.bench.rig import SimulatedRig
 from experiments.bench.stop_check import check_damping
+from experiments.bench.stroke_tracking import FAST_DEG, FAST_RAD_S, check_stroke
 from experiments.bench.test_rig import TestRig
 from experiments.bench.watchdog_check import check_watchdog_times, check_what_feeds_watchdogs
 from experiments.bench.wiring_check import check_firmware, check_watchdogs
@@ -75,3 +76,22 @@ def test_drives_whose_watchdog_cannot_be_read_are_armed_only_where_an_operator_a
 @pytest.mark.parametrize("drive", [DAMIAO, "moteus"])
 def test_damping_brakes_a_fast_sweep_of_drives_whose_answers_are_a_tick_old(drive: str) -> None:
     assert wrong(list(check_damping(test_rig_of(drive)))) == []
+
+
+@pytest.mark.parametrize(
+    ("drive", "range_rad_s"),
+    [
+        ("odrive", 0.0),
+        ("odrive05", 0.0),
+        ("moteus", 0.0),
+        (DAMIAO, 0.0),
+        (CUBEMARS, 0.0),
+        (CUBEMARS, 25.64),  # of a V2, where the model's 50 is configured
+        (CUBEMARS, 65.0),
+        ("mit:AK60-6", 50.0),
+    ],
+)
+def test_a_stroke_finds_a_velocity_of_another_scale_than_the_angle_and_no_other(drive: str, range_rad_s: float) -> None:
+    rig = test_rig_of(drive, **({"velocity_range_rad_s": range_rad_s} if range_rad_s else {}))
+    readings = [each for each in check_stroke(rig, "fast", FAST_RAD_S, FAST_DEG) if "slope" in each.what]
+    assert len(wrong(readings)) == (len(readings) if range_rad_s else 0) and len(readings) == 4

@@ -6,7 +6,7 @@ import pytest
 
 from control.modes import Mode
 from control.records import Phase
-from experiments.flipper.base_check import INVALID_M, load_remarks, moved_text, pose_remarks, surface_remarks
+from experiments.flipper.base_check import INVALID_M, load_remarks, pose_remarks, surface_remarks
 from logs.files.log_reader import Log
 from tests.experiments.synthetic_strides import (
     CONFIGURATION,
@@ -50,7 +50,7 @@ def test_a_log_without_an_insertion_gives_no_remark() -> None:
 
 
 def test_a_pose_that_moved_is_reported_in_millimetres() -> None:
-    assert moved_text(0.1, 0.0953, INVALID_M) == "" != moved_text(0.1, 0.0853, INVALID_M)
+    assert not pose_remarks(0.1, 0.0953, INVALID_M) and pose_remarks(0.1, 0.0853, INVALID_M)
     assert pose_remarks(0.1, 0.0953) == ["the base moved by -4.7 mm: clamp it, and measure again"]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,24 +12,25 @@ import numpy as np
 import pytest
 
 from control.records import Phase, Rig
-from experiments.flipper import measurement as flipper
-from experiments.flipper.measurement import FlipperTrials, require_fixed_base, require_mud
-from experiments.flipper.report import Report, report_of
-from experiments.flipper.simulation import bench_configuration, flipper_bench
-from experiments.flipper.text import COMPARISON, result_of
+from estimation.estimation_parameters import Method
+from experiments.flipper.measurement import measure, require_bench, require_mud
+from experiments.flipper.report import Report, report_of, result_of, trials_by_mud
 from experiments.robot.bench_errors import BenchError
 from experiments.robot.bench_robot import leave
 from experiments.robot.lockstep_robot import LockstepRobot, simulated_configuration
+from experiments.studies.flipper import bench_configuration, flipper_bench
 from experiments.study.notebook import Entry, Notebook
+from experiments.trials.coefficient_page import COMPARISON
 from experiments.trials.estimation_methods import DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial
+from experiments.trials.mud_trials import Bench, InvalidTrialError, PlannedTrial, conduct_trials
 from experiments.trials.simulated_bed import CarriedBed
 from experiments.trials.stride_profile import profile_from_row
 from tests.experiments.synthetic_strides import make_estimate, make_profile, make_stride
 from tests.scripted_operator import ScriptedOperator
 
 MUD = "51.2"
-SHORT = FlipperTrials((MUD,), trials=1, simulated=True)
+TRIAL = PlannedTrial(f"{MUD}/1", MUD, 1, 1)
+SETTINGS = {"simulated": True}
 
 
 @cache
@@ -39,8 +40,8 @@ def measured() -> tuple[dict[str, Entry], list[str]]:
     with TemporaryDirectory() as name:
         folder = Path(name)
         robot, bed = flipper_bench(folder, [MUD], 1)
-        bench = Bench(robot, FaultyOnce(robot, bed), operator, Notebook(folder, SHORT.identity))
-        flipper.run(bench, SHORT, lambda done, of: None)
+        bench = Bench(robot, FaultyOnce(robot, bed), operator, Notebook(folder, SETTINGS))
+        conduct_trials(bench, [TRIAL], partial(measure, bench, "right", 0.03, 1), lambda done, of: None)
         leave(bench.robot, bench.operator, folder)
     return bench.notebook.entries, operator.asked
 
@@ -66,8 +67,15 @@ class FaultyOnce:
             self._robot.call("disarm")
 
 
-def report(truth: dict[str, dict[str, float]] | None = None) -> Report:
-    return report_of(SHORT, measured()[0], bench_configuration(), truth)
+def report(
+    entries: dict[str, Entry] | None = None,
+    muds: tuple[str, ...] = (MUD,),
+    truth: dict[str, dict[str, float]] | None = None,
+    method: Method = "default",
+) -> Report:
+    configuration = bench_configuration()
+    configuration = replace(configuration, estimation=replace(configuration.estimation, method=method))
+    return report_of(SETTINGS, trials_by_mud(muds, entries or measured()[0]), configuration, truth, {})
 
 
 # the required configuration
@@ -75,9 +83,9 @@ def report(truth: dict[str, dict[str, float]] | None = None) -> Report:
 
 def test_a_robot_that_is_set_up_to_walk_is_refused_with_what_to_set() -> None:
     with pytest.raises(BenchError, match=r'gait\.protocol = "single_flipper" and estimation\.fixed_base = true'):
-        require_fixed_base(simulated_configuration())
+        require_bench("right", simulated_configuration())
     with pytest.raises(BenchError, match=r"set estimation\.fixed_base = true in"):
-        require_fixed_base(simulated_configuration('[gait]\nprotocol = "single_flipper"\n'))
+        require_bench("right", simulated_configuration('[gait]\nprotocol = "single_flipper"\n'))
 
 
 # invalid trials
@@ -112,10 +120,10 @@ class SlidingRobot(LockstepRobot):
 def test_a_trial_whose_base_moved_is_invalid_but_can_be_kept(tmp_path: Path) -> None:
     robot, bed = flipper_bench(tmp_path, [MUD], 1)
     robot.__class__ = SlidingRobot
-    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SHORT.identity))
-    bed.prepare(SHORT.planned[0])
+    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SETTINGS))
+    bed.prepare(TRIAL)
     with pytest.raises(InvalidTrialError, match="the base moved by .* mm") as invalid:
-        flipper.measure(bench, SHORT, SHORT.planned[0])
+        measure(bench, "right", 0.03, 1, TRIAL)
     assert invalid.value.entry is not None and invalid.value.entry["remarks"] == []
 
 
@@ -139,7 +147,7 @@ def test_the_daemons_strides_count_and_the_papers_method_is_next_to_them() -> No
 
 def test_the_truth_of_another_load_cell_replaces_the_beds() -> None:
     truth = {MUD: {"k_p": 2e6}}
-    reported = report(truth)
+    reported = report(truth=truth)
     assert reported["muds"][0]["truth"] == truth[MUD]
     assert {row["coefficient"] for row in reported["errors"]} == {"k_p"}
 
@@ -179,44 +187,38 @@ FORCES = {"insertion_force_n": 2.0, "stance_force_n": 8.0, "extraction_force_n":
 
 
 def test_the_report_says_whether_coefficients_fall_with_water() -> None:
-    plan, configuration = FlipperTrials(("51.2", "47.6")), bench_configuration()
-    falling = report_of(plan, entries_of(w47_6=[2e6, 2.2e6], w51_2=[1e6]), configuration, None)
+    falling = report(entries_of(w47_6=[2e6, 2.2e6], w51_2=[1e6]), ("51.2", "47.6"))
     assert falling["falls_with_water"]["k_p"] is True
-    rising = report_of(plan, entries_of(w47_6=[1e6], w51_2=[2e6]), configuration, None)
+    rising = report(entries_of(w47_6=[1e6], w51_2=[2e6]), ("51.2", "47.6"))
     assert rising["falls_with_water"]["k_p"] is False
-    named = report_of(FlipperTrials(("a", "b")), entries_of(a=[1e6], b=[2e6]), configuration, None)
-    assert named["falls_with_water"]["k_p"] is None
+    assert report(entries_of(a=[1e6], b=[2e6]), ("a", "b"))["falls_with_water"]["k_p"] is None
 
 
 def test_muds_that_were_measured_before_stay_in_the_report() -> None:
-    plan, entries = FlipperTrials(("51.2",)), entries_of(w47_6=[2e6], w51_2=[1e6])
-    reported = report_of(plan, entries, bench_configuration(), None)
-    assert [mud["mud"] for mud in reported["muds"]] == ["51.2", "47.6"]
-    forces = result_of(reported, plan, entries, bench_configuration(), []).tables[-1]
-    assert forces.cells()[1][:2] == ["51.2 %", f"2.00 ({reported['misfit_n']['51.2']['insertion']:.2f})"]
+    by_mud = trials_by_mud(("51.2", "30"), entries_of(w47_6=[2e6], w51_2=[1e6]))
+    assert list(by_mud) == ["51.2", "47.6"]
 
 
 def test_later_strides_in_the_same_hole_are_reported_apart() -> None:
     entries = entries_of(w47_6=[2e6])
     entries["47.6/1"]["strides"][DEFAULT].append(make_stride(k_p=make_estimate(1.6e6)))
-    reported = report_of(FlipperTrials(("47.6",), strides=2), entries, bench_configuration(), None)
+    reported = report(entries, ("47.6",))
     assert reported["later_strokes"]["k_p"] == pytest.approx([0.8])
     assert reported["muds"][0]["k_p"].value == 2e6
 
 
 def test_without_a_load_cell_there_are_no_errors() -> None:
-    entries, plan, configuration = entries_of(w47_6=[2e6]), FlipperTrials(("47.6",)), bench_configuration()
-    reported = report_of(plan, entries, configuration, None)
+    entries = entries_of(w47_6=[2e6])
+    reported = report(entries, ("47.6",))
     assert reported["errors"] == []
-    result = result_of(reported, plan, entries, configuration, [])
+    result = result_of(reported, trials_by_mud(("47.6",), entries), bench_configuration(), [])
     assert not result.texts[COMPARISON] and [table.name for table in result.tables] == ["muds", "forces"]
+    assert result.tables[-1].cells()[1][:2] == ["47.6 %", f"2.00 ({reported['misfit_n']['47.6']['insertion']:.2f})"]
     assert all(figure.draw().axes for figure in result.figures)
 
 
 def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> None:
-    configuration = bench_configuration()
-    paper = replace(configuration, estimation=replace(configuration.estimation, method="paper"))
-    reported = report_of(SHORT, measured()[0], paper, None)
+    reported = report(method="paper")
     (entry,) = measured()[0].values()
     assert reported["muds"][0]["k_p"].trials == [entry["strides"][PAPER][0]["k_p"]["value"]]
     assert reported["settings"]["method"] == "paper"
@@ -225,12 +227,11 @@ def test_a_daemon_that_estimates_by_the_papers_method_is_reported_by_it() -> Non
 
 def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
     """Like this rig, the paper's own bench has one flipper (section II-C)."""
-    plan = replace(SHORT, motors=2)
-    robot, bed = flipper_bench(tmp_path, [MUD], 1, plan.simulated_rig)
+    robot, bed = flipper_bench(tmp_path, [MUD], 1, Rig(("right",)))
     assert robot.configuration.rig.joints == ("right_sweep", "right_adduction")
-    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, plan.identity))
-    flipper.run(bench, plan, lambda done, of: None)
-    (entry,) = bench.notebook.entries.values()
+    bench = Bench(robot, bed, ScriptedOperator(), Notebook(tmp_path, SETTINGS))
+    bed.prepare(TRIAL)
+    entry = measure(bench, "right", 0.03, 1, TRIAL)
     (stride,) = entry["strides"][DEFAULT]
     (truth,) = entry["truths"].values()
     assert all(stride[name]["valid"] for name in ("k_p", "k_s", "k_e"))
@@ -239,4 +240,4 @@ def test_a_rig_with_two_motors_measures_the_same_mud(tmp_path: Path) -> None:
 
 def test_a_flipper_that_the_rig_lacks_is_refused() -> None:
     with pytest.raises(BenchError, match="--flipper right"):
-        flipper.require_flipper(bench_configuration(Rig(("right",))), "left")
+        require_bench("left", bench_configuration(Rig(("right",))))

@@ -22,7 +22,8 @@ from experiments.reports.coefficient_table import (
 )
 from experiments.reports.error_table import COEFFICIENTS, Row
 from experiments.robot.bench_errors import BenchError
-from experiments.trials.truth_file import load_truth, truth_in, truth_settings
+from experiments.trials.coefficient_page import truth_settings
+from experiments.trials.truth_file import load_truth, truth_in
 from tests.experiments.synthetic_strides import make_estimate, make_stride
 
 

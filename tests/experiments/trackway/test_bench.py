@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,30 +17,28 @@ from experiments.study.prompt import SKIP
 from experiments.study.result import to_json
 from experiments.trackway.bench import (
     UNSEEN_S,
-    Mud,
     Progress,
     Trackway,
     first_walks,
     measure,
     report_of,
-    run,
 )
 from experiments.trackway.plots import draw_trackway
 from experiments.trackway.walk import Walk
-from experiments.trials.mud_trials import Bench, InvalidTrialError, counted_entries
+from experiments.trials.mud_trials import Bench, InvalidTrialError, conduct_trials, counted_entries
 from experiments.trials.simulated_bed import simulated_bench
 from simulation.devices.motion_capture_parameters import AT_EVERY_TICK, MotionCaptureParameters
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
 from tests.scripted_operator import ScriptedOperator
 
-SHORT = Trackway((Mud("48.5", 0.2), Mud("53.1", 0.2)), trials=1, depths_m=(0.03,))
-TINY = Trackway((Mud("48.5", 0.15),), trials=1, depths_m=(0.03,))
+SHORT = Trackway((("48.5", 0.2), ("53.1", 0.2)), trials=1, depths_m=(0.03,))
+TINY = Trackway((("48.5", 0.15),), trials=1, depths_m=(0.03,))
 COPIES, BEYOND_M = 3, 0.5  # fresh trackways in a row, and the length of mud after each
 
 
 def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = AT_EVERY_TICK) -> Bench:
-    segments = [(mud.length_m, MUDS[mud.name]) for mud in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
+    segments = [(length_m, MUDS[name]) for name, length_m in SHORT.muds] + [(BEYOND_M, MUDS["48.5"])]
     track = Track(segments * COPIES)
     robot, bed = simulated_bench(
         folder, simulated_configuration(), track, 1, lambda trial, prepared: prepared * track.length_m / COPIES, capture
@@ -48,7 +47,7 @@ def make_bench(folder: Path, *answers: str, capture: MotionCaptureParameters = A
 
 
 def walk_all(bench: Bench, plan: Trackway) -> dict[str, Any]:
-    run(bench, plan, lambda done, total: None)
+    conduct_trials(bench, plan.planned, partial(measure, bench, plan), lambda done, total: None)
     bench.robot.close()
     return report_of(plan, counted_entries(bench.notebook), 0.12)
 

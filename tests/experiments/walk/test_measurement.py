@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,32 +12,29 @@ from typing import Any
 import pytest
 from pandas import DataFrame
 
-from experiments.flipper.text import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.robot.lockstep_robot import LockstepRobot
+from experiments.studies.walk import walking_bench
 from experiments.study.notebook import Entry, Notebook
-from experiments.trackway.bench import Mud
+from experiments.trials.coefficient_page import KNOWN_BIAS, WRONG_CONSTANTS
 from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER
-from experiments.trials.mud_trials import Bench, InvalidTrialError
+from experiments.trials.mud_trials import Bench, InvalidTrialError, conduct_trials
 from experiments.trials.simulated_bed import CarriedBed
-from experiments.walk import measurement as walk_mapping
 from experiments.walk.known_surface import KNOWN, KNOWN_COMPENSATED
 from experiments.walk.measurement import MUDS, Advance, WalkTrials, measure, require_mud
-from experiments.walk.report import Report, located_strides, report_of, walks_of
-from experiments.walk.simulation import walking_bench
-from experiments.walk.text import result_of
+from experiments.walk.report import Report, located_strides, report_of, result_of, walks_of
 from tests.experiments.synthetic_strides import CONFIGURATION, make_estimate, make_stride
 from tests.scripted_operator import ScriptedOperator
 
-SHORT = WalkTrials((Mud("47.6", 0.3), Mud("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
-TINY = WalkTrials((Mud("47.6", 0.2),), trials=1, simulated=True)
+SHORT = WalkTrials((("47.6", 0.3), ("51.2", 0.3)), trials=1, soft=("51.2",), soft_strides=2, simulated=True)
+TINY = WalkTrials((("47.6", 0.2),), trials=1, simulated=True)
 
 
 @cache
 def measured() -> dict[str, Entry]:
     with TemporaryDirectory() as name:
         bench = bench_of(Path(name), SHORT)
-        walk_mapping.run(bench, SHORT, lambda done, of: None)
+        conduct_trials(bench, SHORT.planned, partial(measure, bench, SHORT), lambda done, of: None)
         bench.robot.close()
     return bench.notebook.entries
 
@@ -47,7 +44,7 @@ def bench_of(folder: Path, plan: WalkTrials) -> Bench:
 
 
 def report(plan: WalkTrials = SHORT, truth: dict[str, dict[str, float]] | None = None) -> Report:
-    return report_of(plan, measured(), CONFIGURATION, truth)
+    return report_of(plan, measured(), CONFIGURATION, truth, {})
 
 
 # the plan
@@ -64,13 +61,13 @@ def test_the_walks_over_all_muds_come_before_those_at_both_depths_in_each_soft_m
     [(0.06, "47.6"), (0.57, "47.6"), (0.59, ""), (0.63, ""), (0.65, "49.5"), (1.5, "51.2"), (1.83, ""), (9.0, "")],
 )
 def test_a_plate_belongs_to_the_mud_in_which_it_went_down_unless_it_is_near_a_border(plates_m: float, mud: str) -> None:
-    assert WalkTrials().mud_at(plates_m) == mud
+    assert WalkTrials().layout.mud_at(plates_m) == mud
 
 
 @pytest.mark.parametrize(("slip_m", "mud"), [(0.0, "49.5"), (0.01, "49.5"), (0.03, ""), (0.07, ""), (0.6, "")])
 def test_a_plate_that_slips_back_to_a_border_belongs_to_no_mud(slip_m: float, mud: str) -> None:
     """It went down 5 cm past the border at 61 cm."""
-    assert WalkTrials().mud_at(0.66, slip_m) == mud
+    assert WalkTrials().layout.mud_at(0.66, slip_m) == mud
 
 
 def test_a_walk_without_any_estimate_is_invalid() -> None:
@@ -103,7 +100,7 @@ def test_the_robot_stops_past_the_last_mud() -> None:
     positions_m = located()["plates_m"].tolist()
     assert positions_m == sorted(positions_m)
     assert 0.0 < positions_m[0] < 0.1
-    assert SHORT.length_m - 0.13 < positions_m[-1] < SHORT.length_m
+    assert SHORT.layout.ends_m[-1] - 0.13 < positions_m[-1] < SHORT.layout.ends_m[-1]
     assert {"47.6", "51.2"} <= set(located()["mud"])
 
 
@@ -113,7 +110,7 @@ def test_in_soft_mud_a_plate_slips_back_by_half_of_its_stance_and_more() -> None
     for (mud, plates_m), slip_m in zip(located()[["mud", "plates_m"]].to_numpy().tolist(), slips_m, strict=True):
         if mud:
             assert (0.055 < slip_m < 0.09) if mud == "51.2" else slip_m < 0.055
-        assert mud in ("", SHORT.mud_at(plates_m - slip_m))
+        assert mud in ("", SHORT.layout.mud_at(plates_m - slip_m))
 
 
 def test_the_coefficients_are_those_of_the_load_cell_or_bounds_below_it() -> None:
@@ -199,7 +196,7 @@ def test_without_a_pose_the_robot_makes_only_as_many_strides_as_lead_to_the_end(
     entry = measure(bench, TINY, TINY.planned[0])
     assert [remark for remark in entry["remarks"] if "no pose arrives" in remark]
     assert len(entry["strides"][DEFAULT]) == 2
-    reported = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None)
+    reported = report_of(TINY, {"walk/1": json.loads(json.dumps(entry))}, CONFIGURATION, None, {})
     assert reported["without_pose"] == 1
     assert len(reported["muds"][0]["k_p"].trials) == 2
 
@@ -224,7 +221,7 @@ def test_a_walk_that_another_client_stops_is_invalid(tmp_path: Path) -> None:
 
 
 def test_without_a_pose_strides_are_spread_over_the_lengths_of_the_muds() -> None:
-    plan = replace(SHORT, muds=(Mud("a", 0.2), Mud("b", 0.6)))
+    plan = replace(SHORT, muds=(("a", 0.2), ("b", 0.6)))
     entry = {"trial": 1, "start_m": None, "truths": {}, "strides": {DEFAULT: [make_stride(place_m=None)] * 4}}
     spread = located_strides(plan, {"walk/1": entry}, CONFIGURATION, None)
     assert spread["mud"].tolist() == [mud for mud in ("a", "b", "b", "b") for _ in COEFFICIENTS]

@@ -183,14 +183,18 @@ def test_random_frames_never_raise_and_leave_a_finite_torque(frames: list[Frame]
     assert len(list(drive.cyclic_frames(1.0))) == len(PERIODIC)
 
 
-@pytest.mark.parametrize(
-    ("message", "size"), [(SET_INPUT_TORQUE, 8), (SET_INPUT_TORQUE, 3), (SET_AXIS_STATE, 8), (SET_LIMITS, 4)]
-)
-def test_commands_of_another_length_and_of_no_number_change_nothing(message: Message, size: int) -> None:
+@pytest.mark.parametrize(("message", "size"), [(SET_INPUT_TORQUE, 3), (SET_AXIS_STATE, 2), (SET_LIMITS, 4)])
+def test_commands_that_are_too_short_and_of_no_number_change_nothing(message: Message, size: int) -> None:
     drive = make_armed_drive()
     assert torque_nm(drive, 0.25) == 0.25
     drive.receive(Frame(arbitration_id(NODE, message), bytes(size)), 0.0)
     assert drive.torque_nm(0.0) == torque_nm(drive, nan) == 0.25
+
+
+@pytest.mark.parametrize(("volts", "flag"), [(10.4, 0x200), (10.6, 0), (59.9, 0), (60.1, 0x100)])
+def test_a_supply_outside_of_its_levels_trips_the_drive(volts: float, flag: int) -> None:
+    drive = make_armed_drive(bus_voltage_v=volts)
+    assert (torque_nm(drive, 0.25) == 0.0) is bool(flag) and ask(drive, GET_ERROR) == (flag, flag)
 
 
 def reported_setting(drive: SimulatedOdrive, endpoint: int) -> bytes:

@@ -10,7 +10,7 @@ from drivers.odrive import codec
 from drivers.odrive.codec import AxisState, Message, arbitration_id
 from drivers.odrive05 import codec as codec05
 from simulation.devices.drive import DriveError, Forgery
-from simulation.devices.odrive05.device import SimulatedOdrive05
+from simulation.devices.odrive05.device import SimulatedOdrive05, join_boards
 from tests.drivers.bench.simulated_bus import simulated
 
 NODE = 3
@@ -107,6 +107,8 @@ def test_an_idle_drive_repeats_its_last_current_and_the_set_point_of_its_newest_
     [
         (DriveError.OVERCURRENT, codec05.ERROR_MOTOR, (1, 0, 0)),
         (DriveError.OVERSPEED, codec05.ERROR_CONTROLLER, (0, 0, 1)),
+        (DriveError.UNDERVOLTAGE, codec05.ERROR_MOTOR, (1, 0, 0)),
+        (DriveError.BRAKE_RESISTOR, codec05.ERROR_MOTOR, (1, 0, 0)),
         (DriveError.WATCHDOG, codec05.ERROR_WATCHDOG, (0, 0, 0)),
         (None, codec05.ERROR_ESTOP, (0, 0, 0)),
     ],
@@ -131,3 +133,16 @@ def test_a_drive_that_restarts_is_not_fed_meanwhile() -> None:
     for wait_s, failed in ((0.09, False), (0.11, True)):
         drive.torque_nm(drive.boot_s + wait_s)
         assert drive.failed is failed
+
+
+@pytest.mark.parametrize("command", [codec05.CLEAR_ERRORS.command, codec.REBOOT.command])
+def test_the_two_axes_of_a_board_are_cleared_and_restarted_together(command: int) -> None:
+    first, second, other = (make_drive(armed=True) for _ in range(3))
+    join_boards((first, second, other))
+    for drive in (first, second, other):
+        drive.trip(DriveError.OVERCURRENT)
+    first.receive(Frame(NODE << 5 | command, bytes(8)), 0.0)
+    assert [drive.failed for drive in (first, second, other)] == [False, False, True]
+    request = Frame(arbitration_id(NODE, codec.GET_IQ), is_remote=True)
+    silent = [not drive.receive(request, 0.1) for drive in (first, second, other)]
+    assert silent == [command == codec.REBOOT.command] * 2 + [False]

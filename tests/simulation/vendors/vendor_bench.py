@@ -1,0 +1,129 @@
+"""Simulated drives on a bus of python-can in real time, for the makers' own programs, and our driver on the same bus.
+
+A thread is the hardware: it answers frames and turns a flywheel on each motor.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from random import Random
+from typing import Any
+
+import can
+
+from control.parameters.joint_limits import JointLimits
+from drivers.can.can_port import PythonCanPort, frame_from, message_from
+from drivers.can.frames import MalformedMessageError
+from drivers.drive import DriveAxis, DriveParameters
+from drivers.drive_types import DRIVE_TYPES
+from drivers.transmit_gate import TransmitGate
+from simulation.devices.drive import SimulatedDriveParameters
+from simulation.devices.drive_types import make_simulated_drive
+from simulation.devices.simulated_drive import SimulatedDrive
+
+STEP_S = 0.001
+FLYWHEEL_KG_M2 = 0.2
+PATIENCE_S = 5.0
+
+
+class VendorBench:
+    """Owns the drives and the thread that steps them; `open_bus` gives a program its end of the bus."""
+
+    def __init__(self, channel: str, drives: list[SimulatedDrive], fd: bool) -> None:
+        self.channel, self.drives, self._fd = channel, drives, fd
+        self.angles_rad, self.velocities_rad_s = [0.0] * len(drives), [0.0] * len(drives)
+        self.torques_nm = [0.0] * len(drives)
+        self._bus = self.open_bus()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def open_bus(self) -> can.BusABC:
+        protocol = can.CanProtocol.CAN_FD if self._fd else can.CanProtocol.CAN_20
+        return can.Bus(self.channel, "virtual", protocol=protocol, ignore_config=True)
+
+    def _run(self) -> None:
+        before_s = time.monotonic()
+        while not self._ended.is_set():
+            message = self._bus.recv(STEP_S)
+            now_s = time.monotonic()
+            for index, drive in enumerate(self.drives):
+                answers = drive.receive(frame_from(message), now_s) if message else []
+                self.torques_nm[index] = torque_nm = drive.torque_nm(now_s)
+                self.velocities_rad_s[index] += torque_nm / FLYWHEEL_KG_M2 * (now_s - before_s)
+                self.angles_rad[index] += self.velocities_rad_s[index] * (now_s - before_s)
+                drive.measure(self.angles_rad[index], self.velocities_rad_s[index])
+                for frame in (*answers, *drive.cyclic_frames(now_s)):
+                    self._bus.send(message_from(frame))
+            before_s = now_s
+
+    def start(self) -> None:
+        for drive in self.drives:
+            drive.reset(time.monotonic())
+        self._thread.start()
+
+    def end(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    @contextmanager
+    def driver(self, parameters: DriveParameters) -> Iterator[DriveReader]:
+        """Yield our own driver of one drive, on the same bus."""
+        port = PythonCanPort(self.open_bus())
+        try:
+            yield DriveReader(port, parameters)
+        finally:
+            port.close()
+
+
+class DriveReader:
+    """Our driver as an idle daemon runs it: it reads, asks for settings and never opens the gate."""
+
+    def __init__(self, port: PythonCanPort, parameters: DriveParameters) -> None:
+        kind = DRIVE_TYPES[parameters.type]
+        outlet = TransmitGate(JointLimits()).outlet(port, [kind.gate_table(parameters)])
+        self.axis: DriveAxis = kind.make_axis("left_sweep", parameters, outlet, [])
+        self._port = port
+
+    def read_until(self, condition: Callable[[DriveAxis], bool]) -> DriveAxis:
+        """Return the axis once the condition is met; fail after PATIENCE_S."""
+        receivers, begun_s = self.axis.receivers, time.monotonic()
+        while not condition(self.axis):
+            assert time.monotonic() - begun_s < PATIENCE_S, self.axis.health
+            self.axis.begin_read(time.monotonic())
+            for frame in self._port.receive():
+                receive = receivers.get(frame.arbitration_id | frame.is_fd << 29)
+                if receive is not None and not frame.is_remote:
+                    with suppress(MalformedMessageError):  # a daemon counts them
+                        receive(frame.data, frame.stamp_s)
+            self.axis.poll()
+            self.axis.request_settings(time.monotonic())
+            time.sleep(0.003)
+        return self.axis
+
+
+@contextmanager
+def vendor_bench(type_name: str, count: int = 1, fd: bool = False, **changes: Any) -> Iterator[VendorBench]:
+    """Yield a bench with drives of ids 1, 2, ... on a bus of their own."""
+    drives = [
+        make_simulated_drive(
+            SimulatedDriveParameters(node_id, type=type_name, **{"current_noise_a": 0.0} | changes), Random(node_id)
+        )
+        for node_id in range(1, count + 1)
+    ]
+    bench = VendorBench(f"{type_name} {time.monotonic_ns()}", drives, fd)
+    bench.start()
+    try:
+        yield bench
+    finally:
+        bench.end()
+
+
+def wait_until(condition: Callable[[], bool], what: str) -> None:
+    begun_s = time.monotonic()
+    while not condition():
+        assert time.monotonic() - begun_s < PATIENCE_S, what
+        time.sleep(0.005)
