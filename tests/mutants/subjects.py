@@ -10,6 +10,7 @@ class Subject(NamedTuple):
     tests: tuple[str, ...]  # in the order in which they run, below tests/
     selected: str = ""  # pytest's expression of the tests that run
     functions: tuple[str, ...] = ()  # of the module; none: all of it
+    has_fixtures: bool = False  # of conftest.py, which cost a second each time
     equivalent: dict[str, str] = {}  # the text of a mutant that behaves the same, and why
 
 
@@ -123,12 +124,14 @@ SUBJECTS = (
         ("firmware_host/test_daemon.py",),
         "not foreground",
         functions=("update", "request", "step", "end_safely"),
+        has_fixtures=True,
     ),
     Subject(
         "firmware_host.loop",
         ("firmware_host/test_loop.py",),
         "lease or slew or no_torque or finite or forced",
         functions=("_end_lost_lease", "_limit", "_pop_request"),
+        has_fixtures=True,
     ),
     Subject("drivers.mit.axis", ("drivers/mit/test_axis.py",)),
     Subject(
