@@ -146,10 +146,14 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         loop = Loop(configuration, drives, seen_pose, recorder, wall_clock=wall_clock)
         warnings = status.warnings
         calls = OperatorCalls(loop, warnings, time.monotonic)
-        status.methods = with_failures(calls.methods, failures, loop.events.report, time.monotonic)
+        status.methods = with_failures(
+            calls.methods, failures, loop.events.report, time.monotonic, calls.require_own_robot
+        )
         status.on_hang_up = loop.lease.hang_up
         status.is_protected = lambda caller: caller == loop.lease.holder
         status.report_bug = lambda message: loop.events.report(time.monotonic(), message)
+        for warning in configuration.warnings:
+            loop.events.report(time.monotonic(), f"warning: {warning}")
         notifier = SystemdNotifier()
         stack.callback(notifier.close)
         processors = AwakeProcessors(configuration.loop.stay_awake)

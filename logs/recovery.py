@@ -30,6 +30,7 @@ from firmware_host.log.log_folder import BROKEN, PART, finished_path, move_file,
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS
 from firmware_host.log.schema import LayoutError
 from logs.files.chunks import RECORD_HEAD, Record, Row, open_chunk, split_records
+from logs.files.expansion import Expansion
 from logs.files.file_pass import KIND_OF_TOPIC, OTHER_VERSION, described_kind
 from logs.files.log_error import DAMAGE, LogError, Watch, unwatched
 from logs.files.scanned_log import scan_log
@@ -58,6 +59,7 @@ class Salvage:
         self.wall_offset_ns = 0
         self.last_stamp_s = 0.0  # of the last row with a time
         self._file, self._size = file, os.fstat(file.fileno()).st_size
+        self._expansion = Expansion(Path(file.name), self._size)
         self._number_of_channel = {number + 1: number for number in range(len(ROW_KINDS))}  # as LogFile numbers them
         self._schemas: dict[int, Schema] = {}
         self._expected = [0] * len(ROW_KINDS)  # sequence number after the largest one found
@@ -96,7 +98,9 @@ class Salvage:
             chunk = Chunk.read(stream)
             key = chunk.uncompressed_crc, chunk.uncompressed_size, chunk.message_start_time
             if key not in self._chunks:
-                records = list(split_records(open_chunk(chunk)))
+                contents = open_chunk(chunk)
+                self._expansion.add(len(contents))
+                records = list(split_records(contents))
                 self._chunks.add(key)
                 return records
         return []

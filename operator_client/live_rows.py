@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from firmware_host.log.row_records import split_records
-from firmware_host.log.row_stream import BUFFER_BYTES, LOST, OPENING, REFUSAL
+from firmware_host.log.row_stream import BUFFER_BYTES, FULL, LOST, OPENING, REFUSAL
 from firmware_host.log.rows import TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from operator_client.status_client import NoDaemonError, NotPermittedError
@@ -87,6 +87,8 @@ class LiveRows:
         for number, content in split_records(packet)[0]:
             if number == REFUSAL:
                 raise NotPermittedError(content.decode())
+            if number == FULL:
+                raise NoDaemonError(f"{self._path} accepts no more subscribers: {content.decode()}")
             if number == OPENING:
                 self._open(json.loads(content))
             elif not self.is_open:

@@ -1,4 +1,8 @@
-"""Runs a study from the command line: its folder before it, its page, numbers and exit status after it."""
+"""Runs a study from the command line: folder, progress and prompts before it, page, numbers and exit status after it.
+
+An interrupted experiment stops its robot first. Its folder holds the trials that it measured, and the same command
+continues from there. Every report carries what computed it.
+"""
 
 import argparse
 import json
@@ -12,30 +16,25 @@ from types import ModuleType
 from typing import Any
 
 from command_line import exit_codes
-from command_line.experiments.conduct import (
-    EXIT_STATUS,
-    end_early,
-    open_folder,
-    print_written,
-    refuse,
-    run_with_progress,
-    session_in,
-)
+from command_line.experiments.terminal_prompt import TerminalPrompt
 from command_line.function_options import flag_of, given_options
 from command_line.json_output import print_value
 from command_line.options.studies import has_files, takes_session
 from command_line.screen import Progress, complain
-from experiments.robot.bench_errors import BenchError, EndedError
+from experiments.robot.bench_errors import AccessDeniedError, BenchError, DaemonLostError, EndedError
 from experiments.study.catalogue import load_study
 from experiments.study.notebook import NotebookError, count_entries, plan_in
 from experiments.study.option import OptionError, declared_options
+from experiments.study.prompt import AutomaticOperator
 from experiments.study.provenance import identity, provenance
-from experiments.study.results_folder import PAGE, remove_unused
+from experiments.study.results_folder import PAGE, make_folder, remove_unused, require_unfinished, set_aside
+from experiments.study.session import Ending, Session
 from experiments.study.workers import LocalWorkers, Workers, WorkersError
-from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.configuration.file_problems import ConfigurationError, why_not
 from operator_client.status_client import CallRefusedError
 
 NEEDED = ("matplotlib", "pandas", "pyarrow")
+EXIT_STATUS = {Ending.DONE: exit_codes.OK, Ending.UNHEALTHY: exit_codes.UNHEALTHY, Ending.REFUSED: exit_codes.REFUSED}
 Values = dict[str, Any]
 Function = Callable[..., Any]
 
@@ -48,7 +47,8 @@ def run_study(options: argparse.Namespace) -> int:
     try:
         return _conduct(options, load_study(options.name))
     except (OptionError, argparse.ArgumentTypeError) as problem:
-        return refuse(str(problem))
+        complain(str(problem))
+        return exit_codes.USAGE
     except NotebookError as problem:
         complain(str(problem))
         return exit_codes.REFUSED
@@ -60,15 +60,18 @@ def run_study(options: argparse.Namespace) -> int:
 def _conduct(options: argparse.Namespace, module: ModuleType) -> int:
     function = _chosen(options, module)
     values = given_options(options, function)
-    typed = _effective(function, values, options)
+    defaults = {each.parameter: each.default for each in declared_options(function)}
+    simulated = {"simulated": options.simulated} if "simulated" in options else {}
+    # every option that the results depend on, as JSON has it
+    typed = json.loads(json.dumps(defaults | values | simulated, default=str))
     program = identity(module.__name__)  # reads the sources before minutes of work, in which they may change
     is_new = options.out is None or not options.out.exists()
-    results = open_folder(options, typed, getattr(module, "folder_name", lambda **_: "")(**values))
+    results = _open_folder(options, typed, getattr(module, "folder_name", lambda **_: "")(**values))
     before = count_entries(results) if (results / PAGE).exists() else None
     try:
         status = _run(options, module, partial(function, **values), results, program, typed)
     except (BenchError, EndedError, CallRefusedError, WorkersError, KeyboardInterrupt, OSError) as problem:
-        status = end_early(results, problem)
+        status = _end_early(results, problem)
     finally:
         if is_new:
             remove_unused(results)
@@ -95,11 +98,19 @@ def _chosen(options: argparse.Namespace, module: ModuleType) -> Function:
     return chosen
 
 
-def _effective(function: Callable[..., Any], values: Values, options: argparse.Namespace) -> Values:
-    """Return every option that the results depend on with its value, as JSON has it."""
-    defaults = {each.parameter: each.default for each in declared_options(function)}
-    simulated = {"simulated": options.simulated} if "simulated" in options else {}
-    return dict(json.loads(json.dumps(defaults | values | simulated, default=str)))
+def _open_folder(options: argparse.Namespace, typed: Values, name: str) -> Path:
+    """Return the folder of the results: without --out a new one. Raises NotebookError, OSError.
+
+    A finished study continues with options other than `typed`, such as more trials.
+    """
+    if options.out is None:
+        return make_folder(f"mudskipper-{name or options.name}")
+    folder: Path = options.out.resolve() if options.restart else options.out  # the working directory moves too
+    if options.restart and (old := set_aside(folder)):
+        print(f"the earlier results are in {old} now", file=sys.stderr)
+    require_unfinished(folder, options.name, typed)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def _run(
@@ -113,14 +124,17 @@ def _run(
     from experiments.study.page import write_result  # matplotlib and pandas are slow to import
     from experiments.study.trials import Trials
 
-    def run(progress: Progress) -> tuple[Any, Trials | None]:
+    progress = Progress("trials")
+    trials: Trials | None = None
+    try:
         if takes_session(function.func):  # type: ignore[attr-defined]
-            return function(session_in(options, results, progress, program)), None
-        plan = {"experiment": options.name, "simulated": True, **program}
-        trials = Trials(results, plan, progress.show, _workers_of(options))
-        return function(trials), trials
-
-    result, trials = run_with_progress("trials", run)
+            result = function(_session_in(options, results, progress, program))
+        else:
+            plan = {"experiment": options.name, "simulated": True, **program}
+            trials = Trials(results, plan, progress.show, _workers_of(options))
+            result = function(trials)
+    finally:
+        progress.clear()
     simulated = " (simulated)" if typed.get("simulated") else ""
     result = replace(result, title=f"{result.title or f'Experiment: {options.name}'}{simulated}")
     report = (
@@ -134,8 +148,16 @@ def _run(
         print_value(report)
     else:
         print(result.text())
-    print_written(written)
+    print(f"written  {', '.join(map(str, written))}", file=sys.stderr)
     return EXIT_STATUS[result.ending]
+
+
+def _session_in(options: argparse.Namespace, folder: Path, progress: Progress, program: Mapping[str, str]) -> Session:
+    prompt = TerminalPrompt(progress.clear)
+    if options.simulated:
+        operator = AutomaticOperator(prompt.report)
+        return Session(folder, operator, progress.show, simulated=True, program=program)
+    return Session(folder, prompt, progress.show, getattr(options, "socket", None), program=program)
 
 
 def _workers_of(options: argparse.Namespace) -> Workers:
@@ -144,3 +166,22 @@ def _workers_of(options: argparse.Namespace) -> Workers:
 
         return ClusterWorkers(options.cluster)
     return LocalWorkers(options.workers)
+
+
+def _end_early(folder: Path, problem: BaseException) -> int:
+    message, status = str(problem), exit_codes.REFUSED
+    match problem:
+        case DaemonLostError():
+            status = exit_codes.NO_DAEMON
+        case AccessDeniedError():
+            status = exit_codes.NOT_PERMITTED
+        case KeyboardInterrupt():
+            message, status = "interrupted", exit_codes.INTERRUPTED
+        case WorkersError():
+            status = exit_codes.UNHEALTHY
+        case OSError():  # such as a full disk
+            message, status = why_not(problem, folder), exit_codes.UNHEALTHY
+    complain(message)
+    if count_entries(folder):
+        complain(f"the measurements so far are in {folder}; the same command with --out {folder} continues from there")
+    return status

@@ -38,10 +38,13 @@ def live(
     socket: Socket,
     page: Annotated[bool, Option("serve a page for a browser in place of a viewer's WebSocket")] = False,
     host: Annotated[str, Option("to listen on", metavar="ADDRESS")] = "127.0.0.1",
+    name: Annotated[
+        tuple[str, ...], Option("with --page: under which browsers open it, such as robot.local", metavar="NAME")
+    ] = (),
     port: Annotated[int, Option("0: a free one (default: 8765)", low=0, high=65535)] = 8765,
 ) -> int:
     try:
-        audience, address = _open_page(host, port, socket) if page else _open_viewers(host, port)
+        audience, address = _open_page(host, port, socket, name) if page else _open_viewers(host, port)
     except ModuleNotFoundError:
         raise CommandError(
             "viewers need foxglove-sdk: install mudskipper with its extra 'live', or use --page"
@@ -56,10 +59,10 @@ def live(
         return exit_codes.OK
 
 
-def _open_page(host: str, port: int, socket: Path) -> tuple[Audience, str]:
+def _open_page(host: str, port: int, socket: Path, names: Sequence[str]) -> tuple[Audience, str]:
     from command_line.live.page_server import PageServer
 
-    page = PageServer(host, port, socket)
+    page = PageServer(host, port, socket, names)
     return page, f"http://{host}:{page.port}/"
 
 

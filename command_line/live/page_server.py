@@ -2,21 +2,22 @@
 
 The page receives server-sent events (HTML standard, section 9.2), ten a second, each with the newest tick and every
 stride and event since the last one. Every viewer has a queue of its own; one that hangs loses its own messages alone.
-A stop is accepted only with a header that no other site's page can send, and only under the address of this server, so
-no page from the internet can reach it through the browser.
+Every request must come from this server's own page (own_page.py); a stop needs a header too that no other site's page
+can send. The page asks over the same path whether a stop would reach the robot, and says so in red where it would not.
 """
 
 import json
 import queue
 import threading
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Collection, Sequence
+from contextlib import closing, suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-from command_line.operation.confirmation import end_motion
+from command_line.live.own_page import own_page
+from command_line.operation.confirmation import TORQUE_UNKNOWN, end_motion
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import TWO_FLIPPERS, Phase
@@ -25,13 +26,14 @@ from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import STRIDE, TICK
 from firmware_host.operator.reports import known
 from operator_client.live_rows import LiveRow, LiveRows
+from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
 PAGE = Path(__file__).with_name("page.html")
 INTERVAL_S = 0.1  # between two messages
 QUEUED = 20  # messages for one viewer: two seconds
 RECENT_STRIDES = 60  # that a new viewer gets
 STOP_HEADER = "X-Mudskipper"
-LOCAL = ("127.0.0.1", "localhost", "[::1]")
+ANSWER_S = 2.0  # of the daemon, whether it would take a stop
 
 
 class Viewer:
@@ -95,9 +97,10 @@ class Viewers:
 class PageServer:
     """Owns the HTTP server and the rows of the interval under way. Raises OSError if the port is in use."""
 
-    def __init__(self, host: str, port: int, status_socket: Path) -> None:
+    def __init__(self, host: str, port: int, status_socket: Path, names: Collection[str] = ()) -> None:
+        """`names` are those under which browsers may open the page, in addition to the address."""
         self._viewers = Viewers()
-        self._server = _Server(host, port, self._viewers, status_socket)
+        self._server = _Server(host, port, self._viewers, status_socket, names)
         self.port = int(self._server.server_address[1])
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
         self._reset()
@@ -165,8 +168,8 @@ class _Server(ThreadingHTTPServer):
 
     daemon_threads = True  # a browser that hangs must not keep this program
 
-    def __init__(self, host: str, port: int, viewers: Viewers, status_socket: Path) -> None:
-        self.host, self.viewers, self.status_socket = host, viewers, status_socket
+    def __init__(self, host: str, port: int, viewers: Viewers, status_socket: Path, names: Collection[str]) -> None:
+        self.own_page, self.viewers, self.status_socket = own_page(host, names), viewers, status_socket
         super().__init__((host, port), _Handler)
 
 
@@ -177,7 +180,9 @@ class _Handler(BaseHTTPRequestHandler):
     server: _Server
 
     def do_GET(self) -> None:
-        if self.path == "/":
+        if refused := self._refusal():
+            self._answer(HTTPStatus.FORBIDDEN, refused.encode())
+        elif self.path == "/":
             self._answer(HTTPStatus.OK, PAGE.read_bytes(), "text/html; charset=utf-8")
         elif self.path == "/rows":
             self._stream()
@@ -185,16 +190,22 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
 
     def do_POST(self) -> None:
-        if self.path != "/stop":
-            self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
-        elif self.headers.get(STOP_HEADER) != "stop" or not self._is_own_address():
-            self._answer(HTTPStatus.FORBIDDEN, b"only the page of this server may stop the robot")
-        else:
+        refused = self._refusal()
+        if not refused and self.headers.get(STOP_HEADER) != "stop":
+            refused = f"a request without {STOP_HEADER}: only the page of this server may stop the robot"
+        if refused:
+            self._answer(HTTPStatus.FORBIDDEN, f"{TORQUE_UNKNOWN}. stop refused: {refused}".encode())
+        elif self.path == "/stop":
             self._answer(*stop_robot(self.server.status_socket))
+        elif self.path == "/can_stop":
+            self._answer(*can_stop(self.server.status_socket))
+        else:
+            self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
 
-    def _is_own_address(self) -> bool:
-        host, asked = self.server.host, self.headers.get("Host", "").rsplit(":", 1)[0]
-        return asked == host or (asked in LOCAL and host in LOCAL)
+    def _refusal(self) -> str | None:
+        """Return why this request is none of the own page; every route asks."""
+        arrived_at = str(self.connection.getsockname()[0])
+        return self.server.own_page.refusal(self.headers.get("Host", ""), self.headers.get("Origin"), arrived_at)
 
     def _stream(self) -> None:
         viewer = self.server.viewers.add()
@@ -225,3 +236,13 @@ def stop_robot(status_socket: Path) -> tuple[HTTPStatus, bytes]:
     """Wait until every drive has confirmed the stop, as `mudskipper stop` does."""
     answer = end_motion(status_socket, "stop")
     return HTTPStatus.OK if answer.confirmed else HTTPStatus.CONFLICT, answer.text.encode()
+
+
+def can_stop(status_socket: Path) -> tuple[HTTPStatus, bytes]:
+    """Answer whether the daemon would take a stop and show that the drives have confirmed it."""
+    try:
+        with closing(StatusClient(status_socket, ANSWER_S)) as client:
+            client.call("status")
+    except (CallRefusedError, NotPermittedError, NoDaemonError) as problem:
+        return HTTPStatus.CONFLICT, str(problem).encode()
+    return HTTPStatus.OK, b"ready"

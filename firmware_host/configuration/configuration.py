@@ -74,12 +74,21 @@ class LoopParameters:
 
 
 @dataclass(frozen=True)
+class SafetyParameters:
+    weakened: Annotated[
+        str, Meaning("why bounds of protection may be beyond twice their defaults; empty: they are refused")
+    ] = ""
+
+
+@dataclass(frozen=True)
 class StatusParameters:
     socket: Annotated[str, Meaning("path of the Unix socket for operators")] = "/run/mudskipper/mudskipper.sock"
     anyone_may_stop: Annotated[
         bool, Meaning("every local account may stop and disarm; false: the two groups below")
     ] = True
-    read_group: Annotated[str, Meaning("may see the status; empty: the daemon's own group")] = ""
+    read_group: Annotated[
+        str, Meaning("may see the status; empty: mudskipper-view, or without that the daemon's own group")
+    ] = ""
     drive_group: Annotated[str, Meaning("may operate the robot, and see; empty: the daemon's own group")] = ""
 
 
@@ -122,6 +131,7 @@ class Configuration:
     limits: JointLimits = JointLimits()
     winding: WindingParameters = WindingParameters()
     faults: FaultBounds = FaultBounds()
+    safety: SafetyParameters = SafetyParameters()
     estimation: EstimationParameters = EstimationParameters()
     friction: dict[str, JointFriction] = field(default_factory=dict)  # by joint, where it was measured
     adaptation: AdaptationParameters = AdaptationParameters()

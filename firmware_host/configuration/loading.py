@@ -22,6 +22,7 @@ from firmware_host.configuration.toml_records import (
     rename_former_keys,
     shown,
 )
+from firmware_host.configuration.weakened_protection import require_reason
 
 FORMER_KEYS = {  # key of version 0.1: present key in the same section; version 0.2 accepts both
     "faults.lag_share": "lag_fraction",
@@ -42,8 +43,11 @@ _READER = RecordReader(Configuration, without=NO_KEYS, hints={"drive": dict[str,
 
 
 def load_configuration(path: Path) -> Configuration:
-    """Read a file. Raises ConfigurationError, also for a file that cannot be read."""
-    return parse_configuration(read_text(path), path)
+    """Read the file of a robot that is to run. Raises ConfigurationError, also for a file that cannot be read.
+
+    Unlike the text in a log, which may be of an earlier version, it needs a reason for weakened protection.
+    """
+    return require_reason(parse_configuration(read_text(path), path))
 
 
 def parse_configuration(text: str, file: Path | None = None) -> Configuration:

@@ -26,12 +26,25 @@ def failures_of(configuration: Configuration) -> Failures | None:
     return Failures(configuration.bus) if configuration.failures.allowed else None
 
 
-def with_failures(methods: Methods, failures: Failures | None, report: Report, clock: Callable[[], float]) -> Methods:
-    """Add the methods that inject failures; without failures they only refuse."""
+def with_failures(
+    methods: Methods,
+    failures: Failures | None,
+    report: Report,
+    clock: Callable[[], float],
+    require_own_robot: Callable[[Caller], None],
+) -> Methods:
+    """Add the methods that inject failures; without failures they only refuse.
+
+    `require_own_robot` raises RefusedError for a user who may not let the robot fail now.
+    """
     if failures is None:
         nothing = {"allowed": False, "failing": [], "table": []}
         return {**methods, "fail": _refuse, "failures": lambda params, caller: nothing}
     calls = FailureCalls(failures, report, clock)
+
+    def fail(params: dict[str, Any], caller: Caller) -> Any:
+        require_own_robot(caller)
+        return calls.fail(params, caller)
 
     def status(params: dict[str, Any], caller: Caller) -> Any:
         """Add the active failures to the status, also as warnings."""
@@ -46,7 +59,7 @@ def with_failures(methods: Methods, failures: Failures | None, report: Report, c
         calls.end(ALL)
         return methods["disarm"](params, caller)
 
-    added: Methods = {"fail": validated("fail", calls.fail), "failures": validated("failures", calls.failures)}
+    added: Methods = {"fail": validated("fail", fail), "failures": validated("failures", calls.failures)}
     return {**methods, **added, "status": status, "disarm": disarm}
 
 

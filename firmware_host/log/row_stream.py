@@ -11,6 +11,9 @@ A packet is a sequence of records (row_records.py) of these kinds:
                 metadata and its configuration
     LOST        JSON, the number of rows that this subscriber has lost here
     REFUSAL     text, the only record for a user without the right to read; the connection then ends
+    FULL        text, the only record where every place is taken; the connection then ends
+
+Some places are for operators alone, so that silent readers cannot take the rows from those who drive.
 """
 
 import json
@@ -27,8 +30,10 @@ from firmware_host.sockets.rights import Group, Peer, Rights, read_peer
 from firmware_host.sockets.socket_file import AlreadyServedError, SocketFile
 from firmware_host.sockets.socket_methods import Level
 
-OPENING, LOST, REFUSAL = 255, 254, 253
-MOST_SUBSCRIBERS = 8
+OPENING, LOST, REFUSAL, FULL = 255, 254, 253, 252
+MOST_SUBSCRIBERS = {Level.READ: 6, Level.DRIVE: 8}  # at which one more of this level is refused
+MOST_ACCEPTS = 32  # at once
+BACKLOG = 128  # connections that wait to be accepted
 PACKET_BYTES = 32 * 1024  # less than the kernel's smallest usual buffer
 BUFFER_BYTES = 512 * 1024  # of one subscriber: two seconds of rows; the kernel may allow less
 
@@ -94,7 +99,7 @@ class RowStream:
         self._subscribers: list[Subscriber] = []
         self._file: SocketFile | None = None
         try:
-            self._file = SocketFile(path, MOST_SUBSCRIBERS, kind=socket.SOCK_SEQPACKET)
+            self._file = SocketFile(path, BACKLOG, kind=socket.SOCK_SEQPACKET)
         except (OSError, AlreadyServedError) as problem:
             self.problem = f"rows are not served on {path}: {problem}"
 
@@ -107,7 +112,8 @@ class RowStream:
             self._subscribers = [each for each in self._subscribers if each.send(packet, count)]
 
     def _accept(self) -> None:
-        while self._file is not None and len(self._subscribers) < MOST_SUBSCRIBERS:
+        for _ in range(MOST_ACCEPTS if self._file is not None else 0):
+            assert self._file is not None
             try:
                 connection, _ = self._file.listener.accept()
             except OSError:
@@ -115,16 +121,22 @@ class RowStream:
             self._admit(connection)
 
     def _admit(self, connection: socket.socket) -> None:
-        refusal: str | None = "the connection has ended"
-        with suppress(OSError):
+        """Add the subscriber, or tell it in words why not."""
+        level, subscriber = Level.ANYONE, Subscriber(connection)
+        with suppress(OSError):  # it has disconnected already
             level = self._rights.level(self._peer_of(connection))
-            refusal = None if level >= Level.READ else self._rights.refusal("status", level)
-        subscriber = Subscriber(connection)
-        admitted = subscriber.send(pack_record(REFUSAL, refusal.encode()) if refusal else self._opening, 0)
-        if admitted and refusal is None:
-            self._subscribers.append(subscriber)
+        refusal = self._rights.refusal("status", level)
+        if refusal:
+            first = pack_record(REFUSAL, refusal.encode())
+        elif len(self._subscribers) >= MOST_SUBSCRIBERS[level]:
+            places = f"all {MOST_SUBSCRIBERS[level]} places for the level {level.name.lower()} are taken"
+            first = pack_record(FULL, f"{places}; end another viewer".encode())
+        elif subscriber.send(self._opening, 0):
+            return self._subscribers.append(subscriber)
         else:
-            subscriber.close()
+            return None
+        subscriber.send(first, 0)
+        return subscriber.close()
 
     def close(self) -> None:
         for subscriber in self._subscribers:

@@ -96,7 +96,7 @@ class OperatorCalls:
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
-            "warnings": self._warnings,
+            "warnings": [*loop.configuration.warnings, *self._warnings],
             "bus": _bus_report(loop),
             "log": _log_report(loop),
         }
@@ -201,7 +201,15 @@ class OperatorCalls:
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
         return _accepted(self._loop.request(request, self._clock(), order, forced, str(caller)))
 
+    def require_own_robot(self, caller: Caller) -> None:
+        """Raise RefusedError while a program of another user holds the lease."""
+        holder = self._lease.holder
+        if self._lease.held and isinstance(holder, Caller) and holder.peer.uid != caller.peer.uid:
+            ways = "wait until that program has ended; 'mudskipper stop' and 'disarm' are always allowed"
+            raise RefusedError(f"{holder} operates the robot: {ways}")
+
     def reset_timing(self, params: dict[str, Any], caller: Caller) -> str:
+        self.require_own_robot(caller)
         self._loop.timing.reset()
         return "accepted"
 

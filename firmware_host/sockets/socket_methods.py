@@ -183,7 +183,7 @@ STATUS_KEYS = {
     "loads": "the mud's load on each flipper: torques in N·m, forces in N, depth in m",
     "loop": "rate in Hz, ticks, missed ticks, and percentiles of wake-up delay and tick duration in µs;"
     " a tick lasts until its clients are served",
-    "warnings": "what the computer could not provide for real-time operation",
+    "warnings": "weakened protection, and what the computer could not provide for real-time operation",
     "bus": "state of every bus, and counts of errors and lost frames",
     "log": "path of the log, rows dropped, and the state of its writer and disk",
 }

@@ -40,6 +40,7 @@ from logs.files.whole_files import hidden_path, whole_file
 NAME = "catalogue.parquet"
 VERSION = 1  # of COLUMNS; an older catalogue is made again
 VERSION_KEY = "mudskipper_catalogue"
+MOST_DIGITS = 9  # of a version; one with more is damage
 TRIALS_TABLE = "trials"
 ERROR_NUMBER = re.compile(r'"errno":"(\d+)"')  # of the operating system, in DuckDB's message
 
@@ -108,7 +109,7 @@ class Catalogue:
     def _stored_version(self) -> int:
         query = "SELECT value FROM parquet_kv_metadata(?) WHERE key = ?"
         found = self._connection.execute(query, [str(self.path), VERSION_KEY.encode()]).fetchone()
-        return int(found[0]) if found and found[0].isdigit() else 0
+        return int(found[0]) if found and found[0].isdigit() and len(found[0]) <= MOST_DIGITS else 0
 
     def entries(self) -> list[LogEntry]:
         return [entry_of_row(row) for row in self._connection.execute("SELECT * FROM logs ORDER BY file").fetchall()]

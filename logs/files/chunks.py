@@ -1,9 +1,9 @@
 """Opens one chunk of an MCAP file without trusting its length fields, and splits it into records.
 
 A length that a damaged card has changed must cost neither gigabytes of memory nor a crash. The decompression therefore
-ends at the size that the chunk states, that size is limited by what LZ4 can reach, and the contents have to match their
-checksum. Most records of a log are ticks of one length, one after another: such a run is one array over the chunk's
-bytes.
+ends at the size that the chunk states, that size is limited (expansion.py), also by what LZ4 can reach, and the
+contents have to match their checksum. Most records of a log are ticks of one length, one after another: such a run is
+one array over the chunk's bytes.
 """
 
 import struct
@@ -14,11 +14,13 @@ from typing import NamedTuple
 
 import lz4.frame
 import numpy as np
+import zstandard  # a requirement of mcap
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
-from mcap.stream_reader import get_chunk_data_stream
 from numpy.typing import NDArray
+
+from logs.files.expansion import LARGEST_CHUNK_BYTES
 
 LARGEST_RATIO = 256  # of LZ4, whose format allows 255
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
@@ -40,20 +42,32 @@ Record = Row | Schema | Channel
 
 def open_chunk(chunk: Chunk) -> bytes:
     """Return the chunk's records. Raises ValueError or RuntimeError where the chunk is damaged."""
-    size = chunk.uncompressed_size
-    if size > LARGEST_RATIO * (len(chunk.data) + 1):
-        raise ValueError(f"a chunk of {len(chunk.data)} bytes cannot hold {size}")
-    if chunk.compression == "lz4":
-        contents = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
-    elif chunk.compression == "":
-        contents = chunk.data
-    else:  # another tool has compressed it again
-        contents = get_chunk_data_stream(chunk)[0].read(size)
+    size, stored = chunk.uncompressed_size, len(chunk.data)
+    most = stored if chunk.compression == "" else min(LARGEST_RATIO * (stored + 1), LARGEST_CHUNK_BYTES)
+    if size > most:
+        raise ValueError(f"a chunk of {stored} bytes cannot hold {size}, at most {most}")
+    match chunk.compression:
+        case "lz4":
+            contents = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        case "zstd":  # another tool has compressed it again
+            contents = _open_zstd(chunk.data, size)
+        case "":
+            contents = chunk.data
+        case other:
+            raise ValueError(f"a chunk has the compression {other!r:.20}, which must be lz4 or zstd")
     if len(contents) != size:
         raise ValueError(f"a chunk of {size} bytes holds {len(contents)}")
     if chunk.uncompressed_crc not in (0, zlib.crc32(contents)):
         raise ValueError("crc validation failed in Chunk")
     return bytes(contents)
+
+
+def _open_zstd(stored: bytes, size: int) -> bytes:
+    """Return at most one byte more than `size`: the stored bytes may state any length."""
+    try:
+        return zstandard.ZstdDecompressor().stream_reader(stored).read(size + 1)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from None
 
 
 def split_records(contents: bytes) -> Iterator[Record]:

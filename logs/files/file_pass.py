@@ -27,6 +27,7 @@ from firmware_host.log.log_folder import present_path
 from firmware_host.log.rows import EVENT_KIND, ROW_KINDS, STRIDE_KIND, TICK, TICK_KIND, rig_of, row_kinds
 from firmware_host.log.schema import LayoutError, RowKind, read_definition
 from logs.files.chunks import RECORD_HEAD, Record, Row, open_chunk, record_at, run_of_rows
+from logs.files.expansion import Expansion
 from logs.files.log_error import DAMAGE, LogError, Watch, unwatched
 from logs.files.stored_logs import why_not_read
 
@@ -51,6 +52,7 @@ class FilePass:
         self.kinds: dict[int, RowKind] = {}  # as the file describes them, by their number in ROW_KINDS
         self.messages = self.messages_counted = 0
         self._ticks = 0
+        self._expansion = Expansion(path, 0)
         self._misfit = ""  # the first row that is not as long as its description says
         self._encoded: dict[int, list[bytes]] = {STRIDE_KIND: [], EVENT_KIND: []}
         self._schemas: dict[int, Schema] = {}
@@ -66,6 +68,7 @@ class FilePass:
             with present_path(self.path).open("rb") as file:
                 stream = _Beginning(file, self.size)
                 self.size = stream.size
+                self._expansion = Expansion(self.path, stream.size)
                 yield from self._read(stream, watch)
         except OSError as error:
             raise LogError(why_not_read(self.path, error)) from None
@@ -96,7 +99,9 @@ class FilePass:
             case Chunk() if not self._is_wanted(record):
                 return
             case Chunk():
-                yield from self._add_chunk(open_chunk(record), bool(record.uncompressed_crc))
+                contents = open_chunk(record)
+                self._expansion.add(len(contents))
+                yield from self._add_chunk(contents, bool(record.uncompressed_crc))
             case Schema():
                 self._schemas[record.id] = record
             case Channel():

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.files.expansion import Expansion
 from logs.files.log_error import LogError
 from logs.lab.findings import Finding, FindingKind, of_whole_log
 
@@ -69,11 +70,13 @@ def _unpack(path: Path) -> bytes:
     """Return the contents, decompressed if they are compressed; the name does not matter."""
     pieces: list[bytes] = []
     try:
+        expansion = Expansion(path, path.stat().st_size)
         with path.open("rb") as file:
             packed = file.read(len(GZIP_MAGIC)) == GZIP_MAGIC
         with gzip.open(path) if packed else path.open("rb") as file:
             while piece := file.read1():
                 pieces.append(piece)
+                expansion.add(len(piece))
     except (EOFError, zlib.error, gzip.BadGzipFile):
         line = b"".join(pieces).count(b"\n")
         raise LogError(f"{path}: the compressed file breaks off or is damaged after line {line}") from None

@@ -57,6 +57,9 @@ lag_s = 0.5
 lag_fraction = 1.0
 crawl_s = 0.5
 
+[safety]
+weakened = "a simulated robot on a computer without real time"
+
 [log]
 directory = {logs}
 min_free_fraction = 0.0  # a full disk of a desktop computer deletes no logs

@@ -133,7 +133,9 @@ class OperatedRobot:
         self._coming: deque[Peer] = deque()
         self._shutdown = Shutdown()
         calls = OperatorCalls(self.loop, WARNINGS, self._clock)
-        methods = with_failures(calls.methods, lockstep.failures, self.loop.events.report, self._clock)
+        methods = with_failures(
+            calls.methods, lockstep.failures, self.loop.events.report, self._clock, calls.require_own_robot
+        )
         noted = {name: self._noted(name, method) for name, method in methods.items()}
         self._status = StatusSocket(folder / "s", noted, RIGHTS, lambda _: self._coming.popleft(), self._clock)
         self._status.on_hang_up = self.loop.lease.hang_up

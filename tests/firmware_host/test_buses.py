@@ -209,7 +209,7 @@ def test_a_daemon_without_its_bus_waits_if_configured_and_else_exits_with_1(
         assert daemon.returncode == 0
     else:
         assert daemon.returncode == 1
-        assert said.startswith("mudskipperd: bus.left (socketcan ")
+        assert "\nmudskipperd: bus.left (socketcan " in said
 
 
 @pytest.mark.parametrize(

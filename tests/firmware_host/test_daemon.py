@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,9 @@ from drivers.odrive.codec import SET_AXIS_STATE
 from firmware_host.computer.sd_notify import SystemdNotifier
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.daemon import EXIT_FAILED, NOTIFY_TICKS, Shutdown, WatchdogFeed, end_safely, serve
+from firmware_host.log.log_folder import DONE
 from firmware_host.ticker import Tick
+from logs.files.log_reader import read_log
 from operator_client.status_client import StatusClient
 from simulation.harness.local_setup import write_local_setup
 from simulation.harness.lockstep import Lockstep
@@ -53,6 +56,18 @@ def test_a_shutdown_in_a_walk_raises_the_flippers_and_idles_the_drives(robot: Lo
     assert run_shutdown(robot, shutdown)
     assert energised(robot) == [False] * 4
     assert robot.loop.events.notice == ""  # a notice would report flippers in the mud
+
+
+@pytest.mark.parametrize("walked_s", [0.01, 1.0, 1.7, 1.9, 2.5])
+def test_a_signal_in_a_walk_raises_the_flippers_from_the_second_tick_on(robot: Lockstep, walked_s: float) -> None:
+    robot.walk(WalkOrder(0.03))
+    robot.run_for(walked_s)
+    shutdown = Shutdown()
+    shutdown.request(signal.SIGTERM, None)
+    for _ in range(2):
+        assert not shutdown.step(robot.loop, robot.now_s)
+        robot.step()
+    assert robot.loop.mode is Mode.STOPPING
 
 
 def test_a_shutdown_waits_for_the_last_drive_to_be_idle(robot: Lockstep) -> None:
@@ -158,7 +173,11 @@ def test_a_daemon_in_the_foreground_prints_when_and_where_it_can_be_operated(sho
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as daemon:
         assert daemon.stdout is not None
         line = daemon.stdout.readline()
-        StatusClient(short_folder / "mudskipper.sock").close()
+        with closing(StatusClient(short_folder / "mudskipper.sock")) as client:
+            warnings = client.call("status")["warnings"]
         daemon.send_signal(signal.SIGTERM)
         assert daemon.wait(LONGEST_S) == 0
+    assert warnings[0].startswith("protection is weakened (")
+    (log,) = (short_folder / "logs" / DONE).glob("*.mcap")
+    assert f"warning: {warnings[0]}" in [event["text"] for event in read_log(log).events]
     assert "ready" in line and str(short_folder / "mudskipper.sock") in line

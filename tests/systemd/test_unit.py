@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import grp
+import os
 import shutil
 import subprocess
 import sys
@@ -18,6 +20,9 @@ from drivers.drive_types import make_drives
 from firmware_host import daemon
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, Configuration, StatusParameters
 from firmware_host.configuration.file_problems import ConfigurationError
+from firmware_host.sockets.rights import Peer
+from firmware_host.sockets.socket_methods import Level
+from firmware_host.sockets.user_groups import load_rights
 from tests.folders import ROOT
 from tests.waiting import LONGEST_S
 
@@ -117,6 +122,19 @@ def test_the_unit_s_user_and_group_are_the_ones_that_sysusers_makes(unit: Settin
     lines = (SYSTEMD / "mudskipper.sysusers").read_text(encoding="utf-8").splitlines()
     users = [line.split()[1] for line in lines if line.startswith("u ")]  # `u` makes the group as well
     assert users == [only(unit, "User")] == [only(unit, "Group")]
+
+
+def test_the_service_that_a_network_reaches_may_read_and_not_drive(
+    unit: Settings, configuration: Configuration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a robot after the installation: the groups that sysusers makes, the daemon's own, the shipped file."""
+    lines = (SYSTEMD / "mudskipper.sysusers").read_text(encoding="utf-8").splitlines()
+    made = {line.split()[1]: number for number, line in enumerate(lines, 990) if line[:2] in ("u ", "g ")}
+    monkeypatch.setattr(grp, "getgrnam", lambda name: grp.struct_group((name, "x", made[name], [])))
+    monkeypatch.setattr(os, "getegid", lambda: made[only(unit, "Group")])
+    live = read_settings("mudskipper-live.service")
+    peer = Peer(1, 61234, frozenset({61234, *(made[group] for group in live["SupplementaryGroups"])}))
+    assert load_rights(configuration.status).level(peer) is Level.READ
 
 
 def test_the_unit_has_the_settings_on_which_the_daemon_relies(unit: Settings) -> None:

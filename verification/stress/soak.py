@@ -131,7 +131,9 @@ class SoakedLoop:
         self.robot = Lockstep(configuration, self._track(), seed, self.recorder, failures=failures)
         calls = OperatorCalls(self.robot.loop, [], self._now_s)
         self.socket = StatusSocket(folder / "s", {}, load_rights(configuration.status))
-        self.socket.methods = with_failures(calls.methods, failures, self.robot.loop.events.report, self._now_s)
+        self.socket.methods = with_failures(
+            calls.methods, failures, self.robot.loop.events.report, self._now_s, calls.require_own_robot
+        )
         self.bugs: list[str] = []
         self.socket.report_bug = self.bugs.append
         self.visitors: list[tuple[StreamClient, int, int]] = []  # with the number of its calls and its last tick

@@ -46,3 +46,18 @@ def test_an_unauthorised_user_reads_neither_log_nor_state(booted: Robot) -> None
     answer = booted.machine.run("ls /var/lib/mudskipper/logs", user=UNAUTHORISED)
     assert answer.status != 0
     assert "Permission denied" in answer.errors
+
+
+def test_the_service_for_viewers_reads_and_stops_but_never_drives(walking: Robot) -> None:
+    walking.shell("systemctl start mudskipper-live")
+    walking.wait_for("python3 -c 'import urllib.request as u; u.urlopen(\"http://127.0.0.1:8765/\")'")
+    own = walking.shell("grep ^Groups: /proc/$(systemctl show --value --property=MainPID mudskipper-live)/status")
+    drivers = walking.shell("getent group mudskipper").split(":")[2]
+    assert drivers not in own.split()
+    as_the_service = "systemd-run --quiet --pipe --wait --property=DynamicUser=yes"
+    as_the_service += " --property=SupplementaryGroups=mudskipper-view /opt/mudskipper/venv/bin/mudskipper"
+    for command in ("disarm", "arm", "walk", "clear"):
+        answer = walking.machine.run(f"{as_the_service} {command}")
+        assert (answer.status == 0) == (command == "disarm"), answer
+    assert walking.torque_is_off()
+    walking.shell("systemctl stop mudskipper-live")

@@ -32,7 +32,7 @@ REFUSED = {
     "sweep --simulated --workers 2 --cluster tcp://127.0.0.1:8786": "--workers",
     "trackway --compartment 0.5": "--compartment can only be given with --simulated",
     "trackway --simulated --mud 48.5": "--mud can only be given without --simulated",
-    "trackway --mud 48.5=5": "its length from 20 to 10000 cm",
+    "trackway --mud 48.5=5": "from 20 to 10000 cm",
     "sweep": "--simulated",
     "mud-fit": "--simulated",
     "trackway --simulated --method paper --method fog": "'fog'",

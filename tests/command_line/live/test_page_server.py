@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 
 from command_line.live.page_server import PageServer, Viewer, Viewers, robot_facts
+from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.rows import EVENT, STRIDE, TICK
 from operator_client.live_rows import LiveRow
+from tests.command_line.watch.served_robot import ServedRobot, resting_robot
 
 ADDRESS = "127.0.0.1"
 MESSAGE: dict[str, Any] = {"tick": {"stamp_s": 1.0}, "strides": [], "events": []}
@@ -41,9 +43,9 @@ def next_message(response: HTTPResponse) -> dict[str, Any]:
             return dict(json.loads(line.removeprefix("data: ")))
 
 
-def post(page: PageServer, **headers: str) -> tuple[int, str]:
+def post(page: PageServer, path: str = "/stop", **headers: str) -> tuple[int, str]:
     connection = HTTPConnection(ADDRESS, page.port, timeout=60)
-    connection.request("POST", "/stop", headers={name.replace("_", "-"): value for name, value in headers.items()})
+    connection.request("POST", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
     response = connection.getresponse()
     return response.status, response.read().decode()
 
@@ -107,12 +109,56 @@ def test_a_new_viewer_gets_the_strides_before_it() -> None:
     assert message and json.loads(message)["strides"] == [{"index": 5}]
 
 
-@pytest.mark.parametrize(
-    "headers", [{}, {"X_Mudskipper": "go"}, {"X_Mudskipper": "stop", "Host": "evil.example:80"}], ids=str
-)
-def test_a_page_of_another_site_cannot_stop_the_robot(page: PageServer, headers: dict[str, str]) -> None:
+@pytest.fixture
+def open_page(short_folder: Path) -> Iterator[PageServer]:
+    server = PageServer("0.0.0.0", 0, short_folder / "no daemon", ["Robot.local"])
+    yield server
+    server.close()
+
+
+REACHES, REFUSED = 409, 403  # a stop without a daemon; one that does not reach it
+HOSTS = {  # Host of a request to a server on 0.0.0.0, what Origin differs from it by, and whether it is the own page
+    "address": ("127.0.0.1", None, True),
+    "0.0.0.0": ("0.0.0.0", None, True),
+    "localhost": ("localhost", None, True),
+    "configured name": ("robot.local", None, True),
+    "configured name in capitals": ("ROBOT.local", None, True),
+    "foreign host": ("evil.example", None, False),
+    "other address": ("192.0.2.1", None, False),
+    "no host": ("", None, False),
+    "malformed": ("[::1", None, False),
+    "foreign origin": ("127.0.0.1", "http://evil.example", False),
+    "origin null": ("127.0.0.1", "null", False),
+    "other port of this computer": ("127.0.0.1", "http://127.0.0.1:1", False),
+}
+
+
+@pytest.mark.parametrize(("host", "origin", "own"), HOSTS.values(), ids=HOSTS)
+def test_every_route_serves_the_own_page_alone(open_page: PageServer, host: str, origin: str | None, own: bool) -> None:
+    address = f"{host}:{open_page.port}" if host else ""
+    headers = {"Host": address, "Origin": origin or f"http://{address}"}
+    status, text = post(open_page, X_Mudskipper="stop", **headers)
+    assert status == (REACHES if own else REFUSED) and "torque unknown: cut motor power" in text
+    for path in ("/", "/rows"):
+        connection = HTTPConnection(ADDRESS, open_page.port, timeout=60)
+        connection.request("GET", path, headers=headers)
+        response = connection.getresponse()
+        assert (response.status == 200) == own and response.status in (200, REFUSED)
+        connection.close()
+
+
+@pytest.mark.parametrize("headers", [{}, {"X_Mudskipper": "go"}], ids=str)
+def test_a_stop_without_the_page_s_header_is_refused(page: PageServer, headers: dict[str, str]) -> None:
     status, text = post(page, **headers)
-    assert status == 403 and "only the page" in text
+    assert status == REFUSED and "torque unknown: cut motor power" in text
+
+
+def test_the_page_learns_whether_a_stop_would_reach_the_robot(
+    page: PageServer, configuration: Configuration, short_folder: Path
+) -> None:
+    assert post(page, path="/can_stop", X_Mudskipper="stop")[0] == REACHES
+    with ServedRobot(resting_robot(configuration)).served(short_folder / "no daemon"):
+        assert post(page, path="/can_stop", X_Mudskipper="stop") == (200, "ready")
 
 
 def test_a_stop_without_a_daemon_says_to_cut_the_power(page: PageServer) -> None:

@@ -11,7 +11,6 @@ from control.records import JOINTS
 from experiments.actuator.calibration import Calibration
 from experiments.actuator.friction import Loop
 from experiments.actuator.plan import Plan, Step
-from experiments.actuator.reading import MovedError
 from experiments.actuator.simulation import bench_configuration
 from experiments.robot.bench_errors import BenchError
 from experiments.study.notebook import Entry, Notebook
@@ -78,7 +77,7 @@ class ScriptedWeights:
 
 
 class ScriptedJoint:
-    """A HeldJoint that reads the hanging weight without an error; with a negative weight it never comes to rest."""
+    """A HeldJoint that reads the hanging weight without an error."""
 
     def __init__(self, robot: Any, joint: str) -> None:
         self.robot: ScriptedRobot = robot
@@ -86,8 +85,6 @@ class ScriptedJoint:
     def read(self) -> Entry:
         if self.robot.mode != "hold":
             raise BenchError(f"the robot no longer holds its pose: {self.robot.message}")
-        if self.robot.hanging_g < 0.0:
-            raise MovedError("the joint swings by 3.00 degrees")
         current_a = PLAN.torque_nm(self.robot.hanging_g) / TRUE_NM_A + 0.6
         return {"current_a": current_a, "rest_friction_a": 0.0, "angle_rad": 0.0}
 
@@ -129,7 +126,3 @@ class Case:
             return GO_ON
 
         return fail
-
-
-def say(answer: str) -> Callable[[], str]:
-    return lambda: answer

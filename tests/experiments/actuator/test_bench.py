@@ -10,8 +10,7 @@ import pytest
 
 from experiments.actuator.bench import FALLS, RobotBench
 from experiments.actuator.plan import Plan
-from experiments.robot.bench_errors import BenchError, DaemonLostError, RobotInUseError
-from experiments.robot.bench_robot import ALONE
+from experiments.robot.bench_errors import BenchError, RobotInUseError
 from experiments.study.session import Session
 from tests.experiments.still_robot import StillRobot
 from tests.scripted_operator import ScriptedOperator
@@ -80,26 +79,12 @@ def test_a_second_ctrl_c_switches_the_torque_off_at_once(tmp_path: Path) -> None
     assert robot.mode == "idle" and robot.closed
 
 
-def test_an_idle_robot_makes_no_prompt(tmp_path: Path) -> None:
-    robot, operator = HoldingRobot(), ScriptedOperator()
-    robot.mode = "idle"
-    bench_of(robot, operator, tmp_path).leave()
-    assert not operator.asked and robot.closed
-
-
 def test_the_torque_of_a_robot_that_was_taken_over_stays_on(tmp_path: Path) -> None:
     robot, operator = HoldingRobot(RobotInUseError("taken over: uid 1")), ScriptedOperator()
     with pytest.raises(RobotInUseError):
         bench_of(robot, operator, tmp_path).leave()
     assert not operator.asked and robot.mode == "hold" and robot.closed
     assert operator.reported == ["another program operates the robot now: it is left as it is"]
-
-
-def test_a_lost_daemon_is_reported_once(tmp_path: Path) -> None:
-    robot, operator = HoldingRobot(DaemonLostError("the daemon is gone")), ScriptedOperator()
-    with pytest.raises(DaemonLostError):
-        bench_of(robot, operator, tmp_path).leave()
-    assert operator.reported == [ALONE] and not operator.asked
 
 
 def test_torque_goes_off_and_the_operator_is_warned_before_a_joint_is_mounted(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.actuator.mismatch import find_mismatch
-from experiments.actuator.plan import PAPER_WEIGHTS_G, Plan, Step
+from experiments.actuator.plan import Plan, Step
 from tests.experiments.actuator.test_fit import TARE_A, TRUE_NM_A, Entries, make_entries
 
 PLAN = Plan(("right_sweep",), trials=2)
@@ -24,24 +24,19 @@ def before(step: Step, sign: float = 1.0) -> Entries:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("trial", [1, 2])
-@pytest.mark.parametrize("weight_g", [*PAPER_WEIGHTS_G[::3], 0.0])
-def test_the_weight_that_was_asked_for_matches(weight_g: float, trial: int, sign: float) -> None:
+@pytest.mark.parametrize(("trial", "weight_g"), [(1, 10.0), (1, 800.0), (2, 100.0), (2, 0.0)])
+def test_the_weight_that_was_asked_for_matches(trial: int, weight_g: float, sign: float) -> None:
     step = Step(trial, weight_g)
     assert find_mismatch(PLAN, before(step, sign), step, current_a(weight_g, sign), CONFIGURED_NM_A) is None
 
 
-@pytest.mark.parametrize("trial", [1, 2])
-@pytest.mark.parametrize("other_g", PAPER_WEIGHTS_G[::2])
-@pytest.mark.parametrize("weight_g", PAPER_WEIGHTS_G[1::2])
-def test_another_weight_of_the_list_is_named(weight_g: float, other_g: float, trial: int) -> None:
-    if {weight_g, other_g} == {10.0, 20.0}:
-        return  # friction may be as large as the difference
-    step = Step(trial, weight_g)
-    mismatch = find_mismatch(PLAN, before(step), step, current_a(other_g), CONFIGURED_NM_A)
-    assert mismatch is not None
-    if other_g > 0.4 * weight_g:
-        assert mismatch.other_g == other_g and f"that is {other_g:g} g rather than {weight_g:g} g" in mismatch.message
+@pytest.mark.parametrize(
+    ("trial", "asked_g", "hung_g"), [(1, 20.0, 50.0), (1, 400.0, 600.0), (2, 100.0, 50.0), (2, 800.0, 600.0)]
+)
+def test_another_weight_of_the_list_is_named(trial: int, asked_g: float, hung_g: float) -> None:
+    step = Step(trial, asked_g)
+    mismatch = find_mismatch(PLAN, before(step), step, current_a(hung_g), CONFIGURED_NM_A)
+    assert mismatch is not None and mismatch.other_g == hung_g
 
 
 def test_a_weight_at_another_lever_matches_nothing() -> None:

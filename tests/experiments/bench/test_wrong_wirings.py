@@ -166,10 +166,6 @@ WRONG = (
     Wrong("watchdog off", lambda c: with_drive(c, "right_sweep", watchdog_s=0.0), "wiring", "enable_watchdog"),
     Wrong("slow watchdog", lambda c: with_drive(c, "right_sweep", watchdog_s=0.5), "wiring", "watchdog_timeout = 0.1"),
     Wrong("node ids", lambda c: swapped(c, "left_sweep", "left_adduction"), "signs", "exchange the node ids"),
-    Wrong("sweeps", lambda c: swapped(c, "left_sweep", "right_sweep"), "signs", "exchange the node ids"),
-    Wrong(
-        "sweep's sign", lambda c: SimulatedRig(c, built(c, left_sweep={"sign": -1})), "signs", "drive.left_sweep.sign"
-    ),
     Wrong(
         "adduction's sign",
         lambda c: SimulatedRig(c, built(c, left_adduction={"sign": 1})),
@@ -218,13 +214,6 @@ WRONG = (
         "watchdogs",
         "right_adduction: idle among requests of the position",
         "watchdogs",
-    ),
-    Wrong(
-        "firmware 0.5, watchdog off",
-        lambda _: of_firmware05(watchdog_s=0.0),
-        "wiring",
-        "left_sweep: watchdog is 0 s",
-        "wiring",
     ),
     Wrong("firmware 0.5 instead of 0.6", lambda _: of_firmware05(configured=False), "wiring", "left_sweep", "wiring"),
     Wrong("firmware 0.6 instead of 0.5", lambda _: of_firmware05(built=False), "wiring", "it is 0.6.11", "wiring"),

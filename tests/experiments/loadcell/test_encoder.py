@@ -8,14 +8,13 @@ from typing import Any
 
 import pytest
 
-from experiments.loadcell.analysis import bench_uncertainty
-from experiments.loadcell.preparation import CellSettings, examine_encoder
-from experiments.loadcell.recording import RAW, load_counted
+from experiments.loadcell.preparation import examine_encoder
+from experiments.loadcell.recording import load_counted
 from experiments.loadcell.trials import KEEP, WITHOUT
 from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON
 from simulation.test_rig.emulated_instruments import EmulatedStageEncoder, StageEncoderParameters
-from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Laboratory, Make, laboratories
+from tests.experiments.loadcell.loadcell_bench import SETTINGS, Laboratory, Make, laboratories
 from tests.scripted_operator import ScriptedOperator
 
 
@@ -39,20 +38,6 @@ def counter_of(laboratory: Laboratory) -> EmulatedStageEncoder:
 def examine(laboratory: Laboratory) -> None:
     laboratory.recorder.listen(2.0)
     examine_encoder(laboratory.recorder, SETTINGS)
-
-
-def test_the_known_coefficients_are_found_on_a_manual_stage(make: Make) -> None:
-    laboratory = make(trials=2, seed=4)
-    laboratory.measure(CellSettings(scale_n=1.0 / 42000.0))
-    results = laboratory.evaluate_muds()
-    reported = results.muds["lawful"]
-    assert {name: each.value for name, each in reported.items()} == {
-        name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
-    }
-    assert all(trial.is_measured for trial in results.trials) and results.remarks == []
-    no_ruler = bench_uncertainty("k_p", SETTINGS, 0.0, 0.0) * reported["k_p"].value
-    assert reported["k_p"].shared_error == pytest.approx(no_ruler)
-    assert len(list((laboratory.folder / RAW).glob("*_position.csv"))) == 4
 
 
 def test_an_encoder_unplugged_in_a_trial_costs_its_positions_and_no_force(make: Make) -> None:

@@ -18,7 +18,7 @@ from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
 from simulation.test_rig.plate_stage import StageParameters
-from tests.experiments.loadcell.loadcell_bench import KNOWN, SETTINGS, Make, laboratories
+from tests.experiments.loadcell.loadcell_bench import SETTINGS, Make, laboratories
 from tests.scripted_operator import ScriptedOperator
 
 
@@ -38,18 +38,6 @@ class Idle(SimulatedStage):
     def start(self, trial: Trial) -> None: ...
 
     def lift(self) -> None: ...
-
-
-def test_calibrated_with_two_weights_the_known_coefficients_come_out(make: Make) -> None:
-    laboratory = make(trials=3, seed=4)
-    laboratory.measure()
-    reported = laboratory.evaluate_muds().muds["lawful"]
-    assert {name: each.value for name, each in reported.items()} == {
-        name: pytest.approx(value, rel=0.03) for name, value in KNOWN.items()
-    }
-    assert [len(each.trials) for each in reported.values()] == [3, 3, 3]
-    assert laboratory.port.calibration.per_newton == pytest.approx(42000.0, rel=0.002)
-    assert len(list((laboratory.folder / RAW).iterdir())) == 6
 
 
 def test_an_amplifier_that_averages_four_samples_is_reported_once(make: Make) -> None:

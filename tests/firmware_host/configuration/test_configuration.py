@@ -337,3 +337,35 @@ def test_a_slow_extraction_right_after_the_stance_is_warned_of(example_text: str
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_no_protocol_is_warned_of(example_text: str, protocol: str) -> None:
     assert parse_configuration(example_text.replace('"walking"', f'"{protocol}"')).warnings == ()
+
+
+WEAK = {  # a section with a bound beyond twice its default, and the refusal without a reason
+    "faults": ("silence_s = 2.0", "faults.silence_s = 2.0: must be at most 0.0526"),
+    "faults watchdog": ("longest_watchdog_s = 10.0", "faults.longest_watchdog_s = 10.0: must be at most 0.6"),
+    "limits": ("adduction_min_deg = -180.0", "limits.adduction_min_deg = -180.0: must be at least -150"),
+    "limits margin": ("position_margin_deg = 90.0", "limits.position_margin_deg = 90.0: must be at most 20"),
+    "motion": ("longest_hold_s = 0.0", "motion.longest_hold_s = 0.0: must be more than 0 and at most 1200"),
+}
+
+
+@pytest.mark.parametrize("case", WEAK)
+def test_weak_protection_needs_a_reason_and_is_shown(case: str, tmp_path: Path, capsys: Capture) -> None:
+    given, refusal = WEAK[case]
+    path, text = tmp_path / "mudskipper.toml", f"{minimal_text()}\n[{case.split()[0]}]\n{given}\n[safety]\nweakened = "
+    for no_reason in ('""', '" "'):
+        path.write_text(text + no_reason, encoding="utf-8")
+        assert main(["--config", str(path), "--check-config"]) == 78
+        assert f"{refusal}, twice its default, or [safety] weakened" in capsys.readouterr().err
+    path.write_text(f'{text}"a bench in air"', encoding="utf-8")
+    assert main(["--config", str(path), "--check-config"]) == 0
+    shown = f"protection is weakened (a bench in air): {case.split()[0]}.{given}"
+    assert capsys.readouterr().err == f"mudskipperd: warning: {shown}\n"
+    assert load_configuration(path).warnings == (shown,)
+
+
+@pytest.mark.parametrize("reason", ["a robot", "a\\u001bb", "x" * 201])
+def test_a_reason_without_weak_protection_or_that_cannot_be_shown_is_refused(reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "mudskipper.toml"
+    path.write_text(f'{minimal_text()}\n[safety]\nweakened = "{reason}"', encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="safety.weakened = .*: must be"):
+        load_configuration(path)

@@ -28,10 +28,15 @@ class Bench:
         self.reported: list[tuple[float, str, bool]] = []  # time, text, and whether a failure was active
         self.failures = failures
         self.failing_at_disarm: list[str] = []
-        self.methods = with_failures(self._plain(), failures, self._report, lambda: self.now_s)
+        self.holder = MIA
+        self.methods = with_failures(self._plain(), failures, self._report, lambda: self.now_s, self._require_holder)
 
     def _plain(self) -> Methods:
         return {"status": self._status, "disarm": self._disarm}
+
+    def _require_holder(self, caller: Caller) -> None:
+        if caller != self.holder:
+            raise RefusedError("not yours")
 
     def _status(self, params: dict[str, Any], caller: Caller) -> dict[str, Any]:
         return {"warnings": ["hot"], "mode": "idle"}
@@ -50,6 +55,13 @@ class Bench:
 @pytest.fixture
 def bench() -> Bench:
     return Bench(Failures(("left", "right")))
+
+
+def test_nothing_fails_for_an_operator_while_another_one_holds_the_lease(bench: Bench) -> None:
+    bench.holder = MIA._replace(connection=2)
+    with pytest.raises(RefusedError, match="not yours"):
+        bench.fail("log", "off")
+    assert bench.reported == []
 
 
 def test_a_failure_is_bounded_and_reported_before_it_begins(bench: Bench) -> None:

@@ -1,6 +1,7 @@
 """Rows reach every subscriber; a slow subscriber loses only its own rows and is informed of their number."""
 
 import os
+import socket
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,7 +13,7 @@ from firmware_host.log.row_stream import PACKET_BYTES, RowStream, packets
 from firmware_host.log.rows import EVENT, EVENT_KIND, TICK, TICK_KIND
 from firmware_host.sockets.rights import Group, Peer, Rights
 from operator_client.live_rows import LiveRows
-from operator_client.status_client import NotPermittedError
+from operator_client.status_client import NoDaemonError, NotPermittedError
 
 OWN = Rights(Group("own", os.getegid()), Group("own", os.getegid()), os.geteuid())
 RIGHTS_OF_OTHERS = Rights(Group("readers", 77777), Group("operators", 77778), 77779)
@@ -82,6 +83,26 @@ def test_a_subscriber_that_leaves_costs_the_others_nothing(stream: RowStream, pa
     stream.publish([tick(1)])
     stream.publish([tick(2)])
     assert received(staying) == [1, 2]
+
+
+def test_silent_readers_leave_places_for_operators_and_one_too_many_is_refused_in_words(path: Path) -> None:
+    uids = iter([65001] * 7 + [65000] * 3)  # readers, then operators
+    rights = Rights(Group("readers", 65001), Group("operators", 65000), 1)
+
+    def next_peer(connection: socket.socket) -> Peer:
+        uid = next(uids)
+        return Peer(1, uid, frozenset({uid}))
+
+    stream = RowStream(path, rights, {"robot": "test"}, peer_of=next_peer)
+    places = [subscribe(stream, path) for _ in range(6)]
+    with pytest.raises(NoDaemonError, match="all 6 places for the level read are taken"):
+        subscribe(stream, path)
+    places += [subscribe(stream, path) for _ in range(2)]
+    with pytest.raises(NoDaemonError, match="all 8 places for the level drive are taken"):
+        subscribe(stream, path)
+    stream.publish([tick(1)])
+    assert received(places[-1]) == [1]
+    stream.close()
 
 
 def test_a_user_without_the_right_to_read_is_refused_with_the_reason(path: Path) -> None:

@@ -51,7 +51,9 @@ def methods(configuration: Configuration) -> Methods:
     robot.loop.faults.update(every_fault(), energised=False)
     calls = OperatorCalls(robot.loop, ["a warning about the operating system"] * 4, lambda: robot.now_s)
     failures = Failures(configuration.bus)
-    return with_failures(calls.methods, failures, lambda now_s, text: None, lambda: robot.now_s)
+    return with_failures(
+        calls.methods, failures, lambda now_s, text: None, lambda: robot.now_s, calls.require_own_robot
+    )
 
 
 def answer(methods: Methods, name: str) -> Any:

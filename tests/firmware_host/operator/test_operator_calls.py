@@ -127,6 +127,15 @@ def test_a_lease_that_ends_with_torque_off_does_not_block_arming(robot: Robot, e
     assert robot.ask("status")["mode"] == "hold"
 
 
+def test_an_operator_resets_no_timing_while_another_user_holds_the_lease(armed: Robot) -> None:
+    armed.ask("lease", for_s=0.5)
+    with pytest.raises(RefusedError, match="uid 1000 .* operates the robot"):
+        armed.ask("reset_timing", BEN)
+    assert armed.ask("reset_timing") == "accepted"  # the user's own second program may
+    armed.ask("release")
+    assert armed.ask("reset_timing", BEN) == "accepted"
+
+
 MOTIONS: list[tuple[str, dict[str, Any]]] = [("walk", {"strides": 1}), ("move", {"left_sweep_rad": 0.1})]
 
 

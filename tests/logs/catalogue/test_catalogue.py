@@ -116,6 +116,13 @@ def test_a_catalogue_of_a_newer_version_is_refused_and_left(folder: Path) -> Non
     assert path.read_bytes() == before
 
 
+def test_a_catalogue_whose_version_is_no_number_of_ours_is_made_again(folder: Path) -> None:
+    known = updated(folder)
+    version, path = "9" * 5000, catalogue_path(folder)
+    duckdb.execute(f"COPY (SELECT 1 AS x) TO '{path}' (FORMAT parquet, KV_METADATA {{{VERSION_KEY}: '{version}'}})")
+    assert updated(folder) == known
+
+
 @pytest.mark.parametrize("contents", [b"", b"PAR1 garbage PAR1"])
 def test_a_damaged_catalogue_is_made_again(folder: Path, contents: bytes) -> None:
     known = updated(folder)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import random
+import struct
 from pathlib import Path
 from typing import Any
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
@@ -221,6 +225,41 @@ def test_channels_of_others_are_passed_over(tmp_path: Path) -> None:
 def test_a_log_that_a_tool_has_compressed_again_is_read(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "zstd.mcap", [make_tick(0)], compression=CompressionType.ZSTD)
     assert len(read_log(path).ticks) == 1
+
+
+MIB = 1024 * 1024
+BOMBS = {  # compression, sizes of the chunks, what the refusal says
+    "lz4, 16 MiB in 69 kB": ("lz4", [16 * MIB], "a chunk of .* cannot hold 16777216, at most 8388608"),
+    "zstd, 16 MiB": ("zstd", [16 * MIB], "a chunk of .* cannot hold 16777216"),
+    "lz4, chunks that are each allowed": ("lz4", [3 * MIB // 9 * 9] * 20, "expand to more than .* 32 times its size"),
+}
+
+
+@pytest.mark.parametrize(("compression", "sizes", "refusal"), BOMBS.values(), ids=BOMBS)
+def test_a_log_that_expands_without_bound_is_refused_at_once(
+    compression: str, sizes: list[int], refusal: str, tmp_path: Path
+) -> None:
+    path, contents = tmp_path / "bomb.mcap", bytearray(MCAP0_MAGIC)
+    for size in sizes:
+        contents += chunk_of_zeros(size, compression)
+    path.write_bytes(contents + MCAP0_MAGIC)
+    with pytest.raises(LogError, match=refusal):
+        read_log(path)
+
+
+def test_a_chunk_is_not_opened_beyond_the_size_that_it_states(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(MCAP0_MAGIC + chunk_of_zeros(256 * MIB, "zstd", stated=1000) + MCAP0_MAGIC)
+    with pytest.raises(LogError, match="a chunk of 1000 bytes holds 1001"):
+        read_log(path)
+
+
+def chunk_of_zeros(size: int, compression: str, stated: int = 0) -> bytes:
+    """Return a chunk's record without a checksum."""
+    compress = lz4.frame.compress if compression == "lz4" else zstandard.compress
+    name, stored = compression.encode(), compress(bytes(size))
+    head = struct.pack(f"<QQQII{len(name)}sQ", 0, 0, stated or size, 0, len(name), name, len(stored))
+    return struct.pack("<BQ", Opcode.CHUNK, len(head) + len(stored)) + head + stored
 
 
 def test_a_log_read_from_a_moment_on_holds_all_that_came_after(path: Path) -> None:

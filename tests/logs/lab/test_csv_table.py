@@ -122,6 +122,13 @@ FORMS: dict[str, Callable[[str], bytes]] = {
 }
 
 
+def test_a_compressed_file_that_expands_without_bound_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.csv.gz"
+    path.write_bytes(gzip.compress(bytes(64 * 1024 * 1024)))
+    with pytest.raises(LogError, match="bytes expand to more than .* 32 times its size"):
+        read_table(path, WANTED)
+
+
 @pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 @pytest.mark.parametrize("name", ["run.csv", "run.csv.gz"])
 def test_the_form_of_the_file_changes_nothing(form: Callable[[str], bytes], name: str, tmp_path: Path) -> None:
