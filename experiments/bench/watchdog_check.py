@@ -106,7 +106,11 @@ def _observed_readings(test_rig: TestRig, when: str, advice: str, others: Others
         idle_s = next((sample.tick.now_s - pressed[-1].tick.now_s for sample in first_idle), nan)
         yield Reading(f"{joint}: idle {when}", idle_s, "s", earliest_s, latest_s, todo)
         if "adduction" in joint and not others:
-            seen_s, latest_s = _gone_s(pressed, silence, index), latest_s if drive.holds_idle_current else gone_s
+            flowed_a = fsum(sample.states[index].current_a for sample in pressed[-40:]) / 40.0
+            low = [sample.states[index].current_a / flowed_a < GONE_FRACTION for sample in silence]
+            first = first_lasting(low, GONE_TICKS)
+            seen_s = nan if first is None else silence[first].tick.now_s - pressed[-1].tick.now_s
+            latest_s = latest_s if drive.holds_idle_current else gone_s
             yield Reading(f"{joint}: no current after it", seen_s, "s", earliest_s, latest_s, todo)
 
 
@@ -169,14 +173,6 @@ def clear(test_rig: TestRig) -> Sequence[DriveHealth]:
     reported = test_rig.drives.health
     test_rig.clear_fault()
     return reported
-
-
-def _gone_s(pressed: list[Sample], silence: list[Sample], index: int) -> float:
-    """Return the time until the current stays below half of its earlier value."""
-    flowed_a = fsum(sample.states[index].current_a for sample in pressed[-40:]) / 40.0
-    low = [sample.states[index].current_a / flowed_a < GONE_FRACTION for sample in silence]
-    first = first_lasting(low, GONE_TICKS)
-    return nan if first is None else silence[first].tick.now_s - pressed[-1].tick.now_s
 
 
 def _reasons(test_rig: TestRig) -> Readings:

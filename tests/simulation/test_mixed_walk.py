@@ -75,7 +75,7 @@ def test_drives_whose_watchdog_cannot_be_read_are_armed_by_force_only() -> None:
     robot.run_for(1.0)
     assert {fault.kind for fault in robot.loop.faults.blocking()} == {FaultKind.WATCHDOG_UNKNOWN}
     assert robot.loop.request(Request.ARM, robot.now_s) is not None
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is None
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 3.0) and robot.loop.forced
     robot.run_for(0.5)
     assert robot.loop.mode is Mode.HOLD and robot.loop.drives.refused_commands == 0
@@ -97,7 +97,7 @@ def test_drives_whose_watchdog_is_proven_are_armed_without_force() -> None:
 def test_a_drive_with_the_ranges_of_another_model_is_not_armed_by_force_either() -> None:
     robot = robot_with(with_drive_type(EXAMPLE, "mit"), model="DM4340")
     robot.run_for(1.0)
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
     assert robot.loop.mode is Mode.IDLE
     assert {fault.kind for fault in robot.loop.faults.blocking()} == {FaultKind.DRIVE_SETTINGS}
 
