@@ -47,10 +47,13 @@ class FaultLatch:
         """Ticks since a present fault was detected first."""
         return self._tick - self._present[fault.name, fault.subject].first_tick
 
-    def blocking(self, forced: bool = False) -> list[Fault]:
-        """The present faults that block arming."""
-        least = Blocks.ALWAYS if forced else Blocks.UNLESS_FORCED
-        return [each.fault for each in self._present.values() if each.fault.kind.blocks >= least]
+    def blocking(self, forced: str = "") -> list[Fault]:
+        """The present faults that block arming; `forced`: the name of the one kind that an operator overrules."""
+        return [
+            fault
+            for fault in self.present
+            if fault.kind.blocks is Blocks.ALWAYS or fault.kind.blocks is Blocks.UNLESS_FORCED and fault.name != forced
+        ]
 
     def update(self, present: Sequence[Fault], energised: bool, clearing: bool = False, ticks: int = 1) -> None:
         """Take in all faults that this tick detects, `ticks` after the last update."""

@@ -211,7 +211,7 @@ class FaultKind(StrEnum):
     WATCHDOG_UNKNOWN = (
         "watchdog_unknown", "watchdog", NONE, UNLESS_FORCED, WHEN_GONE, 2,
         "A drive's watchdog is unknown.", "The {subject} drive's watchdog is unknown.",
-        f"{SET_UP}, or arm with --force",
+        f"{SET_UP}, or arm with --force watchdog_unknown",
     )
     WATCHDOG_OFF = (
         "watchdog_off", "watchdog", NONE, ALWAYS, WHEN_GONE, 2,
@@ -280,6 +280,11 @@ class FaultKind(StrEnum):
         "A joint gains energy that its motor was not commanded to give.",
         "The {subject} joint gained {energy_j:.2f} J without a command; the limit is {limit_j:.2f} J.", DISOBEYS,
     )
+    JOINT_DRIVEN_BACK = (
+        "joint_driven_back", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 230,
+        "A joint moves against a large torque for 0.4 s.",
+        "The {subject} joint moves against its motor's torque, as at an end stop while its encoder slips.", ENCODER,
+    )
     JOINT_OSCILLATING = (
         "joint_oscillating", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 120,
         "A joint keeps moving away from its commanded path.",
@@ -307,6 +312,18 @@ class FaultKind(StrEnum):
         "encoder_stuck", "joint", DAMPING, ALWAYS, BY_HAND, 120,
         "A position stands still while joint or torque change.",
         "The {subject} encoder stands still while the joint moves or its torque changes.", ENCODER,
+    )
+    ENCODER_SLIPS = (
+        "encoder_slips", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 1500,
+        "A position drifts away from the integral of its speed.",
+        "The {subject} angle drifted by {slipped_rad:+.2f} rad that its speed does not explain.",
+        "check magnet, belt and range of velocity, calibrate the zero, then 'mudskipper clear'",
+    )
+    SPEED_WRONG = (
+        "speed_wrong", "joint", SOFT_STOP, ALWAYS, BY_HAND, 1900,
+        "A reported speed is not the rate of change of its position.",
+        "The {subject} drive's speed is {factor:.2f} times the rate of change of its angle.",
+        "check the drive's model and range of velocity in [drive.JOINT], then 'mudskipper clear'",
     )
     TORQUE_MISSING = (
         "torque_missing", "joint", SOFT_STOP, ALWAYS, BY_HAND, 45,
@@ -471,3 +488,6 @@ class Fault(NamedTuple):
 
 
 FAULT_KINDS: dict[str, FaultKind] = {kind.value: kind for kind in FaultKind}
+
+
+OVERRULED_BY_FORCE = tuple(kind.value for kind in FaultKind if kind.blocks is Blocks.UNLESS_FORCED)

@@ -56,6 +56,11 @@ class DriveParameters:
         """Return whether its protocol can read the drive's watchdog, version and serial number back."""
         return True
 
+    @property
+    def knows_watchdog(self) -> bool:
+        """Return whether the drive reports its watchdog, or a trial of it is recorded."""
+        return self.reports_settings
+
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         """Yield reasons why this drive cannot exert `torque_nm`: the key with its value, and what it must be."""
         if self.current_limit_a < torque_nm / self.torque_constant_nm_a:
@@ -74,6 +79,19 @@ class WatchdogEndpoints:
     hardware: Annotated[str, Meaning("product line, version and variant, such as 4.4.58")]
     enable: Annotated[int, Bounds(1, 65535), Meaning("number of the flag that enables the watchdog", "parameter id")]
     timeout: Annotated[int, Bounds(1, 65535), Meaning("number of the watchdog's time-out", "parameter id")]
+
+
+@dataclass(frozen=True)
+class ProvenWatchdog:
+    """What the bench has proven of a drive that cannot report its watchdog, and of which drive."""
+
+    watchdog_s: Annotated[
+        float, Bounds(0.0, 10.0), Meaning("silence after which its torque was gone; 0: not proven")
+    ] = 0.0
+    bus: Annotated[str, Meaning("of the drive that was tried")] = ""
+    node_id: Annotated[int, Bounds(0, 127), Meaning("of the drive that was tried", "id")] = 0
+    model: Annotated[str, Meaning("of the drive that was tried")] = ""
+    date: Annotated[str, Meaning("of the trial, such as 2026-11-24")] = ""
 
 
 class DriveHealth(NamedTuple):

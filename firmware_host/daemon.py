@@ -181,6 +181,8 @@ def _run_loop(
 ) -> int:
     watchdog, ticker = WatchdogFeed(notifier), Ticker()
     wait = ticker.wait if failures is None else FailingTicker(ticker, failures, loop.events.report).wait
+    if repairing := loop.recorder.report().repairing:
+        print(f"mudskipperd: repairing {repairing} logs that earlier runs did not finish; see 'status'", flush=True)
     notifier.send("READY=1", "STATUS=running")
     print(f"mudskipperd: ready, operated by 'mudskipper' through {status.path}", flush=True)
     now_s = time.monotonic()

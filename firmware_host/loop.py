@@ -13,7 +13,7 @@ from control.controller import RESTING, Controller, WalkOrder
 from control.depth.gait_choice import quickest
 from control.fault_causes import AgedFault
 from control.fault_latch import FaultLatch
-from control.faults import Fault, Reaction
+from control.faults import OVERRULED_BY_FORCE, Fault, Reaction
 from control.gait.recovery import Recovery
 from control.limits import LimitedTorques, apply_limits
 from control.modes import ENERGISED, MOVING, Health, Mode, Request, next_mode, refusal
@@ -68,7 +68,7 @@ class Loop:
         self.health = Health()
         self.missed_ticks = 0  # since the start
         self.ending = False  # the daemon is about to end: nothing is armed any more
-        self.forced = False  # armed by force against a present fault
+        self.forced = ""  # the kind of fault against which the robot was armed by force
         self.pending_request = Request.NONE  # for the next tick
         self._clearing_until_s = NEVER_S
         self._mode_since_s = 0.0
@@ -87,7 +87,7 @@ class Loop:
         self.learning.adapt(self.controller)
         self.health = self._examine(tick, self._end_lost_lease(now_s))
         self._enter(next_mode(self.mode, self._pop_request(), self.health), now_s)
-        self.forced = self.forced and self.mode in ENERGISED
+        self.forced = self.forced if self.mode in ENERGISED else ""
         if self.fault and self.controller.moving:
             self._end_move(now_s, self.fault.message)
         self.sent = self._limit(self._control(tick.missed))
@@ -248,7 +248,7 @@ class Loop:
         self.timing.update(tick.now_s, tick.late_s, tick.missed, tick_s)
 
     def request(
-        self, request: Request, now_s: float, order: WalkOrder | None = None, forced: bool = False, by: str = ""
+        self, request: Request, now_s: float, order: WalkOrder | None = None, forced: str = "", by: str = ""
     ) -> str | None:
         """Accept an operator's request for the next tick, or return why it is refused."""
         refused = self._refusal(request, order, forced)
@@ -265,9 +265,9 @@ class Loop:
             self.drives.clear_errors()
             self._clearing_until_s = now_s + CLEARING_S
         elif request is Request.ARM:
-            overruled = self.faults.blocking() if forced else []
+            overruled = [fault for fault in self.faults.blocking() if fault.name == forced]
             self.events.report_overruled(now_s, overruled)
-            self.forced = bool(overruled)
+            self.forced = forced if overruled else ""
         if order is not None:
             self.controller.order = order
         if self.pending_request is not Request.DISARM:  # no later request replaces it
@@ -281,9 +281,11 @@ class Loop:
         self.events.notice = ""
         self.controller.move([angles_rad.get(joint) for joint in self.configuration.rig.joints])
 
-    def _refusal(self, request: Request, order: WalkOrder | None, forced: bool) -> str | None:
+    def _refusal(self, request: Request, order: WalkOrder | None, forced: str) -> str | None:
         if self.ending and request in (Request.ARM, Request.WALK):
             return "the daemon is ending"
+        if forced and forced not in OVERRULED_BY_FORCE:
+            return f"force = {forced!r}: must be one of {', '.join(OVERRULED_BY_FORCE)}"
         deepest_m = self.configuration.geometry.deepest_m(self.configuration.gait.sweep_angle_deg)
         if order is not None and not 0.0 < order.depth_m <= deepest_m:
             return f"depth {100.0 * order.depth_m:g} cm: out of the flippers' reach over the sweep"

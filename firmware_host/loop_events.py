@@ -73,9 +73,10 @@ class LoopEvents:
         for fault in over:
             self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
 
-    def report_request(self, now_s: float, request: Request, forced: bool, by: str, changes: bool) -> None:
+    def report_request(self, now_s: float, request: Request, forced: str, by: str, changes: bool) -> None:
         """Log a request with its sender, unless it changes nothing or was logged just now."""
-        text = f"request {request.name.lower()}{' by force' if forced else ''}{f' by {by}' if by else ''}"
+        force = f" by force against {forced}" if forced else ""
+        text = f"request {request.name.lower()}{force}{f' by {by}' if by else ''}"
         message = self.requests.update(text, changes, now_s)
         if message:
             self.report(now_s, message)

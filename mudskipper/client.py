@@ -66,8 +66,8 @@ class Client:
             pieces += page
         return pieces
 
-    def arm(self, force: bool = False) -> None:
-        """Energise the joints; `force` overrules the faults that are not mandatory."""
+    def arm(self, force: str = "") -> None:
+        """Energise the joints; `force` names the one kind of fault to overrule, such as watchdog_unknown."""
         self._move("arm", force=force)
 
     def walk(self, strides: int = 0, depth_m: float | None = None) -> None:

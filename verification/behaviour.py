@@ -50,7 +50,7 @@ QUERIES = ("hello", "status", "check", "map", "strides")
 REFUSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("walk", {"strides": 3}),
     ("move", {"left_sweep_rad": 0.1}),
-    ("arm", {"force": "x"}),
+    ("arm", {"force": 1}),
     ("walk", {"depth_m": 9.0}),
     ("walk", {"strides": -1}),
     ("lease", {"for_s": 99}),

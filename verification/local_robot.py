@@ -54,7 +54,8 @@ class LocalRobot:
         text = self.configuration.read_text(encoding="utf-8")
         text = with_drive_type(text.replace("[log]\n", f"[log]\n{log_lines}"), drive, watchdog_s=WATCHDOG_S)
         self.configuration.write_text(text, encoding="utf-8")
-        self.forced = not all(each.reports_settings for each in parse_configuration(text).drive.values())
+        known = all(each.knows_watchdog for each in parse_configuration(text).drive.values())
+        self.forced = "" if known else "watchdog_unknown"
         self._processes: list[subprocess.Popen[bytes]] = []
         self._start(robot)
 
@@ -101,7 +102,7 @@ class LocalRobot:
         def is_decided() -> bool:
             report.update(self.call("status"))
             fault = report["fault"] and report["fault"]["name"]
-            ready = report["mode"] != "idle" or fault is None or self.forced and fault == "watchdog_unknown"
+            ready = report["mode"] != "idle" or fault is None or fault == self.forced
             return ready and bool({report["mode"], report["phase"]} & {mode_or_phase, "fault", "damping"})
 
         return wait_for(is_decided) and mode_or_phase in (report["mode"], report["phase"])

@@ -52,7 +52,7 @@ def arm(
     *,
     socket: Socket,
     json: Json = False,
-    force: Annotated[bool, Option("overrule failed checks that are not mandatory")] = False,
+    force: Annotated[str, Option("overrule this one check, such as watchdog_unknown", metavar="CHECK")] = "",
     take_over: TakeOver = False,
 ) -> int:
     return _change_mode("arm", "hold", socket, json, {"force": force, "take_over": take_over})
@@ -201,7 +201,7 @@ def _check_text(item: dict[str, Any], following: list[str]) -> str:
     if following:
         lines.append(f"       and from the same cause: {', '.join(following)}")
     if item["fix"] and not item["ok"]:
-        overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force'"
+        overruled = "" if item.get("mandatory", True) else "; or overrule it with 'mudskipper arm --force CHECK'"
         lines.append(f"       -> {item['fix']}{overruled}")
     return "\n".join(lines)
 
@@ -218,7 +218,7 @@ def status_text(report: dict[str, Any]) -> str:
         lines.append(f"the lease is held by {report['lease']} for {number(report['lease_left_s'], 1)} s more")
     notices = [report["notice"]] if report["notice"] else []
     if report["forced"]:
-        notices.append("armed by 'mudskipper arm --force' against failed checks: see 'mudskipper check'")
+        notices.append("armed by 'mudskipper arm --force' against a failed check: see 'mudskipper check'")
     if report["pose"]["trouble"]:
         notices.append(f"{report['pose']['trouble']} 'mudskipper check' says what to do")
     lines += [coloured(f"warning: {warning}", YELLOW) for warning in notices + report["warnings"]]
@@ -278,6 +278,8 @@ def _loop_text(report: dict[str, Any]) -> str:
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
             f"pose   {poses if pose['source'] else 'none'}",
-            f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped",
+            f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped"
+            + (f", safe up to {number(log['durable_age_s'], 1)} s ago" if log.get("durable_age_s") else "")
+            + (f", repairing {counted(log['repairing'], 'earlier log')}" if log.get("repairing") else ""),
         )
     )

@@ -1,4 +1,4 @@
-"""Detects an encoder that fails: angles that jump, and angles that freeze while the joint moves.
+"""Detects an encoder that fails: angles that jump, freeze while the joint moves, or slip (speed_monitor.py).
 
 Between two messages the angle must change by the mean of the two reported velocities times the interval, and the angle
 must follow the integral of the velocity. A slipping magnet or a broken cable violates the first condition, a frozen
@@ -11,6 +11,7 @@ half a step of a 14-bit encoder at 1000 N·m/rad, ten times the stiffness of the
 from math import degrees, inf
 
 from control.faults import Fault, FaultKind
+from control.monitors.speed_monitor import SpeedMonitor
 from control.records import NEVER_S, UNKNOWN, DriveState
 
 MOVED_RAD = 0.03  # integral of the velocity while the angle stays the same to the last bit
@@ -28,11 +29,13 @@ class EncoderMonitor:
     def __init__(self, joint: str, jump_rad: float) -> None:
         self._joint = joint
         self._jump_rad = jump_rad
+        self._speed = SpeedMonitor(joint)
         self.reset()
 
     def reset(self) -> None:
         self._angle_rad, self._velocity_rad_s, self._stamp_s = UNKNOWN, UNKNOWN, NEVER_S
         self._reset_frozen()
+        self._speed.reset()
 
     def _reset_frozen(self) -> None:
         self._repeated = False  # the newest angle, since the sums below began
@@ -52,6 +55,7 @@ class EncoderMonitor:
         fault = None
         if gap_s > LONGEST_GAP_S:  # also that before the first message
             self._reset_frozen()
+            self._speed.begin_interval()
         elif state.angle_rad == self._angle_rad:
             self._repeated = True
             fault = self._check_frozen(state, gap_s, torque_nm)
@@ -59,6 +63,9 @@ class EncoderMonitor:
             fault = self._check_jump(state, gap_s, dt_s)
             if self._repeated:
                 self._reset_frozen()
+        if not fault and 0.0 < gap_s <= LONGEST_GAP_S:
+            path_rad = (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s
+            fault = self._speed.update(gap_s, path_rad, state.angle_rad - self._angle_rad)
         self._angle_rad, self._velocity_rad_s, self._stamp_s = state.angle_rad, state.velocity_rad_s, stamp_s
         return fault
 

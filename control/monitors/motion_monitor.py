@@ -1,7 +1,7 @@
 """Detects a joint whose motion neither its commanded torque nor its commanded path explains.
 
 A drive that obeys late, weakly, in the wrong direction, or another program, reports currents that look healthy. Its
-joint shows it. Three quantities are small in every healthy motion, in air and in mud:
+joint shows it. Four quantities are small in every healthy motion, in air and in mud:
 
     runaway      the energy that the joint has and was not given, by the commanded torque τ over its path:
                      E = ½ I ω² - ∫ τ dθ
@@ -14,6 +14,10 @@ joint shows it. Three quantities are small in every healthy motion, in air and i
     following    the angle θ* - θ that remains after the PD has reached full torque, as LinuxCNC's FERROR: its bound
                  grows with the commanded speed. A flipper in the mud may lag behind by any angle, so this one counts
                  in air only.
+    driven back  the path against a torque, where the target does not lead, in intervals in a row. Mud, friction and
+                 stops yield to a torque or resist it, and a load that outweighs it moves the joint until both are
+                 equal. Only where the joint presses against its stop while the encoder slips together with its speed
+                 does it seem to move on. An encoder that slips alone is found before (speed_monitor.py).
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
 
@@ -34,6 +38,10 @@ AWAY_RAD = 0.5  # twice that of a joint that catches up in its swing: 0.24 rad
 AWAY_LEAK_S = 0.3
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
+PRESSING_NM = 0.25  # more than dry friction and cogging
+DRIVEN_BACK_S = 0.09
+DRIVEN_BACK_RAD = 0.0027  # in each interval, 0.03 rad/s: seven steps of a 14-bit encoder
+DRIVEN_BACK_INTERVALS = 4  # in a row, so after at most five; a body that sinks pushes a swing back in two
 LONGEST_GAP_S = 0.03  # between two samples
 PUNCTUAL_S = 0.012  # between two samples: four periods; a sound joint then moves away by 0.27 rad in all
 SETTLING_S = 0.3  # after a longer gap: the joint returns to its path within a swing
@@ -69,6 +77,8 @@ class MotionMonitor:
         self._target_rad = self._lag_rad = UNKNOWN
         self._impulse_nm_s = self._elapsed_s = 0.0  # since the sample before
         self._punctual_s = SETTLING_S  # since the last gap
+        self.driven_back = 0  # intervals in a row
+        self._pressed_s = self._back_rad = self._pressing_nm = 0.0  # in the present interval
 
     def update(
         self, found: list[Fault], state: DriveState, dt_s: float, torque_nm: float, target: JointTarget | None
@@ -90,14 +100,17 @@ class MotionMonitor:
         self._stamp_s, self._angle_rad, self._velocity_rad_s = stamp_s, angle_rad, velocity_rad_s
         self._target_rad, self._lag_rad = target_rad, abs(target_rad - angle_rad)
         following = not self._lag_rad > self._following_rad  # also without a target
-        if not (following and self.unexplained_j <= self._runaway_j and self.away_rad <= AWAY_RAD):
+        explained = self.unexplained_j <= self._runaway_j and self.driven_back < DRIVEN_BACK_INTERVALS
+        if not (following and explained and self.away_rad <= AWAY_RAD):
             self._report(found, target)
 
     def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float) -> None:
         """Add a sample to the energy, and to the path away where the joint had a target and still has one."""
         before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
-        work_j = self._impulse_nm_s / elapsed_s * step_rad
+        torque_nm = self._impulse_nm_s / elapsed_s
+        self._watch_pressing(elapsed_s, step_rad, torque_nm, target_rad - self._target_rad)
+        work_j = torque_nm * step_rad
         unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
         if self._punctual_s < SETTLING_S:
@@ -111,10 +124,26 @@ class MotionMonitor:
         away_rad = self.away_rad + (abs(step_rad) - step_of_target_rad) + error_rad
         self.away_rad = away_rad if away_rad > 0.0 else 0.0
 
+    def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
+        """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
+        lasts = torque_nm * self._pressing_nm >= 0.0 and not -PRESSING_NM < torque_nm < PRESSING_NM
+        self._pressing_nm = torque_nm
+        if not lasts or target_step_rad != target_step_rad:
+            self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
+            return
+        back_rad, target_back_rad = (-step_rad, -target_step_rad) if torque_nm > 0.0 else (step_rad, target_step_rad)
+        self._pressed_s += elapsed_s
+        self._back_rad += back_rad - target_back_rad if target_back_rad > 0.0 else back_rad
+        if self._pressed_s >= DRIVEN_BACK_S:
+            self.driven_back = self.driven_back + 1 if self._back_rad > DRIVEN_BACK_RAD else 0
+            self._pressed_s = self._back_rad = 0.0
+
     def _report(self, found: list[Fault], target: JointTarget | None) -> None:
         if self.unexplained_j > self._runaway_j:
             kind = FaultKind.JOINT_RUNAWAY
             found.append(kind.fault(self._joint, energy_j=self.unexplained_j, limit_j=self._runaway_j))
+        if self.driven_back >= DRIVEN_BACK_INTERVALS:
+            found.append(FaultKind.JOINT_DRIVEN_BACK.fault(self._joint))
         if self.away_rad > AWAY_RAD:
             found.append(FaultKind.JOINT_OSCILLATING.fault(self._joint, away_rad=self.away_rad))
         if target is None or self._punctual_s < SETTLING_S:

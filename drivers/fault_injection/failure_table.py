@@ -173,16 +173,27 @@ WRONG_RANGES = {"25.64 for 50": 50.0 / 25.64, "65 for 50": 50.0 / 65.0, "45 for 
 def _slipping() -> Iterator[FailureMode]:
     """Yield encoders that slip in both directions, alone and together with the reported speed."""
     for rate_rad_s in (sign * rate for rate in SLIPS_RAD_S for sign in (1.0, -1.0)):
-        drive = {"encoder_slip_rad_s": rate_rad_s}
-        yield from _rows("JOINT.encoder", f"slipping at {rate_rad_s:+g} rad/s", drive=drive)
+        how, drive = f"at {rate_rad_s:+g} rad/s", {"encoder_slip_rad_s": rate_rad_s}
+        expected = expects("encoder_slips", 4.0, ("hold", "swing"), how=how)
+        yield from _rows("JOINT.encoder", f"slipping {how}", "", expected, drive=drive)
         drive = drive | {"velocity_slip_rad_s": rate_rad_s}
-        yield from _rows("JOINT.encoder", f"slipping with its speed at {rate_rad_s:+g} rad/s", drive=drive)
+        yield from _rows("JOINT.encoder", f"slipping with its speed {how}", drive=drive)
+    yield from _rows(
+        "JOINT.encoder",
+        "slipping at a stop",
+        "",
+        expects("joint_driven_back", 1.0, ("hold",)),
+        act=("slipped_to_stop", 0.3),
+    )
 
 
 def _wrong_speeds() -> Iterator[FailureMode]:
     """Yield drives whose range of velocity codes is another than the configured one."""
     for ranges, factor in WRONG_RANGES.items():
-        yield from _rows("JOINT.encoder", f"speed in {ranges} rad/s", drive={"velocity_error": factor - 1.0})
+        expected = expects("speed_wrong", 8.0, ("stance",), how=f"{ranges} rad/s")
+        yield from _rows(
+            "JOINT.encoder", f"speed in {ranges} rad/s", "", expected, drive={"velocity_error": factor - 1.0}
+        )
 
 
 BUGGY_METHODS = {  # of the loop, by the part of the tick in which the method is called
@@ -395,14 +406,19 @@ CONSEQUENCES: Mapping[str, tuple[str, ...]] = {  # faults that may be reported w
     # the second drive reports another angle, and its own set-points
     "duplicate_node_id": (
         *("encoder_jump", "joint_moving", "drive_disarmed", "joint_position", "encoder_stuck", "setpoint_mismatch"),
+        *("encoder_slips", "speed_wrong"),
     ),
     "setpoint_mismatch": ("joint_runaway",),  # in that torque's direction
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version", "wrong_drive"),
     "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
     "bus_refuses": (*IDLE_DRIVE, "joint_runaway"),  # at the last torque
     "joint_position": ("encoder_jump",),
-    "encoder_stuck": ("encoder_jump",),  # when it reports angles again
+    "encoder_stuck": ("encoder_jump", "encoder_slips", "speed_wrong"),  # when it reports angles again, or meanwhile
     "encoder_jump": ("joint_moving",),
+    # it drifts on, and bends the line that shows a wrong speed
+    "encoder_slips": ("joint_moving", "joint_position", "encoder_stuck", "speed_wrong"),
+    "joint_driven_back": ("joint_moving", "joint_position", "encoder_jump"),
+    "speed_wrong": ("encoder_stuck", "encoder_slips", "joint_moving", "joint_runaway", "joint_oscillating"),
     "joint_velocity": ("encoder_stuck", "joint_runaway"),  # its angle is held and its speed is not, nor commanded
     "joint_oscillating": ("joint_runaway",),
     "damping_failed": ("encoder_jump", "torque_missing", "joint_moving"),

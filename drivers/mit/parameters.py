@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import date
 from functools import cached_property
 from typing import Annotated, ClassVar
 
 from control.bounds import Bounds, Meaning
-from drivers.drive import DriveParameters
+from drivers.drive import DriveParameters, ProvenWatchdog
 from drivers.mit.models import MODELS, Model
 
 LARGEST_ID = 15  # an answer has four bits for it
@@ -27,6 +28,11 @@ class MitParameters(DriveParameters):
         float, Bounds(0.001, 10.0), Meaning("by which its answers state torque: current is that torque divided by it")
     ] = 0.083
 
+    firmware_date: Annotated[
+        str, Meaning("when its firmware was installed, such as 2026-11-24; an older proof counts no more")
+    ] = ""
+    proven_watchdog: ProvenWatchdog = ProvenWatchdog()
+
     models: ClassVar[tuple[str, ...]] = tuple(MODELS)
     serial_digits: ClassVar[int] = 8
     answers_only: ClassVar[bool] = True
@@ -44,6 +50,10 @@ class MitParameters(DriveParameters):
     def reports_settings(self) -> bool:
         return self.ranges.has_registers
 
+    @property
+    def knows_watchdog(self) -> bool:
+        return self.reports_settings or self.proven_watchdog.watchdog_s > 0.0
+
     def torque_problems(self, torque_nm: float) -> Iterator[tuple[str, str]]:
         yield from super().torque_problems(torque_nm)
         if self.model not in MODELS:
@@ -53,6 +63,7 @@ class MitParameters(DriveParameters):
         if range_rad_s != AS_DELIVERED and range_rad_s < SMALLEST_RAD_S:
             bounds = f"{SMALLEST_RAD_S:g} to {LARGEST_RAD_S:g}"
             yield f"velocity_range_rad_s = {range_rad_s:g}", f"must be {bounds}, or -1 for that of the model"
+        yield from self._proof_problems()
         if self.serial_number and not self.reports_settings:
             yield f"serial_number = {self.serial_number!r}", f"must be empty: that of an {self.model} cannot be read"
         if self.torque_range_nm and not MODELS[self.model].has_registers:
@@ -62,3 +73,32 @@ class MitParameters(DriveParameters):
             value = f"{self.torque_range_nm:g}" if self.torque_range_nm else f"{self.model!r}"
             reason = f"its codes end at {self.ranges.torque_nm:g} N·m, and limits.torque_nm = {torque_nm}"
             yield f"{key} = {value}", reason
+
+    def _proof_problems(self) -> Iterator[tuple[str, str]]:
+        """Yield why a proof is not that of this drive with this firmware."""
+        proof = self.proven_watchdog
+        for key, value in (("firmware_date", self.firmware_date), ("proven_watchdog.date", proof.date)):
+            if value and not is_date(value):
+                yield f"{key} = {value!r}", "must be a date such as 2026-11-24"
+                return
+        if not proof.watchdog_s:
+            return
+        if self.reports_settings:
+            yield f"proven_watchdog.watchdog_s = {proof.watchdog_s:g}", f"must be 0: a {self.model} reports its own"
+            return
+        for key in ("bus", "node_id", "model"):
+            proven, own = getattr(proof, key), getattr(self, key)
+            if proven != own:
+                yield f"proven_watchdog.{key} = {proven!r}", f"must be {own!r}: it is a proof of another drive"
+        if not proof.date:
+            yield "proven_watchdog.date = ''", "must be the date of the trial"
+        elif proof.date < self.firmware_date:
+            earliest = f"must be at least firmware_date = {self.firmware_date}"
+            yield f"proven_watchdog.date = {proof.date}", f"{earliest}: the trial was of older firmware; repeat it"
+
+
+def is_date(text: str) -> bool:
+    try:
+        return date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        return False

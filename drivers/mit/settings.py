@@ -60,13 +60,15 @@ class MitSettings:
 
     @property
     def watchdog_s(self) -> float:
-        """The time-out: NaN until it was read back, 0 where the watchdog is off."""
+        """The time-out: NaN until it was read back, 0 where the watchdog is off. That of a CubeMars may be proven."""
+        if not self._readable:
+            return self._parameters.proven_watchdog.watchdog_s or nan
         return self._values.get(TIMEOUT, nan) * TIMEOUT_UNIT_S
 
     @property
     def watchdog_advice(self) -> str:
         if not self._readable:
-            return f"an {self._parameters.model} reports none in MIT mode; see docs/how-to/mit.md for how to try it"
+            return f"an {self._parameters.model} reports none in MIT mode; docs/how-to/mit.md: how to prove it once"
         return "the drive did not answer on id 0x7FF: check ESC_ID, MST_ID and its firmware"
 
     @property

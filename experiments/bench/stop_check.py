@@ -11,7 +11,7 @@ last tick before the request, because the torque does not change in a missed tic
 from collections.abc import Sequence
 from math import degrees, nan, radians
 
-from control.controller import DAMPING_NM, RAISING_S, SOFT_STOP_S, HoldLaw, measured_angles
+from control.controller import DAMPING_NM, RAISING_S, SOFT_STOP_S, measured_angles
 from control.joint_pd import damping_torques_nm
 from control.modes import Mode, Request
 from control.rate import PERIOD_S
@@ -83,7 +83,9 @@ def check_torque_off(test_rig: TestRig) -> Readings:
     rig = test_rig.configuration.rig
     test_rig.raise_flippers()
     test_rig.move([same_for_each(*STARTING, rig)])
-    test_rig.controller.hold_law = push(test_rig)
+    constants_nm_a = test_rig.configuration.torque_constants_nm_a
+    pushing_nm = constants_nm_a.map(lambda constant_nm_a: PUSH_A * constant_nm_a)  # forward and up
+    test_rig.controller.hold_law = lambda held, states: pushing_nm
     pushed = test_rig.run_for(PUSH_TICKS * PERIOD_S)
     begun = measured_angles(test_rig.loop.states)
     test_rig.loop.request(Request.DISARM, test_rig.rig.now_s)
@@ -92,12 +94,6 @@ def check_torque_off(test_rig: TestRig) -> Readings:
         yield from _off_readings(joint, test_rig.configuration.drive[joint], pushed, samples, index)
     advice = "see what drives it on"
     yield from _sweep_readings(rig, "torque off", pushed[-1], samples, begun, COASTING_S, COASTING_DEG, advice)
-
-
-def push(test_rig: TestRig) -> HoldLaw:
-    """Return a hold law that pushes forward and up with the same current in each motor."""
-    pushing_nm = test_rig.configuration.torque_constants_nm_a.map(lambda constant_nm_a: PUSH_A * constant_nm_a)
-    return lambda held, states: pushing_nm
 
 
 def _off_readings(

@@ -42,7 +42,7 @@ MOST_LIMITED_FRACTION = 0.005  # of ticks: where two phases meet, limits take a 
 
 def lag_ticks(commanded: Vector, measured: Vector) -> float:
     """Return by how many ticks `measured` lags `commanded`; NaN without motion."""
-    fits = np.array([_fit(commanded, measured, lag) for lag in range(-MOST_LAG_TICKS, MOST_LAG_TICKS + 1)])
+    fits = np.array([_correlation(commanded, measured, lag) for lag in range(-MOST_LAG_TICKS, MOST_LAG_TICKS + 1)])
     if not np.isfinite(fits).all():
         return float("nan")
     best = int(fits.argmax())
@@ -52,12 +52,11 @@ def lag_ticks(commanded: Vector, measured: Vector) -> float:
     return best - MOST_LAG_TICKS + float((before - after) / (2.0 * (before - 2.0 * here + after)))
 
 
-def _fit(commanded: Vector, measured: Vector, lag: int) -> float:
+def _correlation(commanded: Vector, measured: Vector, lag: int) -> float:
     end = len(commanded)
     a, b = commanded[max(0, -lag) : end - max(0, lag)], measured[max(0, lag) : end - max(0, -lag)]
-    a, b = a - a.mean(), b - b.mean()
-    size = float(np.sqrt(np.dot(a, a) * np.dot(b, b)))
-    return float(np.dot(a, b)) / size if size else float("nan")
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return float(np.corrcoef(a, b)[0, 1])
 
 
 def slope_by_velocity(angles_rad: Vector, velocities_rad_s: Vector, times_s: Vector) -> float:

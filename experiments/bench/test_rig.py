@@ -10,7 +10,7 @@ from itertools import compress
 from typing import NamedTuple
 
 from control.controller import HoldLaw, measured_angles
-from control.faults import Fault, Reaction
+from control.faults import Fault, FaultKind, Reaction
 from control.modes import ENERGISED, Mode, Request
 from control.rate import PERIOD_S
 from control.records import DriveStates, JointAngles, Joints, JointTargets, Torques, same_for_all
@@ -54,15 +54,14 @@ class TestRig:
         self._rest = self.level  # joint angles in which the flippers lie without torque
         self.lateness = Lateness()  # of one measurement, while torque is on
         self.lateness_so_far = Lateness()  # of all measurements
-        self._unreadable = [joint for joint, drive in self.configuration.drive.items() if not drive.reports_settings]
-        self.forced = False  # the operator allows torque without a known watchdog
+        self._unreadable = [joint for joint, drive in self.configuration.drive.items() if not drive.knows_watchdog]
+        self.forced = ""  # the operator allows torque without a known watchdog
 
     def tick(self) -> Sample:
         aim, loop = self.controller.joint_targets, self.loop
         tick, torque_on = self.rig.wait(), self._torque_on()
         loop.tick(tick)
-        if torque_on:
-            self._update_lateness(tick, loop.states)
+        self._update_lateness(torque_on, tick, loop.states)
         return Sample(tick, loop.mode, loop.states, aim, loop.sent.torques_nm, loop.sent.limited)
 
     def run_for(self, duration_s: float) -> list[Sample]:
@@ -70,7 +69,10 @@ class TestRig:
         return [self.tick_checked() for _ in range(round(duration_s / PERIOD_S))]
 
     def tick_checked(self) -> Sample:
-        return self._checked(self.tick())
+        sample, fault = self.tick(), self.loop.faults.worst
+        if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
+            raise BenchError(f"{fault.name}: {_advice([fault])}")
+        return sample
 
     def run_until(self, done: Callable[[Sample], bool], longest_s: float, what: str) -> list[Sample]:
         """Run until `done` accepts a sample. Raises BenchError after the longest time, and for a fault."""
@@ -97,23 +99,16 @@ class TestRig:
         asked = [axis for axis in self.drives.axes if not axis.parameters.asking_ends_torque]
         for axis in asked:
             axis.poll()
-        if self._torque_on() and len(asked) == len(states):
-            self._update_lateness(tick, states)
+        self._update_lateness(self._torque_on() and len(asked) == len(states), tick, states)
         return Sample(tick, self.loop.mode, states, None, self.loop.sent.torques_nm, False)
 
     def _torque_on(self) -> bool:
         """Return whether a drive reported closed loop before this tick, in any mode of the loop."""
         return any(state.closed_loop for state in self.loop.states)
 
-    def _update_lateness(self, tick: Tick, states: DriveStates) -> None:
-        self.lateness.update(tick, states)
-        self.lateness_so_far.update(tick, states)
-
-    def _checked(self, sample: Sample) -> Sample:
-        fault = self.loop.faults.worst
-        if sample.mode in (*ENERGISED, Mode.FAULT) and fault and fault.kind.reaction >= Reaction.HOLD:
-            raise BenchError(f"{fault.name}: {_advice([fault])}")
-        return sample
+    def _update_lateness(self, counts: bool, tick: Tick, states: DriveStates) -> None:
+        for lateness in (self.lateness, self.lateness_so_far) if counts else ():
+            lateness.update(tick, states)
 
     def arm(self, law: HoldLaw | None = None) -> None:
         """Arm the robot into HOLD, with a hold law from the first torque on. Raises BenchError."""
@@ -143,7 +138,7 @@ class TestRig:
         what = f"{', '.join(self._unreadable)}: no watchdog can be read; stage 5 measures whether it ends the torque."
         if not self.operator.allows_unknown_watchdogs(what, self._tick_during_prompt):
             raise BenchError(f"The robot cannot be armed: {what} An operator at a terminal must allow it.")
-        self.forced = True
+        self.forced = FaultKind.WATCHDOG_UNKNOWN.value
 
     def _wait_until_armable(self) -> None:
         if self._is_armable_soon():

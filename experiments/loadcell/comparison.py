@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from math import hypot, isfinite, nan
+from math import hypot, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -27,32 +27,22 @@ def compare_muds(flipper: Mapping[str, Any], muds: Mapping[str, Mapping[str, Mud
     """Return a row for each coefficient that both measured, in N/m³. `flipper` is a summary, or empty."""
     sensed = {mud_key(str(row.get("mud"))): row for row in flipper.get("muds", ()) if isinstance(row, dict)}
     rows = []
-    for mud, coefficients in muds.items():
-        for name, truth in coefficients.items():
-            estimate = sensed.get(mud_key(mud), {}).get(name)
-            value, error = _value_of(estimate)
-            if isfinite(value) and isfinite(truth.value):
-                ratio = value / truth.value
-                rows.append(
-                    {
-                        "mud": mud,
-                        "coefficient": name,
-                        "sensed": value,
-                        "sensed_std_error": error,
-                        "truth": truth.value,
-                        "truth_std_error": truth.std_error,
-                        "at_least": bool((estimate or {}).get("at_least")),  # the flipper's value is a lower bound
-                        "ratio": ratio,
-                        "ratio_std_error": ratio * hypot(error / value, truth.std_error / truth.value),
-                    }
-                )
+    for mud, name, truth in ((mud, name, each) for mud, of_mud in muds.items() for name, each in of_mud.items()):
+        estimate: Any = sensed.get(mud_key(mud), {}).get(name)
+        value = estimate.get("value") if isinstance(estimate, dict) else None
+        if isinstance(value, int | float) and value > 0.0 and isfinite(truth.value):
+            error, ratio = estimate.get("std_error") or 0.0, value / truth.value
+            rows.append(
+                {
+                    "mud": mud,
+                    "coefficient": name,
+                    "sensed": value,
+                    "sensed_std_error": error,
+                    "truth": truth.value,
+                    "truth_std_error": truth.std_error,
+                    "at_least": bool(estimate.get("at_least")),  # the flipper's value is a lower bound
+                    "ratio": ratio,
+                    "ratio_std_error": ratio * hypot(error / value, truth.std_error / truth.value),
+                }
+            )
     return rows
-
-
-def _value_of(estimate: Any) -> tuple[float, float]:
-    """Return value and standard error of an estimate in a summary, or NaN."""
-    value = estimate.get("value") if isinstance(estimate, dict) else None
-    if not isinstance(value, int | float) or not value > 0.0:
-        return nan, nan
-    error = estimate.get("std_error")
-    return float(value), float(error) if isinstance(error, int | float) else 0.0

@@ -64,24 +64,17 @@ class Results(NamedTuple):
 def evaluate_muds(folder: Path, notebook: Notebook, plan: TrialPlan, show: Show) -> Results:
     """Evaluate the recorded trials of a folder."""
     trials = analyse(load_counted(folder, notebook), plan.settings, show)
-    muds = {}
+    muds: dict[str, dict[str, MudCoefficient]] = {}
     for mud in dict.fromkeys(trial.recorded.mud for trial in trials):
-        own = [trial for trial in trials if trial.recorded.mud == mud]
-        errors = _bench_errors(own, notebook, plan)
-        muds[mud] = {name: gather_trials(own, name, errors[name]) for name in COEFFICIENTS}
+        own, muds[mud] = [trial for trial in trials if trial.recorded.mud == mud], {}
+        calibrations = [notebook.entries[trial.recorded.key]["calibration"] for trial in own]
+        calibration_error = max(LoadCellCalibration(**calibration).relative_error for calibration in calibrations)
+        is_measured = all(trial.is_measured for trial in own if trial.coefficients)
+        for name in COEFFICIENTS:  # a shear keeps the depth that the operator set
+            depth_error_m = 0.0 if is_measured and name != "k_s" else plan.depth_error_m
+            bench = bench_uncertainty(name, plan.settings, depth_error_m, calibration_error)
+            muds[mud][name] = gather_trials(own, name, bench)
     return Results(trials, muds, list_remarks(trials, plan.settings))
-
-
-def _bench_errors(trials: Sequence[AnalysedTrial], notebook: Notebook, plan: TrialPlan) -> dict[str, float]:
-    """Return the fraction by which the bench may err alike in all trials of a mud, by coefficient."""
-    calibrations = [notebook.entries[trial.recorded.key]["calibration"] for trial in trials]
-    calibration_error = max(LoadCellCalibration(**calibration).relative_error for calibration in calibrations)
-    depth_errors_m = dict.fromkeys(COEFFICIENTS, plan.depth_error_m)
-    if all(trial.is_measured for trial in trials if trial.coefficients):
-        depth_errors_m |= {"k_p": 0.0, "k_e": 0.0}  # a shear keeps the depth that the operator set
-    return {
-        name: bench_uncertainty(name, plan.settings, depth_errors_m[name], calibration_error) for name in COEFFICIENTS
-    }
 
 
 def list_remarks(trials: Sequence[AnalysedTrial], settings: StageSettings) -> list[str]:
@@ -113,8 +106,9 @@ def make_result(
     figures = [Figure("coefficients", caption, partial(draw_coefficients, muds), "Coefficients")]
     texts = {"Coefficients": "\n\n".join([METHOD, *position_texts(results.trials), _errors_text(muds, plan)])}
     if compared:
-        tables.append(_comparison_table(compared))
-        texts[tables[-1].section] = _comparison_text(flipper, plan.settings)
+        section = "Compared with the flipper"
+        tables.append(Table("compared", COMPARED, UNITS, DataFrame(map(_comparison_row, compared)), section))
+        texts[section] = _comparison_text(flipper, plan.settings)
     if truths:
         tables.append(_truth_table(muds, truths))
     for mud, coefficients in muds.items():
@@ -170,20 +164,15 @@ def _coefficient_table(muds: Muds) -> Table:
     return Table("coefficients", HEADING, UNITS, DataFrame(rows), "Coefficients")
 
 
-def _comparison_table(compared: Sequence[Mapping[str, Any]]) -> Table:
-    rows = []
-    for row in compared:
-        bound = "≥ " if row["at_least"] else ""
-        rows.append(
-            {
-                "mud": mud_text(row["mud"]),
-                "": row["coefficient"],
-                "flipper": bound + value_text(row["sensed"], row["sensed_std_error"], per=N_CM3),
-                "load cell": value_text(row["truth"], row["truth_std_error"], per=N_CM3),
-                "flipper / load cell": bound + value_text(row["ratio"], row["ratio_std_error"]),
-            }
-        )
-    return Table("compared", COMPARED, UNITS, DataFrame(rows), "Compared with the flipper")
+def _comparison_row(row: Mapping[str, Any]) -> dict[str, str]:
+    bound = "≥ " if row["at_least"] else ""
+    return {
+        "mud": mud_text(row["mud"]),
+        "": row["coefficient"],
+        "flipper": bound + value_text(row["sensed"], row["sensed_std_error"], per=N_CM3),
+        "load cell": value_text(row["truth"], row["truth_std_error"], per=N_CM3),
+        "flipper / load cell": bound + value_text(row["ratio"], row["ratio_std_error"]),
+    }
 
 
 def _truth_table(muds: Muds, truths: Mapping[str, TrueCoefficients]) -> Table:
@@ -234,16 +223,15 @@ def position_texts(trials: Sequence[AnalysedTrial]) -> list[str]:
 
 def _errors_text(muds: Muds, plan: TrialPlan) -> str:
     """Explain the two errors of each value."""
-    largest = dict.fromkeys(COEFFICIENTS, 0.0)
-    for name, each in ((name, mud[name]) for mud in muds.values() for name in COEFFICIENTS):
-        if isfinite(each.value):
-            largest[name] = max(largest[name], each.shared_error / each.value)
-    fractions = ", ".join(f"{100.0 * fraction:.1f} % of {name}" for name, fraction in largest.items())
+    fractions = []
+    for name in COEFFICIENTS:
+        errors = [mud[name].shared_error / mud[name].value for mud in muds.values() if isfinite(mud[name].value)]
+        fractions.append(f"{100.0 * max(errors, default=0.0):.1f} % of {name}")
     return (
         "The first ± is one standard error of the trials. The second ± is alike in all trials: depth "
         f"± {1000.0 * plan.depth_error_m:g} mm (--depth-error), callipers ± {1000.0 * CALLIPERS_M:g} mm on width and "
-        f"thickness, and the reading of the calibration, together at most {fractions}. k is the least-squares fit to "
-        f"the mud's own curve and belongs to its depth; {ACCURACY} explains both errors."
+        f"thickness, and the reading of the calibration, together at most {', '.join(fractions)}. k is the "
+        f"least-squares fit to the mud's own curve and belongs to its depth; {ACCURACY} explains both errors."
     )
 
 

@@ -6,7 +6,7 @@ clay with the disturbances of the authors' logs. Each trial is simulated once, a
 samples.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from itertools import chain
@@ -28,7 +28,16 @@ from experiments.trials.estimation_methods import COMPENSATED, DEFAULT, PAPER, w
 from experiments.trials.latency import LATENCY_S
 from experiments.trials.load_cell_truth import LoadCellTruth, load_cell_truth
 from experiments.trials.transitions import transition_rows, transitions_of
-from experiments.trials.trial import MEASURING_WALK, SINGLE, TORQUE_ERROR, WALKING, Setup, Trial, run_trial, strides_of
+from experiments.trials.trial import (
+    MEASURING_WALK,
+    SINGLE,
+    TORQUE_ERROR,
+    WALKING,
+    Setup,
+    Trial,
+    replay_trial,
+    run_trial,
+)
 from simulation.mud.clay import Clay, clay_of_water
 from simulation.mud.disturbances import LAB, NONE, Disturbances
 from simulation.mud.track import Track
@@ -59,6 +68,7 @@ LAYERS = (*FIELD_OF_LAYER, REPEATS, TORQUE, LATENCY)
 COLOURS = {"default": "tab:blue", "paper": "tab:red", "paper compensated": "tab:orange"}
 HIGHEST_PERCENT = 150.0  # higher values are drawn at the edge
 Row = dict[str, Any]
+Columns = Mapping[str, tuple[str, Callable[[Any], str]]]  # by head: the key in a row, and how its value is shown
 
 
 def parse_layers(text: str) -> tuple[str, ...]:
@@ -124,7 +134,11 @@ def study(
     }
     summary = {"errors": errors, "plates": plates, "boundaries": boundaries, "settings": settings}
     return Result(
-        tables=[_error_table(errors), _plate_table(plates), *_boundary_tables(boundaries)],
+        tables=[
+            _table("errors", "", errors, ERROR_COLUMNS),
+            _table("plates", "The paper's upright plate (section II-E)", plates, PLATE_COLUMNS),
+            *[_table("boundaries", "Mud boundaries", boundaries, BOUNDARY_COLUMNS)] * bool(boundaries),
+        ],
         figures=[Figure("estimation", "", partial(draw_errors, errors))],
         summary=summary,
         notes=[] if boundaries else ["Mud boundaries: no walk over any"],
@@ -187,7 +201,7 @@ def run_part(
         for truth in trial.truths
     }
     if len(clays) > 1:
-        return {"evaluated": [], "transitions": [each._asdict() for each in transitions_of(trial, truths)]}
+        return {"evaluated": [], "transitions": transitions_of(trial, truths)}
     evaluated = [_evaluate_method(method, clays[0].name, trial, truths) for method in methods_of(own)]
     return {"evaluated": list(chain.from_iterable(evaluated)), "transitions": []}
 
@@ -195,7 +209,7 @@ def run_part(
 def _evaluate_method(
     method: Method, mud: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]
 ) -> Iterator[Row]:
-    for stride in strides_of(trial, method.parameters, method.with_pose):
+    for stride, _ in replay_trial(trial, method.parameters, method.with_pose):
         truth = truths.get((stride.flipper, stride.index))
         for name in COEFFICIENTS if truth else ():
             estimate, leaning, upright = (getattr(each, name) for each in (stride, *(truth or ())))
@@ -206,58 +220,46 @@ def _evaluate_method(
 # tables and figure
 
 
-def _error_table(errors: Sequence[Row]) -> Table:
-    rows = [
-        {
-            "setup": row["setup"],
-            "mud": mud_text(row["mud"]),
-            "": row["coefficient"],
-            "method": row["method"],
-            "median": _percent(row["median"]),
-            "p95": _percent(row["p95"]),
-            "bias": _percent(row["bias"]),
-            "in 95 %": _percent(row["coverage"]),
-            "strides": row["strides"],
-            "bounds": row["bounds"],
-            "hold": _percent(row["bounds_hold"]),
-            "not valid": row["not_valid"],
-        }
-        for row in errors
-    ]
-    return Table("errors", "", {}, DataFrame(rows))
-
-
-def _plate_table(plates: Sequence[Row]) -> Table:
-    rows = [
-        {
-            "setup": row["setup"],
-            "mud": mud_text(row["mud"]),
-            "": row["coefficient"],
-            "upright / leaning plate": number(row["upright_over_leaning"]),
-            "estimate / upright": number(row["estimate_over_upright"]),
-            "fraction due to the lean": _percent(row["lean_fraction"]),
-        }
-        for row in plates
-    ]
-    return Table("plates", "The paper's upright plate (section II-E)", {}, DataFrame(rows))
-
-
-def _boundary_tables(boundaries: Sequence[Row]) -> list[Table]:
-    rows = [
-        {
-            "from": mud_text(row["from"]),
-            "to": mud_text(row["to"]),
-            "transitions": row["transitions"],
-            "followed within two strides": _percent(row["within_two"]),
-            "most strides": row["most_strides"],
-        }
-        for row in boundaries
-    ]
-    return [Table("boundaries", "Mud boundaries", {}, DataFrame(rows))] if rows else []
+def _table(
+    name: str, title: str, rows: Sequence[Row], columns: Mapping[str, tuple[str, Callable[[Any], str]]]
+) -> Table:
+    shown = [{head: show(row[key]) for head, (key, show) in columns.items()} for row in rows]
+    return Table(name, title, {}, DataFrame(shown))
 
 
 def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100.0 * value:.1f} %"
+
+
+ERROR_COLUMNS: Columns = {
+    "setup": ("setup", str),
+    "mud": ("mud", mud_text),
+    "": ("coefficient", str),
+    "method": ("method", str),
+    "median": ("median", _percent),
+    "p95": ("p95", _percent),
+    "bias": ("bias", _percent),
+    "in 95 %": ("coverage", _percent),
+    "strides": ("strides", str),
+    "bounds": ("bounds", str),
+    "hold": ("bounds_hold", _percent),
+    "not valid": ("not_valid", str),
+}
+PLATE_COLUMNS: Columns = {
+    "setup": ("setup", str),
+    "mud": ("mud", mud_text),
+    "": ("coefficient", str),
+    "upright / leaning plate": ("upright_over_leaning", number),
+    "estimate / upright": ("estimate_over_upright", number),
+    "fraction due to the lean": ("lean_fraction", _percent),
+}
+BOUNDARY_COLUMNS: Columns = {
+    "from": ("from", mud_text),
+    "to": ("to", mud_text),
+    "transitions": ("transitions", str),
+    "followed within two strides": ("within_two", _percent),
+    "most strides": ("most_strides", str),
+}
 
 
 def draw_errors(errors: Sequence[Row]) -> Drawing:

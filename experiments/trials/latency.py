@@ -5,9 +5,7 @@ a gap between their 50 to 210 distinct states a second cannot be seen in a log. 
 in such a gap, so those of one joint are at most half of it apart: 2.6 ms at 190 a second.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from random import Random
 from typing import NamedTuple
 
@@ -15,7 +13,6 @@ from control.rate import PERIOD_S
 from control.records import BodyPose, DriveState, DriveStates, Phase
 
 LATENCY_S = 0.0026  # the largest
-Late = Callable[[DriveState, DriveState, float], DriveState]
 
 
 class Sample(NamedTuple):
@@ -36,15 +33,15 @@ def with_latency(samples: Sequence[Sample], current_late_s: float) -> list[Sampl
     """Return the samples with late currents, or with late angles where it is negative, to the nearest tick."""
     ticks = round(abs(current_late_s) / PERIOD_S)
     late = _with_late_current if current_late_s > 0.0 else _with_late_angle
-    return [
-        sample._replace(states=_late_states(late, sample, samples[max(0, number - ticks)])) if ticks else sample
-        for number, sample in enumerate(samples)
-    ]
-
-
-def _late_states(late: Late, sample: Sample, earlier: Sample) -> DriveStates:
-    delay_s = sample.now_s - earlier.now_s
-    return DriveStates(*(late(*pair, delay_s) for pair in zip(sample.states, earlier.states, strict=True)))
+    if not ticks:
+        return list(samples)
+    delayed = []
+    for number, sample in enumerate(samples):
+        earlier = samples[max(0, number - ticks)]
+        pairs = zip(sample.states, earlier.states, strict=True)
+        delay_s = sample.now_s - earlier.now_s
+        delayed.append(sample._replace(states=DriveStates(*(late(*pair, delay_s) for pair in pairs))))
+    return delayed
 
 
 def _with_late_current(state: DriveState, earlier: DriveState, delay_s: float) -> DriveState:

@@ -6,45 +6,36 @@ once the flipper's current k_p is within FOLLOWED of the truth in that mud; the 
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 from pandas import DataFrame
 
 from control.mud_estimate import MudEstimate
 from experiments.trials.load_cell_truth import LoadCellTruth
-from experiments.trials.trial import Trial, mud_estimates
+from experiments.trials.trial import Trial, replay_trial
 from simulation.body.reference_sensor import StrideTruth
 
 FOLLOWED = 0.2  # of the truth: half of the smallest step between the muds
 
 
-class Transition(NamedTuple):
-    """One flipper's step from one mud into the next."""
+def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[dict[str, Any]]:
+    """Return each step of a flipper from one mud into the next, with the strides until the estimate followed.
 
-    before: str
-    after: str
-    flipper: str
-    strides: int | None  # until the estimate followed; None where it did not before the next border or the end
-
-
-def transitions_of(trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth]) -> list[Transition]:
-    estimates = mud_estimates(trial, trial.configuration.estimation)
-    return [
-        each for flipper in trial.configuration.rig.flippers for each in _transitions(flipper, trial, truths, estimates)
-    ]
-
-
-def _transitions(
-    flipper: str, trial: Trial, truths: Mapping[tuple[str, int], LoadCellTruth], estimates: Mapping[int, MudEstimate]
-) -> list[Transition]:
-    strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in estimates]
-    starts = [i for i in range(1, len(strides)) if strides[i].clay.name != strides[i - 1].clay.name]
-    transitions = []
-    for start, end in pairwise([*starts, len(strides)]):
-        close = [_is_close(stride, truths, estimates) for stride in strides[start:end]]
-        if close:
+    They are None where it did not follow before the next border or the end.
+    """
+    replayed = replay_trial(trial, trial.configuration.estimation)
+    estimates = {stride.index: estimate for stride, estimate in replayed}
+    transitions: list[dict[str, Any]] = []
+    for flipper in trial.configuration.rig.flippers:
+        strides = [truth for truth in trial.truths if truth.flipper == flipper and truth.index in estimates]
+        muds = [stride.clay.name for stride in strides]
+        starts = [i for i in range(1, len(strides)) if muds[i] != muds[i - 1]]
+        for start, end in pairwise([*starts, len(strides)]):
+            close = [_is_close(stride, truths, estimates) for stride in strides[start:end]]
             followed = close.index(True) + 1 if True in close else None
-            transitions.append(Transition(strides[start - 1].clay.name, strides[start].clay.name, flipper, followed))
+            transitions.append(
+                {"before": muds[start - 1], "after": muds[start], "flipper": flipper, "strides": followed}
+            )
     return transitions
 
 

@@ -4,7 +4,7 @@ Robot, drives and mud run in lockstep with the daemon's own loop, frames include
 estimator. So any number of methods can be evaluated on the same trial.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -64,10 +64,8 @@ def configuration_of(setup: Setup, drive_type: str = DEFAULT) -> Configuration:
     configuration = replace(
         simulated_configuration(drive_type=drive_type), geometry=setup.geometry, gait=setup.gait, estimation=estimation
     )
-    return _with_bench_drives(configuration) if setup.fixed_base else configuration
-
-
-def _with_bench_drives(configuration: Configuration) -> Configuration:
+    if not setup.fixed_base:
+        return configuration
     drive = {joint: replace(each, current_limit_a=BENCH_CURRENT_A) for joint, each in configuration.drive.items()}
     return replace(configuration, drive=drive, limits=replace(configuration.limits, torque_nm=BENCH_TORQUE_NM))
 
@@ -127,21 +125,12 @@ def _sample_of(lockstep: Lockstep) -> Sample:
     return Sample(lockstep.now_s, loop.target.phase, loop.states, loop.body)
 
 
-def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:
-    """Return an estimator's strides of the trial."""
+def replay_trial(
+    trial: Trial, parameters: EstimationParameters, with_pose: bool = True
+) -> Iterator[tuple[StrideEstimate, MudEstimate]]:
+    """Yield each stride of an estimator, and the estimate of the mud after it."""
     estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters, rig=trial.configuration.rig)
-    strides: list[StrideEstimate] = []
     for sample in trial.samples:
         known = sample if with_pose else sample._replace(body=BodyPose())
-        strides += estimator.update(*known).strides
-    return strides
-
-
-def mud_estimates(trial: Trial, parameters: EstimationParameters) -> dict[int, MudEstimate]:
-    """Return the estimate after each stride, by the stride's index."""
-    estimator = MudEstimator(trial.configuration.geometry, trial.drives, parameters, rig=trial.configuration.rig)
-    estimates: dict[int, MudEstimate] = {}
-    for sample in trial.samples:
-        for stride in estimator.update(*sample).strides:
-            estimates[stride.index] = estimator.mud_estimate
-    return estimates
+        for stride in estimator.update(*known).strides:
+            yield stride, estimator.mud_estimate

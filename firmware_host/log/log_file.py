@@ -26,7 +26,7 @@ from firmware_host.log.schema import RowKind
 
 CHUNK_BYTES = 64 * 1024
 FLUSH_INTERVAL_S = 0.4  # the death of the writer may cost as much
-SYNC_INTERVAL_S = 1.0  # a power cut may cost as much
+SYNC_INTERVAL_S = 1.0  # a power cut may cost as much, and the time of a synchronisation
 LATEST_NS = (1 << 63) - 1
 METADATA = "mudskipper"
 EXPORTED = "exported"  # key of the metadata in a copy that `log export --ros` of version 0.2 made
@@ -68,6 +68,8 @@ class LogFile:
         self._buffer = _Buffer()
         stream: Any = self._buffer  # has everything of a stream that the MCAP writer uses
         self._writer = Writer(stream, chunk_size=1 << 40, compression=CompressionType.LZ4)
+        self.durable_stamp_s = math.nan  # of the newest row that a power cut would leave
+        self._written_stamp_s = self._flushed_stamp_s = math.nan
         self._wall_offset_ns = int(opening["wall_minus_monotonic_ns"])
         self._latest_ns = min(max(0, self._wall_offset_ns), LATEST_NS)
         self._channels: list[int] = []
@@ -82,6 +84,7 @@ class LogFile:
                 self._channels.append(self._writer.register_channel(kind.topic, "cdr", schema, kind.metadata))
             self._write_out()
             self._synchronise()
+            synchronise_folder(path.parent)  # the name too
         except OSError:
             self.abandon()
             raise
@@ -100,7 +103,8 @@ class LogFile:
 
     def write(self, rows: Rows) -> None:
         for number, row in rows:
-            log_time_ns = self._wall_time_ns(self._kinds[number].stamp_s(row))
+            self._written_stamp_s = self._kinds[number].stamp_s(row)
+            log_time_ns = self._wall_time_ns(self._written_stamp_s)
             self._writer.add_message(self._channels[number], log_time_ns, row, log_time_ns, self._sequences[number])
             self._sequences[number] += 1
             self.rows += 1
@@ -111,9 +115,10 @@ class LogFile:
 
     def _flush_by_time(self) -> None:
         now_s = time.monotonic()
-        if now_s - self._flushed_s > FLUSH_INTERVAL_S and self.rows > self.safe_rows:
+        due = now_s - self._synchronised_s > SYNC_INTERVAL_S
+        if self.rows > self.safe_rows and (due or now_s - self._flushed_s > FLUSH_INTERVAL_S):
             self.flush()
-        if now_s - self._synchronised_s > SYNC_INTERVAL_S and self._unsynchronised:
+        if due and self._unsynchronised:
             self._synchronise()
 
     def _wall_time_ns(self, stamp_s: float) -> int:
@@ -138,6 +143,7 @@ class LogFile:
             unwritten.release()
         self._buffer.unwritten = bytearray()
         self._safe_bytes, self.safe_rows = self._buffer.length, self.rows
+        self._flushed_stamp_s = self._written_stamp_s
         self._unsynchronised = True
         self._flushed_s = time.monotonic()
         self.slowest_s = max(self.slowest_s, self._flushed_s - started_s)
@@ -147,8 +153,9 @@ class LogFile:
         os.fsync(self._file.fileno())
         self._require_path()
         self._unsynchronised = False
-        self._synchronised_s = time.monotonic()
-        self.slowest_s = max(self.slowest_s, self._synchronised_s - started_s)
+        self.durable_stamp_s = self._flushed_stamp_s
+        self._synchronised_s = started_s  # what came meanwhile is not durable
+        self.slowest_s = max(self.slowest_s, time.monotonic() - started_s)
 
     def _require_path(self) -> None:
         """Raise FileNotFoundError for a removed file: writing into it would not fail."""

@@ -135,10 +135,11 @@ def move_file(path: Path, target: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and its missing parents, each with the owner of the folder that it is in. Raises OSError."""
+    """Make a folder and its missing parents durably, each with the owner of the folder it is in. Raises OSError."""
     if not folder.exists():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
+        synchronise_folder(folder.parent)
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         try:
             copy_owner(descriptor, folder.parent)

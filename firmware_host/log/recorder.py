@@ -9,6 +9,7 @@ A second pipe leads back: once a second the writer reports the state of the disk
 """
 
 import json
+import math
 import os
 import select
 import signal
@@ -25,7 +26,7 @@ from typing import Any, NamedTuple, Protocol
 
 from control.records import TWO_FLIPPERS, Rig
 from firmware_host.configuration.log_parameters import ONE_FILE, LogParameters
-from firmware_host.log.log_folder import present_path
+from firmware_host.log.log_folder import ACTIVE, present_path, unfinished_files
 from firmware_host.log.row_records import HEADER, pack_record
 from firmware_host.log.rows import EVENT, EVENT_KIND
 
@@ -47,11 +48,29 @@ class LogReport(NamedTuple):
     free_fraction: float  # of the disk
     free_bytes: int
     slowest_write_s: float  # in the last ten seconds, an unfinished one included
+    durable_stamp_s: float  # of the newest row that a power cut would leave; NaN before the first
+    repairing: int  # logs that earlier runs did not finish
 
 
-REPORT_TYPES = (bool, int, str, float, int, float)  # of its fields, in the message of the writer after the log's path
+REPORT_TYPES = (
+    bool,
+    int,
+    str,
+    float,
+    int,
+    float,
+    float,
+    int,
+)  # of its fields, in the message of the writer after the log's path
 HEALTHY = LogReport(  # until the writer reports
-    alive=True, dropped=0, problem="", free_fraction=1.0, free_bytes=1 << 62, slowest_write_s=0.0
+    alive=True,
+    dropped=0,
+    problem="",
+    free_fraction=1.0,
+    free_bytes=1 << 62,
+    slowest_write_s=0.0,
+    durable_stamp_s=math.nan,
+    repairing=0,
 )
 
 
@@ -101,11 +120,12 @@ class Recorder:
         self.writer_alive = True
         self._unreported = 0
         self._loss_stamp_s = 0.0
+        unfinished = 0 if path.parent.name != ACTIVE else len(unfinished_files(path.parent.parent))
         self._writer = _start_writer(path)
         self.writer_pid = self._writer.pid
         assert self._writer.stdin is not None and self._writer.stdout is not None
         self._pipe, self._reports = self._writer.stdin.fileno(), self._writer.stdout.fileno()
-        self._report, self._dropped_by_writer = HEALTHY, 0
+        self._report, self._dropped_by_writer = HEALTHY._replace(repairing=unfinished), 0
         self._calls, self._reported_s = 0, time.monotonic()
         self.malformed_reports = 0
         os.set_blocking(self._reports, False)

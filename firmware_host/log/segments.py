@@ -7,6 +7,7 @@ written, and a new file is tried every few seconds; its first event reports the 
 """
 
 import errno
+import math
 import platform
 import subprocess
 import sys
@@ -43,6 +44,7 @@ class LogSegments:
         self.problem = self._reason = ""
         self.dropped = 0
         self.path = first
+        self.durable_stamp_s = math.nan  # of the newest row that a power cut would leave
         self.slowest_s = 0.0  # write since this was last set to zero
         self._first, self._opening, self._parameters = first, opening, parameters
         self._folder = first.parent.parent if first.parent.name == ACTIVE else None
@@ -57,6 +59,7 @@ class LogSegments:
         self._first_stamp_s: float | None = None  # of the ticks in this file
         self._retry_s = self._quota_s = 0.0
         self._recovery: subprocess.Popen[bytes] | None = None
+        self._repaired = 0  # files that it examines
         self._tried: set[Path] = set()  # to recover, once a run: a failure would be repeated at every file
         self._open()
 
@@ -82,7 +85,7 @@ class LogSegments:
         except OSError as error:
             self._give_up(error, unwritten=len(rows) - (self._file.rows - before))
         else:
-            self._note_slowest(self._file)
+            self._note_disk(self._file)
 
     def _event(self, text: str) -> tuple[int, bytes]:
         return EVENT_KIND, EVENT.encode(self._latest_stamp_s, text)
@@ -151,8 +154,10 @@ class LogSegments:
         self._full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         self._retry_s = time.monotonic() + RETRY_S
 
-    def _note_slowest(self, file: LogFile) -> None:
+    def _note_disk(self, file: LogFile) -> None:
         self.slowest_s, file.slowest_s = max(self.slowest_s, file.slowest_s), 0.0
+        if not math.isnan(file.durable_stamp_s):
+            self.durable_stamp_s = file.durable_stamp_s
 
     def _rotate(self, rows: Rows) -> None:
         """Begin a new file before these rows where the present one is too long or too large."""
@@ -173,7 +178,7 @@ class LogSegments:
             return
         try:
             self.path = self._file.finish()
-            self._note_slowest(self._file)
+            self._note_disk(self._file)
             self._file = None
         except OSError as error:
             self._give_up(error)
@@ -205,6 +210,11 @@ class LogSegments:
             for message in delete_by_quota(self._folder, quota_bytes, fraction):
                 self._write([self._event(message)])
 
+    @property
+    def repairing(self) -> int:
+        """Return how many unfinished logs of other runs are being repaired."""
+        return self._repaired if self._recovery is not None and self._recovery.poll() is None else 0
+
     def _start_recovery(self) -> None:
         """Recover the files of other runs, or of this run before its disk failed, in a process of its own."""
         if self._folder is None or (self._recovery is not None and self._recovery.poll() is None):
@@ -213,6 +223,7 @@ class LogSegments:
         if found <= self._tried:
             return
         self._tried |= found
+        self._repaired = len(found)
         command = [sys.executable, "-P", "-m", "logs.recovery", str(self._folder)]
         with suppress(OSError):  # the next start finds them too
             self._recovery = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)

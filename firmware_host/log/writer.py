@@ -61,7 +61,16 @@ class Reporter:
         with suppress(OSError):  # a disk that does not even answer this has no room
             space = free_space(log.path.parent)
         problem, slowest_s = log.problem[:LONGEST_MESSAGE], max(self._slowest_s, default=0.0)
-        report = LogReport(True, log.dropped, problem, *space, slowest_s)  # `dropped` counts those of the writer only
+        report = LogReport(
+            alive=True,
+            dropped=log.dropped,  # by the writer only
+            problem=problem,
+            free_fraction=space.free_fraction,
+            free_bytes=space.free_bytes,
+            slowest_write_s=slowest_s,
+            durable_stamp_s=log.durable_stamp_s,
+            repairing=log.repairing,
+        )
         with suppress(OSError):  # the loop is busy or has ended
             os.write(self._pipe, json.dumps([str(log.path), *report]).encode() + b"\n")
 

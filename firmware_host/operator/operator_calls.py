@@ -84,7 +84,7 @@ class OperatorCalls:
             "mode": loop.mode.name.lower(),
             "moving": loop.controller.moving,
             **self._fault_reports(),
-            "forced": loop.forced,
+            "forced": bool(loop.forced),
             "notice": loop.events.notice,
             "unlogged_requests": loop.events.requests.unlogged,
             "lease": str(lease.holder) if lease.held else None,
@@ -98,7 +98,7 @@ class OperatorCalls:
             "loop": loop.timing.summary(),
             "warnings": [*loop.configuration.warnings, *self._warnings],
             "bus": _bus_report(loop),
-            "log": _log_report(loop),
+            "log": _log_report(loop, now_s),
         }
 
     def _fault_reports(self) -> dict[str, Any]:
@@ -198,7 +198,7 @@ class OperatorCalls:
 
         return call
 
-    def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: bool = False) -> str:
+    def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: str = "") -> str:
         return _accepted(self._loop.request(request, self._clock(), order, forced, str(caller)))
 
     def require_own_robot(self, caller: Caller) -> None:
@@ -266,7 +266,7 @@ def _walk_report(loop: Loop) -> dict[str, Any]:
     }
 
 
-def _log_report(loop: Loop) -> dict[str, Any]:
+def _log_report(loop: Loop, now_s: float) -> dict[str, Any]:
     log, path = loop.recorder.report(), loop.recorder.path
     return {
         "path": str(path) if path else None,
@@ -275,6 +275,8 @@ def _log_report(loop: Loop) -> dict[str, Any]:
         "problem": log.problem,
         "free_fraction": known(log.free_fraction),
         "slowest_write_s": known(log.slowest_write_s),
+        "durable_age_s": known(now_s - log.durable_stamp_s),
+        "repairing": log.repairing,
     }
 
 

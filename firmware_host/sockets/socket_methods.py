@@ -54,7 +54,7 @@ class Parameter(NamedTuple):
     unit: str = ""
     range: Bounds | None = None
     bounds_note: str = ""  # bounds that the configuration sets
-    default: bool | int | float | None = None
+    default: bool | int | float | str | None = None
     required: bool = False
     null_is_default: bool = False  # else an explicit null is refused
 
@@ -243,7 +243,10 @@ METHODS: dict[str, SocketMethod] = {
     "arm": SocketMethod(
         Level.DRIVE,
         "Switch torque on and hold the present pose.",
-        (Parameter("force", Type.FLAG, "overrule faults that are not mandatory", default=False), *LEASE),
+        (
+            Parameter("force", Type.TEXT, "the one kind of fault to overrule, such as watchdog_unknown", default=""),
+            *LEASE,
+        ),
     ),
     "walk": SocketMethod(
         Level.DRIVE, "Walk, with a depth that adapts to the mud or is fixed.", (DEPTH, STRIDES, *LEASE)

@@ -155,7 +155,7 @@ class Lockstep:
             self.step()
         return done()
 
-    def arm(self, forced: bool = False) -> None:
+    def arm(self, forced: str = "") -> None:
         """Go from power-on to holding the pose. Raises RuntimeError with the reason where that fails."""
         self.run_until(lambda: self.loop.mode is Mode.IDLE and not self.loop.faults.blocking(forced), 3.0)
         refused = self.loop.request(Request.ARM, self.now_s, forced=forced)

@@ -168,6 +168,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         terminalreporter.write_line(line, **({} if good else {"red": True}))
     for warning in report.robot["warnings"]:
         terminalreporter.write_line(f"warning: {warning}")
+    for joint, key in report.robot.get("proven_watchdogs", {}).items():
+        terminalreporter.write_line(f"to arm without --force, write under [drive.{joint}]:\n{key}")
     late = report.robot.get("lateness")
     if late and late["ticks"]:
         seen = f"{late['missed']} of {late['ticks']} ticks missed, messages up to {1e3 * late['oldest_s']:.0f} ms old"

@@ -163,7 +163,8 @@ def test_force_overrules_what_may_be_overruled() -> None:
     latch = FaultLatch()
     latch.update([LATE, DISK, HOT], False)
     assert latch.blocking() == [DISK, HOT]
-    assert latch.blocking(forced=True) == [HOT]
+    assert latch.blocking(forced=DISK.name) == [HOT]
+    assert latch.blocking(forced="watchdog_unknown") == [DISK, HOT] == latch.blocking(forced=HOT.name)
 
 
 def test_missed_ticks_count_as_time() -> None:

@@ -40,6 +40,7 @@ BUSES = ("left", "right")  # of the example configuration
 WEIGHTS = {"power-on": 1, "idle": 2, "hold": 3, "path": 1, "insertion": 3, "stance": 3, "extraction": 3, "release": 4}
 FAILURES = {0: 1, 1: 4, 2: 5, 3: 3}  # number of failures: weight
 FLAPPING = 0.2
+FORCED = "watchdog_unknown"  # the check that arming by force overrules
 EARLIEST_S, LATEST_S, AFTER_S = 0.02, 0.4, 0.25
 TERMINATED = 0.08
 HOSTILE = 0.15
@@ -56,8 +57,8 @@ NO_REQUESTS = (
     bytes(range(256)) * 16,
 )
 ATTACKS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("arm", {"force": True}),
-    ("arm", {"take_over": True, "force": True, "lease_s": 0.1}),
+    ("arm", {"force": FORCED}),
+    ("arm", {"take_over": True, "force": FORCED, "lease_s": 0.1}),
     ("walk", {}),
     ("walk", {"depth_m": 0.035, "take_over": True}),
     ("walk", {"depth_m": 1e308}),
@@ -134,13 +135,17 @@ def _draw_slow(random: Random, forced: bool) -> tuple[str, list[Event]]:
     return "hold", [*drifts, *_insist(random, for_s, random.choice((2.0, 7.0, 20.0)), forced)]
 
 
+def _force(random: Random, forced: bool, probability: float) -> str:
+    return FORCED if forced or random.random() < probability else ""
+
+
 def _insist(random: Random, for_s: float, every_s: float, forced: bool) -> Iterator[Event]:
     """Draw an operator who walks, and clears, arms and walks again every now and then."""
     yield Call(0.0, "pilot", "walk", {})
     at_s = every_s
     while at_s < for_s:
         yield Call(round(at_s, 3), "pilot", "clear", {})
-        yield Call(round(at_s + 0.1, 3), "pilot", "arm", {"force": forced or random.random() < 0.5})
+        yield Call(round(at_s + 0.1, 3), "pilot", "arm", {"force": _force(random, forced, 0.5)})
         yield Call(round(at_s + 0.4, 3), "pilot", random.choice(("walk", "walk", "stop", "disarm")), {})
         at_s += every_s
 
@@ -285,7 +290,7 @@ def _draw_calls(random: Random, start: str, moments_s: list[float], forced: bool
         return round(random.choice(moments_s) + random.choice((0.0, 0.003, 0.02, 0.1)) * random.random(), 3)
 
     if start in ("power-on", "idle"):
-        yield Call(0.0 if start == "idle" else 0.75, "pilot", "arm", {"force": forced or random.random() < 0.3})
+        yield Call(0.0 if start == "idle" else 0.75, "pilot", "arm", {"force": _force(random, forced, 0.3)})
         yield Call(round(random.uniform(0.2, 0.4), 3), "pilot", "walk", {})
     if start == "hold":
         yield Call(0.0, "pilot", *random.choice((("walk", {}), _move(random))))
@@ -320,7 +325,7 @@ def _draw_call(random: Random, at_s: float) -> Event:
         return HangUp(at_s, client)
     method, params = random.choice(
         (
-            ("arm", {"force": random.random() < 0.5}),
+            ("arm", {"force": FORCED if random.random() < 0.5 else ""}),
             ("arm", {"take_over": True, "lease_s": 0.3}),
             ("walk", {"strides": 1}),
             ("walk", {"depth_m": 0.02, "take_over": True}),

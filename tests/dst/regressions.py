@@ -45,7 +45,7 @@ REGRESSIONS = (
             surroundings=Surroundings(strength_pa=3760, depth_m=0.026),
             start="idle",
             events=(
-                Call(at_s=0.0, client="pilot", method="arm", params={"force": True}),
+                Call(at_s=0.0, client="pilot", method="arm", params={"force": "watchdog_unknown"}),
                 Failure(at_s=0.241, component="right_sweep.motor", kind="inverted", for_s=0.876),
                 Call(at_s=0.378, client="pilot", method="walk"),
             ),

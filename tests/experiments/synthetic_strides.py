@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from control.modes import Mode
-from control.records import Phase
+from control.records import Phase, StrideEstimate
+from estimation.estimation_parameters import EstimationParameters
 from experiments.robot.lockstep_robot import simulated_configuration
 from experiments.trials.stride_profile import StrideProfile
+from experiments.trials.trial import Trial, replay_trial
 from logs.files.log_reader import Log
 from logs.files.tick_array import tick_type
 
@@ -56,3 +58,8 @@ def make_profile(phase: Phase, sweeps_deg: list[float], depths_m: list[float], *
         "depth_m": np.array(depths_m),
     }
     return StrideProfile(**(columns | {name: np.array(values) for name, values in others.items()}))
+
+
+def strides_of(trial: Trial, parameters: EstimationParameters, with_pose: bool = True) -> list[StrideEstimate]:
+    """Return an estimator's strides of a simulated trial."""
+    return [stride for stride, _ in replay_trial(trial, parameters, with_pose)]

@@ -65,7 +65,7 @@ class Memory(NamedTuple):
     mode: Mode = Mode.BOOT
     mode_ticks: int = 0  # where a duration ends the mode
     pending: Request = Request.NONE
-    forced: bool = False
+    forced: str = ""
     ending: bool = False
     clearing: bool = False
     moving: bool = False

@@ -128,8 +128,9 @@ def _arms_by_request(edge: TickEdge) -> bool:
 
 
 def _arms_only_unblocked(edge: TickEdge) -> bool:
-    least = Blocks.ALWAYS if edge.before.forced else Blocks.UNLESS_FORCED
-    blocked = any(kind.blocks >= least for kind in edge.present) or edge.reaction >= Reaction.HOLD
+    forced = edge.before.forced
+    least = {kind: Blocks.ALWAYS if kind.value == forced else Blocks.UNLESS_FORCED for kind in edge.present}
+    blocked = any(kind.blocks >= least[kind] for kind in edge.present) or edge.reaction >= Reaction.HOLD
     return not edge.energises or not (blocked or edge.debts.uncleared)
 
 

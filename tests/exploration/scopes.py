@@ -15,7 +15,7 @@ LEASE_S = 2.0  # it survives one tick without renewal
 ANNA, BEN = Operator
 ORDERS = (
     Call(ANNA, "arm"),
-    Call(ANNA, "arm", (("force", True),)),
+    Call(ANNA, "arm", (("force", "watchdog_unknown"),)),
     Call(ANNA, "walk"),
     Call(ANNA, "move", (("left_sweep_rad", 0.1),)),
     Call(BEN, "stop"),

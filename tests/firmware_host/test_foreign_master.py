@@ -130,7 +130,7 @@ def test_another_drive_or_one_that_does_not_answer_does_not_arm(configuration: C
         )
     robot.run_for(2.0)
     assert present(robot) == {"wrong_drive"}
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True)
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown")
 
 
 def test_a_serial_number_is_asked_for_only_of_firmware_that_knows_it(configuration: Configuration) -> None:

@@ -233,7 +233,7 @@ def test_a_fault_that_must_be_cleared_stays_until_then_even_against_force(at: Co
     end(failure)
     robot.run_for(1.0)
     assert mode_of(robot) is Mode.FAULT
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
     assert robot.loop.request(Request.CLEAR, robot.now_s) is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.IDLE, 0.6)
     robot.run_for(0.5)
@@ -266,7 +266,7 @@ def test_a_bug_stays_a_fault_until_a_restart(at: Copied) -> None:
         robot.loop.request(Request.CLEAR, robot.now_s)
         robot.run_for(0.6)
     assert mode_of(robot) is Mode.FAULT
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
 
 
 # force
@@ -287,16 +287,22 @@ def unread(configuration: Configuration) -> Robot:
 def test_arming_by_force_logs_every_overruled_fault(unread: Robot) -> None:
     refused = unread.loop.request(Request.ARM, unread.now_s)
     assert refused is not None and "right_sweep" in refused
-    assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
+    assert unread.loop.request(Request.ARM, unread.now_s, forced="watchdog_unknown") is None
     assert unread.run_until(lambda: mode_of(unread) is Mode.HOLD, 1.0)
     assert unread.loop.forced
     overruled = [text for text in unread.recorder.texts if text.startswith("armed by force despite ")]
     assert len(overruled) == 1 and "watchdog_unknown" in overruled[0] and "right_sweep" in overruled[0]
-    assert "request arm by force" in unread.recorder.texts
+    assert "request arm by force against watchdog_unknown" in unread.recorder.texts
+
+
+@pytest.mark.parametrize("name", ["drive_silent", "everything", "disk_low"])
+def test_force_overrules_the_one_check_that_it_names(unread: Robot, name: str) -> None:
+    refused = unread.loop.request(Request.ARM, unread.now_s, forced=name)
+    assert refused is not None and (name in refused) is (name != "disk_low")
 
 
 def test_force_ends_with_the_torque(unread: Robot) -> None:
-    assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
+    assert unread.loop.request(Request.ARM, unread.now_s, forced="watchdog_unknown") is None
     assert unread.run_until(lambda: mode_of(unread) is Mode.HOLD, 1.0)
     unread.loop.request(Request.DISARM, unread.now_s)
     unread.step()
@@ -305,7 +311,7 @@ def test_force_ends_with_the_torque(unread: Robot) -> None:
 
 
 def test_a_disarmed_request_by_force_leaves_no_trace(unread: Robot) -> None:
-    assert unread.loop.request(Request.ARM, unread.now_s, forced=True) is None
+    assert unread.loop.request(Request.ARM, unread.now_s, forced="watchdog_unknown") is None
     unread.loop.request(Request.DISARM, unread.now_s)
     unread.step()
     assert mode_of(unread) is Mode.IDLE
@@ -316,7 +322,7 @@ def test_a_disarmed_request_by_force_leaves_no_trace(unread: Robot) -> None:
 
 def test_force_without_a_fault_to_overrule_is_not_recorded(at: Copied) -> None:
     robot = at("idle")
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is None
     assert robot.run_until(lambda: mode_of(robot) is Mode.HOLD, 1.0)
     assert not robot.loop.forced
     assert not any("despite" in text for text in robot.recorder.texts)
@@ -327,7 +333,7 @@ def test_mandatory_faults_are_never_overruled(at: Copied, name: str) -> None:
     robot = at("idle")
     fail(robot, name)
     ticks_until(robot, name, FAULT_KINDS[name].bound_ticks)
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
     robot.run_for(0.1)
     assert mode_of(robot) is Mode.IDLE
     assert not any("despite" in text for text in robot.recorder.texts)

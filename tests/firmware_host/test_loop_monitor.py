@@ -160,7 +160,9 @@ def test_rows_that_a_dead_writer_does_not_take_are_no_second_fault() -> None:
 
 
 def test_no_fault_of_the_log_stops_a_robot_and_an_unwritable_log_blocks_arming() -> None:
-    ill = LogReport(True, 3, "No space left on device.", 0.0, 0, 9.0)
+    ill = HEALTHY._replace(
+        dropped=3, problem="No space left on device.", free_fraction=0.0, free_bytes=0, slowest_write_s=9.0
+    )
     faults = LogMonitor(BOUNDS).update(ill) + LogMonitor(BOUNDS).update(HEALTHY._replace(alive=False))
     assert {fault.kind.reaction for fault in faults} == {Reaction.WARN}
     against = {fault.name for fault in faults if fault.kind.blocks is Blocks.UNLESS_FORCED}

@@ -1,6 +1,7 @@
 """Walks with every type of drive, and with two of them on one robot, in lockstep: the mud is the same."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from statistics import median
 
 import pytest
@@ -9,6 +10,8 @@ from control.controller import WalkOrder
 from control.faults import FaultKind
 from control.modes import Mode, Request
 from control.records import JOINTS
+from drivers.drive import DriveParameters, ProvenWatchdog
+from drivers.mit.parameters import MitParameters
 from drivers.moteus import codec
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.drive_presets import with_drive_type
@@ -72,16 +75,29 @@ def test_drives_whose_watchdog_cannot_be_read_are_armed_by_force_only() -> None:
     robot.run_for(1.0)
     assert {fault.kind for fault in robot.loop.faults.blocking()} == {FaultKind.WATCHDOG_UNKNOWN}
     assert robot.loop.request(Request.ARM, robot.now_s) is not None
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is None
     assert robot.run_until(lambda: robot.loop.mode is Mode.HOLD, 3.0) and robot.loop.forced
     robot.run_for(0.5)
     assert robot.loop.mode is Mode.HOLD and robot.loop.drives.refused_commands == 0
 
 
+def test_drives_whose_watchdog_is_proven_are_armed_without_force() -> None:
+    text = with_drive_type(EXAMPLE, "mit").replace('type = "mit"', 'type = "mit"\nmodel = "AK80-9"')
+    configuration = parse_configuration(text)
+    proven: dict[str, DriveParameters] = {
+        joint: replace(drive, proven_watchdog=ProvenWatchdog(0.3, drive.bus, drive.node_id, "AK80-9", "2026-11-24"))
+        for joint, drive in configuration.drive.items()
+        if isinstance(drive, MitParameters)
+    }
+    robot = Lockstep(replace(configuration, drive=proven), TRACK, drives=drives_of(configuration))
+    robot.arm()
+    assert robot.loop.mode is Mode.HOLD and not robot.loop.forced
+
+
 def test_a_drive_with_the_ranges_of_another_model_is_not_armed_by_force_either() -> None:
     robot = robot_with(with_drive_type(EXAMPLE, "mit"), model="DM4340")
     robot.run_for(1.0)
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
     assert robot.loop.mode is Mode.IDLE
     assert {fault.kind for fault in robot.loop.faults.blocking()} == {FaultKind.DRIVE_SETTINGS}
 

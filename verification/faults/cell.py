@@ -157,7 +157,7 @@ class Measurement:
             self._cell.reported_ticks = self._ticks
             blocks = kind.blocks is not Blocks.NO or kind.reaction >= Reaction.HOLD
             refusing = self._cell.phase == "idle" and blocks
-            forced = self._bench.forced and kind.blocks is not Blocks.UNLESS_FORCED
+            forced = self._bench.forced if kind.value != self._bench.forced else ""
             if refusing and loop.request(Request.ARM, self._bench.now_s, forced=forced) is None:
                 self._cell.why.append("arming was not refused")
 

@@ -48,11 +48,12 @@ class FailingRobot(Lockstep):
             act()
 
     @property
-    def forced(self) -> bool:
-        """Return whether the robot is armed by force, because the watchdog of a drive cannot be read."""
-        return not all(drive.reports_settings for drive in self.loop.configuration.drive.values())
+    def forced(self) -> str:
+        """Return the fault to overrule, because the watchdog of a drive cannot be read; empty where it can."""
+        known = all(drive.knows_watchdog for drive in self.loop.configuration.drive.values())
+        return "" if known else "watchdog_unknown"
 
-    def arm(self, forced: bool = False) -> None:
+    def arm(self, forced: str = "") -> None:
         super().arm(forced or self.forced)
 
     def stall(self, ticks: int) -> None:

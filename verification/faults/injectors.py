@@ -15,6 +15,7 @@ from control.modes import Mode
 from control.rate import PERIOD_S
 from drivers.can.frames import Frame
 from drivers.drive_types import type_of
+from simulation.body.plant import END_STOPS_RAD
 from simulation.devices.drive import DriveError, Forgery
 from simulation.devices.foreign_master import ForeignMaster
 from verification.faults.failing_robot import FailingRobot
@@ -204,6 +205,17 @@ def out_of_range(robot: FailingRobot, joint: str) -> Iterator[None]:
 
 
 @during
+def slipped_to_stop(robot: FailingRobot, joint: str, rate_rad_s: float) -> Iterator[None]:
+    """Put a joint at its upper stop, where an encoder that slips together with its speed has taken it unseen."""
+    before_rad, stop_rad = _angle_rad(robot, joint), END_STOPS_RAD[joint.endswith("adduction")]
+    _move(robot, joint, stop_rad)
+    robot.drive(joint).measure(stop_rad, 0.0)
+    slip = {"encoder_slip_rad_s": -rate_rad_s, "velocity_slip_rad_s": -rate_rad_s}
+    with robot.drive_changed(joint, encoder_offset_rad=before_rad - stop_rad, **slip):
+        yield
+
+
+@during
 def moved_at_speed(robot: FailingRobot, joint: str, velocity_rad_s: float) -> Iterator[None]:
     signed_rad_s = -copysign(velocity_rad_s, _angle_rad(robot, joint))
 
@@ -236,7 +248,7 @@ def blocked(robot: FailingRobot, joint: str) -> Iterator[None]:
     """Push a sweep joint off its pose until the torque is at its limit, and block it there."""
     joint = joint.replace("adduction", "sweep")
     for _ in range(PUSHES):
-        _move(robot, joint, _angle_rad(robot, joint) + PUSHED_RAD / PUSHES)
+        _move(robot, joint, _angle_rad(robot, joint), PUSHED_RAD / PUSHES / PERIOD_S)
         robot.step()
     with jammed(robot, joint):
         robot.step()

@@ -133,7 +133,9 @@ class TimedWalk:
     def _warm_up(self) -> None:
         """Arm by force where drives cannot report their watchdogs, as an operator has to."""
         configuration = self.walk.loop.configuration
-        self.walk.arm(forced=not all(drive.reports_settings for drive in configuration.drive.values()))
+        self.walk.arm(
+            forced="" if all(drive.knows_watchdog for drive in configuration.drive.values()) else "watchdog_unknown"
+        )
         self.walk.walk(WalkOrder(configuration.adaptation.initial_depth_m))
         self.walk.run_for(WARM_UP_S)
         freeze_garbage()

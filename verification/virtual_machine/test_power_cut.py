@@ -30,6 +30,7 @@ def cut_s(booted: Robot) -> float:
     booted.machine.cut_power()
     booted.machine.boot()
     booted.wait_until_ready()
+    booted.wait_for("! mudskipper status --json | grep -E '\"repairing\": [1-9]'")
     return when_s
 
 

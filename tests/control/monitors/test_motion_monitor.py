@@ -186,3 +186,31 @@ def test_a_speed_that_no_joint_has_is_no_energy() -> None:
     for tick, velocity_rad_s in enumerate((0.0, 2.0 * FASTEST_RAD_S, 3e38, float("inf"), float("nan"), 0.0)):
         monitor.update(found, DriveState(0.0, velocity_rad_s, tick * PERIOD_S), PERIOD_S, 0.0, None)
     assert not found and monitor.unexplained_j == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("rate_rad_s", [0.05, 0.3, 1.0])
+def test_a_joint_at_its_stop_whose_encoder_slips_with_its_speed_is_found(sign: float, rate_rad_s: float) -> None:
+    """From 0.3 N·m on the motor presses for at most 0.5 s."""
+    monitor, pressed_s, now_s = MotionMonitor("left_sweep", DYNAMICS, TORQUE_NM), 0.0, 0.0
+    found: list[Fault] = []
+    while not found and now_s < 10.0:
+        now_s += PERIOD_S
+        angle_rad = -sign * rate_rad_s * now_s
+        torque_nm = min(max(-DYNAMICS.stiffness_nm_rad * angle_rad, -TORQUE_NM), TORQUE_NM)
+        pressed_s += PERIOD_S if abs(torque_nm) >= 0.3 else 0.0
+        state = DriveState(angle_rad, -sign * rate_rad_s, now_s)
+        monitor.update(found, state, PERIOD_S, torque_nm, JointTarget(0.0, 0.0))
+    assert found[0].name in ("joint_driven_back", "following_error") and pressed_s < 0.48
+
+
+def test_a_load_that_a_held_joint_yields_to_and_a_path_that_lowers_it_are_healthy() -> None:
+    assert Joint().run(holding, 3.0, load_nm=0.6, target_rad=0.0) == []
+    joint = Joint(velocity_rad_s=0.5)
+    joint.angle_rad = lag_rad = 0.05
+    while joint.now_s < 2.0:
+        target = JointTarget(joint.now_s * 0.5, 0.5)
+        torque_nm = DYNAMICS.stiffness_nm_rad * (target.angle_rad - joint.angle_rad) + DAMPING_NM_S * (
+            target.velocity_rad_s - joint.velocity_rad_s
+        )
+        assert joint.tick(torque_nm, DYNAMICS.stiffness_nm_rad * lag_rad, target) == []

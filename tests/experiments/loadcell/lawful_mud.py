@@ -12,6 +12,8 @@ from simulation.test_rig.plate_stage import CarriedPlate, PlateStage, StageParam
 from simulation.test_rig.stage_motion import ManualMotionParameters
 
 WIDTH_M, THICKNESS_M = 0.03, 0.004
+RATE_HZ, NOISE_N = 80.0, 0.008  # of the cell
+COUNT_M = 1e-5  # of the encoder
 
 
 class LawfulMud:
@@ -49,39 +51,32 @@ def feel(
     seed: int,
     speed_m_s: float = 0.1,
     acceleration_m_s2: float = 2.0,
-    rate_hz: float = 80.0,
-    noise_n: float = 0.008,
-    cell_sign: float = 1.0,
-    drift_n_s: float = 0.0,
 ) -> Recorded:
     """Return one trial of a motorised stage that starts at a random time."""
     random = Random(seed)
-    stage = PlateStage(plate, StageParameters(acceleration_m_s2, cell_sign))
+    stage = PlateStage(plate, StageParameters(acceleration_m_s2))
     stage.mean_force_n(0.0)
     stage.move_over(plate, kind == SHEAR)
     _start(stage, plate, kind, random.uniform(1.0, 1.3), speed_m_s)
-    return _heard(stage, kind, seed, random, rate_hz, noise_n, drift_n_s)
+    return _heard(stage, kind, seed, random)
 
 
 def feel_by_hand(
     plate: CarriedPlate,
     kind: str,
     seed: int,
-    hand: ManualMotionParameters | None = None,
     lag_s: float = 0.012,
-    position_rate_hz: float = 100.0,
     jitter_s: float = 0.0015,
-    count_m: float = 1e-5,
 ) -> Recorded:
     """Return one trial of a manual stage with an encoder; forces are stamped later by `lag_s`."""
     random = Random(seed)
-    stage = PlateStage(plate, StageParameters(manual=hand or ManualMotionParameters(), seed=seed))
+    stage = PlateStage(plate, StageParameters(manual=ManualMotionParameters(), seed=seed))
     stage.mean_force_n(0.0)
     stage.move_over(plate, kind == SHEAR)
     _start(stage, plate, kind, random.uniform(1.0, 1.3), 0.1)
-    felt = _heard(stage, kind, seed, random, 80.0, 0.008, 0.0)
-    times_s = np.arange(0.003, stage.ends_s + 1.05, 1.0 / position_rate_hz)
-    positions_m = count_m * np.round([stage.travelled_m(float(t)) / count_m for t in times_s])
+    felt = _heard(stage, kind, seed, random)
+    times_s = np.arange(0.003, stage.ends_s + 1.05, 0.01)
+    positions_m = COUNT_M * np.round([stage.travelled_m(float(t)) / COUNT_M for t in times_s])
     reported = StagePositions(_jittered(times_s, jitter_s, random), positions_m)
     return felt._replace(times_s=_jittered(felt.times_s, jitter_s, random) + lag_s, positions=reported)
 
@@ -99,9 +94,7 @@ def _start(stage: PlateStage, plate: CarriedPlate, kind: str, start_s: float, sp
         stage.insert(start_s, 0.03, speed_m_s, 3.0)
 
 
-def _heard(
-    stage: PlateStage, kind: str, seed: int, random: Random, rate_hz: float, noise_n: float, drift_n_s: float
-) -> Recorded:
-    times_s: Array = np.arange(1.0 / rate_hz, stage.ends_s + 1.0, 1.0 / rate_hz)
-    forces_n = [stage.mean_force_n(float(t)) + random.gauss(0.0, noise_n) + drift_n_s * t for t in times_s]
+def _heard(stage: PlateStage, kind: str, seed: int, random: Random) -> Recorded:
+    times_s: Array = np.arange(1.0 / RATE_HZ, stage.ends_s + 1.0, 1.0 / RATE_HZ)
+    forces_n = [stage.mean_force_n(float(t)) + random.gauss(0.0, NOISE_N) for t in times_s]
     return Recorded(f"lawful/{kind}/{seed}", "lawful", kind, times_s, np.array(forces_n), 0.0)

@@ -56,25 +56,18 @@ class Laboratory:
         muds: Mapping[str, CarriedPlate],
         operator: ScriptedOperator,
         trials: int = 1,
-        baud: int = 115200,
         amplifier: AmplifierParameters | None = None,
-        stage: StageParameters | None = None,
         seed: int = 1,
-        line_format: str = "number",
         encoder: StageEncoderParameters | None = None,
-        encoder_baud: int = 115200,
     ) -> None:
         """Emulate a motorised stage, or with an `encoder` one that is pushed by hand."""
         self.folder, self.operator = folder, operator
-        if encoder is not None:
-            stage = StageParameters(manual=ManualMotionParameters(), seed=seed)
+        stage = None if encoder is None else StageParameters(manual=ManualMotionParameters(), seed=seed)
         self.bench = EventfulBench(next(iter(muds.values())), folder / "cell", amplifier, stage, seed, encoder)
-        self.port = LoadCellPort(
-            str(folder / "cell"), baud, LineFormat(line_format), LoadCellCalibration("counts", 1.0)
-        )
+        self.port = LoadCellPort(str(folder / "cell"), 115200, LineFormat("number"), COUNTS)
         self.encoder = None
         if encoder is not None:
-            settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count, encoder_baud)
+            settings = StageEncoderSettings(str(folder / "cell_position"), encoder.metres_per_count)
             self.encoder = StageEncoder(settings)
         self.recorder = CellRecorder(self.port, self.bench, operator, self.encoder)
         self.plan = TrialPlan(tuple(muds), trials, SETTINGS)
@@ -127,7 +120,6 @@ def laboratories(folder: Path) -> Iterator[Make]:
         own_folder = folder / str(len(made))
         own_folder.mkdir()
         laboratory = Laboratory(own_folder, {"lawful": LawfulMud(**KNOWN)}, operator or ScriptedOperator(), **options)
-        laboratory.port.calibration = COUNTS
         made.append(laboratory)
         return laboratory
 

@@ -17,7 +17,6 @@ from experiments.loadcell.trials import list_problems, record
 from experiments.robot.bench_errors import BenchError
 from experiments.study.prompt import GO_ON, REDO, SKIP
 from simulation.test_rig.emulated_instruments import AmplifierParameters
-from simulation.test_rig.plate_stage import StageParameters
 from tests.experiments.loadcell.loadcell_bench import SETTINGS, Make, laboratories
 from tests.scripted_operator import ScriptedOperator
 
@@ -64,19 +63,19 @@ def test_a_trial_with_an_unplugged_cell_is_repeated_and_both_files_remain(make: 
 
 
 @pytest.mark.parametrize(
-    ("amplifier", "stage", "kind", "message"),
+    ("amplifier", "kind", "message"),
     [
-        (AmplifierParameters(drift_n_s=0.03), None, INSERTION, "the zero moved by"),
-        (AmplifierParameters(range_n=2.0), None, INSERTION, "at its limit"),
-        (AmplifierParameters(garbled_fraction=0.2), None, SHEAR, "lines were garbled"),
-        (AmplifierParameters(drop_out_rate_hz=2.0, drop_out_s=0.3), None, SHEAR, "are missing"),
-        (AmplifierParameters(rate_hz=10.0), None, INSERTION, "fewer than 6 samples"),
+        (AmplifierParameters(drift_n_s=0.03), INSERTION, "the zero moved by"),
+        (AmplifierParameters(range_n=2.0), INSERTION, "at its limit"),
+        (AmplifierParameters(garbled_fraction=0.2), SHEAR, "lines were garbled"),
+        (AmplifierParameters(drop_out_rate_hz=2.0, drop_out_s=0.3), SHEAR, "are missing"),
+        (AmplifierParameters(rate_hz=10.0), INSERTION, "fewer than 6 samples"),
     ],
 )
 def test_an_invalid_trial_is_reported_and_left_out(
-    make: Make, amplifier: AmplifierParameters, stage: StageParameters | None, kind: str, message: str
+    make: Make, amplifier: AmplifierParameters, kind: str, message: str
 ) -> None:
-    laboratory = make(amplifier=amplifier, stage=stage, operator=ScriptedOperator(SKIP))
+    laboratory = make(amplifier=amplifier, operator=ScriptedOperator(SKIP))
     assert any(message in each for each in laboratory.try_once(kind))
     (entry,) = laboratory.notebook.entries.values()
     assert entry["skipped"] and any(message in each for each in entry["why"])

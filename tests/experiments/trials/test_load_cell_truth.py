@@ -23,7 +23,7 @@ from experiments.trials.load_cell_truth import (
     TrueCoefficients,
     load_cell_truth,
 )
-from experiments.trials.trial import WALKING, run_trial, strides_of
+from experiments.trials.trial import WALKING, run_trial
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import (
     ADHESION,
@@ -38,6 +38,7 @@ from simulation.mud.clay import (
 )
 from simulation.mud.disturbances import NONE
 from simulation.mud.track import Track
+from tests.experiments.synthetic_strides import strides_of
 
 GEOMETRY = FlipperGeometry()
 EDGE_M2 = GEOMETRY.plate_width_m * GEOMETRY.plate_thickness_m

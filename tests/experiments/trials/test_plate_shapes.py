@@ -16,10 +16,11 @@ from estimation.estimation_parameters import EstimationParameters
 from experiments.campaign.plate_file import read_corners
 from experiments.reports.error_table import COEFFICIENTS
 from experiments.trials.load_cell_truth import true_coefficients
-from experiments.trials.trial import SINGLE, run_trial, strides_of
+from experiments.trials.trial import SINGLE, run_trial
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB
 from simulation.mud.track import Track
+from tests.experiments.synthetic_strides import strides_of
 
 PLATES = Path(__file__).resolve().parents[3] / "examples" / "plates"
 TRACK = Track([(100.0, clay_of_water(48.6))])

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
@@ -11,24 +12,25 @@ import experiments.trials.transitions
 from control.mud_estimate import Coefficient, FlipperEstimate, MudEstimate
 from control.records import FLIPPERS
 from experiments.trials.load_cell_truth import LoadCellTruth, TrueCoefficients
-from experiments.trials.transitions import Transition, transition_rows, transitions_of
+from experiments.trials.transitions import transition_rows, transitions_of
 from experiments.trials.trial import SINGLE, Trial, configuration_of
 from simulation.body.reference_sensor import StrideTruth, StrokeTruth
 from simulation.mud.clay import Clay
 
 DEPTH_M = 0.03
+Row = dict[str, Any]
 K_P = {"soft": 1e6, "firm": 2e6}
 
 
-def transition(strides: int | None, flipper: str = "left", before: str = "soft", after: str = "firm") -> Transition:
-    return Transition(before, after, flipper, strides)
+def transition(strides: int | None, flipper: str = "left", before: str = "soft", after: str = "firm") -> Row:
+    return {"before": before, "after": after, "flipper": flipper, "strides": strides}
 
 
 # rows
 
 
-def rows_of(*transitions: Transition) -> list[dict[str, Any]]:
-    return transition_rows(DataFrame([each._asdict() for each in transitions]))
+def rows_of(*transitions: Row) -> list[Row]:
+    return transition_rows(DataFrame(list(transitions)))
 
 
 def test_transitions_within_two_strides_are_given_as_a_fraction_for_each_direction() -> None:
@@ -70,10 +72,10 @@ class Walk:
     estimates: Sequence[float | None]
     depth_m: float = DEPTH_M
 
-    def transitions(self, monkeypatch: pytest.MonkeyPatch) -> list[Transition]:
+    def transitions(self, monkeypatch: pytest.MonkeyPatch) -> list[Row]:
         truths = [stride(flipper, i, mud) for i, mud in enumerate(self.muds) for flipper in FLIPPERS]
-        by_index = {i: mud_estimate(k_p, self.depth_m) for i, k_p in enumerate(self.estimates)}
-        monkeypatch.setattr(experiments.trials.transitions, "mud_estimates", lambda trial, parameters: by_index)
+        replayed = [(SimpleNamespace(index=i), mud_estimate(k_p, self.depth_m)) for i, k_p in enumerate(self.estimates)]
+        monkeypatch.setattr(experiments.trials.transitions, "replay_trial", lambda trial, parameters: replayed)
         trial = Trial(configuration_of(SINGLE), cast(Any, None), (), truths)
         return transitions_of(trial, self.cells(truths))
 
@@ -106,17 +108,17 @@ def test_an_estimate_within_a_fifth_of_the_truth_has_followed(
     sign: float, off: float, strides: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     walk = Walk(("soft", "firm"), (1e6, (1.0 + sign * off) * 2e6))
-    assert [each.strides for each in walk.transitions(monkeypatch)] == [strides, strides]
+    assert [each["strides"] for each in walk.transitions(monkeypatch)] == [strides, strides]
 
 
 def test_the_estimate_is_evaluated_at_the_depth_of_the_stride(monkeypatch: pytest.MonkeyPatch) -> None:
     """k ∝ 1/z here: 4 million at 1.5 cm are 2 million at 3 cm."""
     walk = Walk(("soft", "firm"), (1e6, 4e6), depth_m=DEPTH_M / 2.0)
-    assert [each.strides for each in walk.transitions(monkeypatch)] == [1, 1]
+    assert [each["strides"] for each in walk.transitions(monkeypatch)] == [1, 1]
 
 
 def test_the_next_border_ends_a_transition(monkeypatch: pytest.MonkeyPatch) -> None:
     """An estimate that becomes right again only because the next mud begins has not followed."""
     walk = Walk(("soft", "firm", "firm", "soft", "soft"), (1e6, 1e6, 1e6, 1e6, 1e6))
-    left = [each for each in walk.transitions(monkeypatch) if each.flipper == "left"]
+    left = [each for each in walk.transitions(monkeypatch) if each["flipper"] == "left"]
     assert left == [transition(None), transition(1, before="firm", after="soft")]

@@ -16,13 +16,13 @@ from experiments.trials.trial import (
     Setup,
     Trial,
     configuration_of,
-    mud_estimates,
+    replay_trial,
     run_trial,
-    strides_of,
 )
 from simulation.mud.clay import clay_of_water
 from simulation.mud.disturbances import LAB, NONE
 from simulation.mud.track import Track
+from tests.experiments.synthetic_strides import strides_of
 
 TRACK = Track([(100.0, clay_of_water(47.6))])
 EVERY_ROW_NEW = replace(WALKING, row_period_s=0.0)
@@ -114,7 +114,7 @@ def test_mud_estimates_are_those_after_each_stride() -> None:
     estimator = MudEstimator(trial().configuration.geometry, trial().drives, parameters)
     for sample in trial().samples:
         estimator.update(*sample)
-    assert mud_estimates(trial(), parameters) == {0: estimator.mud_estimate}
+    assert [estimate for _, estimate in replay_trial(trial(), parameters)][-1] == estimator.mud_estimate
 
 
 def test_in_a_walk_both_flippers_read_the_same_of_the_same_mud() -> None:

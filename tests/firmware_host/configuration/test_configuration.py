@@ -94,6 +94,23 @@ REFUSED = [  # a text of the example, its replacement, and the beginnings of the
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nvelocity_range_rad_s = 501.0', [
         "drive.left_sweep.velocity_range_rad_s = 501.0: must be at most 500.0"
     ]),
+    *[
+        ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\nfirmware_date = "2026-11-01"\n'
+         f'proven_watchdog = {{ watchdog_s = 0.3, bus = "{bus}", node_id = {node_id}, model = "{model}",'
+         f' date = "{date}" }}',
+         [f"drive.left_sweep.proven_watchdog.{problem}"])
+        for bus, node_id, model, date, problem in (
+            ("right", 5, "AK80-9", "2026-11-24", "bus = 'right': must be 'left'"),
+            ("left", 6, "AK80-9", "2026-11-24", "node_id = 6: must be 5"),
+            ("left", 5, "AK80-6", "2026-11-24", "model = 'AK80-6': must be 'AK80-9'"),
+            ("left", 5, "AK80-9", "2026-10-31", "date = 2026-10-31: must be at least firmware_date = 2026-11-01"),
+            ("left", 5, "AK80-9", "24.11.2026", "date = '24.11.2026': must be a date such as 2026-11-24"),
+            ("left", 5, "AK80-9", "", "date = '': must be the date of the trial"),
+        )
+    ],
+    ("node_id = 0", 'node_id = 5\ntype = "mit"\nproven_watchdog = { watchdog_s = 0.3 }', [
+        "drive.left_sweep.proven_watchdog.watchdog_s = 0.3: must be 0: a DM4310 reports its own"
+    ]),
     ("node_id = 0", 'node_id = 5\ntype = "mit"\nmodel = "AK80-9"\ntorque_range_nm = 9.0', [
         "drive.left_sweep.torque_range_nm = 9: must be 0: that of an AK80-9 is fixed"
     ]),

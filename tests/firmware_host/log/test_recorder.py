@@ -263,8 +263,10 @@ def test_what_a_killed_writer_left_is_recovered_at_the_next_start(tmp_path: Path
     cut = read_log(killed.path)
     assert (cut.complete, cut.configuration_text) == (False, CONFIGURATION)
     recorder = Recorder(first_path(tmp_path, "2"), CONFIGURATION, {"robot": "test"}, LogParameters())
+    assert recorder.report().repairing == 1  # before its writer has said anything
     recorder.put(TICK_KIND, make_tick(1.0))
     wait_until((tmp_path / DONE / "1-0000.mcap").exists)
+    wait_until(lambda: not look(recorder).repairing)
     assert recorder.close(LONGEST_S)
     assert recorder.path == tmp_path / DONE / "2-0000.mcap"
     wait_until(lambda: not unfinished_files(tmp_path))

@@ -6,9 +6,11 @@ import errno
 import os
 import shutil
 import subprocess
+import time
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -113,6 +115,36 @@ def test_a_full_disk_frees_nothing_where_nothing_may_be_freed_and_stops_where_it
         for number in range(5):
             log.write(make_ticks(100 * number, 100 * number + 190))
     assert log.problem and [path.exists() for path in old] == [False] * deleted + [True] * (5 - deleted)
+
+
+@pytest.mark.parametrize("disk_s", [0.0, 0.7, 4.0])
+def test_a_power_cut_costs_a_second_and_what_the_disk_needs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, disk_s: float
+) -> None:
+    """Each synchronisation takes `disk_s`, and a cut before its end leaves what the one before has synchronised."""
+    now_s, lengths, ages_s = 0.0, [0], list[float]()
+
+    def synchronise(descriptor: int) -> None:
+        nonlocal now_s
+        now_s += disk_s
+        if written:
+            ages_s.append(now_s - log.durable_stamp_s)
+            lengths.append(os.fstat(descriptor).st_size)
+
+    written = 0
+    monkeypatch.setattr(log_file, "time", SimpleNamespace(monotonic=lambda: now_s, time_ns=time.time_ns))
+    monkeypatch.setattr(os, "fsync", synchronise)
+    log = make_segments(tmp_path, ONE_FILE)
+    log.write(make_ticks(0, 1))
+    while now_s < 30.0:
+        now_s += 0.05
+        come = int(380 * now_s)
+        log.write(make_ticks(written, come, Mode.WALKING))
+        written = come
+    assert max(ages_s[1:]) < max(1.0, disk_s) + disk_s + 0.1  # rows are gathered for 0.05 s
+    left = tmp_path / "left.mcap"
+    left.write_bytes(log.path.read_bytes()[: lengths[-1]])
+    assert read_log(left).ticks["stamp_s"][-1] == log.durable_stamp_s
 
 
 @pytest.mark.usefixtures("at_once")

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from control.faults import FAULT_KINDS, Blocks, FaultKind, Reaction
+from control.faults import FAULT_KINDS, OVERRULED_BY_FORCE, Blocks, FaultKind, Reaction
 from control.modes import Mode, Request
 from control.records import JOINTS
 from firmware_host.configuration.configuration import Configuration
@@ -62,17 +62,18 @@ def test_a_line_fails_exactly_if_its_fault_blocks_arming(ready: Lockstep) -> Non
         assert all(each["ok"] for identity, each in lines.items() if identity != line["id"]), kind
 
 
-@pytest.mark.parametrize("forced", [False, True])
-def test_the_check_and_a_refused_arm_agree(ready: Lockstep, forced: bool) -> None:
+@pytest.mark.parametrize("by_force", [False, True])
+def test_the_check_and_a_refused_arm_agree(ready: Lockstep, by_force: bool) -> None:
     loop = ready.loop
     for kind in FaultKind:
         fault = kind.fault(SUBJECTS.get(kind.part, ""))
         lines = lines_of(ready, kind)
+        forced = kind.value if by_force and kind.value in OVERRULED_BY_FORCE else ""
         loop.faults.update([fault], False)
         loop.health = loop.health._replace(worst=loop.faults.worst)
         against = [line for line in lines.values() if not line["ok"] and (line["mandatory"] or not forced)]
         refused = loop.request(Request.ARM, ready.now_s, forced=forced)
-        loop.pending_request, loop.forced = Request.NONE, False
+        loop.pending_request, loop.forced = Request.NONE, ""
         loop.faults.reset()
         loop.health = loop.health._replace(worst=None)
         assert refused == (fault.message if against else None)
@@ -105,7 +106,7 @@ def test_an_unheard_drive_is_a_mandatory_line_with_its_missing_signals(configura
     assert items["drive.right_sweep"]["mandatory"] and "wiring" in items["drive.right_sweep"]["fix"]
     assert not items.keys() & {"joint.right_sweep", "watchdog.right_sweep"}
     assert "joint.left_sweep" in items and not any("nan" in item["text"] for item in items.values())
-    assert robot.loop.request(Request.ARM, robot.now_s, forced=True) is not None
+    assert robot.loop.request(Request.ARM, robot.now_s, forced="watchdog_unknown") is not None
 
 
 def test_a_drive_without_temperature_is_reported_but_does_not_block_arming(

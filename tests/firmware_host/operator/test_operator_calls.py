@@ -80,8 +80,8 @@ def test_arming_by_force_is_logged_with_its_sender(robot: Robot) -> None:
     robot.steps.run_for(2.0)
     fault = FaultKind.LOG_UNWRITABLE.fault(reason="No space left")
     robot.steps.loop.faults.update([fault], False)
-    robot.ask("arm", force=True)
-    assert robot.events.about("request") == ["request arm by force by uid 1000 (process 77)"]
+    robot.ask("arm", force="log_unwritable")
+    assert robot.events.about("request") == ["request arm by force against log_unwritable by uid 1000 (process 77)"]
 
 
 def test_a_repeated_request_is_logged_once_a_second(robot: Robot) -> None:

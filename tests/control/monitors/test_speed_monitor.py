@@ -1,0 +1,60 @@
+"""Angles that drift away from their speed, and speeds in a wrong range, beside sound joints at any motion."""
+
+from __future__ import annotations
+
+from math import cos, floor, pi, sin
+from random import Random
+
+import pytest
+
+from control.monitors.encoder_monitor import EncoderMonitor
+from control.records import DriveState
+
+MESSAGE_S = 0.00263
+COUNT_RAD = 2.0 * pi / 16384
+CODE_RAD_S = 130.0 / 4095.0  # of the widest range of CubeMars
+
+
+def first_fault(
+    slip_rad_s: float = 0.0,
+    factor: float = 1.0,
+    amplitude_rad: float = 0.5,
+    noise_rad_s: float = 0.0,
+    for_s: float = 20.0,
+) -> tuple[str, float]:
+    """Return the name of the first fault and its time, for strides of 2 s with codes that are rounded down."""
+    encoder, random, now_s = EncoderMonitor("left_sweep", 0.05), Random(1), 0.0
+    while now_s < for_s:
+        now_s += MESSAGE_S
+        angle_rad = amplitude_rad * sin(pi * now_s) + slip_rad_s * now_s
+        speed_rad_s = factor * amplitude_rad * pi * cos(pi * now_s) + random.gauss(0.0, noise_rad_s)
+        seen = floor(angle_rad / COUNT_RAD) * COUNT_RAD, floor(speed_rad_s / CODE_RAD_S + 0.5) * CODE_RAD_S
+        fault = encoder.update(DriveState(*seen, angle_stamp_s=now_s), MESSAGE_S)
+        if fault:
+            return fault.name, now_s
+    return "", now_s
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("rate_rad_s", "within_s"), [(0.05, 3.9), (0.1, 1.7), (0.3, 0.7), (1.0, 0.4)])
+@pytest.mark.parametrize("amplitude_rad", [0.001, 0.5])
+def test_an_encoder_that_slips_is_found(sign: float, rate_rad_s: float, within_s: float, amplitude_rad: float) -> None:
+    name, found_s = first_fault(slip_rad_s=sign * rate_rad_s, amplitude_rad=amplitude_rad)
+    assert name in ("encoder_slips", "encoder_stuck") and found_s < within_s
+
+
+@pytest.mark.parametrize("factor", [50.0 / 25.64, 50.0 / 65.0, 50.0 / 45.0, 1.05, 0.95])
+def test_a_speed_in_a_wrong_range_is_found_within_three_strides(factor: float) -> None:
+    name, found_s = first_fault(factor=factor)
+    assert name == "speed_wrong" or (factor > 1.5 and name == "encoder_slips")  # before the line has a slope
+    assert found_s < 6.0
+
+
+@pytest.mark.parametrize("amplitude_rad", [0.01, 0.05, 0.5, 1.0])
+@pytest.mark.parametrize("noise_rad_s", [0.0, 0.3])
+def test_a_sound_encoder_is_never_suspected(amplitude_rad: float, noise_rad_s: float) -> None:
+    assert first_fault(amplitude_rad=amplitude_rad, noise_rad_s=noise_rad_s, for_s=60.0)[0] == ""
+
+
+def test_a_speed_that_is_rounded_by_half_a_step_of_its_widest_code_is_no_slip() -> None:
+    assert first_fault(slip_rad_s=CODE_RAD_S / 2.0, for_s=60.0)[0] == ""
