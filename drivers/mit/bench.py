@@ -21,11 +21,19 @@ from drivers.mit.setup import NOTHING, DamiaoSetup, is_answer, is_register, mode
 NAME = "mit"
 IDS = range(1, LARGEST_ID + 1)
 ASKED = (SOFTWARE, SERIAL, PMAX, VMAX, TMAX)
+OTHER_REPORT = 0x29  # in the upper bits of an extended id, above the drive's: a CubeMars that speaks another protocol
+OTHER_HARDWARE = "a CubeMars V3, or one in servo mode"
+OTHER_PROBLEM = "it reports by extended ids (0x29xx), another protocol, which is not supported: see docs/how-to/mit.md"
 Values = dict[int, set[float]]  # of one id by register: two values where two drives answer
 
 
 class MitBench(DriveBench):
     disturbs = "ODrives of id 0 take its questions for commands"
+
+    def ids_heard(self, frames: Iterable[Frame]) -> set[int]:
+        """Return the ids of CubeMars drives that report in another protocol; one in MIT mode only answers."""
+        extended = (frame.arbitration_id for frame in frames if frame.is_extended and not frame.is_fd)
+        return {identifier & 0xFF for identifier in extended if identifier >> 8 == OTHER_REPORT}
 
     def find(self, port: BenchPort, heard: set[int]) -> Sequence[FoundDrive]:
         answered: dict[int, list[int]] = {}  # the ids of the answers, by the id of the drive that gave them
@@ -34,10 +42,14 @@ class MitBench(DriveBench):
             if is_answer(frame, node_id) and not is_register(frame, node_id):
                 answered.setdefault(node_id, []).append(frame.arbitration_id)
         registers = _read_registers(port, answered)
+        others = sorted(heard - answered.keys())
         return [
-            each
-            for node_id, ids in sorted(answered.items())
-            for each in _found(node_id, ids, registers.get(node_id, {}))
+            *(
+                each
+                for node_id, ids in sorted(answered.items())
+                for each in _found(node_id, ids, registers.get(node_id, {}))
+            ),
+            *(FoundDrive(NAME, node_id, OTHER_HARDWARE, problem=OTHER_PROBLEM) for node_id in others),
         ]
 
     def open_setup(self, port: BenchPort, facts: SetupFacts) -> DriveSetup:

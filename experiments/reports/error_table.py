@@ -78,18 +78,16 @@ def plate_rows(evaluations: DataFrame) -> list[Row]:
 
 
 def _plates(group: DataFrame) -> Row:
-    """Return how the lean of the flipper's plate explains the difference to the paper's upright plate."""
+    """Return how the lean of the flipper's plate explains the difference to the paper's upright plate.
+
+    The lean's fraction is of the sizes of two differences, which may cancel each other.
+    """
     values = group[group["kind"] == "value"]
     leaning = float(np.median(group["truth"] / group["upright"]))
-    estimate = float(np.median(values["value"] / values["upright"])) if len(values) else None
-    return {
-        "upright_over_leaning": round(1.0 / leaning, 4),
-        "estimate_over_upright": None if estimate is None else round(estimate, 4),
-        "lean_fraction": None if estimate is None else round(_lean_fraction(leaning - 1.0, estimate - leaning), 4),
-    }
-
-
-def _lean_fraction(lean: float, error: float) -> float:
-    """Return the lean's fraction of the sizes of two differences, which may cancel each other."""
-    both = abs(lean) + abs(error)
-    return abs(lean) / both if both > 0.0 else 0.0
+    row: Row = {"upright_over_leaning": round(1.0 / leaning, 4), "estimate_over_upright": None, "lean_fraction": None}
+    if len(values):
+        estimate = float(np.median(values["value"] / values["upright"]))
+        lean, both = abs(leaning - 1.0), abs(leaning - 1.0) + abs(estimate - leaning)
+        row["estimate_over_upright"] = round(estimate, 4)
+        row["lean_fraction"] = round(lean / both if both > 0.0 else 0.0, 4)
+    return row

@@ -121,7 +121,15 @@ def _gathered(estimates: DataFrame) -> dict[str, GatheredCoefficient]:
 
 def headline_sentences(run: Run, headline: Entry) -> list[str]:
     """Return the result in sentences; a CSV of the authors knows no faults."""
-    return [_travel_sentence(headline), _strides_sentence(headline), *[_faults_sentence(headline)] * bool(run.log)]
+    strides, outcomes = headline["strides"], headline["outcomes"]
+    known = [f"{outcomes[outcome]} {doing}" for outcome, doing in DOING.items() if outcomes[outcome]]
+    text = f"{counted(strides, 'stride')}{': ' * bool(known)}{', '.join(known)}." if strides else "No complete stride."
+    sentences = [_travel_sentence(headline), text]
+    if run.log:
+        stops = f"{counted(headline['stops'], 'fault')} stopped it" if headline["stops"] else "No fault stopped it"
+        warnings = f"; {counted(headline['warnings'], 'warning')}" * bool(headline["warnings"])
+        sentences.append(f"{stops}{warnings}.")
+    return sentences
 
 
 def _travel_sentence(headline: Entry) -> str:
@@ -132,19 +140,6 @@ def _travel_sentence(headline: Entry) -> str:
     walks = f" in {headline['walks']} walks" if headline["walks"] > 1 else ""
     speed = f"{100.0 * headline['speed_m_s']:.1f} cm/s"
     return f"The robot walked {headline['distance_m']:.2f} m in {headline['duration_s']:.1f} s{walks}: {speed}."
-
-
-def _strides_sentence(headline: Entry) -> str:
-    if not headline["strides"]:
-        return "No complete stride."
-    known = [(number, doing) for outcome, doing in DOING.items() if (number := headline["outcomes"][outcome])]
-    text = ", ".join(f"{number} {doing}" for number, doing in known)
-    return f"{counted(headline['strides'], 'stride')}{': ' * bool(text)}{text}."
-
-
-def _faults_sentence(headline: Entry) -> str:
-    stops = f"{counted(headline['stops'], 'fault')} stopped it" if headline["stops"] else "No fault stopped it"
-    return f"{stops}; {counted(headline['warnings'], 'warning')}." if headline["warnings"] else f"{stops}."
 
 
 # several runs

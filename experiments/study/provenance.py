@@ -14,7 +14,6 @@ from datetime import UTC, datetime
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple
 
 from firmware_host.software_version import PACKAGE, build_metadata, software_version
 
@@ -56,8 +55,8 @@ def source_digest(*modules: str) -> str:
         module = left.pop()
         source = None if module in texts else _source(module)
         if source is not None:
-            texts[module] = source.text
-            left += source.imports
+            texts[module] = source[0]
+            left += source[1]
     if unknown := set(modules) - set(texts):
         raise ValueError(f"{', '.join(sorted(unknown))}: no module of {PACKAGE}")
     digest = sha256()
@@ -66,21 +65,16 @@ def source_digest(*modules: str) -> str:
     return digest.hexdigest()[:DIGITS]
 
 
-class _Source(NamedTuple):
-    text: bytes
-    imports: list[str]
-
-
 @cache
-def _source(module: str) -> _Source | None:
-    """Return a module of the product as it was when it was first asked for; None for any other name."""
+def _source(module: str) -> tuple[bytes, list[str]] | None:
+    """Return text and imports of a module as it was when it was first asked for; None for one of another product."""
     if module.partition(".")[0] not in PACKAGES:
         return None
     path = ROOT.joinpath(*module.split("."))
     for file in (path / "__init__.py", path.with_suffix(".py")):
         if file.is_file():
             text = file.read_bytes()
-            return _Source(text, [module.rpartition(".")[0], *_imports(text)])
+            return text, [module.rpartition(".")[0], *_imports(text)]
     return None
 
 

@@ -38,6 +38,11 @@ def constant_depth(depth_m: float) -> DepthRule:
     return DepthRule(f"{100.0 * depth_m:g} cm", depth_m)
 
 
+def rule_of(depth_m: float, method: str) -> DepthRule:
+    """Return the rule of a method of adaptation, or of a constant depth where none is named."""
+    return chosen_by(method) if method else constant_depth(depth_m)
+
+
 def chosen_by(method: str) -> DepthRule:
     return DepthRule(method, configuration_of(WALKING).adaptation.initial_depth_m, method)
 

@@ -5,14 +5,13 @@ its first two strides and is evaluated from the third on.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from statistics import fmean
 from typing import Any
 
 from pandas import DataFrame
 
-from experiments.trackway.depth_rule import chosen_by, constant_depth, walk_by
-from experiments.trackway.walk import Walk, WalkedStride, speed_m_s, walk_of
+from experiments.trackway.depth_rule import rule_of, walk_by
+from experiments.trackway.walk import Walk, speed_m_s, walk_of
 from simulation.mud.clay import Clay
 from simulation.mud.track import Track
 
@@ -30,13 +29,8 @@ def walk_in_mud(
 
     `plant` changes parameters of the simulated robot's body.
     """
-    rule = chosen_by(method) if method else constant_depth(depth_m)
     track = Track([(ENDLESS_M, Clay("mud", strength_pa))])
-    return walk_by(rule, track, seed, partial(has_strides, count), **plant).entry
-
-
-def has_strides(count: int, strides: Sequence[WalkedStride]) -> bool:
-    return len(strides) >= count
+    return walk_by(rule_of(depth_m, method), track, seed, lambda strides: len(strides) >= count, **plant).entry
 
 
 def speed_cm_s(walk: Walk, skipped: int = STARTING) -> float:

@@ -1,7 +1,7 @@
 """The walks as a picture: along the trackway as in the paper's figure 8, and Table I as bars and dots."""
 
 from collections.abc import Mapping, Sequence
-from itertools import accumulate
+from itertools import accumulate, cycle
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -41,15 +41,19 @@ def _plot_steps(panel: Axes, report: Summary, colours: Mapping[str, str]) -> Non
     panel.set_ylabel("step length (cm)")
     low, high = panel.get_ylim()
     panel.set_ylim(min(0.0, low), high + 0.1 * (high - low))  # room for the muds' names
-    _name_muds(panel, report)
+    across = panel.get_xaxis_transform()
+    for mud, begin_cm, end_cm in _mud_regions(report):
+        panel.text((begin_cm + end_cm) / 2.0, 0.97, mud_label(mud), transform=across, ha="center", va="top", color=TEXT)
     panel.set_title("One walk of each gait over the trackway")
     panel.legend(handles=_legend(colours, report), loc="lower left", ncols=2, framealpha=0.9)
     panel.tick_params(labelbottom=False)
 
 
 def _plot_walks(panel: Axes, report: Summary, colours: Mapping[str, str], key: str) -> None:
-    """Draw the first walk of each gait."""
-    _shade_muds(panel, report)
+    """Draw the first walk of each gait on its muds."""
+    for shade, (_, begin_cm, end_cm) in zip(cycle(MUD_SHADES), _mud_regions(report), strict=False):
+        panel.axvspan(begin_cm, end_cm, color=shade, zorder=0)
+    panel.set_xlim(0.0, end_cm)
     for style, rule in zip(_styles(colours), colours, strict=True):
         for walk in report["walks"][rule][:1]:  # none where every trial was left out
             _plot_walk(panel, walk, key, style)
@@ -73,19 +77,6 @@ def _mud_regions(report: Summary) -> list[tuple[str, float, float]]:
     lengths_cm = report["settings"]["mud_length_cm"]
     ends_cm = list(accumulate(lengths_cm.values()))
     return [(mud, end - length, end) for (mud, length), end in zip(lengths_cm.items(), ends_cm, strict=True)]
-
-
-def _shade_muds(panel: Axes, report: Summary) -> None:
-    regions = _mud_regions(report)
-    for i, (_, begin_cm, end_cm) in enumerate(regions):
-        panel.axvspan(begin_cm, end_cm, color=MUD_SHADES[i % len(MUD_SHADES)], zorder=0)
-    panel.set_xlim(0.0, regions[-1][2])
-
-
-def _name_muds(panel: Axes, report: Summary) -> None:
-    high = panel.get_xaxis_transform()
-    for mud, begin_cm, end_cm in _mud_regions(report):
-        panel.text((begin_cm + end_cm) / 2.0, 0.97, mud_label(mud), transform=high, ha="center", va="top", color=TEXT)
 
 
 def _plot_walk(panel: Axes, strides: Sequence[Summary], key: str, style: Mapping[str, Any]) -> None:

@@ -6,11 +6,10 @@ after 90 s in one mud, or with a fault.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from math import fsum
 from typing import Any
 
-from experiments.trackway.depth_rule import chosen_by, constant_depth, walk_by
+from experiments.trackway.depth_rule import rule_of, walk_by
 from experiments.trackway.walk import Walk, WalkedStride
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -21,8 +20,7 @@ STUCK_S = 90.0  # longest walking time in one mud
 def walk_trackway(compartment_m: float, seed: int, depth_m: float = 0.0, method: str = "") -> dict[str, Any]:
     """Return the entry of a walk over the paper's muds."""
     track = Track([(compartment_m, clay) for clay in MUDS.values()])
-    rule = chosen_by(method) if method else constant_depth(depth_m)
-    return walk_by(rule, track, seed, partial(is_over, track.length_m)).entry
+    return walk_by(rule_of(depth_m, method), track, seed, lambda strides: is_over(track.length_m, strides)).entry
 
 
 def is_over(length_m: float, strides: Sequence[WalkedStride]) -> bool:

@@ -107,13 +107,10 @@ class StrideRecord:
         self._recovered = self._recovered or tick.phase == Phase.RECOVERY
         if tick.phase in AFTER_STANCE:
             self._ticks_after += 1
-            self._measure_push_back(tick.body_m)
-
-    def _measure_push_back(self, body_m: float) -> None:
-        if isfinite(body_m):
-            self._seen_after += 1
-            self._furthest_m = max(self._furthest_m, body_m)
-            self._pushed_back_m = max(self._pushed_back_m, self._furthest_m - body_m)
+            if isfinite(tick.body_m):
+                self._seen_after += 1
+                self._furthest_m = max(self._furthest_m, tick.body_m)
+                self._pushed_back_m = max(self._pushed_back_m, self._furthest_m - tick.body_m)
 
     def _finish_stride(self, tick: WalkTick) -> None:
         first, seen = self._first, self._seen_after >= SEEN_FRACTION * self._ticks_after

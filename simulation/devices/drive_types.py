@@ -1,6 +1,6 @@
 """The simulated drives by the type that `[drive.JOINT] type` names."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from random import Random
 
 from simulation.devices.drive import SimulatedDriveParameters
@@ -8,7 +8,7 @@ from simulation.devices.mit.device import SimulatedMit
 from simulation.devices.moteus.device import SimulatedMoteus
 from simulation.devices.odrive.device import SimulatedOdrive
 from simulation.devices.odrive.settings import BUILD
-from simulation.devices.odrive05.device import SimulatedOdrive05
+from simulation.devices.odrive05.device import SimulatedOdrive05, join_boards
 from simulation.devices.simulated_drive import SimulatedDrive
 
 SIMULATED_DRIVES: Mapping[str, Callable[[SimulatedDriveParameters, Random], SimulatedDrive]] = {
@@ -22,3 +22,8 @@ PUBLISHED_NUMBERS = BUILD  # of the simulated drives' parameters, where a maker 
 
 def make_simulated_drive(parameters: SimulatedDriveParameters, random: Random) -> SimulatedDrive:
     return SIMULATED_DRIVES[parameters.type](parameters, random)
+
+
+def connect_drives(drives: Sequence[SimulatedDrive]) -> None:
+    """Tell the drives of one bus which of them share a board."""
+    join_boards(drives)

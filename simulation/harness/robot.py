@@ -13,9 +13,8 @@ from drivers.can.frames import Frame
 from simulation.body.plant import STEP_S, Plant
 from simulation.body.plant_parameters import PlantParameters
 from simulation.devices.drive import SimulatedDriveParameters
-from simulation.devices.drive_types import make_simulated_drive
+from simulation.devices.drive_types import connect_drives, make_simulated_drive
 from simulation.devices.foreign_master import ForeignMaster
-from simulation.devices.odrive05.device import join_boards
 from simulation.devices.simulated_drive import SimulatedDrive
 from simulation.mud.track import Track
 
@@ -43,7 +42,7 @@ class SimulatedRobot:
             for port in ports.values()
         ]
         for _, drives_on_bus in self._drives_on:
-            join_boards(drives_on_bus)
+            connect_drives(drives_on_bus)
         self.now_s = start_s
         self.observers: list[Callable[[float, Torques], None]] = []  # of each step's length and the motors' torques
         self.foreign_masters: list[ForeignMaster] = []  # other programs that command the drives

@@ -20,6 +20,7 @@ from firmware_host.log.rows import STRIDE_KIND, TICK_KIND
 from firmware_host.ticker import Tick
 from simulation.devices.drive import DriveError
 from simulation.devices.simulated_drive import SimulatedDrive
+from simulation.harness.drive_presets import with_drive_type
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS, Clay
 from simulation.mud.track import Track
@@ -206,6 +207,58 @@ def test_a_torque_that_is_not_finite_is_never_sent(robot: Lockstep) -> None:
     for frame in torque_frames(listener):
         (torque_nm,) = SET_INPUT_TORQUE.decode(frame.data)
         assert torque_nm == torque_nm
+
+
+def test_a_lease_that_is_lost_ends_with_the_torque(robot: Lockstep) -> None:
+    """It stays lost while torque is on; then another program may take it."""
+    lease = robot.loop.lease
+    lease.renew("anna", robot.now_s, 0.1)
+    robot.run_for(0.2)
+    assert robot.loop.mode is not Mode.IDLE and lease.refusal("ben", robot.now_s) is not None
+    robot.loop.request(Request.DISARM, robot.now_s)
+    robot.run_for(0.02)
+    assert lease.holder is None
+    assert lease.renew("ben", robot.now_s, 0.1) is None
+    robot.run_for(0.2)
+    assert lease.holder is None
+    assert "lease of ben is over" in recorder_of(robot).texts
+
+
+def test_a_program_that_lost_its_lease_while_idle_does_not_arm(robot: Lockstep) -> None:
+    robot.loop.request(Request.DISARM, robot.now_s)
+    robot.run_for(0.02)
+    robot.loop.lease.renew("anna", robot.now_s, 1.0)
+    robot.loop.request(Request.ARM, robot.now_s)
+    robot.loop.lease.hang_up("anna")
+    robot.run_for(0.1)
+    assert robot.loop.mode is Mode.IDLE
+
+
+def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot: Lockstep) -> None:
+    wanted_nm = same_for_all(0.05)
+    robot.loop.controller.step = lambda *arguments: wanted_nm  # type: ignore[method-assign]
+    robot.step()
+    assert robot.loop.sent.torques_nm == wanted_nm
+    robot.loop.request(Request.DISARM, robot.now_s)
+    for mode in (Mode.IDLE, Mode.ARMING):
+        robot.step()
+        assert (robot.loop.mode, robot.loop.sent.torques_nm) == (mode, NO_TORQUE)
+        robot.run_for(0.02)
+        robot.loop.request(Request.ARM, robot.now_s)
+
+
+@pytest.mark.parametrize(("drive_type", "forced"), [("mit:AK80-9", True), ("odrive", False)])
+def test_only_an_arming_that_overruled_a_fault_counts_as_forced(
+    example_text: str, drive_type: str, forced: bool
+) -> None:
+    robot = Lockstep(parse_configuration(with_drive_type(example_text, drive_type)), FIRM)
+    robot.run_for(1.0)
+    assert (robot.loop.request(Request.ARM, robot.now_s) is not None) is forced  # its watchdog cannot be read
+    robot.arm(forced=True)
+    assert robot.loop.forced is forced
+    robot.loop.request(Request.DISARM, robot.now_s)
+    robot.step()
+    assert not robot.loop.forced
 
 
 def test_firmware_of_another_family_is_not_armed(configuration: Configuration, monkeypatch: pytest.MonkeyPatch) -> None:

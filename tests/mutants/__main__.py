@@ -58,7 +58,8 @@ def _run_tests(subject: Subject, tree: ast.Module) -> int:
         exec(compile(tree, module.__file__, "exec"), module.__dict__)  # a mutant of our own file
     except (AttributeError, IndexError, KeyError, NameError, TypeError, ValueError):
         return 1
-    options = ["-x", "-q", "-p", "no:cacheprovider", "--noconftest", "-k", subject.selected]
+    options = ["-x", "-q", "-p", "no:cacheprovider", "-k", subject.selected]
+    options += [] if subject.has_fixtures else ["--noconftest"]
     return int(pytest.main([*options, *(str(ROOT / "tests" / path) for path in subject.tests)]))
 
 

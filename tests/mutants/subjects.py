@@ -10,6 +10,7 @@ class Subject(NamedTuple):
     tests: tuple[str, ...]  # in the order in which they run, below tests/
     selected: str = ""  # pytest's expression of the tests that run
     functions: tuple[str, ...] = ()  # of the module; none: all of it
+    has_fixtures: bool = False  # of conftest.py, which cost a second each time
     equivalent: dict[str, str] = {}  # the text of a mutant that behaves the same, and why
 
 
@@ -118,4 +119,37 @@ SUBJECTS = (
         },
     ),
     Subject("firmware_host.lease", ("firmware_host/test_lease.py",)),
+    Subject(
+        "firmware_host.daemon",
+        ("firmware_host/test_daemon.py",),
+        "not foreground",
+        functions=("update", "request", "step", "end_safely"),
+        has_fixtures=True,
+    ),
+    Subject(
+        "firmware_host.loop",
+        ("firmware_host/test_loop.py",),
+        "lease or slew or no_torque or finite or forced",
+        functions=("_end_lost_lease", "_limit", "_pop_request"),
+        has_fixtures=True,
+    ),
+    Subject("drivers.mit.axis", ("drivers/mit/test_axis.py",)),
+    Subject(
+        "drivers.odrive.cansimple_axis",
+        ("drivers/odrive/test_axis.py", "drivers/odrive/test_drives.py"),
+        functions=("_receive_encoder", "_receive_current", "_receive_state", "_on_silence", "_on_restart"),
+        equivalent={
+            **{
+                f"{change} in `{test}`": REPORTED
+                for stamp in ("angle", "current", "heartbeat")
+                for change, test in (
+                    ("always", f"if now_s - self._{stamp}_stamp_s > RESTART_SILENCE_S:"),
+                    ("Gt to GtE", f"now_s - self._{stamp}_stamp_s > RESTART_SILENCE_S"),
+                    ("to Add", f"now_s - self._{stamp}_stamp_s"),
+                )
+            },
+            "Gt to GtE in `self._read_before_s - heard_s > RESTART_SILENCE_S`": CONTINUOUS,
+            "to Sub in `turns + turns_s`": "neither of them is finite either",
+        },
+    ),
 )

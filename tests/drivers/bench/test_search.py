@@ -47,6 +47,14 @@ def test_a_damiao_is_found_with_the_models_of_its_ranges_and_a_cubemars_without_
     ]
 
 
+def test_a_cubemars_that_reports_by_extended_ids_is_named_as_unsupported() -> None:
+    bus = SimulatedBus(simulated("mit", 15, model="AK80-9"))
+    report = Frame(0x2900 | 104, bytes.fromhex("0000 0000 0000 1e00"), is_extended=True)
+    bus.each_step = lambda: bus._far.send(report)
+    drives = {each.node_id: each.problem for each in search(bus.bench_port(), DRIVE_BENCHES, False).found}
+    assert drives.keys() == {15, 104} and drives[15] == "" and "0x29xx" in drives[104]
+
+
 def test_ranges_of_no_model_are_a_problem() -> None:
     bus = SimulatedBus(simulated("mit", 1, torque_range_nm=3.3))
     (drive,) = search(bus.bench_port(), DRIVE_BENCHES, False).found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import isnan, nan
+from math import isnan, nan, pi
 from random import Random
 
 import pytest
@@ -69,7 +69,7 @@ def test_a_drive_heard_again_after_a_silence_was_restarted(bench: Bench, silence
     for number in range(1, round(silence_s / 0.002)):
         bench.read(1.0 + 0.002 * number)
     bench.live(2.0 + silence_s)
-    assert bench.axis.restarts == restarts
+    assert bench.axis.health.restarts == restarts
     assert (bench.axis.settings.version is None) == bool(restarts)
 
 
@@ -277,3 +277,50 @@ def test_a_current_that_is_no_number_is_none_in_a_drive_that_lets_none_flow(benc
     bench.report(GET_IQ, 0.0, float("nan"))
     bench.read(0.6)
     assert bench.axis.state.current_a == 0.0
+
+
+@pytest.mark.parametrize("message", [GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT])
+@pytest.mark.parametrize(("silent_s", "restarts"), [(0.25, 0), (0.35, 1)])
+def test_any_message_after_a_silence_of_all_is_a_restart(
+    bench: Bench, message: Message, silent_s: float, restarts: int
+) -> None:
+    for each in (GET_ENCODER_ESTIMATES, GET_IQ, HEARTBEAT):
+        bench.report(each, *((0, 1, 0, 0) if each is HEARTBEAT else (0.0, 0.0)), stamp_s=1.0)
+    bench.read(1.0)
+    assert bench.axis.health.restarts == 0
+    for tick in range(1, round(silent_s / 0.01) + 1):
+        bench.read(1.0 + 0.01 * tick)
+    bench.report(message, *((0, 1, 0, 0) if message is HEARTBEAT else (0.0, 0.0)), stamp_s=bench.now_s + 0.01)
+    bench.read(bench.now_s + 0.01)
+    assert bench.axis.health.restarts == restarts
+
+
+def test_the_speed_of_a_joint_is_in_radians(bench: Bench) -> None:
+    bench.report(GET_ENCODER_ESTIMATES, 0.25, 2.0)
+    bench.read(1.0)
+    assert bench.axis.state.velocity_rad_s == pytest.approx(4.0 * pi)
+
+
+def test_a_state_that_nobody_asked_for_is_reported_while_it_lasts(bench: Bench) -> None:
+    for state, busy in ((1, ""), (3, "axis state 3"), (8, ""), (3, "axis state 3"), (1, "")):
+        bench.report(HEARTBEAT, 0, state, 0, 0)
+        bench.read(bench.now_s + 0.1)
+        assert bench.axis.health.busy_state == busy
+
+
+@pytest.mark.parametrize(("state", "turns_s", "found"), [(8, 0.0, True), (8, 0.5, True), (1, 0.0, False)])
+def test_set_points_that_were_not_commanded_are_another_program_s_in_closed_loop(
+    bench: Bench, state: int, turns_s: float, found: bool
+) -> None:
+    constant_nm_a = bench.axis.parameters.torque_constant_nm_a
+    for setpoint_nm, problem in ((0.1, False), (-0.3, found)):
+        bench.report(HEARTBEAT, 0, state, 0, 0)
+        for _ in range(40):
+            bench.axis.send_torque(0.1)
+            bench.report(GET_ENCODER_ESTIMATES, 0.0, turns_s)
+            bench.report(GET_IQ, setpoint_nm / constant_nm_a, 0.0)
+            bench.read(bench.now_s + 0.01)
+        assert bool(bench.axis.health.setpoint_problem) is problem
+    bench.report(HEARTBEAT, 0, 1, 0, 0)  # it left closed loop
+    bench.read(bench.now_s + 0.01)
+    assert bench.axis.health.setpoint_problem == ""

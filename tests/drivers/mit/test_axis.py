@@ -1,0 +1,297 @@
+"""One MIT motor as a joint: what its answers mean, when it follows torque, and which commands are another program's."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import pytest
+
+from control.records import DriveState
+from drivers.can.frames import Frame, MalformedMessageError
+from drivers.mit import codec
+from drivers.mit.axis import MitAxis
+from drivers.mit.codec import Answer
+from drivers.mit.models import MODELS
+from drivers.mit.parameters import MitParameters
+from drivers.mit.settings import PMAX
+
+DAMIAO, CUBEMARS = "DM4310", "AK80-9"
+each_model = pytest.mark.parametrize("model", [DAMIAO, CUBEMARS])
+NODE = 1
+TICK_S = 0.0026
+
+
+class Bench:
+    """One axis whose frames are collected, and answers that the tests write. It reads every tick."""
+
+    def __init__(self, model: str, **settings: Any) -> None:
+        self.sent: list[Frame] = []
+        parameters = MitParameters(bus="a", node_id=NODE, type="mit", model=model, torque_constant_nm_a=0.1, **settings)
+        self.model = MODELS[model]
+        self.axis = MitAxis("left_sweep", parameters, self)
+        self.now_s = 10.0
+        self.axis.begin_read(self.now_s)
+
+    def send(self, frame: Frame) -> None:
+        self.sent.append(frame)
+
+    @property
+    def last(self) -> bytes:
+        return self.sent[-1].data
+
+    def answer(self, status: int = codec.DISABLED, fault: int = 0, **values: float) -> DriveState:
+        """Let a tick pass in which the drive answers."""
+        given = {"position_rad": 0.0, "velocity_rad_s": 0.0, "torque_nm": 0.0, "temperature_c": 30.0} | values
+        last = 41 if self.model.has_registers else fault
+        shown = status if self.model.has_registers else 0
+        data = codec.encode_answer(Answer(NODE, shown, last=last, **given), self.model)
+        self.hear(codec.feedback_id(NODE, self.model), data)
+        return self.axis.state
+
+    def hear(self, identifier: int, data: bytes) -> None:
+        self.now_s += TICK_S
+        self.axis.begin_read(self.now_s)
+        self.axis.receivers[identifier](data, self.now_s - 0.001)
+
+    def enter(self) -> None:
+        self.axis.prepare()
+        self.axis.close_loop()
+        self.answer(codec.ENABLED)
+
+
+@each_model
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_answer_is_the_motion_of_the_joint(model: str, sign: int) -> None:
+    bench = Bench(model, sign=sign, zero_turn=0.1)
+    state = bench.answer(position_rad=1.0, velocity_rad_s=2.0, torque_nm=0.5)
+    assert state.angle_rad == pytest.approx(sign * (1.0 - 0.2 * 3.14159265), abs=1e-3)
+    assert state.velocity_rad_s == pytest.approx(sign * 2.0, abs=0.05)
+    assert state.current_a == pytest.approx(sign * 0.5 / bench.axis.parameters.reported_constant_nm_a, rel=0.05)
+    assert state.angle_stamp_s == state.current_stamp_s == state.heartbeat_stamp_s == bench.now_s - TICK_S
+    assert state.temperature_c == (41.0 if bench.model.has_registers else 30.0)
+
+
+def test_a_temperature_of_zero_is_that_of_no_sensor() -> None:
+    bench = Bench(CUBEMARS)
+    assert bench.answer(temperature_c=50.0).temperature_c == 50.0
+    assert bench.answer(temperature_c=0.0).temperature_c == 50.0
+
+
+@each_model
+def test_an_idle_drive_is_commanded_to_leave_the_mode_in_every_tick(model: str) -> None:
+    bench = Bench(model)
+    bench.axis.send_torque(0.0)
+    assert bench.last == codec.LEAVE
+    bench.enter()
+    bench.axis.send_torque(0.0)
+    assert codec.decode_torque(bench.last, bench.model.torque_nm) == 0.0
+    bench.axis.disarm()
+    assert bench.last == codec.LEAVE
+    bench.axis.send_torque(0.0)
+    assert bench.last == codec.LEAVE
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_command_has_the_sign_of_the_motor(sign: int) -> None:
+    bench = Bench(DAMIAO, sign=sign)
+    bench.enter()
+    bench.axis.send_torque(0.5)
+    torque_nm = codec.decode_torque(bench.last, bench.model.torque_nm)
+    assert torque_nm == pytest.approx(sign * 0.5, abs=0.01)
+
+
+def test_no_remembered_command_is_followed_on_entering() -> None:
+    bench = Bench(DAMIAO)
+    bench.axis.prepare()
+    bench.axis.close_loop()
+    torque_nm, entering = (frame.data for frame in bench.sent[-2:])
+    assert codec.decode_torque(torque_nm, bench.model.torque_nm) == 0.0
+    assert entering == codec.ENTER
+
+
+def test_a_cubemars_follows_from_its_first_answer_after_the_command_until_one_to_leave() -> None:
+    bench = Bench(CUBEMARS)
+    assert not bench.answer().closed_loop
+    bench.axis.close_loop()
+    assert bench.answer().closed_loop
+    bench.axis.disarm()
+    assert not bench.answer().closed_loop
+
+
+def test_a_fault_ends_the_mode_of_a_cubemars_and_it_is_not_entered_again() -> None:
+    bench = Bench(CUBEMARS)
+    bench.enter()
+    assert not bench.answer(fault=1).closed_loop
+    assert "over-temperature" in bench.axis.health.errors
+    assert not bench.answer().closed_loop
+    bench.axis.send_torque(0.0)
+    assert bench.last == codec.LEAVE
+
+
+def test_a_damiao_that_left_the_mode_is_not_commanded_back_into_it() -> None:
+    bench = Bench(DAMIAO)
+    bench.enter()
+    assert not bench.answer(codec.LOST_COMMANDS).closed_loop
+    assert bench.axis.health.watchdog_expired
+    bench.axis.send_torque(0.0)
+    assert bench.last == codec.LEAVE
+
+
+@pytest.mark.parametrize(
+    ("data", "foreign"),
+    [(codec.LEAVE, 0), (codec.CLEAR, 0), (codec.ENTER, 1), (codec.SET_ZERO, 1), (codec.encode_torque(0.1, 18.0), 1)],
+)
+def test_only_commands_that_stop_a_drive_are_anybody_s(data: bytes, foreign: int) -> None:
+    for model in (DAMIAO, CUBEMARS):
+        bench = Bench(model)
+        bench.hear(NODE, data)
+        assert bench.axis.health.foreign_commands == foreign
+
+
+def test_another_program_that_stops_a_cubemars_is_believed() -> None:
+    bench = Bench(CUBEMARS)
+    bench.enter()
+    bench.hear(NODE, codec.LEAVE)
+    assert not bench.answer().closed_loop
+
+
+@pytest.mark.parametrize(
+    ("node_id", "kind", "foreign"),
+    [(NODE, codec.WRITE, 1), (NODE, codec.STORE, 1), (NODE, codec.READ, 0), (NODE + 1, codec.WRITE, 0)],
+)
+def test_a_register_that_another_program_writes_is_its_command(node_id: int, kind: int, foreign: int) -> None:
+    bench = Bench(DAMIAO)
+    bench.hear(codec.REGISTER_ID, codec.encode_register(node_id, kind, PMAX, bytes(4)))
+    assert bench.axis.health.foreign_commands == foreign
+
+
+def test_answers_under_the_master_id_count_for_their_own_drive() -> None:
+    bench = Bench(CUBEMARS)
+    answer = codec.encode_answer(Answer(NODE, 0, 1.0, 0.0, 0.0, 30.0, 0), bench.model)
+    bench.hear(0, bytes([NODE + 1]) + answer[1:])
+    assert bench.axis.state.angle_rad != bench.axis.state.angle_rad  # still unknown
+    bench.hear(0, answer)
+    assert bench.axis.state.angle_rad == pytest.approx(1.0, abs=1e-3)
+
+
+@each_model
+def test_a_drive_that_answers_again_after_a_silence_has_restarted_and_follows_nothing(model: str) -> None:
+    bench = Bench(model)
+    bench.enter()
+    for _ in range(150):
+        bench.now_s += TICK_S
+        bench.axis.begin_read(bench.now_s)
+        bench.axis.send_torque(0.0)
+    bench.answer()
+    assert bench.axis.health.restarts == 1
+    bench.axis.send_torque(0.0)
+    assert bench.last == codec.LEAVE
+
+
+def test_errors_of_a_damiao_are_cleared_and_those_of_a_cubemars_only_end() -> None:
+    for model, data in ((DAMIAO, codec.CLEAR), (CUBEMARS, codec.LEAVE)):
+        bench = Bench(model)
+        bench.axis.clear_errors()
+        assert bench.last == data
+
+
+def run_following(bench: Bench, commanded_nm: float, measured_nm: float, ticks: int) -> None:
+    """Command a torque in every tick; the drive measures another one in every second answer."""
+    for tick in range(ticks):
+        bench.axis.send_torque(commanded_nm)
+        bench.answer(codec.ENABLED, torque_nm=measured_nm if tick % 2 else commanded_nm)
+
+
+def test_a_torque_that_was_not_commanded_again_and_again_is_another_program_s() -> None:
+    bench = Bench(DAMIAO)
+    bench.enter()
+    run_following(bench, 0.5, 0.5, 40)
+    assert bench.axis.health.setpoint_problem == ""
+    run_following(bench, 0.5, -0.5, 40)
+    assert "where 0.5 N·m was commanded" in bench.axis.health.setpoint_problem
+    bench.axis.disarm()
+    bench.answer(codec.DISABLED)
+    assert bench.axis.health.setpoint_problem == ""
+    run_following(bench, 0.5, 0.5, 40)
+    bench.axis.disarm()
+    for tick in range(40):  # what an idle drive measures belongs to no command
+        bench.answer(codec.DISABLED, torque_nm=tick % 2)
+    assert bench.axis.health.setpoint_problem == ""
+
+
+def test_torque_that_stays_away_is_not_another_program_s() -> None:
+    bench = Bench(DAMIAO)
+    bench.enter()
+    for _ in range(40):
+        bench.axis.send_torque(0.5)
+        bench.answer(codec.ENABLED, torque_nm=-0.5)
+    assert bench.axis.health.setpoint_problem == ""
+
+
+def test_answers_to_questions_of_nobody_are_a_second_drive_s() -> None:
+    for questions, duplicate in ((1, False), (0, True)):
+        bench = Bench(DAMIAO)
+        for _ in range(20):
+            for _ in range(questions):
+                bench.axis.poll()
+                assert bench.last == codec.LEAVE
+            bench.answer()
+        assert bench.axis.health.duplicate_id is duplicate
+
+
+def test_answers_to_the_commands_of_another_program_are_no_second_drive_s() -> None:
+    bench = Bench(DAMIAO)
+    for _ in range(20):
+        bench.hear(NODE, codec.LEAVE)
+        bench.answer()
+    assert not bench.axis.health.duplicate_id
+
+
+def test_an_answer_under_its_id_that_another_drive_sent_is_refused() -> None:
+    bench = Bench(DAMIAO)
+    data = codec.encode_answer(Answer(NODE + 1, 0, 1.0, 0.0, 0.0, 30.0, 40), bench.model)
+    with pytest.raises(MalformedMessageError):
+        bench.hear(codec.feedback_id(NODE, bench.model), data)
+
+
+@pytest.mark.parametrize("data", [codec.CLEAR, codec.ENTER])
+def test_only_the_command_to_leave_ends_what_a_cubemars_follows(data: bytes) -> None:
+    bench = Bench(CUBEMARS)
+    bench.enter()
+    bench.hear(NODE, data)
+    assert bench.answer().closed_loop
+
+
+def test_a_damiao_that_has_not_entered_the_mode_yet_is_still_to_follow() -> None:
+    bench = Bench(DAMIAO)
+    bench.axis.close_loop()
+    assert not bench.answer(codec.DISABLED).closed_loop
+    bench.axis.send_torque(0.0)
+    assert codec.decode_torque(bench.last, bench.model.torque_nm) == 0.0
+
+
+def test_the_registers_of_a_damiao_are_asked_for_and_their_answers_are_no_motion() -> None:
+    bench = Bench(DAMIAO)
+    bench.answer(position_rad=0.5)
+    bench.axis.request_settings(bench.now_s)
+    request = bench.sent[-1]
+    assert (request.arbitration_id, request.data[2]) == (codec.REGISTER_ID, codec.READ)
+    sent = len(bench.sent)
+    bench.axis.request_settings(bench.now_s)  # the answer is awaited
+    assert len(bench.sent) == sent
+    assert bench.axis.health.setting_problem == ""
+    other_range = codec.encode_register(NODE, codec.READ, PMAX, struct.pack("<f", 99.0))
+    bench.hear(codec.feedback_id(NODE, bench.model), other_range)
+    assert "PMAX" in bench.axis.health.setting_problem
+    assert bench.axis.state.angle_rad == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_status_that_returns_to_normal_is_reported_again() -> None:
+    bench = Bench(DAMIAO)
+    bench.answer(0xA)
+    assert "over-current" in bench.axis.health.errors
+    bench.answer(0xB)
+    assert "transistors" in bench.axis.health.errors
+    bench.answer(codec.DISABLED)
+    assert bench.axis.health.errors == ""
