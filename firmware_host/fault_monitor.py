@@ -82,6 +82,7 @@ class FaultMonitor:
         self.joints = _joint_monitors(configuration)
         self._geometry = configuration.geometry
         self._gains = _gain_monitors(configuration)
+        self._phase = Phase.REST  # in the tick before
         self.zeros = tuple(ZeroMonitor(joint, configuration.faults.jump_rad) for joint in joints)
         self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
@@ -189,6 +190,9 @@ class FaultMonitor:
     def _check_gains(self, found: list[Fault], punctual: bool, monitor_input: MonitorInput) -> None:
         """Compare commanded torques with the joints' accelerations."""
         phase, torques_nm = monitor_input.phase, monitor_input.sent.torques_nm
+        if phase is self._phase and phase not in (Phase.SWING, Phase.INSERTION):
+            return
+        self._phase = phase
         for gains, states, sent_nm in zip(self._gains, monitor_input.states.flippers, torques_nm.flippers, strict=True):
             gains.update(found, punctual, states, sent_nm, phase)
 
