@@ -331,6 +331,21 @@ class FaultKind(StrEnum):
         "The {subject} motor gives {measured_nm:.2f} N·m instead of {commanded_nm:.2f} N·m.",
         "check the drive's limits, its torque constant and cables, then 'mudskipper clear'",
     )
+    ZERO_SHIFTED = (
+        "zero_shifted", "joint", NONE, ALWAYS, WHEN_GONE, 580,
+        "A drive reports another angle after a restart, a silence or a jump, so its zero may have shifted.",
+        "The {subject} joint was at {before_deg:.1f} and is reported at {now_deg:.1f} degrees, and its drive saw no"
+        " motion between.",
+        "if 'mudskipper status' shows the joint's true angle, 'mudskipper clear --zero'; else correct its zero_turn and"
+        " restart the daemon",
+    )
+    TORQUE_GAIN = (
+        "torque_gain", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 1400,
+        "A motor gives another torque than commanded, by the acceleration of its joint in air.",
+        "The {subject} motor gives {gain:.2g} times the commanded torque; 1/{most:g} to {most:g} times is permitted.",
+        "run 'mudskipper experiment actuator'; check the drive's torque constant and the inertias in [arm];"
+        " then 'mudskipper clear'",
+    )
     MOTOR_OVERHEATING = (
         "motor_overheating", "joint", SOFT_STOP, ALWAYS, WHEN_GONE, 100,
         "A motor is nearly too hot.", "The {subject} motor has {temperature_c:.0f} degrees C.", COOL,

@@ -148,6 +148,9 @@ class DriveAxis(Protocol):
 
     def reset(self) -> None: ...
 
+    def limit_commands(self, largest_nm: float) -> None:
+        """State the largest torque that is ever commanded: a larger set-point is another program's."""
+
     def begin_read(self, now_s: float) -> None:
         """Begin a read: the frames that follow arrived between the previous call and `now_s`."""
 

@@ -41,6 +41,9 @@ class DriveSignals(ABC):
     def forget_commands(self) -> None:
         self.setpoints.forget_commands()
 
+    def limit_commands(self, largest_nm: float) -> None:
+        self.setpoints.limit_commands(largest_nm)
+
     def _count_foreign_command(self) -> None:
         self._foreign_commands += 1
         self._health = None

@@ -51,7 +51,8 @@ def make_drives(
 
     `limits` are what the gate lets pass; `endpoints` belong to further builds of the drives' firmware.
     """
-    gate = TransmitGate(limits or JointLimits())
+    limits = limits or JointLimits()
+    gate = TransmitGate(limits)
     outlets = {
         name: gate.outlet(port, [type_of(each).gate_table(each) for each in parameters.values() if each.bus == name])
         for name, port in ports.items()
@@ -61,6 +62,8 @@ def make_drives(
         for joint in JOINTS
         if joint in parameters
     ]
+    for axis in axes:
+        axis.limit_commands(limits.torque_nm)
     return Drives(axes, ports, gate, {name: _other_types(parameters, name) for name in ports})
 
 

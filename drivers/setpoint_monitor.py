@@ -15,6 +15,9 @@ A drive may reduce torque near its velocity limit without reporting it. A set-po
 A drive that reports no set-point may be judged by the torque that it measures, of which only the first of several
 reports in a row that differ counts: torque that stays away for a while is missing (control/monitors/joint_monitor.py),
 torque that is another one again and again is another program's.
+
+No command of this program exceeds the torque limit. So one set-point that does, by more than the tolerances, is enough:
+it belongs to another program, however rarely that sends. A measured torque is no set-point, and may overshoot.
 """
 
 from collections import deque
@@ -25,6 +28,7 @@ from control.rate import PERIOD_S
 TOLERANCE_NM = 0.05  # a drive with compensation of its cogging adds as much
 TOLERANCE_FRACTION = 0.2  # two conventions of a torque constant differ by 15.5 %: 8.27 / KV and 9.55 / KV
 WEIGHT, FOUND = 24, 125
+REPORTS_OF_FOUND = 6  # that differ, as many as one beyond the limit counts
 TURN_RAD = 2.0 * pi
 SPEED_UP_TURN_S = 0.5  # of a joint at full torque, from one report to the next
 
@@ -49,7 +53,14 @@ class SetpointMonitor:
         self._commands: deque[float] = deque(maxlen=followed)
         self._clamp_from_rad_s = (velocity_limit_turn_s - SPEED_UP_TURN_S) * TURN_RAD
         self._clamp_nm_s_rad = velocity_gain_nm_s_turn / TURN_RAD
+        self.limit_commands(inf)
         self.reset()
+
+    def limit_commands(self, largest_nm: float) -> None:
+        """State the largest torque that this program ever commands."""
+        self._largest_nm = largest_nm
+        tolerance_nm = self._tolerance_nm + TOLERANCE_FRACTION * largest_nm
+        self._beyond_nm = inf if self._measured else largest_nm + tolerance_nm
 
     def reset(self) -> None:
         self.forget_commands()
@@ -70,6 +81,12 @@ class SetpointMonitor:
 
     def on_report(self, setpoint_nm: float, velocity_rad_s: float) -> None:
         """Compare a report of a drive in closed loop."""
+        if not -self._beyond_nm <= setpoint_nm <= self._beyond_nm and isfinite(setpoint_nm):
+            forward_rad_s = velocity_rad_s if setpoint_nm < 0.0 else -velocity_rad_s
+            if not self._may_clamp(forward_rad_s, self._largest_nm):
+                self.example = (setpoint_nm, self._newest_nm)
+                self._rise(REPORTS_OF_FOUND)
+                return
         difference_nm = setpoint_nm - self._newest_nm
         if -self._tolerance_nm < difference_nm < self._tolerance_nm or self._may_follow(setpoint_nm, velocity_rad_s):
             self._differed = False

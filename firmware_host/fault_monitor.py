@@ -8,9 +8,12 @@ from typing import NamedTuple
 
 from control.faults import Fault, FaultKind
 from control.gait.recovery import is_in_mud
+from control.joint_friction import NO_FRICTION
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointMonitor, TickFacts
+from control.monitors.torque_gain_monitor import TorqueGainMonitor
+from control.monitors.zero_monitor import ZeroMonitor
 from control.rate import PERIOD_S
 from control.records import (
     NEVER_S,
@@ -30,6 +33,7 @@ from firmware_host.log.recorder import LogReport
 from firmware_host.loop_monitor import LogMonitor, LoopMonitor
 from firmware_host.ticker import Tick
 
+STALL_S = 0.02  # of this program, in which a drive that answers only when asked was silent
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
 REFUSED_TICKS = 3  # consecutive ticks in which one bus failed to send a command
 BUS_TROUBLE_S = 2.0  # how long a bus warning outlasts the last error frame
@@ -77,6 +81,8 @@ class FaultMonitor:
         self._all_trusted = same_for_all(True, configuration.rig)
         self.joints = _joint_monitors(configuration)
         self._geometry = configuration.geometry
+        self._gains = _gain_monitors(configuration)
+        self.zeros = tuple(ZeroMonitor(joint, configuration.faults.jump_rad) for joint in joints)
         self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
         self._longest_watchdog_s = configuration.faults.longest_watchdog_s
@@ -122,6 +128,7 @@ class FaultMonitor:
             return found
         health = self._drives.health
         self._check_joints(found, tick, monitor_input, health)
+        self._check_gains(found, tick.missed == 0, monitor_input)
         self._check_trust(found, monitor_input.mode)
         if not monitor_input.sent.finite:
             found.append(FaultKind.TORQUE_NOT_FINITE.fault())
@@ -165,14 +172,25 @@ class FaultMonitor:
             may_stand_still=monitor_input.freeing or mode not in HELD,
             damping=mode is Mode.DAMPING,
         )
-        for joint, health, state, torque_nm, target in zip(
-            self.joints, drives, monitor_input.states, sent_nm, targets, strict=True
+        for joint, zero, health, state, torque_nm, target in zip(
+            self.joints, self.zeros, drives, monitor_input.states, sent_nm, targets, strict=True
         ):
+            if tick.missed * self._period_s > STALL_S and health.restarts == self._restarts[health.joint]:
+                zero.skip_gap()
+            shifted = zero.update(state)
+            if shifted:
+                found.append(shifted)
             for fault in joint.update(facts, state, torque_nm, target):
                 if fault.kind is FaultKind.FOLLOWING_ERROR and self._is_held_back(fault.subject, tick, monitor_input):
                     continue
                 explained = fault.kind in EXPLAINED and health.errors
                 found.append(fault.with_values(reason=health.errors) if explained else fault)
+
+    def _check_gains(self, found: list[Fault], punctual: bool, monitor_input: MonitorInput) -> None:
+        """Compare commanded torques with the joints' accelerations."""
+        phase, torques_nm = monitor_input.phase, monitor_input.sent.torques_nm
+        for gains, states, sent_nm in zip(self._gains, monitor_input.states.flippers, torques_nm.flippers, strict=True):
+            gains.update(found, punctual, states, sent_nm, phase)
 
     def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:
         """Return whether mud may hold a joint that lags behind, or held it until CATCH_UP_S ago.
@@ -280,4 +298,18 @@ def _joint_monitors(configuration: Configuration) -> tuple[JointMonitor, ...]:
             drives[joint].answers_only,
         )
         for joint, joint_range, own_dynamics in zip(configuration.rig.joints, ranges, dynamics, strict=True)
+    )
+
+
+def _gain_monitors(configuration: Configuration) -> tuple[TorqueGainMonitor, ...]:
+    rig, drives, frictions = configuration.rig, configuration.drive, configuration.friction
+    return tuple(
+        TorqueGainMonitor(
+            joints,
+            configuration.geometry,
+            configuration.arm,
+            [frictions.get(joint, NO_FRICTION) for joint in joints],
+            drives[joints[0]].answers_only,
+        )
+        for joints in (rig.joints[rig.joints_of(flipper)] for flipper in rig.flippers)
     )

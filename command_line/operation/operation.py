@@ -124,9 +124,14 @@ def move(
     return exit_codes.OK
 
 
-def clear(*, socket: Socket, json: Json = False) -> int:
+def clear(
+    *,
+    socket: Socket,
+    json: Json = False,
+    zero: Annotated[bool, Option("also confirm the angles of joints whose zero may have shifted")] = False,
+) -> int:
     with connect(socket) as client:
-        client.call("clear")
+        client.call("clear", **({"zero": True} if zero else {}))
         report = _poll(client, lambda status: _is_at_rest(status) and not stopping_faults(status), CLEARING_S)
     messages = [fault["message"] for fault in stopping_faults(report)]
     if messages or not _is_at_rest(report):

@@ -166,6 +166,13 @@ def _wrong_motor(
     yield from _rows("JOINT.motor", kind, "", *expected, bounded, drive=drive, scheduled=scheduled)
 
 
+def _wrong_constants() -> Iterator[FailureMode]:
+    """Yield motors whose true torque constant is not the configured one: limit and gate bound the command only."""
+    for gain in (0.2, 0.5, 2.0, 2.5, 4.0, 5.0):
+        drive = {"torque_constant_error": round(gain - 1.0, 3)}
+        yield from _rows("JOINT.motor", f"torque constant x {gain:g}", drive=drive, torque_nm=max(gain, 1.0) * 0.75)
+
+
 SLIPS_RAD_S = (0.05, 0.1, 0.3, 0.5, 1.0)
 WRONG_RANGES = {"25.64 for 50": 50.0 / 25.64, "65 for 50": 50.0 / 65.0, "45 for 50": 50.0 / 45.0}  # rad/s
 
@@ -227,6 +234,11 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
            scheduled=True),
     *_rows("JOINT", "never armed", "", expects("arming_failed", 3.0, ("arming",)), act=("never_in_closed_loop",)),
     *_rows("JOINT", "restarted", "", expects("drive_restarted", 2.0), act=("restart",), scheduled=True),
+    *_rows("JOINT", "restarted with another zero", "", expects("zero_shifted", 2.0, ("idle",)),
+           act=("restart_shifted", 0.5, 0.1)),
+    *(mode for boot_s in (0.02, 0.25, 1.0)
+      for mode in _rows("JOINT", f"restarted within {boot_s:g} s with another zero",
+                        act=("restart_shifted", -0.5, boot_s))),
     *_rows("JOINT", "duplicate", "", expects("duplicate_node_id", 1.6), act=("duplicate", 0.3)),
     *_rows("JOINT", "repeated", drive={"repeated_fraction": 0.7}, scheduled=True),
     *_rows("JOINT", "late", drive={"message_delay_s": 0.01}, scheduled=True),
@@ -289,6 +301,9 @@ FAILURE_MODES: tuple[FailureMode, ...] = (
     *_wrong_motor("feeble", "0.1", 84.3),
     *_wrong_motor("weak", "0.5", 60.0, scheduled=True),
     *_rows("JOINT.motor", "strong", drive={"torque_constant_error": 0.4}, scheduled=True),
+    *_rows("JOINT.motor", "torque constant x 0.25", "", expects("torque_gain", 4.0, ("swing",), turns=True),
+           drive={"torque_constant_error": -0.75}),
+    *_wrong_constants(),
     *_rows("JOINT.motor", "warm", "", expects("motor_overheating", phases=PHASES), drive={"temperature_c": 82.0},
            scheduled=True),
     *_rows("JOINT.motor", "hot", "", expects("motor_hot"), drive={"temperature_c": 95.0}, scheduled=True),
@@ -393,39 +408,45 @@ ABSENT_DRIVE = (  # faults of a drive from which no messages arrive
 IDLE_DRIVE = ("drive_error", "drive_disarmed", "torque_missing")  # faults of a drive that no commands reach
 CONSEQUENCES: Mapping[str, tuple[str, ...]] = {  # faults that may be reported with a fault, because they are true too
     "drive_quiet": ("drive_late", "position_stale", "current_stale"),
-    "drive_silent": ABSENT_DRIVE,
+    "drive_silent": (*ABSENT_DRIVE, "zero_shifted"),  # of a joint that fell meanwhile
     "position_stale": ("drive_late",),
-    "position_silent": ("drive_late", "position_stale"),
+    "position_silent": ("drive_late", "position_stale", "zero_shifted"),
     "current_stale": ("drive_late",),
     "current_silent": ("drive_late", "current_stale", "torque_missing"),
     "heartbeat_silent": ("drive_energised",),
     "drive_settings": ("foreign_commands",),  # by which another program changed them
     "drive_energised": ("foreign_commands",),  # by which another program closed the loop
     "drive_error": ("drive_disarmed", "torque_missing"),
-    "drive_restarted": ABSENT_DRIVE,
+    "drive_restarted": (*ABSENT_DRIVE, "zero_shifted"),
+    "zero_shifted": (*ABSENT_DRIVE, "encoder_jump", "joint_moving"),  # by the restart
     # the second drive reports another angle, and its own set-points
     "duplicate_node_id": (
         *("encoder_jump", "joint_moving", "drive_disarmed", "joint_position", "encoder_stuck", "setpoint_mismatch"),
-        *("encoder_slips", "speed_wrong"),
+        *("encoder_slips", "speed_wrong", "zero_shifted"),
     ),
     "setpoint_mismatch": ("joint_runaway",),  # in that torque's direction
     "watchdog_unknown": ("drive_error", "drive_restarted", "drive_version", "wrong_drive"),
-    "bus_off": (*ABSENT_DRIVE, *IDLE_DRIVE, "bus_refuses"),
-    "bus_refuses": (*IDLE_DRIVE, "joint_runaway"),  # at the last torque
-    "joint_position": ("encoder_jump",),
-    "encoder_stuck": ("encoder_jump", "encoder_slips", "speed_wrong"),  # when it reports angles again, or meanwhile
-    "encoder_jump": ("joint_moving",),
+    "bus_off": (*ABSENT_DRIVE, "zero_shifted", *IDLE_DRIVE, "bus_refuses"),
+    "bus_refuses": (*IDLE_DRIVE, "zero_shifted", "joint_runaway"),  # at the last torque
+    "joint_position": ("encoder_jump", "zero_shifted"),
+    "encoder_stuck": (
+        "encoder_jump",
+        "zero_shifted",
+        "encoder_slips",
+        "speed_wrong",
+    ),  # when it reports angles again, or meanwhile
+    "encoder_jump": ("joint_moving", "zero_shifted"),
     # it drifts on, and bends the line that shows a wrong speed
     "encoder_slips": ("joint_moving", "joint_position", "encoder_stuck", "speed_wrong"),
-    "joint_driven_back": ("joint_moving", "joint_position", "encoder_jump"),
+    "joint_driven_back": ("joint_moving", "joint_position", "encoder_jump", "zero_shifted"),
     "speed_wrong": ("encoder_stuck", "encoder_slips", "joint_moving", "joint_runaway", "joint_oscillating"),
     "joint_velocity": ("encoder_stuck", "joint_runaway"),  # its angle is held and its speed is not, nor commanded
     "joint_oscillating": ("joint_runaway",),
-    "damping_failed": ("encoder_jump", "torque_missing", "joint_moving"),
+    "damping_failed": ("encoder_jump", "zero_shifted", "torque_missing", "joint_moving"),
     "motor_overheating": ("winding_overheating",),
     "motor_hot": ("winding_hot",),
     "loop_lagging": ("loop_overrun", "joint_oscillating"),  # the last torque takes a joint away from its target
     "loop_stalled": ("loop_lagging",),
     "loop_crawling": ("loop_stalled", "loop_lagging"),
-    "daemon_hung": (*IDLE_DRIVE, "loop_stalled", "loop_crawling", "loop_lagging", "arming_failed"),
+    "daemon_hung": (*IDLE_DRIVE, "zero_shifted", "loop_stalled", "loop_crawling", "loop_lagging", "arming_failed"),
 }

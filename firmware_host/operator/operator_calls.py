@@ -14,6 +14,7 @@ from control.fault_causes import group_by_cause
 from control.faults import Blocks, Fault
 from control.gait.gait import full_step_m
 from control.modes import Mode, Request
+from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.records import JOINTS
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
@@ -32,6 +33,7 @@ from firmware_host.sockets.status_socket import Methods
 from firmware_host.software_version import is_compiled, software_version
 
 Method = Callable[[dict[str, Any], Caller], Any]
+RESTING_RAD_S = STILL_RAD / REST_S
 MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v")  # by a drive
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
@@ -65,7 +67,7 @@ class OperatorCalls:
             "move": self._as_holder(self.move),
             "stop": lambda params, caller: self._request(caller, Request.STOP),
             "disarm": lambda params, caller: self._request(caller, Request.DISARM),
-            "clear": lambda params, caller: self._request(caller, Request.CLEAR),
+            "clear": self.clear,
             "lease": lambda params, caller: self._renew_lease(caller, params["for_s"]),
             "release": self.release,
             "reset_timing": self.reset_timing,
@@ -200,6 +202,25 @@ class OperatorCalls:
 
     def _request(self, caller: Caller, request: Request, order: WalkOrder | None = None, forced: str = "") -> str:
         return _accepted(self._loop.request(request, self._clock(), order, forced, str(caller)))
+
+    def clear(self, params: dict[str, Any], caller: Caller) -> str:
+        """Clear faults; with `zero`, also accept the angles of joints whose zero may have shifted."""
+        loop = self._loop
+        if params["zero"]:
+            self.require_own_robot(caller)
+            for joint, state in zip(self._rig.joints, loop.states, strict=True):
+                if not abs(state.velocity_rad_s) <= RESTING_RAD_S:
+                    raise RefusedError(
+                        f"{joint} turns at {state.velocity_rad_s:.2f} rad/s: must be at most {RESTING_RAD_S:g} rad/s"
+                        " while zeros are confirmed"
+                    )
+        answer = self._request(caller, Request.CLEAR)
+        for zero in loop.fault_monitor.zeros if params["zero"] else ():
+            if shift_rad := zero.confirm():
+                loop.events.report(
+                    self._clock(), f"zero of {zero.joint} confirmed by {caller} after {degrees(shift_rad):.1f} degrees"
+                )
+        return answer
 
     def require_own_robot(self, caller: Caller) -> None:
         """Raise RefusedError while a program of another user holds the lease."""

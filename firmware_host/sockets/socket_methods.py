@@ -259,7 +259,11 @@ METHODS: dict[str, SocketMethod] = {
     ),
     "stop": SocketMethod(Level.ANYONE, "End a walk or a move; a walk ends with the flippers raised."),
     "disarm": SocketMethod(Level.ANYONE, "Switch torque off at once."),
-    "clear": SocketMethod(Level.DRIVE, "Clear faults whose cause is gone."),
+    "clear": SocketMethod(
+        Level.DRIVE,
+        "Clear faults whose cause is gone.",
+        (Parameter("zero", Type.FLAG, "also accept the angles of joints whose zero may have shifted", default=False),),
+    ),
     "lease": SocketMethod(
         Level.DRIVE,
         "Take or renew the lease: if it is not renewed in time, the robot stops. Only its holder moves the robot.",

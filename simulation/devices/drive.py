@@ -16,7 +16,7 @@ class SimulatedDriveParameters:
     sign: Annotated[int, Bounds(-1, 1)] = 1
     zero_turn: Annotated[float, Bounds(-1000.0, 1000.0)] = 0.0
     torque_constant_nm_a: Annotated[float, Bounds(0.001, 10.0)] = 0.083  # in the drive's own settings
-    torque_constant_error: Annotated[float, Bounds(-0.5, 0.5)] = 0.0  # fraction by which the true one is larger
+    torque_constant_error: Annotated[float, Bounds(-0.9, 9.0)] = 0.0  # fraction by which the true one is larger
     commutation_error_deg: Annotated[float, Bounds(-180.0, 180.0)] = 0.0  # electrical: 60 halves, 180 inverts torque
     cogging_nm: Annotated[float, Bounds(0.0, 0.5)] = 0.0
     cogging_per_turn: Annotated[int, Bounds(1, 1000)] = 84  # 12 slots and 14 magnets, as many small motors have

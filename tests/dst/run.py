@@ -110,7 +110,7 @@ class Run:
             if self._is_ready():
                 return
             if tick % CLEARING_TICKS == 0:
-                self._robot.call(STEWARD, "clear")
+                self._robot.call(STEWARD, "clear", zero=tick > CLEARING_TICKS)
             self._step()
         names = ", ".join(sorted({str(fault.kind) for fault in self._loop.faults.present})) or "no fault"
         self._break("BackToIdle", f"after a clear the robot is {self._loop.mode.name.lower()} with {names}")

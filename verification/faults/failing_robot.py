@@ -85,6 +85,14 @@ class FailingRobot(Lockstep):
         own.remove(changes)
         self._apply_changes(joint)
 
+    def change_drive(self, joint: str, **changes: Any) -> None:
+        """Change parameters of a simulated drive for good."""
+        if self._changes.get(joint):
+            self._sound[joint] = replace(self._sound[joint], **changes)
+            self._apply_changes(joint)
+        else:
+            self.drive(joint).parameters = replace(self.drive(joint).parameters, **changes)
+
     def _apply_changes(self, joint: str) -> None:
         merged: dict[str, Any] = {}
         for changes in self._changes[joint]:

@@ -111,6 +111,14 @@ def restart(robot: FailingRobot, joint: str) -> None:
     robot.drive(joint).restart(robot.robot.now_s)
 
 
+@once
+def restart_shifted(robot: FailingRobot, joint: str, shift_rad: float, boot_s: float) -> None:
+    """Restart a drive, which counts from another zero afterwards."""
+    robot.drive(joint).boot_s = boot_s
+    robot.drive(joint).restart(robot.robot.now_s)
+    robot.change_drive(joint, encoder_offset_rad=shift_rad)
+
+
 @during
 def duplicate(robot: FailingRobot, joint: str, angle_rad: float) -> Iterator[None]:
     with robot.every_step(robot.add_duplicate(joint, angle_rad)):

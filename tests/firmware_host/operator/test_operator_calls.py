@@ -227,6 +227,20 @@ def test_a_clear_is_refused_in_hold(armed: Robot) -> None:
         armed.ask("clear")
 
 
+def test_zeros_are_confirmed_at_rest_only(robot: Robot) -> None:
+    robot.steps.run_for(1.0)
+    loop, rest = robot.steps.loop, robot.steps.loop.states
+    loop.fault_monitor.zeros[2].shift_rad = 0.5
+    loop.states = rest.map(lambda state: state._replace(velocity_rad_s=0.31))
+    with pytest.raises(RefusedError, match=r"^left_sweep turns at 0.31 rad/s: must be at most 0.3 rad/s"):
+        robot.ask("clear", zero=True)
+    assert loop.fault_monitor.zeros[2].shift_rad == 0.5
+    loop.states = rest
+    robot.ask("clear", zero=True)
+    assert loop.fault_monitor.zeros[2].shift_rad == 0.0
+    assert any(text.startswith("zero of right_sweep confirmed by") for text in robot.events.texts)
+
+
 def test_a_move_changes_only_the_requested_joints(armed: Robot) -> None:
     held_rad = [drive["angle_rad"] for drive in armed.ask("status")["drives"]]
     armed.ask("move", BEN, left_sweep_rad=0.3, left_adduction_rad=0.2)

@@ -1,0 +1,215 @@
+"""Detects a motor whose torque is not the commanded one, by the acceleration of its joint in air.
+
+Limits and gate bound commands. A motor whose torque constant is five times the configured one gives five times as much,
+and its current looks healthy. In air the torque that moves a joint is known from its motion,
+
+    m = I dω/dt - τ_gravity(α, β) + τ_friction(θ, ω),
+
+so the commanded torque u follows the line u = m / gain + c. The constant c of each stroke, a motion in one direction,
+holds what is not known: dry friction and the weight of clinging mud. Blocks of four ticks average the noise of the
+velocity: over T = 10.5 ms its effect on u and m is correlated by no more than 1 / (2 · 4) of their variance.
+
+Two regressions enclose the gain. That of m on u attenuates it where u has other causes, such as mud or cogging; that of
+u on m inflates it by the noise of m:
+
+    Σ u m / Σ u²  <=  gain  <=  Σ m² / Σ u m
+
+A motor is too strong if the lower bound is, and too weak if the upper one is. Where the two are further apart than
+SAME_FRACTION, the strokes had too little acceleration for a verdict. One stride proves a gain beyond a factor of 2,
+three strides together one beyond 1.6. [arm] states the inertias, which must be as exact.
+
+The sweep joint is watched in the swing and the adduction joint in the insertion, as far as it is in air: a body that
+has sunk swings its flippers through the mud, whose resistance to an insertion looks like a weak motor. So an insertion
+counts only after a swing whose motion its torques explain. An extraction's end is not used, nor an adduction joint that
+catches up in a swing: the pull of mud that lets go falls with the acceleration.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from control.faults import Fault, FaultKind
+from control.gait.recovery import lowest_point_m
+from control.geometry import FlipperGeometry
+from control.joint_friction import NO_FRICTION, JointFriction
+from control.parameters.arm_mass import ArmMass
+from control.records import DriveState, FlipperJoints, Phase
+
+BLOCK_TICKS = 4
+SLOW_RAD_S = 0.1  # below it dry friction has any direction
+LEAST_BLOCKS = 7  # of a phase
+SAME_FRACTION = 0.5  # of the bounds: r² of the regression
+FACTOR_OF_ONE, FACTOR_OF_THREE = 2.0, 1.6
+STRIDES = 3
+UNSEEN = (DriveState(), DriveState())
+
+
+class Moments(NamedTuple):
+    """The sums about the mean, over blocks, of the commanded torque u and the torque m of the motion."""
+
+    blocks: int = 0
+    uu: float = 0.0
+    um: float = 0.0
+    mm: float = 0.0
+
+    def plus(self, other: "Moments") -> "Moments":
+        return Moments(self.blocks + other.blocks, self.uu + other.uu, self.um + other.um, self.mm + other.mm)
+
+    @property
+    def in_air(self) -> bool:
+        """Return whether the torques have few causes but the motion: in mud, a lower bound of the gain near zero."""
+        return self.blocks >= LEAST_BLOCKS and FACTOR_OF_THREE * self.um > self.uu
+
+    def gain_beyond(self, factor: float) -> float | None:
+        """Return the gain, if it is certainly beyond this factor or its inverse."""
+        blocks, uu, um, mm = self
+        if blocks < LEAST_BLOCKS or um <= 0.0 or um * um < SAME_FRACTION * uu * mm:
+            return None
+        if um > factor * uu or factor * mm < um:
+            gain: float = (mm / uu) ** 0.5
+            return gain
+        return None
+
+
+class JointStrokes:
+    """Owns the sums of one joint: of the stroke under way, of the stride under way, and of the last strides."""
+
+    def __init__(self, joint: str, inertia_kg_m2: float, friction: JointFriction) -> None:
+        self.joint = joint
+        self.inertia_kg_m2 = inertia_kg_m2
+        self.friction = None if friction == NO_FRICTION else friction
+        self._stride = Moments()
+        self._strides: deque[Moments] = deque(maxlen=STRIDES)
+        self._begin_stroke()
+
+    def _begin_stroke(self) -> None:
+        self._blocks = 0
+        self._u = self._m = self._uu = self._um = self._mm = 0.0
+
+    def add(self, before: DriveState, state: DriveState, torque_nm: float, gravity_nm: float) -> None:
+        """Add a block between two states in air; one that is slow or turns ends the stroke."""
+        first_rad_s, last_rad_s = before.velocity_rad_s, state.velocity_rad_s
+        elapsed_s = state.angle_stamp_s - before.angle_stamp_s
+        if not (
+            (first_rad_s > SLOW_RAD_S and last_rad_s > SLOW_RAD_S)
+            or (first_rad_s < -SLOW_RAD_S and last_rad_s < -SLOW_RAD_S)
+        ):
+            self.end_stroke()
+            return
+        if elapsed_s <= 0.0:
+            return
+        moving_nm = self.inertia_kg_m2 * (last_rad_s - first_rad_s) / elapsed_s - gravity_nm
+        if self.friction is not None:
+            moving_nm += self.friction.torque_nm(state.angle_rad, (first_rad_s + last_rad_s) / 2.0)
+        self._blocks += 1
+        self._u += torque_nm
+        self._m += moving_nm
+        self._uu += torque_nm * torque_nm
+        self._um += torque_nm * moving_nm
+        self._mm += moving_nm * moving_nm
+
+    def end_stroke(self) -> None:
+        blocks, u, m = self._blocks, self._u, self._m
+        if blocks > 1:
+            stroke = Moments(blocks, self._uu - u * u / blocks, self._um - u * m / blocks, self._mm - m * m / blocks)
+            self._stride = self._stride.plus(stroke)
+        if blocks:
+            self._begin_stroke()
+
+    def end_stride(self) -> Moments:
+        """Return the sums of the stride, and begin the next one."""
+        stride, self._stride = self._stride, Moments()
+        return stride
+
+    def fault_of(self, stride: Moments) -> Fault | None:
+        """Return a fault if this stride, or the last three, prove a wrong gain."""
+        self._strides.append(stride)
+        gain = stride.gain_beyond(FACTOR_OF_ONE)
+        if gain is None and len(self._strides) == STRIDES:
+            first, second, third = self._strides
+            gain = first.plus(second).plus(third).gain_beyond(FACTOR_OF_THREE)
+        if gain is None:
+            return None
+        self._strides.clear()
+        return FaultKind.TORQUE_GAIN.fault(self.joint, gain=gain, most=FACTOR_OF_THREE)
+
+
+class TorqueGainMonitor:
+    """Owns the block under way of one flipper."""
+
+    def __init__(
+        self,
+        joints: Sequence[str],
+        geometry: FlipperGeometry,
+        mass: ArmMass,
+        frictions: Sequence[JointFriction],
+        asked: bool,
+    ) -> None:
+        """`asked`: the drives answer only when asked, so a state is that of a tick before."""
+        self._geometry, self._mass, self._asked = geometry, mass, asked
+        inertias_kg_m2 = (mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2)
+        self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions)
+        self._joint_of = {Phase.SWING: self._sweep, Phase.INSERTION: adduction}
+        self._phase = Phase.REST
+        self._swung_in_air = False
+        self._sent_nm = FlipperJoints(0.0, 0.0)
+        self._begin_block(*UNSEEN)
+
+    def _begin_block(self, sweep: DriveState, adduction: DriveState) -> None:
+        self._ticks = 0
+        self._sweep_nm = self._adduction_nm = 0.0  # sums of the commands
+        self._states = sweep, adduction
+        self._air = lowest_point_m(self._geometry, sweep.angle_rad, adduction.angle_rad) < 0.0  # not of NaN
+
+    def update(
+        self,
+        found: list[Fault],
+        punctual: bool,
+        states: FlipperJoints[DriveState],
+        torques_nm: FlipperJoints[float],
+        phase: Phase,
+    ) -> None:
+        """Add the faults of this tick. The torques were sent in the tick before, in this phase."""
+        if phase is not self._phase or not punctual:
+            self._end_phase(found, phase)
+            self._begin_block(*states)
+            self._sent_nm = torques_nm
+            return
+        if phase not in self._joint_of:
+            return
+        sweep_nm, adduction_nm = self._sent_nm if self._asked else torques_nm
+        self._sent_nm = torques_nm
+        self._sweep_nm += sweep_nm
+        self._adduction_nm += adduction_nm
+        self._ticks += 1
+        if self._ticks == BLOCK_TICKS:
+            self._end_block(*states)
+
+    def _end_block(self, sweep: DriveState, adduction: DriveState) -> None:
+        (sweep_before, adduction_before), was_air = self._states, self._air
+        sweep_nm, adduction_nm = self._sweep_nm / BLOCK_TICKS, self._adduction_nm / BLOCK_TICKS
+        self._begin_block(sweep, adduction)
+        joint = self._joint_of[self._phase]
+        if not (self._air and was_air):
+            joint.end_stroke()
+            return
+        sweep_gravity_nm, adduction_gravity_nm = self._mass.gravity_torques_nm(sweep.angle_rad, adduction.angle_rad)
+        if joint is self._sweep:
+            joint.add(sweep_before, sweep, sweep_nm, sweep_gravity_nm)
+        else:
+            joint.add(adduction_before, adduction, adduction_nm, adduction_gravity_nm)
+
+    def _end_phase(self, found: list[Fault], phase: Phase) -> None:
+        joint, ended = self._joint_of.get(self._phase), self._phase
+        self._phase = phase
+        if joint is None:
+            return
+        joint.end_stroke()
+        if phase is ended:  # a gap
+            return
+        stride = joint.end_stride()
+        fault = joint.fault_of(stride) if joint is self._sweep or self._swung_in_air else None
+        if joint is self._sweep:
+            self._swung_in_air = stride.in_air
+        if fault:
+            found.append(fault)
