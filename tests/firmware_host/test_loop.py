@@ -247,15 +247,15 @@ def test_no_torque_is_sent_in_a_mode_without_whatever_the_controller_wants(robot
         robot.loop.request(Request.ARM, robot.now_s)
 
 
-@pytest.mark.parametrize(("drive_type", "forced"), [("mit:AK80-9", True), ("odrive", False)])
+@pytest.mark.parametrize(("drive_type", "overruled"), [("mit:AK80-9", "watchdog_unknown"), ("odrive", "")])
 def test_only_an_arming_that_overruled_a_fault_counts_as_forced(
-    example_text: str, drive_type: str, forced: bool
+    example_text: str, drive_type: str, overruled: str
 ) -> None:
     robot = Lockstep(parse_configuration(with_drive_type(example_text, drive_type)), FIRM)
     robot.run_for(1.0)
-    assert (robot.loop.request(Request.ARM, robot.now_s) is not None) is forced  # its watchdog cannot be read
-    robot.arm(forced=True)
-    assert robot.loop.forced is forced
+    assert (robot.loop.request(Request.ARM, robot.now_s) is not None) is bool(overruled)  # its watchdog cannot be read
+    robot.arm(forced="watchdog_unknown")
+    assert robot.loop.forced == overruled
     robot.loop.request(Request.DISARM, robot.now_s)
     robot.step()
     assert not robot.loop.forced
