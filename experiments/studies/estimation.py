@@ -122,16 +122,7 @@ def study(
     evaluated = DataFrame(list(chain.from_iterable(measured["evaluated"])))
     errors, plates = error_rows(evaluated), plate_rows(evaluated)
     boundaries = transition_rows(DataFrame(list(chain.from_iterable(measured["transitions"]))))
-    settings = {
-        "seeds": seeds,
-        **{
-            f"{name}_strength_pa": {clay.name: round(clay.strength_pa, 1) for clay in own} for name, own in muds.items()
-        },
-        "disturbances": asdict(disturbances_of(layers)),
-        "repeats": REPEATS in layers,
-        "torque_error": TORQUE_ERROR if TORQUE in layers else 0.0,
-        "latency_s": LATENCY_S if LATENCY in layers else 0.0,  # the largest of a trial
-    }
+    settings = settings_of(muds, seeds, layers)
     summary = {"errors": errors, "plates": plates, "boundaries": boundaries, "settings": settings}
     return Result(
         tables=[
@@ -143,6 +134,20 @@ def study(
         summary=summary,
         notes=[] if boundaries else ["Mud boundaries: no walk over any"],
     )
+
+
+def settings_of(muds: Mapping[str, Sequence[Clay]], seeds: int, layers: Sequence[str]) -> dict[str, Any]:
+    """Return what the summary says of the simulated trials."""
+    return {
+        "seeds": seeds,
+        **{
+            f"{name}_strength_pa": {clay.name: round(clay.strength_pa, 1) for clay in own} for name, own in muds.items()
+        },
+        "disturbances": asdict(disturbances_of(layers)),
+        "repeats": REPEATS in layers,
+        "torque_error": TORQUE_ERROR if TORQUE in layers else 0.0,
+        "latency_s": LATENCY_S if LATENCY in layers else 0.0,  # the largest of a trial
+    }
 
 
 def parts_of(muds: Mapping[str, Sequence[Clay]], seeds: int, layers: Sequence[str]) -> list[Row]:

@@ -92,10 +92,7 @@ def study(
     elif port is None:
         raise OptionError("name the serial port of the load cell with --port, or use --simulated")
     try:
-        if format != AUTO:
-            LineFormat(format)
-        if unit and unit.lower() not in UNITS:
-            raise ValueError(f"unit {unit!r}: must be one of {', '.join(UNITS)}")
+        _check_lines(format, unit)
         muds = _checked_muds(mud, session.simulated)
     except ValueError as problem:
         raise OptionError(str(problem)) from problem
@@ -111,6 +108,13 @@ def study(
     )
     plan = TrialPlan(muds, trials, _stage_settings(plate, depth, speed), depth_error / 1000.0)
     return _run(session, plan, cell, {} if compare is None else load_flipper(compare))
+
+
+def _check_lines(format_name: str, unit: str) -> None:
+    if format_name != AUTO:
+        LineFormat(format_name)
+    if unit and unit.lower() not in UNITS:
+        raise ValueError(f"unit {unit!r}: must be one of {', '.join(UNITS)}")
 
 
 def _checked_muds(muds: tuple[str, ...], simulated: bool) -> tuple[str, ...]:
