@@ -17,7 +17,9 @@ joint shows it. Four quantities are small in every healthy motion, in air and in
     driven back  the path against a torque, where the target does not lead, in intervals in a row. Mud, friction and
                  stops yield to a torque or resist it, and a load that outweighs it moves the joint until both are
                  equal. Only where the joint presses against its stop while the encoder slips together with its speed
-                 does it seem to move on. An encoder that slips alone is found before (speed_monitor.py).
+                 does it seem to move on. An encoder that slips alone is found before (speed_monitor.py). Where the
+                 target stands still, a hand that pushes or hangs a weight moves a joint just so, up to the largest
+                 torque: only a torque near the limit counts there.
 
 Each sum is one of differences between two samples: it begins again after a gap, and after a jump of the encoder.
 
@@ -39,6 +41,7 @@ AWAY_LEAK_S = 0.3
 FOLLOWING_RAD = 0.2  # beyond the angle at which the PD reaches full torque
 FOLLOWING_S = 0.05  # of the commanded speed: ten times the delay of the loop
 PRESSING_NM = 0.25  # more than dry friction and cogging
+PRESSING_FRACTION = 0.9  # of the torque limit, where the target stands still
 DRIVEN_BACK_S = 0.09
 DRIVEN_BACK_RAD = 0.0027  # in each interval, 0.03 rad/s: seven steps of a 14-bit encoder
 DRIVEN_BACK_INTERVALS = 4  # in a row, so after at most five; a body that sinks pushes a swing back in two
@@ -67,6 +70,7 @@ class MotionMonitor:
         self._joint = joint
         self._half_inertia = 0.5 * dynamics.inertia_kg_m2
         self._runaway_j = runaway_bound_j(torque_nm)
+        self._held_nm = PRESSING_FRACTION * torque_nm
         stiffness_nm_rad = dynamics.stiffness_nm_rad
         self._following_rad = FOLLOWING_RAD + (torque_nm / stiffness_nm_rad if stiffness_nm_rad else float("inf"))
         self.reset()
@@ -126,7 +130,8 @@ class MotionMonitor:
 
     def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
-        lasts = torque_nm * self._pressing_nm >= 0.0 and not -PRESSING_NM < torque_nm < PRESSING_NM
+        least_nm = PRESSING_NM if target_step_rad else self._held_nm
+        lasts = torque_nm * self._pressing_nm >= 0.0 and not -least_nm < torque_nm < least_nm
         self._pressing_nm = torque_nm
         if not lasts or target_step_rad != target_step_rad:
             self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
