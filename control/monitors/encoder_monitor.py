@@ -21,7 +21,7 @@ RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
 UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, at any reported velocity
 YIELDING_NM = 0.4  # change of the torque meanwhile: more than dry friction and shakes of the bench (±0.15 N·m)
-YIELDS_S = 0.01  # after that: an answer is a tick older than its torque, the current rises, and a tenfold inertia starts
+YIELDS_S = 0.01  # after that: an answer is a tick older than its torque, and ten times the inertia starts in 3 ms
 
 
 class EncoderMonitor:
