@@ -1,7 +1,6 @@
-"""Detects a zero that may have shifted: another angle after a drive's restart or silence, or an encoder's jump.
+"""Detects a zero that may have shifted: another angle after a drive's restart or silence.
 
-A drive that starts again may count from elsewhere, and a magnet that slipped once stays where it is. The angle after
-a silence is compared with the one before. A joint can have turned by its speed within LONGEST_GAP_S; over a longer
+A drive that starts again may count from elsewhere. The angle after a silence is compared with the one before. A joint can have turned by its speed within LONGEST_GAP_S; over a longer
 silence it may fall or be moved by hand, which nothing reports, so a larger difference waits for an operator. Steps add
 up: an encoder that jumps back has the same zero as before.
 """
@@ -12,6 +11,7 @@ from control.faults import Fault, FaultKind
 from control.monitors.encoder_monitor import LONGEST_GAP_S
 from control.records import NEVER_S, UNKNOWN, DriveState
 
+SILENCE_S = 0.012  # four periods: no drive starts again within it; a jump between two messages is encoder_jump
 LARGEST_STEP_RAD = 100.0  # more is no measurement
 
 
@@ -40,7 +40,10 @@ class ZeroMonitor:
         return FaultKind.ZERO_SHIFTED.fault(self.joint, before_deg=before_deg, now_deg=now_deg)
 
     def _is_unexplained(self, state: DriveState, step_rad: float) -> bool:
-        gap_s = min(state.angle_stamp_s - self._stamp_s, LONGEST_GAP_S)
+        silence_s = state.angle_stamp_s - self._stamp_s
+        if silence_s < SILENCE_S:
+            return False
+        gap_s = min(silence_s, LONGEST_GAP_S)
         fastest_rad_s = max(abs(self._velocity_rad_s), abs(state.velocity_rad_s))
         return self._jump_rad + fastest_rad_s * gap_s < abs(step_rad) <= LARGEST_STEP_RAD
 

@@ -191,7 +191,7 @@ def test_a_speed_that_no_joint_has_is_no_energy() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("rate_rad_s", [0.05, 0.3, 1.0])
 def test_a_joint_at_its_stop_whose_encoder_slips_with_its_speed_is_found(sign: float, rate_rad_s: float) -> None:
-    """From 0.3 N·m on the motor presses for at most 0.5 s."""
+    """A target that stands still excuses less than 90 % of the limit: a hand may push the joint."""
     monitor, pressed_s, now_s = MotionMonitor("left_sweep", DYNAMICS, TORQUE_NM), 0.0, 0.0
     found: list[Fault] = []
     while not found and now_s < 10.0:
@@ -201,7 +201,10 @@ def test_a_joint_at_its_stop_whose_encoder_slips_with_its_speed_is_found(sign: f
         pressed_s += PERIOD_S if abs(torque_nm) >= 0.3 else 0.0
         state = DriveState(angle_rad, -sign * rate_rad_s, now_s)
         monitor.update(found, state, PERIOD_S, torque_nm, JointTarget(0.0, 0.0))
-    assert found[0].name in ("joint_driven_back", "following_error") and pressed_s < 0.48
+    assert (
+        found[0].name in ("joint_driven_back", "following_error")
+        and pressed_s < 0.48 + (0.9 * TORQUE_NM - 0.3) / DYNAMICS.stiffness_nm_rad / rate_rad_s
+    )
 
 
 def test_a_load_that_a_held_joint_yields_to_and_a_path_that_lowers_it_are_healthy() -> None:
