@@ -21,6 +21,7 @@ RESTS_RAD_S = 1e-9  # far below any encoder's noise: a velocity that has decayed
 FROZEN_S = 0.1  # without a change of even the last bit of angle and non-zero velocity
 UNCHANGED_S = 0.05  # without a change of even the last bit of angle and velocity, at any reported velocity
 YIELDING_NM = 0.4  # change of the torque meanwhile: more than dry friction and shakes of the bench (±0.15 N·m)
+YIELDS_S = 0.01  # after that: an answer is a tick older than its torque, and ten times the inertia starts in 3 ms
 
 
 class EncoderMonitor:
@@ -48,7 +49,8 @@ class EncoderMonitor:
 
     def forget_torque(self) -> None:
         """Begin the wait for a reaction to torque again: without torque a joint may rest exactly where it is."""
-        self._unchanged_s, self._lowest_nm, self._highest_nm = 0.0, inf, -inf
+        self._unchanged_s = self._ignored_s = 0.0
+        self._lowest_nm, self._highest_nm = inf, -inf
 
     def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
         """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""
@@ -107,8 +109,10 @@ class EncoderMonitor:
             self.forget_torque()
             return False
         self._unchanged_s += gap_s
+        if self._highest_nm - self._lowest_nm > YIELDING_NM:
+            self._ignored_s += gap_s
         if torque_nm < self._lowest_nm:
             self._lowest_nm = torque_nm
         if torque_nm > self._highest_nm:
             self._highest_nm = torque_nm
-        return self._unchanged_s > UNCHANGED_S and self._highest_nm - self._lowest_nm > YIELDING_NM
+        return self._unchanged_s > UNCHANGED_S and self._ignored_s > YIELDS_S

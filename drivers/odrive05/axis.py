@@ -6,10 +6,11 @@ idle drive repeats the last current that was measured. So a current with the sam
 and the set-point in its message as absent, also before a heartbeat says that the drive is idle. Its currents have the
 sign of the motor's phases, which `encoder_direction` turns into that of position and torque.
 
-The watchdog cannot be read over CAN: watchdog_proof.py proves it, and the position waits for that. It also expires in
-an idle drive while no program runs. That is no error of the drive: it is reported as one only if torque was on, and is
-cleared before closed loop. Sources: can_simple.cpp, axis.cpp, controller.cpp, motor.cpp and foc.cpp of
-odriverobotics/ODrive, tag fw-v0.5.6.
+The watchdog cannot be read over CAN: watchdog_proof.py proves it, and the position waits for that. A drive with an
+error proves nothing until the error is cleared, which a robot that knows no position refuses: its position does not
+wait. The watchdog also expires in an idle drive while no program runs. That is no error of the drive: it is reported as
+one only if torque was on, and is cleared before closed loop. Sources: can_simple.cpp, axis.cpp, controller.cpp,
+motor.cpp and foc.cpp of odriverobotics/ODrive, tag fw-v0.5.6.
 """
 
 from collections.abc import Callable, Mapping
@@ -105,7 +106,7 @@ class Odrive05Axis(CanSimpleAxis):
             self._counts_known, self._health = True, None
         if not self._absent:
             self._compare_counts(count, turns)
-        elif self._proof.concluded:
+        elif self._proof.concluded or self._error_flags:
             turns_s = self._turns_s(turns - self._turns, now_s - self._angle_stamp_s)
             super()._receive_encoder(GET_ENCODER_ESTIMATES.encode(turns, turns_s), now_s)
         self._turns = turns

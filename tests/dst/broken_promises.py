@@ -102,9 +102,16 @@ def fault_stays() -> AbstractContextManager[Any]:
     return mock.patch("control.fault_latch.FaultLatch._is_over", lambda *arguments: False)
 
 
-def joints_unwatched() -> AbstractContextManager[Any]:
-    """No monitor of a joint detects anything: if only one of them were removed, another would replace it."""
-    return mock.patch("control.monitors.joint_monitor.JointMonitor.update", lambda *arguments: [])
+@contextmanager
+def joints_unwatched() -> Iterator[None]:
+    """Nothing watches joints or torques: if only one monitor were removed, another would replace it."""
+    monitor = "firmware_host.fault_monitor.FaultMonitor"
+    with (
+        mock.patch("control.monitors.joint_monitor.JointMonitor.update", lambda *arguments: []),
+        mock.patch(f"{monitor}._check_gains", lambda *arguments: None),
+        mock.patch(f"{monitor}._check_obedience", lambda *arguments: None),
+    ):
+        yield
 
 
 def unwatched_and_unlimited() -> AbstractContextManager[Any]:

@@ -26,6 +26,16 @@ REST = (
 
 REGRESSIONS = (
     Regression(
+        "an ODrive 0.5 that another program's stop met before it was heard kept the robot in boot without a fault",
+        Scenario(
+            seed=188,
+            surroundings=Surroundings(drive_type="odrive05"),
+            start="power-on",
+            events=(Failure(at_s=0.056, component="left_adduction.master", kind="stop", for_s=0.015),),
+            for_s=0.3,
+        ),
+    ),
+    Regression(
         "a motor with inverted torque presses its joint against the stop while the flippers are raised",
         Scenario(
             seed=115,

@@ -167,6 +167,7 @@ def test_other_errors_are_neither_cleared_nor_hidden_by_the_watchdog_s(bench: Be
     sent = bench.run()
     assert not any(CLEAR in frames for frames in sent)
     assert isnan(bench.health.watchdog_s) and bench.state.error_flags == ENCODER
+    assert not isnan(bench.state.angle_rad)  # a robot that waits for it would neither report nor clear the error
     bench.drives.clear_errors()
     bench.far.receive()
     bench.error = 0
@@ -244,13 +245,13 @@ def test_the_set_point_that_an_idle_drive_repeats_until_its_heartbeat_is_no_mism
 
     def run(currents_a: list[float]) -> None:
         for current_a in currents_a:
-            bench.report(codec.GET_IQ, 8.0 + current_a, current_a)
+            bench.report(codec.GET_IQ, 4.0 + current_a, current_a)  # below the limit, beyond which one counts
             bench.tick()
 
-    run([8.0] * 30)
+    run([4.0] * 30)
     assert not bench.health.setpoint_problem
     bench.run(0.1)
-    run([8.0 + 0.01 * index for index in range(30)])  # a drive that follows it
+    run([4.0 + 0.01 * index for index in range(30)])  # a drive that follows it
     assert bench.health.setpoint_problem
 
 
