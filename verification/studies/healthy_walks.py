@@ -15,15 +15,18 @@ from pandas import DataFrame
 from control.controller import WalkOrder
 from control.faults import Reaction
 from control.modes import Mode, Request
+from drivers.drive_types import DEFAULT
 from experiments.study.option import Option
 from experiments.study.result import Result, Table
 from experiments.study.session import Ending
 from experiments.study.trials import Trials
-from simulation.harness.lockstep import Lockstep, drives_of, plant_of
+from simulation.harness.drive_presets import DRIVES
+from simulation.harness.lockstep import drives_of, plant_of
 from simulation.mud.clay import Clay
 from simulation.mud.disturbances import LAB, NONE, drive_changes
 from simulation.mud.track import Track
 from simulation.mud.unevenness import RandomStrength
+from verification.faults.failing_robot import FailingRobot
 from verification.faults.phases import real_configuration
 
 WALK_S = 60.0
@@ -38,9 +41,10 @@ def study(
     *,
     walks: Annotated[int, Option("of a minute each; 600 are ten hours", low=1, high=100_000)] = 60,
     first: Annotated[int, Option("seed of the first walk", low=0, high=1_000_000)] = 0,
+    drive: Annotated[str, Option("type of the robot's drives", metavar="TYPE", choices=tuple(DRIVES))] = DEFAULT,
 ) -> Result:
     """Hours of walking without a failure, in which no fault may stop the robot."""
-    walked = trials.run(walk, [{"seed": seed} for seed in range(first, first + walks)])
+    walked = trials.run(walk, [{"seed": seed, "drive": drive} for seed in range(first, first + walks)])
     alarms = {int(row.seed): row.alarms for row in walked.itertuples() if row.alarms}
     faults = Counter(text.split(": ")[1] for texts in (*walked["alarms"], *walked["held"]) for text in texts)
     summary = {
@@ -59,16 +63,16 @@ def study(
     return Result([table], summary=summary, notes=notes, ending=Ending.UNHEALTHY if alarms else Ending.DONE)
 
 
-def walk(seed: int) -> dict[str, Any]:
+def walk(seed: int, drive: str = DEFAULT) -> dict[str, Any]:
     """Walk for a minute over a random track; return distances, and the faults that stopped the robot."""
-    chance, configuration = Random(f"healthy {seed}"), real_configuration()
+    chance, configuration = Random(f"healthy {seed}"), real_configuration(drive)
     strength = RandomStrength(chance.choice((0.0, 0.1, 0.25)), chance.uniform(0.05, 0.5), seed)
     track = Track([(100.0, Clay("drawn", chance.uniform(*STRENGTHS_PA)))], random_strength=strength)
     disturbances = chance.choice((NONE, LAB))
     is_free = chance.random() < 0.5
     plant = plant_of(configuration, disturbances, free_body=is_free)
     drives = drives_of(configuration, **drive_changes(disturbances))
-    robot = Lockstep(configuration, track, seed, plant=plant, drives=drives)
+    robot = FailingRobot(configuration, track, seed, plant=plant, drives=drives)
     order = WalkOrder(chance.choice(DEPTHS_M), chance.random() < 0.7)
     robot.arm()
     faults, strides = [], 0
@@ -89,7 +93,7 @@ def walk(seed: int) -> dict[str, Any]:
     }
 
 
-def _operate(robot: Lockstep, chance: Random, order: WalkOrder) -> None:
+def _operate(robot: FailingRobot, chance: Random, order: WalkOrder) -> None:
     """Walk most of the time, and now and then stop and move a joint."""
     loop = robot.loop
     if loop.mode is Mode.HOLD and not loop.controller.moving and chance.random() < 0.01:
