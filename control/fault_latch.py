@@ -49,9 +49,11 @@ class FaultLatch:
 
     def blocking(self, forced: str = "") -> list[Fault]:
         """The present faults that block arming; `forced`: the name of the one kind that an operator overrules."""
+        if not self._present:
+            return []
         return [
             fault
-            for fault in self.present
+            for fault, *_ in self._present.values()
             if fault.kind.blocks is Blocks.ALWAYS or fault.kind.blocks is Blocks.UNLESS_FORCED and fault.name != forced
         ]
 

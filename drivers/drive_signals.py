@@ -72,7 +72,7 @@ class DriveSignals(ABC):
         if (
             health is None
             or health.duplicate_id is not self.duplicates
-            or bool(health.setpoint_problem) is not self.setpoints.found
+            or (health.setpoint_problem != "") is not self.setpoints.found
         ):
             self._health = health = self._build_health()
         return health

@@ -12,7 +12,7 @@ from control.joint_friction import NO_FRICTION
 from control.limits import LimitedTorques
 from control.modes import ENERGISED, HELD, MOVING, Mode
 from control.monitors.joint_monitor import JointMonitor, TickFacts
-from control.monitors.torque_gain_monitor import TorqueGainMonitor
+from control.monitors.torque_gain_monitor import FlipperStrokes, TorqueGainMonitor
 from control.monitors.zero_monitor import ZeroMonitor
 from control.rate import PERIOD_S
 from control.records import (
@@ -81,8 +81,7 @@ class FaultMonitor:
         self._all_trusted = same_for_all(True, configuration.rig)
         self.joints = _joint_monitors(configuration)
         self._geometry = configuration.geometry
-        self._gains = _gain_monitors(configuration)
-        self._phase = Phase.REST  # in the tick before
+        self._gains = _gain_monitor(configuration)
         self.zeros = tuple(ZeroMonitor(joint, configuration.faults.jump_rad) for joint in joints)
         self._loop = LoopMonitor(configuration.faults, period_s)
         self._log = LogMonitor(configuration.faults)
@@ -129,7 +128,8 @@ class FaultMonitor:
             return found
         health = self._drives.health
         self._check_joints(found, tick, monitor_input, health)
-        self._check_gains(found, tick.missed == 0, monitor_input)
+        sent_nm = monitor_input.sent.torques_nm
+        self._gains.update(found, tick.missed == 0, monitor_input.states, sent_nm, monitor_input.phase)
         self._check_trust(found, monitor_input.mode)
         if not monitor_input.sent.finite:
             found.append(FaultKind.TORQUE_NOT_FINITE.fault())
@@ -145,18 +145,19 @@ class FaultMonitor:
     def _check_buses(self, found: list[Fault], now_s: float) -> None:
         """A warning ends with the error frames: not every CAN driver reports that its controller has recovered."""
         for name, port in self._drives.ports.items():
-            if (port.error_frames, port.state) != self._bus_events[name]:
-                self._bus_events[name], self._error_s[name] = (port.error_frames, port.state), now_s
-            if port.state is BusState.OFF or (port.state and now_s - self._error_s[name] < BUS_TROUBLE_S):
-                found.append(BUS_FAULTS[port.state].fault(name, reason=port.last_error or "the reason is unknown"))
-            lost_frames = port.lost_frames - self._lost_frames[name]
-            if lost_frames:
-                self._lost_frames[name] = port.lost_frames
-                found.append(FaultKind.FRAMES_LOST.fault(name, frames=lost_frames))
-            lost = port.failed_sends > self._failed_sends[name]
-            self._refused_ticks[name] = self._refused_ticks[name] + 1 if lost else 0
-            self._failed_sends[name] = port.failed_sends
-            if (ticks := self._refused_ticks[name]) >= REFUSED_TICKS:
+            state, lost_frames, failed_sends = port.state, port.lost_frames, port.failed_sends
+            events = (port.error_frames, state)
+            if events != self._bus_events[name]:
+                self._bus_events[name], self._error_s[name] = events, now_s
+            if state is BusState.OFF or (state and now_s - self._error_s[name] < BUS_TROUBLE_S):
+                found.append(BUS_FAULTS[state].fault(name, reason=port.last_error or "the reason is unknown"))
+            if lost_frames != self._lost_frames[name]:
+                found.append(FaultKind.FRAMES_LOST.fault(name, frames=lost_frames - self._lost_frames[name]))
+                self._lost_frames[name] = lost_frames
+            refused = failed_sends > self._failed_sends[name]
+            self._failed_sends[name] = failed_sends
+            self._refused_ticks[name] = ticks = self._refused_ticks[name] + 1 if refused else 0
+            if ticks >= REFUSED_TICKS:
                 found.append(FaultKind.BUS_REFUSES.fault(name, ticks=ticks, reason=port.last_send_error))
 
     def _check_joints(
@@ -173,10 +174,11 @@ class FaultMonitor:
             may_stand_still=monitor_input.freeing or mode not in HELD,
             damping=mode is Mode.DAMPING,
         )
+        stalled = tick.missed * self._period_s > STALL_S
         for joint, zero, health, state, torque_nm, target in zip(
             self.joints, self.zeros, drives, monitor_input.states, sent_nm, targets, strict=True
         ):
-            if tick.missed * self._period_s > STALL_S and health.restarts == self._restarts[health.joint]:
+            if stalled and health.restarts == self._restarts[health.joint]:
                 zero.skip_gap()
             shifted = zero.update(state)
             if shifted:
@@ -186,15 +188,6 @@ class FaultMonitor:
                     continue
                 explained = fault.kind in EXPLAINED and health.errors
                 found.append(fault.with_values(reason=health.errors) if explained else fault)
-
-    def _check_gains(self, found: list[Fault], punctual: bool, monitor_input: MonitorInput) -> None:
-        """Compare commanded torques with the joints' accelerations."""
-        phase, torques_nm = monitor_input.phase, monitor_input.sent.torques_nm
-        if phase is self._phase and phase not in (Phase.SWING, Phase.INSERTION):
-            return
-        self._phase = phase
-        for gains, states, sent_nm in zip(self._gains, monitor_input.states.flippers, torques_nm.flippers, strict=True):
-            gains.update(found, punctual, states, sent_nm, phase)
 
     def _is_held_back(self, joint: str, tick: Tick, monitor_input: MonitorInput) -> bool:
         """Return whether mud may hold a joint that lags behind, or held it until CATCH_UP_S ago.
@@ -278,7 +271,7 @@ class FaultMonitor:
             found.append(FaultKind.WATCHDOG_OFF.fault(joint, setting=setting, longest_s=self._longest_watchdog_s))
 
     def _check_pose(self, found: list[Fault], now_s: float, body: BodyPose) -> None:
-        if body.stamp_s > float("-inf"):
+        if body.stamp_s > NEVER_S:
             self._pose_stamp_s = now_s
         elif self._pose_stamp_s is not None:
             found.append(FaultKind.POSE_LOST.fault())
@@ -305,15 +298,20 @@ def _joint_monitors(configuration: Configuration) -> tuple[JointMonitor, ...]:
     )
 
 
-def _gain_monitors(configuration: Configuration) -> tuple[TorqueGainMonitor, ...]:
+def _gain_monitor(configuration: Configuration) -> TorqueGainMonitor:
     rig, drives, frictions = configuration.rig, configuration.drive, configuration.friction
-    return tuple(
-        TorqueGainMonitor(
-            joints,
-            configuration.geometry,
-            configuration.arm,
-            [frictions.get(joint, NO_FRICTION) for joint in joints],
-            drives[joints[0]].answers_only,
+    flippers = []
+    for flipper in rig.flippers:
+        own = rig.joints_of(flipper)
+        joints = rig.joints[own]
+        flippers.append(
+            FlipperStrokes(
+                own.start,
+                joints,
+                configuration.geometry,
+                configuration.arm,
+                [frictions.get(joint, NO_FRICTION) for joint in joints],
+                drives[joints[0]].answers_only,
+            )
         )
-        for joints in (rig.joints[rig.joints_of(flipper)] for flipper in rig.flippers)
-    )
+    return TorqueGainMonitor(flippers)

@@ -87,7 +87,8 @@ class Loop:
         self.learning.adapt(self.controller)
         self.health = self._examine(tick, self._end_lost_lease(now_s))
         self._enter(next_mode(self.mode, self._pop_request(), self.health), now_s)
-        self.forced = self.forced if self.mode in ENERGISED else ""
+        if self.forced and self.mode not in ENERGISED:
+            self.forced = ""
         if self.fault and self.controller.moving:
             self._end_move(now_s, self.fault.message)
         self.sent = self._limit(self._control(tick.missed))

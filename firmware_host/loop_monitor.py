@@ -35,24 +35,28 @@ class LoopMonitor:
 
     def _check_ticks(self, tick: Tick) -> list[Fault]:
         found: list[Fault] = []
-        missed_s = tick.missed * self._period_s
-        if missed_s > self._bounds.silence_s:
-            found.append(FaultKind.LOOP_STALLED.fault(late_ms=1e3 * tick.late_s))
-        elif missed_s > self._bounds.lag_s:
-            found.append(FaultKind.LOOP_LAGGING.fault(extent=f"{tick.missed} ticks in a row were missed"))
-        elif tick.missed:
-            found.append(FaultKind.LOOP_OVERRUN.fault(missed=tick.missed))
-        self._stamps_s.append(tick.now_s)
-        if len(self._stamps_s) > CRAWL_TICKS:
-            mean_s = (tick.now_s - self._stamps_s[-1 - CRAWL_TICKS]) / CRAWL_TICKS
+        now_s, stamps_s = tick.now_s, self._stamps_s
+        if tick.missed:
+            found.append(self._missed(tick))
+        stamps_s.append(now_s)
+        if len(stamps_s) > CRAWL_TICKS:
+            mean_s = (now_s - stamps_s[-1 - CRAWL_TICKS]) / CRAWL_TICKS
             if mean_s > self._bounds.crawl_s:
                 found.append(FaultKind.LOOP_CRAWLING.fault(tick_ms=1e3 * mean_s))
-        if len(self._stamps_s) > MEAN_TICKS:
-            fraction = (tick.now_s - self._stamps_s[0]) / (MEAN_TICKS * self._period_s) - 1.0
+        if len(stamps_s) > MEAN_TICKS:
+            fraction = (now_s - stamps_s[0]) / (MEAN_TICKS * self._period_s) - 1.0
             if fraction > self._bounds.lag_fraction:
                 extent = f"its ticks take {100.0 * fraction:.0f} % too long"
                 found.append(FaultKind.LOOP_LAGGING.fault(extent=extent))
         return found
+
+    def _missed(self, tick: Tick) -> Fault:
+        missed_s = tick.missed * self._period_s
+        if missed_s > self._bounds.silence_s:
+            return FaultKind.LOOP_STALLED.fault(late_ms=1e3 * tick.late_s)
+        if missed_s > self._bounds.lag_s:
+            return FaultKind.LOOP_LAGGING.fault(extent=f"{tick.missed} ticks in a row were missed")
+        return FaultKind.LOOP_OVERRUN.fault(missed=tick.missed)
 
 
 class LogMonitor:

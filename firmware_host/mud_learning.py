@@ -173,6 +173,8 @@ class MudLearning:
 
     def pop_faults(self) -> list[Fault]:
         """Return faults of the strides that closed since the last call: coefficients beyond what any mud has."""
+        if not self._unexamined:
+            return []
         strides, self._unexamined = self._unexamined, []
         wild = [stride for stride in strides if any(map(_is_wild, (stride.k_p, stride.k_s, stride.k_e)))]
         return [FaultKind.ESTIMATE_WILD.fault(each.flipper, stride=each.index) for each in wild]

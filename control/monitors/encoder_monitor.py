@@ -11,7 +11,7 @@ half a step of a 14-bit encoder at 1000 N·m/rad, ten times the stiffness of the
 from math import degrees, inf
 
 from control.faults import Fault, FaultKind
-from control.monitors.speed_monitor import SpeedMonitor
+from control.monitors.speed_monitor import INTERVAL_S, SpeedMonitor
 from control.records import NEVER_S, UNKNOWN, DriveState
 
 MOVED_RAD = 0.03  # integral of the velocity while the angle stays the same to the last bit
@@ -37,6 +37,10 @@ class EncoderMonitor:
         self._angle_rad, self._velocity_rad_s, self._stamp_s = UNKNOWN, UNKNOWN, NEVER_S
         self._reset_frozen()
         self._speed.reset()
+        self._begin_interval()
+
+    def _begin_interval(self) -> None:
+        self._interval_s = self._path_rad = self._turned_rad = 0.0  # of speed_monitor.py
 
     def _reset_frozen(self) -> None:
         self._repeated = False  # the newest angle, since the sums below began
@@ -54,32 +58,37 @@ class EncoderMonitor:
         if stamp_s == before_s:
             return None
         gap_s = stamp_s - before_s if stamp_s > before_s else 0.0
+        angle_rad, velocity_rad_s = state.angle_rad, state.velocity_rad_s
+        step_rad = angle_rad - self._angle_rad
+        path_rad = (velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s
         fault = None
         if gap_s > LONGEST_GAP_S:  # also that before the first message
             self._reset_frozen()
-            self._speed.begin_interval()
-        elif state.angle_rad == self._angle_rad:
+            self._begin_interval()
+        elif angle_rad == self._angle_rad:
             self._repeated = True
             fault = self._check_frozen(state, gap_s, torque_nm)
         else:
-            fault = self._check_jump(state, gap_s, dt_s)
+            if not -self._jump_rad <= step_rad - path_rad <= self._jump_rad:
+                fault = self._check_jump(velocity_rad_s, step_rad, path_rad, gap_s, dt_s)
             if self._repeated:
                 self._reset_frozen()
         if not fault and 0.0 < gap_s <= LONGEST_GAP_S:
-            path_rad = (state.velocity_rad_s + self._velocity_rad_s) / 2.0 * gap_s
-            fault = self._speed.update(gap_s, path_rad, state.angle_rad - self._angle_rad)
-        self._angle_rad, self._velocity_rad_s, self._stamp_s = state.angle_rad, state.velocity_rad_s, stamp_s
+            self._interval_s += gap_s
+            self._path_rad += path_rad
+            self._turned_rad += step_rad
+            if self._interval_s >= INTERVAL_S:
+                fault = self._speed.update(self._interval_s, self._path_rad, self._turned_rad)
+                self._begin_interval()
+        self._angle_rad, self._velocity_rad_s, self._stamp_s = angle_rad, velocity_rad_s, stamp_s
         return fault
 
-    def _check_jump(self, state: DriveState, gap_s: float, dt_s: float) -> Fault | None:
+    def _check_jump(
+        self, velocity_rad_s: float, step_rad: float, path_rad: float, gap_s: float, dt_s: float
+    ) -> Fault | None:
         """Return a fault if the step differs from the mean velocity's by more than a late stamp explains."""
-        velocity_rad_s, before_rad_s = state.velocity_rad_s, self._velocity_rad_s
-        step_rad = state.angle_rad - self._angle_rad
-        error_rad = abs(step_rad - (velocity_rad_s + before_rad_s) / 2.0 * gap_s)
-        if not error_rad > self._jump_rad:
-            return None
-        late_rad = max(abs(velocity_rad_s), abs(before_rad_s)) * dt_s
-        if not error_rad > self._jump_rad + late_rad:
+        late_rad = max(abs(velocity_rad_s), abs(self._velocity_rad_s)) * dt_s
+        if not abs(step_rad - path_rad) > self._jump_rad + late_rad:
             return None
         return FaultKind.ENCODER_JUMP.fault(self._joint, step_deg=degrees(abs(step_rad)), gap_ms=gap_s * 1e3)
 

@@ -221,21 +221,16 @@ class JointMonitor:
         self._current_ticks = self._current_ticks + 1 if abs(current_a) > self._most_a else 0
         if self._current_ticks >= CURRENT_TICKS:
             found.append(self._fault(FaultKind.JOINT_CURRENT, current_a=abs(current_a), limit_a=self._most_a))
-        self._watch_torque(found, facts, seen_s, current_a * self._constant_nm_a, torque_nm)
+        measured_nm = current_a * self._constant_nm_a
+        differs = abs(torque_nm - measured_nm) > self._missing_nm
+        self._missing_s = self._missing_s + seen_s if differs and facts.moving else 0.0
+        if self._missing_s > MISSING_S:  # a frozen current, lost commands, a silent clamp
+            kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]
+            found += [self._fault(kind, measured_nm=measured_nm, commanded_nm=torque_nm) for kind in kinds]
         pushed = abs(torque_nm) >= self._saturated_nm > 0.0 and not facts.may_stand_still
         self._stalled_s = self._stalled_s + seen_s if pushed else 0.0
         if self._stalled_s > STALLED_S:
             found.append(self._fault(FaultKind.JOINT_NOT_FOLLOWING, stalled_s=self._stalled_s))
-
-    def _watch_torque(
-        self, found: list[Fault], facts: TickFacts, seen_s: float, measured_nm: float, torque_nm: float
-    ) -> None:
-        """Detect a drive that does not exert the commanded torque: a frozen current, lost commands, a silent clamp."""
-        differs = abs(torque_nm - measured_nm) > self._missing_nm
-        self._missing_s = self._missing_s + seen_s if differs and facts.moving else 0.0
-        if self._missing_s > MISSING_S:
-            kinds = [FaultKind.TORQUE_MISSING] + facts.damping * [FaultKind.DAMPING_FAILED]
-            found += [self._fault(kind, measured_nm=measured_nm, commanded_nm=torque_nm) for kind in kinds]
 
     # heat
 

@@ -101,7 +101,7 @@ class MotionMonitor:
         self._target_rad, self._lag_rad = target_rad, abs(target_rad - angle_rad)
         following = not self._lag_rad > self._following_rad  # also without a target
         explained = self.unexplained_j <= self._runaway_j and self.driven_back < DRIVEN_BACK_INTERVALS
-        if not (following and explained and self.away_rad <= AWAY_RAD):
+        if not following or not explained or self.away_rad > AWAY_RAD:
             self._report(found, target)
 
     def _add(self, elapsed_s: float, step_rad: float, velocity_rad_s: float, target_rad: float) -> None:
@@ -109,7 +109,11 @@ class MotionMonitor:
         before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         torque_nm = self._impulse_nm_s / elapsed_s
-        self._watch_pressing(elapsed_s, step_rad, torque_nm, target_rad - self._target_rad)
+        if -PRESSING_NM < torque_nm < PRESSING_NM:
+            self._pressing_nm = torque_nm
+            self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
+        else:
+            self._watch_pressing(elapsed_s, step_rad, torque_nm, target_rad - self._target_rad)
         work_j = torque_nm * step_rad
         unexplained_j = (1.0 - elapsed_s / RUNAWAY_LEAK_S) * self.unexplained_j + kinetic_j - work_j
         self.unexplained_j = unexplained_j if unexplained_j > 0.0 else 0.0
@@ -126,7 +130,7 @@ class MotionMonitor:
 
     def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
-        lasts = torque_nm * self._pressing_nm >= 0.0 and not -PRESSING_NM < torque_nm < PRESSING_NM
+        lasts = torque_nm * self._pressing_nm >= 0.0
         self._pressing_nm = torque_nm
         if not lasts or target_step_rad != target_step_rad:
             self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0

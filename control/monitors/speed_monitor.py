@@ -24,7 +24,7 @@ WRONG_FRACTION = 0.035  # of the slope: below the 5 % that must be found, and ab
 
 
 class SpeedMonitor:
-    """Owns the sums over the intervals, and those of the present one."""
+    """Owns the sums over the intervals."""
 
     def __init__(self, joint: str) -> None:
         self._joint = joint
@@ -34,27 +34,16 @@ class SpeedMonitor:
         self._wrong_intervals = 0
         self._count = self._path_rad = self._turned_rad = self._path_rad2 = self._product_rad2 = 0.0
         self._turned_rad2 = 0.0
-        self.begin_interval()
 
-    def begin_interval(self) -> None:
-        self._elapsed_s = self._interval_rad = self._interval_turned_rad = 0.0
-
-    def update(self, gap_s: float, path_rad: float, turned_rad: float) -> Fault | None:
-        """Add one message: the integral of the speed since the one before, and the change of the angle."""
-        self._elapsed_s += gap_s
-        self._interval_rad += path_rad
-        self._interval_turned_rad += turned_rad
-        return self._end_interval() if self._elapsed_s >= INTERVAL_S else None
-
-    def _end_interval(self) -> Fault | None:
-        path_rad, turned_rad, kept = self._interval_rad, self._interval_turned_rad, 1.0 - self._elapsed_s / LEAK_S
+    def update(self, interval_s: float, path_rad: float, turned_rad: float) -> Fault | None:
+        """Add an interval of INTERVAL_S: the integral of the speed, and the change of the angle."""
+        kept = 1.0 - interval_s / LEAK_S
         self._count = kept * self._count + 1.0
         self._path_rad = kept * self._path_rad + path_rad
         self._turned_rad = kept * self._turned_rad + turned_rad
         self._path_rad2 = kept * self._path_rad2 + path_rad * path_rad
         self._product_rad2 = kept * self._product_rad2 + path_rad * turned_rad
         self._turned_rad2 = kept * self._turned_rad2 + turned_rad * turned_rad
-        self.begin_interval()
         fault = self._judge()
         if fault:  # the next one needs new evidence: an operator may clear this one
             self.reset()

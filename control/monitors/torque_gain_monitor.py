@@ -33,7 +33,7 @@ from control.gait.recovery import lowest_point_m
 from control.geometry import FlipperGeometry
 from control.joint_friction import NO_FRICTION, JointFriction
 from control.parameters.arm_mass import ArmMass
-from control.records import DriveState, FlipperJoints, Phase
+from control.records import DriveState, DriveStates, Phase, Torques
 
 BLOCK_TICKS = 4
 SLOW_RAD_S = 0.1  # below it dry friction has any direction
@@ -41,7 +41,6 @@ LEAST_BLOCKS = 7  # of a phase
 SAME_FRACTION = 0.5  # of the bounds: r² of the regression
 FACTOR_OF_ONE, FACTOR_OF_THREE = 2.0, 1.6
 STRIDES = 3
-UNSEEN = (DriveState(), DriveState())
 
 
 class Moments(NamedTuple):
@@ -134,78 +133,55 @@ class JointStrokes:
         return FaultKind.TORQUE_GAIN.fault(self.joint, gain=gain, most=FACTOR_OF_THREE)
 
 
-class TorqueGainMonitor:
-    """Owns the block under way of one flipper."""
+class FlipperStrokes:
+    """Owns the block under way of one flipper, and its joint that this phase watches."""
 
     def __init__(
         self,
+        first: int,
         joints: Sequence[str],
         geometry: FlipperGeometry,
         mass: ArmMass,
         frictions: Sequence[JointFriction],
         asked: bool,
     ) -> None:
-        """`asked`: the drives answer only when asked, so a state is that of a tick before."""
-        self._geometry, self._mass, self._asked = geometry, mass, asked
+        """`first`: of the flipper's joints among all. `asked`: drives that answer only when asked, a tick later."""
+        self._first = self._watched = first
+        self._geometry, self._mass = geometry, mass
+        self._commands = slice(0, BLOCK_TICKS) if asked else slice(1, BLOCK_TICKS + 1)
         inertias_kg_m2 = (mass.sweep_inertia_kg_m2, mass.adduction_inertia_kg_m2)
         self._sweep, adduction = map(JointStrokes, joints, inertias_kg_m2, frictions)
         self._joint_of = {Phase.SWING: self._sweep, Phase.INSERTION: adduction}
-        self._phase = Phase.REST
+        self._joint: JointStrokes | None = None  # that this phase watches
         self._swung_in_air = False
-        self._sent_nm = FlipperJoints(0.0, 0.0)
-        self._begin_block(*UNSEEN)
 
-    def _begin_block(self, sweep: DriveState, adduction: DriveState) -> None:
-        self._ticks = 0
-        self._sweep_nm = self._adduction_nm = 0.0  # sums of the commands
-        self._states = sweep, adduction
+    def begin_block(self, states: DriveStates) -> None:
+        sweep, adduction = states[self._first], states[self._first + 1]
+        self._before = sweep if self._joint is self._sweep else adduction
         self._air = lowest_point_m(self._geometry, sweep.angle_rad, adduction.angle_rad) < 0.0  # not of NaN
 
-    def update(
-        self,
-        found: list[Fault],
-        punctual: bool,
-        states: FlipperJoints[DriveState],
-        torques_nm: FlipperJoints[float],
-        phase: Phase,
-    ) -> None:
-        """Add the faults of this tick. The torques were sent in the tick before, in this phase."""
-        if phase is not self._phase or not punctual:
-            self._end_phase(found, phase)
-            self._begin_block(*states)
-            self._sent_nm = torques_nm
+    def end_block(self, states: DriveStates, sent_nm: Sequence[Torques]) -> None:
+        """`sent_nm`: in the tick before the block, and in its ticks."""
+        joint, before, was_air = self._joint, self._before, self._air
+        self.begin_block(states)
+        if joint is None:
             return
-        if phase not in self._joint_of:
-            return
-        sweep_nm, adduction_nm = self._sent_nm if self._asked else torques_nm
-        self._sent_nm = torques_nm
-        self._sweep_nm += sweep_nm
-        self._adduction_nm += adduction_nm
-        self._ticks += 1
-        if self._ticks == BLOCK_TICKS:
-            self._end_block(*states)
-
-    def _end_block(self, sweep: DriveState, adduction: DriveState) -> None:
-        (sweep_before, adduction_before), was_air = self._states, self._air
-        sweep_nm, adduction_nm = self._sweep_nm / BLOCK_TICKS, self._adduction_nm / BLOCK_TICKS
-        self._begin_block(sweep, adduction)
-        joint = self._joint_of[self._phase]
         if not (self._air and was_air):
             joint.end_stroke()
             return
-        sweep_gravity_nm, adduction_gravity_nm = self._mass.gravity_torques_nm(sweep.angle_rad, adduction.angle_rad)
-        if joint is self._sweep:
-            joint.add(sweep_before, sweep, sweep_nm, sweep_gravity_nm)
-        else:
-            joint.add(adduction_before, adduction, adduction_nm, adduction_gravity_nm)
+        watched = self._watched
+        torque_nm = sum([torques_nm[watched] for torques_nm in sent_nm[self._commands]]) / BLOCK_TICKS
+        gravity_nm = self._mass.gravity_torques_nm(states[self._first].angle_rad, states[self._first + 1].angle_rad)
+        joint.add(before, self._before, torque_nm, gravity_nm[watched - self._first])
 
-    def _end_phase(self, found: list[Fault], phase: Phase) -> None:
-        joint, ended = self._joint_of.get(self._phase), self._phase
-        self._phase = phase
+    def begin_phase(self, found: list[Fault], phase: Phase, gap: bool) -> None:
+        """Add the faults of the phase that ends. After a gap in a phase only the stroke ends."""
+        joint, self._joint = self._joint, self._joint_of.get(phase)
+        self._watched = self._first if self._joint is self._sweep else self._first + 1
         if joint is None:
             return
         joint.end_stroke()
-        if phase is ended:  # a gap
+        if gap:
             return
         stride = joint.end_stride()
         fault = joint.fault_of(stride) if joint is self._sweep or self._swung_in_air else None
@@ -213,3 +189,28 @@ class TorqueGainMonitor:
             self._swung_in_air = stride.in_air
         if fault:
             found.append(fault)
+
+
+class TorqueGainMonitor:
+    """Owns the phase and the commands of the block under way."""
+
+    def __init__(self, flippers: Sequence[FlipperStrokes]) -> None:
+        self._flippers = flippers
+        self._phase = Phase.REST
+        self._sent_nm: list[Torques] = []  # in the tick before the block, and in its ticks
+
+    def update(
+        self, found: list[Fault], punctual: bool, states: DriveStates, torques_nm: Torques, phase: Phase
+    ) -> None:
+        """Add the faults of this tick. The torques were sent in the tick before, in this phase."""
+        if phase is not self._phase or not punctual:
+            for flipper in self._flippers:
+                flipper.begin_phase(found, phase, phase is self._phase)
+                flipper.begin_block(states)
+            self._phase, self._sent_nm = phase, [torques_nm]
+        elif phase is Phase.SWING or phase is Phase.INSERTION:
+            self._sent_nm.append(torques_nm)
+            if len(self._sent_nm) > BLOCK_TICKS:
+                for flipper in self._flippers:
+                    flipper.end_block(states, self._sent_nm)
+                self._sent_nm = [torques_nm]

@@ -23,20 +23,22 @@ class Winding:
     """Owns one winding's temperature."""
 
     def __init__(self, parameters: WindingParameters) -> None:
-        self.parameters = parameters
+        self._room_c, self._time_constant_s = parameters.room_c, parameters.time_constant_s
+        self._resistance_ohm = parameters.resistance_ohm
+        self._rise_k_w = parameters.thermal_resistance_k_w * 1.5
         self.reset()
 
     def reset(self) -> None:
-        self.temperature_c = self.parameters.room_c
+        self.temperature_c = self._room_c
 
     def update(self, dt_s: float, current_a: float, measured_c: float) -> float:
         """Advance the model and return the temperature, the higher of model and sensor; a NaN current adds no heat."""
-        parameters, temperature_c = self.parameters, self.temperature_c
+        temperature_c = self.temperature_c
         rise_k = 0.0
         if isfinite(current_a):
-            resistance_ohm = parameters.resistance_ohm * (1.0 + COPPER_PER_K * (temperature_c - REFERENCE_C))
-            rise_k = parameters.thermal_resistance_k_w * 1.5 * resistance_ohm * current_a * current_a
-        temperature_c += (parameters.room_c + rise_k - temperature_c) * dt_s / (parameters.time_constant_s + dt_s)
+            resistance_ohm = self._resistance_ohm * (1.0 + COPPER_PER_K * (temperature_c - REFERENCE_C))
+            rise_k = self._rise_k_w * resistance_ohm * current_a * current_a
+        temperature_c += (self._room_c + rise_k - temperature_c) * dt_s / (self._time_constant_s + dt_s)
         if measured_c > temperature_c:  # never true of NaN
             temperature_c = measured_c
         self.temperature_c = temperature_c = HOTTEST_C if temperature_c > HOTTEST_C else temperature_c

@@ -10,7 +10,7 @@ from math import degrees
 
 from control.faults import Fault, FaultKind
 from control.monitors.encoder_monitor import LONGEST_GAP_S
-from control.records import NEVER_S, UNKNOWN, DriveState
+from control.records import UNKNOWN, DriveState
 
 LARGEST_STEP_RAD = 100.0  # more is no measurement
 
@@ -22,31 +22,34 @@ class ZeroMonitor:
         self.joint = joint
         self._jump_rad = jump_rad
         self.shift_rad = 0.0
-        self._angle_rad, self._velocity_rad_s, self._stamp_s = UNKNOWN, UNKNOWN, NEVER_S
+        self._before = DriveState()
 
     def update(self, state: DriveState) -> Fault | None:
         """Return the fault of a zero that nobody has confirmed since it may have shifted."""
-        stamp_s = state.angle_stamp_s
-        if stamp_s != self._stamp_s:
-            step_rad = state.angle_rad - self._angle_rad
-            if not -self._jump_rad <= step_rad <= self._jump_rad and self._is_unexplained(state, step_rad):
-                self.shift_rad += step_rad
-            if not abs(step_rad) > LARGEST_STEP_RAD:  # also the first angle, or one after a gap of ours
-                self._angle_rad, self._velocity_rad_s, self._stamp_s = state.angle_rad, state.velocity_rad_s, stamp_s
-        if -self._jump_rad <= self.shift_rad <= self._jump_rad:
+        step_rad, jump_rad = state.angle_rad - self._before.angle_rad, self._jump_rad
+        if -jump_rad <= step_rad <= jump_rad:
+            self._before = state
+        elif state.angle_stamp_s != self._before.angle_stamp_s:
+            self._add_step(state, step_rad)
+        if -jump_rad <= self.shift_rad <= jump_rad:
             return None
-        now_rad = self._angle_rad
+        now_rad = self._before.angle_rad
         before_deg, now_deg = degrees(now_rad - self.shift_rad), degrees(now_rad)
         return FaultKind.ZERO_SHIFTED.fault(self.joint, before_deg=before_deg, now_deg=now_deg)
 
-    def _is_unexplained(self, state: DriveState, step_rad: float) -> bool:
-        gap_s = min(state.angle_stamp_s - self._stamp_s, LONGEST_GAP_S)
-        fastest_rad_s = max(abs(self._velocity_rad_s), abs(state.velocity_rad_s))
-        return self._jump_rad + fastest_rad_s * gap_s < abs(step_rad) <= LARGEST_STEP_RAD
+    def _add_step(self, state: DriveState, step_rad: float) -> None:
+        """Add a step that the speed does not explain. No step is known to the first angle, and after a gap of ours."""
+        gap_s = min(state.angle_stamp_s - self._before.angle_stamp_s, LONGEST_GAP_S)
+        fastest_rad_s = max(abs(self._before.velocity_rad_s), abs(state.velocity_rad_s))
+        if abs(step_rad) > LARGEST_STEP_RAD:
+            return
+        if abs(step_rad) > self._jump_rad + fastest_rad_s * gap_s:
+            self.shift_rad += step_rad
+        self._before = state
 
     def skip_gap(self) -> None:
         """Accept the next angle: this program missed ticks, and a drive that is not asked does not answer."""
-        self._angle_rad = UNKNOWN
+        self._before = self._before._replace(angle_rad=UNKNOWN)
 
     def confirm(self) -> float:
         """Accept the present angle; return the shift that was accepted."""

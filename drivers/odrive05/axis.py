@@ -48,7 +48,7 @@ class Odrive05Axis(CanSimpleAxis):
         self._following = False  # commanded by this program
         self._expired_idle = self._expired = False
         self._absent = False  # position and velocity
-        self._turns = 0.0  # by the newest counts
+        self._turns, self._counted_s = 0.0, NEVER_S  # by the newest counts
         self._idle_data = b""  # of the current
         self._measured_data = b""  # of the newest current
         self._proof.reset()
@@ -107,9 +107,9 @@ class Odrive05Axis(CanSimpleAxis):
         if not self._absent:
             self._compare_counts(count, turns)
         elif self._proof.concluded or self._error_flags:
-            turns_s = self._turns_s(turns - self._turns, now_s - self._angle_stamp_s)
+            turns_s = self._turns_s(turns - self._turns, now_s - self._counted_s)
             super()._receive_encoder(GET_ENCODER_ESTIMATES.encode(turns, turns_s), now_s)
-        self._turns = turns
+        self._turns, self._counted_s = turns, now_s
 
     def _turns_s(self, moved_turns: float, elapsed_s: float) -> float:
         """Return the velocity between two positions; zero after a gap, and after a jump that no joint can make."""

@@ -7,6 +7,7 @@ the joints and flippers, in whose order an array has its values, are data: the l
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from functools import cache
+from itertools import chain
 from typing import Any
 
 from control.limits import LimitedTorques
@@ -86,22 +87,19 @@ def tick_row(
 ) -> bytes:
     """Pack the values of one tick, in the order of the table above."""
     now_s = tick.now_s
+    angles_rad, velocities_rad_s, angle_stamps_s, currents_a, current_stamps_s, *_ = zip(*states, strict=True)
     return kind.layout.pack(
         CDR_HEADER,
         now_s,
         tick.late_s,
         tick_s,
-        *[state.angle_rad for state in states],
-        *[state.velocity_rad_s for state in states],
-        *[state.current_a for state in states],
-        *[now_s - state.angle_stamp_s for state in states],
-        *[now_s - state.current_stamp_s for state in states],
+        *angles_rad,
+        *velocities_rad_s,
+        *currents_a,
+        *[now_s - stamp_s for stamp_s in angle_stamps_s],
+        *[now_s - stamp_s for stamp_s in current_stamps_s],
         *sent.torques_nm,
-        *[load.sweep_torque_nm for load in loads],
-        *[load.adduction_torque_nm for load in loads],
-        *[load.force_x_n for load in loads],
-        *[load.force_z_n for load in loads],
-        *[load.depth_m for load in loads],
+        *chain.from_iterable(zip(*loads, strict=True)),  # field by field: torques, forces, depths
         target.depth_m,
         stride_depth_m,
         body.x_m,

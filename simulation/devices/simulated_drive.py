@@ -47,7 +47,7 @@ class SimulatedDrive(ABC):
         self._fed_s = self._stepped_s = now_s
         self._current_a = 0.0  # the motor's
         self._angle = self._speed = self._reported_angle = 0.0  # of the motor
-        self._slipped_rad = 0.0  # of the encoder, and there it stays
+        self.slipped_rad = 0.0  # of the encoder, and there it stays
         self._boots_until_s = self._next_due_s = NEVER_S
         self._forged_a = nan  # the current that the next answer reports
         self._given: list[Frame] = []  # answers that are still to be sent
@@ -56,9 +56,9 @@ class SimulatedDrive(ABC):
 
     def restart(self, now_s: float) -> None:
         """Restart as after a supply dip: ignore and send nothing for `boot_s`; the angle stays."""
-        angle, speed, slipped_rad = self._angle, self._speed, self._slipped_rad
+        angle, speed, slipped_rad = self._angle, self._speed, self.slipped_rad
         self.reset(now_s + self.boot_s)
-        self._angle, self._speed, self._slipped_rad, self._stepped_s = angle, speed, slipped_rad, now_s
+        self._angle, self._speed, self.slipped_rad, self._stepped_s = angle, speed, slipped_rad, now_s
         self._boots_until_s = now_s + self.boot_s
 
     @property
@@ -109,7 +109,7 @@ class SimulatedDrive(ABC):
         """Return the torque that the motor exerts at the joint now."""
         parameters = self.parameters
         torque_nm = self._motor_nm(now_s) * (1.0 + parameters.torque_constant_error)
-        self._slipped_rad += parameters.encoder_slip_rad_s * (now_s - self._stepped_s)
+        self.slipped_rad += parameters.encoder_slip_rad_s * (now_s - self._stepped_s)
         self._stepped_s = now_s
         if parameters.commutation_error_deg:
             torque_nm *= cos(radians(parameters.commutation_error_deg))
@@ -160,7 +160,7 @@ class SimulatedDrive(ABC):
     def _measured_angle(self) -> float:
         parameters, units_per_turn = self.parameters, self.units_per_turn
         if not parameters.encoder_frozen:
-            error_rad = parameters.encoder_offset_rad + self._slipped_rad
+            error_rad = parameters.encoder_offset_rad + self.slipped_rad
             if parameters.encoder_noise_rad:
                 error_rad += self._random.gauss(0.0, parameters.encoder_noise_rad)
             turns = self._angle / units_per_turn + parameters.sign * error_rad / TURN_RAD

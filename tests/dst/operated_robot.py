@@ -43,6 +43,7 @@ PEERS = {
     **{f"intruder{number}": Peer(600 + number, 1001, frozenset({1001, 71})) for number in range(INTRUDERS)},
 }
 LEASED = ("arm", "walk", "move", "lease", "release")  # refused to others than the holder of the lease
+OWN = ("fail", "reset_timing")  # refused to other users than that of the holder
 WARNINGS: list[str] = []
 
 
@@ -200,6 +201,13 @@ class OperatedRobot:
             each.injection.__exit__(None, None, None)
         self._drifts = [drift for drift in self._drifts if drift.moves]
 
+    def repair(self) -> None:
+        """End every failure, and put back what has slipped; the zeros remain to be confirmed."""
+        self.lockstep.failures.end_all()
+        self.end_failures()
+        for drive in self.lockstep.robot.drives:
+            drive.slipped_rad = 0.0
+
     def call(self, client: str, method: str, **params: Any) -> None:
         self._client(client).send(msgpack.packb([REQUEST, 1, method, params]))
 
@@ -243,18 +251,23 @@ class OperatedRobot:
         """Return the method, which also notes its calls."""
 
         def call(params: dict[str, Any], caller: Caller) -> Any:
-            lease = self.loop.lease
-            against_lease = lease.held and caller != lease.holder and not params.get("take_over")
+            against_lease = name in (*LEASED, *OWN) and self._is_against_lease(name, params, caller)
             try:
                 answer = method(params, caller)
             except RefusedError:
                 self.calls.append(Executed(name, refused=True))
                 raise
             self.harmed = self.harmed or name == "fail"
-            self.calls.append(Executed(name, refused=False, against_lease=against_lease and name in LEASED))
+            self.calls.append(Executed(name, refused=False, against_lease=against_lease))
             return answer
 
         return call
+
+    def _is_against_lease(self, name: str, params: dict[str, Any], caller: Caller) -> bool:
+        lease, holder = self.loop.lease, self.loop.lease.holder
+        if name in OWN:
+            return lease.held and isinstance(holder, Caller) and holder.peer.uid != caller.peer.uid
+        return lease.held and caller != holder and not params.get("take_over")
 
     def accepted(self, *methods: str) -> bool:
         """Return whether one of the methods was accepted in the last tick."""

@@ -89,8 +89,7 @@ class Run:
             self._break("Shutdown", f"the daemon has not ended {LONGEST_SHUTDOWN_S:g} s after SIGTERM")
 
     def _end_failures(self) -> None:
-        self._robot.lockstep.failures.end_all()
-        self._robot.end_failures()
+        self._robot.repair()
         self._robot.call("guest", "disarm")
 
     def _check_end(self) -> None:

@@ -140,6 +140,19 @@ def test_a_joint_that_is_moved_has_the_velocity_between_two_counts(bench: Bench)
     assert bench.state.velocity_rad_s == 0.0
 
 
+def test_a_joint_that_comes_to_rest_at_exactly_zero_has_no_velocity_since_its_old_counts(bench: Bench) -> None:
+    bench.counts, near = 164, (0.02, 0.0)
+    bench.run()
+    bench.state_of_axis, bench.estimates = CLOSED_LOOP, near
+    bench.run(0.2)
+    bench.state_of_axis, bench.estimates, bench.counts = IDLE, (0.0, 0.0), 0
+    speeds_rad_s = []
+    for _ in range(HEARTBEAT_TICKS * 2):
+        bench.tick()
+        speeds_rad_s.append(bench.state.velocity_rad_s)
+    assert not any(speeds_rad_s) and COUNTS in bench.sent
+
+
 def test_the_position_waits_until_the_watchdog_is_proven_and_the_drive_is_left_in_silence_once(bench: Bench) -> None:
     sent = []
     while isnan(bench.health.watchdog_s):
