@@ -108,7 +108,7 @@ def joints_unwatched() -> Iterator[None]:
     monitor = "firmware_host.fault_monitor.FaultMonitor"
     with (
         mock.patch("control.monitors.joint_monitor.JointMonitor.update", lambda *arguments: []),
-        mock.patch(f"{monitor}._check_gains", lambda *arguments: None),
+        mock.patch("control.monitors.torque_gain_monitor.TorqueGainMonitor.update", lambda *arguments: None),
         mock.patch(f"{monitor}._check_obedience", lambda *arguments: None),
     ):
         yield
