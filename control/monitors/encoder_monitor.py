@@ -48,9 +48,15 @@ class EncoderMonitor:
         self.forget_torque()
 
     def forget_torque(self) -> None:
-        """Begin the wait for a reaction to torque again: without torque a joint may rest exactly where it is."""
+        """Begin the wait for a reaction to torque again."""
         self._unchanged_s = self._ignored_s = 0.0
         self._lowest_nm, self._highest_nm = inf, -inf
+
+    def release(self) -> None:
+        """Begin again without torque, where a joint rests exactly where it is, or a hand moves it."""
+        self.forget_torque()
+        self._speed.reset()
+        self._begin_interval()
 
     def update(self, state: DriveState, dt_s: float, torque_nm: float = 0.0) -> Fault | None:
         """Return the fault that a new angle shows, if any. A stamp may be late by `dt_s`."""

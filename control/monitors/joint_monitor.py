@@ -198,7 +198,7 @@ class JointMonitor:
         if not self._stillness.update(angle_rad, seen_s):
             self._stalled_s = 0.0
         if not facts.energised:
-            self._encoder.forget_torque()
+            self._encoder.release()
             if self._stillness.still_s < REST_S:
                 found.append(self._fault(FaultKind.JOINT_MOVING))
         encoder_fault = self._encoder.update(state, seen_s, torque_nm)
