@@ -281,7 +281,7 @@ class FaultKind(StrEnum):
         "The {subject} joint gained {energy_j:.2f} J without a command; the limit is {limit_j:.2f} J.", DISOBEYS,
     )
     JOINT_DRIVEN_BACK = (
-        "joint_driven_back", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 230,
+        "joint_driven_back", "joint", DRIVES_IDLE, ALWAYS, BY_HAND, 270,
         "A joint moves against a large torque for 0.4 s.",
         "The {subject} joint moves against its motor's torque, as under a load that the motor cannot hold, or at an end"
         " stop while its encoder slips.",

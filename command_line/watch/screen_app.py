@@ -73,6 +73,7 @@ class Rows(DataTable[Any]):
         if len(rows) != self.row_count:
             self.clear()
             self.add_rows(rows)
+            self.call_after_refresh(self.refresh, layout=True)  # a busy screen measures the table before its rows
             return
         for y, row in enumerate(rows):
             for x, cell in enumerate(row):

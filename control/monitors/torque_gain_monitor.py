@@ -170,7 +170,9 @@ class FlipperStrokes:
             joint.end_stroke()
             return
         watched = self._watched
-        torque_nm = sum([torques_nm[watched] for torques_nm in sent_nm[self._commands]]) / BLOCK_TICKS
+        torque_nm = 0.0
+        for torques_nm in sent_nm[self._commands]:
+            torque_nm += torques_nm[watched] / BLOCK_TICKS
         gravity_nm = self._mass.gravity_torques_nm(states[self._first].angle_rad, states[self._first + 1].angle_rad)
         joint.add(before, self._before, torque_nm, gravity_nm[watched - self._first])
 
