@@ -113,7 +113,8 @@ class MotionMonitor:
         before_rad_s = self._velocity_rad_s
         kinetic_j = self._half_inertia * (velocity_rad_s * velocity_rad_s - before_rad_s * before_rad_s)
         torque_nm = self._impulse_nm_s / elapsed_s
-        if -PRESSING_NM < torque_nm < PRESSING_NM:
+        least_nm = self._held_nm if target_rad == self._target_rad else PRESSING_NM
+        if -least_nm < torque_nm < least_nm:
             self._pressing_nm = torque_nm
             self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
         else:
@@ -134,8 +135,7 @@ class MotionMonitor:
 
     def _watch_pressing(self, elapsed_s: float, step_rad: float, torque_nm: float, target_step_rad: float) -> None:
         """Count the intervals in a row in which the joint moved against a torque that lasts, and its target did not."""
-        held_lightly = not target_step_rad and -self._held_nm < torque_nm < self._held_nm
-        lasts = torque_nm * self._pressing_nm >= 0.0 and not held_lightly
+        lasts = torque_nm * self._pressing_nm >= 0.0
         self._pressing_nm = torque_nm
         if not lasts or target_step_rad != target_step_rad:
             self.driven_back, self._pressed_s, self._back_rad = 0, 0.0, 0.0
