@@ -81,19 +81,6 @@ class WatchdogEndpoints:
     timeout: Annotated[int, Bounds(1, 65535), Meaning("number of the watchdog's time-out", "parameter id")]
 
 
-@dataclass(frozen=True)
-class ProvenWatchdog:
-    """What the bench has proven of a drive that cannot report its watchdog, and of which drive."""
-
-    watchdog_s: Annotated[
-        float, Bounds(0.0, 10.0), Meaning("silence after which its torque was gone; 0: not proven")
-    ] = 0.0
-    bus: Annotated[str, Meaning("of the drive that was tried")] = ""
-    node_id: Annotated[int, Bounds(0, 127), Meaning("of the drive that was tried", "id")] = 0
-    model: Annotated[str, Meaning("of the drive that was tried")] = ""
-    date: Annotated[str, Meaning("of the trial, such as 2026-11-24")] = ""
-
-
 class DriveHealth(NamedTuple):
     """One drive's report about itself. Texts are for people; an empty one means that there is nothing to report."""
 

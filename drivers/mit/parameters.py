@@ -7,12 +7,25 @@ from functools import cached_property
 from typing import Annotated, ClassVar
 
 from control.bounds import Bounds, Meaning
-from drivers.drive import DriveParameters, ProvenWatchdog
+from drivers.drive import DriveParameters
 from drivers.mit.models import MODELS, Model
 
 LARGEST_ID = 15  # an answer has four bits for it
 AS_DELIVERED = -1.0
 SMALLEST_RAD_S, LARGEST_RAD_S = 1.0, 500.0  # the 12 bits of a velocity then have steps of 0.5 mrad/s to 0.24 rad/s
+
+
+@dataclass(frozen=True)
+class ProvenWatchdog:
+    """What the bench has proven of a drive that cannot report its watchdog, and of which drive."""
+
+    watchdog_s: Annotated[
+        float, Bounds(0.0, 10.0), Meaning("silence after which its torque was gone; 0: not proven")
+    ] = 0.0
+    bus: Annotated[str, Meaning("of the drive that was tried")] = ""
+    node_id: Annotated[int, Bounds(0, 127), Meaning("of the drive that was tried", "id")] = 0
+    model: Annotated[str, Meaning("of the drive that was tried")] = ""
+    date: Annotated[str, Meaning("of the trial, such as 2026-11-24")] = ""
 
 
 @dataclass(frozen=True)

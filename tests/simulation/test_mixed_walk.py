@@ -10,8 +10,8 @@ from control.controller import WalkOrder
 from control.faults import FaultKind
 from control.modes import Mode, Request
 from control.records import JOINTS
-from drivers.drive import DriveParameters, ProvenWatchdog
-from drivers.mit.parameters import MitParameters
+from drivers.drive import DriveParameters
+from drivers.mit.parameters import MitParameters, ProvenWatchdog
 from drivers.moteus import codec
 from firmware_host.configuration.loading import parse_configuration
 from simulation.harness.drive_presets import with_drive_type
