@@ -10,6 +10,7 @@ program that was overruled must not continue as if nothing had happened.
 from collections.abc import Hashable
 from math import inf
 
+ALWAYS_ALLOWED = "'mudskipper stop' and 'disarm' are always allowed"
 TAKEN_OVER = "taken over: "  # prefix of a refusal that lasts as long as the connection
 
 
@@ -49,7 +50,7 @@ class Lease:
         left_s = self.until_s - now_s
         return (
             f"{self.holder} operates the robot: wait until that program has ended, or has been silent for"
-            f" {left_s:.1f} s, or overrule it with --take-over; 'mudskipper stop' and 'disarm' are always allowed"
+            f" {left_s:.1f} s, or overrule it with --take-over; {ALWAYS_ALLOWED}"
         )
 
     def renew(self, holder: Hashable, now_s: float, for_s: float) -> str | None:

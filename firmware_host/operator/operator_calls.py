@@ -16,6 +16,7 @@ from control.gait.gait import full_step_m
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
 from control.records import JOINTS
+from firmware_host.lease import ALWAYS_ALLOWED
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
 from firmware_host.operator.reports import (
@@ -226,8 +227,7 @@ class OperatorCalls:
         """Raise RefusedError while a program of another user holds the lease."""
         holder = self._lease.holder
         if self._lease.held and isinstance(holder, Caller) and holder.peer.uid != caller.peer.uid:
-            ways = "wait until that program has ended; 'mudskipper stop' and 'disarm' are always allowed"
-            raise RefusedError(f"{holder} operates the robot: {ways}")
+            raise RefusedError(f"{holder} operates the robot: wait until that program has ended; {ALWAYS_ALLOWED}")
 
     def reset_timing(self, params: dict[str, Any], caller: Caller) -> str:
         self.require_own_robot(caller)
