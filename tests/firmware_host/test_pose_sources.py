@@ -180,8 +180,9 @@ def test_the_daemon_exits_with_a_message_if_the_source_does_not_open(
         f'{before}[pose]\n{ENCODER}device = "/dev/nothing"\nmetres_per_count = 1e-5\n\n{after}', encoding="utf-8"
     )
     assert main(["--config", str(path)]) == EXIT_FAILED
-    reported = capsys.readouterr().err
-    assert reported.endswith("mudskipperd: the rail encoder /dev/nothing does not open: No such file or directory\n")
+    weakened, reported = capsys.readouterr().err.splitlines(keepends=True)
+    assert weakened.startswith("mudskipperd: warning: protection is weakened")
+    assert reported == "mudskipperd: the rail encoder /dev/nothing does not open: No such file or directory\n"
     path.write_text(f"{before}[pose]\n{NATNET}\n{after}", encoding="utf-8")
     assert main(["--config", str(path)]) == EXIT_CONFIGURATION
 
