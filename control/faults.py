@@ -335,7 +335,7 @@ class FaultKind(StrEnum):
     )
     ZERO_SHIFTED = (
         "zero_shifted", "joint", NONE, ALWAYS, WHEN_GONE, 580,
-        "A drive reports another angle after a restart, a silence or a jump, so its zero may have shifted.",
+        "A drive reports another angle after a restart or a silence, so its zero may have shifted.",
         "The {subject} joint was at {before_deg:.1f} and is reported at {now_deg:.1f} degrees, and its drive saw no"
         " motion between.",
         "if 'mudskipper status' shows the joint's true angle, 'mudskipper clear --zero'; else correct its zero_turn and"

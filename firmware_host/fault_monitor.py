@@ -33,7 +33,7 @@ from firmware_host.log.recorder import LogReport
 from firmware_host.loop_monitor import LogMonitor, LoopMonitor
 from firmware_host.ticker import Tick
 
-LATE_S = 0.1  # beyond it, a computer without real time: a simulated robot beside other programs
+LATE_S = 0.1  # beyond it, a computer without real time: a simulated robot next to other programs
 STALL_S = 0.02  # of this program, in which a drive that answers only when asked was silent
 ARMING_S = 2.0  # the longest time that a drive may take to go into closed loop
 REFUSED_TICKS = 3  # consecutive ticks in which one bus failed to send a command

@@ -2,8 +2,8 @@
 
 A drive that starts again may count from elsewhere. The angle after a silence is compared with the one before. A joint
 can have turned by its speed within LONGEST_GAP_S; over a longer silence it may fall or be moved by hand, which nothing
-reports, so a larger difference waits for an operator. Steps add up: an encoder that jumps back has the same zero as
-before.
+reports, so a larger difference waits for an operator. Steps add up: a joint that falls and is put back has the same
+zero as before.
 """
 
 from math import degrees

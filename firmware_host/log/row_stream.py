@@ -121,7 +121,7 @@ class RowStream:
             self._admit(connection)
 
     def _admit(self, connection: socket.socket) -> None:
-        """Add the subscriber, or tell it in words why not."""
+        """Add the subscriber, or send it the reason why not."""
         level, subscriber = Level.ANYONE, Subscriber(connection)
         with suppress(OSError):  # it has disconnected already
             level = self._rights.level(self._peer_of(connection))

@@ -25,5 +25,5 @@ def make_simulated_drive(parameters: SimulatedDriveParameters, random: Random) -
 
 
 def connect_drives(drives: Sequence[SimulatedDrive]) -> None:
-    """Tell the drives of one bus which of them share a board."""
+    """Connect the drives of one bus that are axes of one board."""
     join_boards(drives)

@@ -1,4 +1,4 @@
-"""Angles that drift away from their speed, and speeds in a wrong range, beside sound joints at any motion."""
+"""Angles that drift away from their speed, and speeds in a wrong range, next to sound joints at any motion."""
 
 from __future__ import annotations
 
