@@ -11,6 +11,7 @@ half a step of a 14-bit encoder at 1000 N·m/rad, ten times the stiffness of the
 from math import degrees, inf
 
 from control.faults import Fault, FaultKind
+from control.monitors.motion_monitor import PUNCTUAL_S
 from control.monitors.speed_monitor import INTERVAL_S, SpeedMonitor
 from control.records import NEVER_S, UNKNOWN, DriveState
 
@@ -39,8 +40,9 @@ class EncoderMonitor:
         self._speed.reset()
         self._begin_interval()
 
-    def _begin_interval(self) -> None:
-        self._interval_s = self._path_rad = self._turned_rad = 0.0  # of speed_monitor.py
+    def _begin_interval(self, after_s: float = 0.0) -> None:
+        """Begin the sums of speed_monitor.py, after a time in which messages do not count."""
+        self._interval_s, self._path_rad, self._turned_rad = -after_s, 0.0, 0.0
 
     def _reset_frozen(self) -> None:
         self._repeated = False  # the newest angle, since the sums below began
@@ -70,7 +72,6 @@ class EncoderMonitor:
         fault = None
         if gap_s > LONGEST_GAP_S:  # also that before the first message
             self._reset_frozen()
-            self._begin_interval()
         elif angle_rad == self._angle_rad:
             self._repeated = True
             fault = self._check_frozen(state, gap_s, torque_nm)
@@ -79,10 +80,13 @@ class EncoderMonitor:
                 fault = self._check_jump(velocity_rad_s, step_rad, path_rad, gap_s, dt_s)
             if self._repeated:
                 self._reset_frozen()
-        if not fault and 0.0 < gap_s <= LONGEST_GAP_S:
+        if gap_s > PUNCTUAL_S:
+            self._begin_interval(after_s=INTERVAL_S)  # the messages that were held up come in a burst
+        elif not fault and gap_s > 0.0:
             self._interval_s += gap_s
-            self._path_rad += path_rad
-            self._turned_rad += step_rad
+            if self._interval_s > 0.0:
+                self._path_rad += path_rad
+                self._turned_rad += step_rad
             if self._interval_s >= INTERVAL_S:
                 fault = self._speed.update(self._interval_s, self._path_rad, self._turned_rad)
                 self._begin_interval()

@@ -3,16 +3,16 @@
 A drive that starts again may count from elsewhere. The angle after a silence is compared with the one before. A joint
 can have turned by its speed within LONGEST_GAP_S; over a longer silence it may fall or be moved by hand, which nothing
 reports, so a larger difference waits for an operator. Steps add up: a joint that falls and is put back has the same
-zero as before.
+zero as before. No drive starts again within PUNCTUAL_S: a jump between two punctual messages is encoder_jump.
 """
 
 from math import degrees
 
 from control.faults import Fault, FaultKind
 from control.monitors.encoder_monitor import LONGEST_GAP_S
+from control.monitors.motion_monitor import PUNCTUAL_S
 from control.records import UNKNOWN, DriveState
 
-SILENCE_S = 0.012  # four periods: no drive starts again within it; a jump between two messages is encoder_jump
 LARGEST_STEP_RAD = 100.0  # more is no measurement
 
 
@@ -44,7 +44,7 @@ class ZeroMonitor:
         fastest_rad_s = max(abs(self._before.velocity_rad_s), abs(state.velocity_rad_s))
         if abs(step_rad) > LARGEST_STEP_RAD:
             return
-        if silence_s >= SILENCE_S and abs(step_rad) > self._jump_rad + fastest_rad_s * min(silence_s, LONGEST_GAP_S):
+        if silence_s >= PUNCTUAL_S and abs(step_rad) > self._jump_rad + fastest_rad_s * min(silence_s, LONGEST_GAP_S):
             self.shift_rad += step_rad
         self._before = state
 
