@@ -63,7 +63,7 @@ def test_it_shows_every_part_of_a_robot_that_walks(
     async def script(app: WatchApp, pilot: Pilot[int]) -> None:
         parts = {"slip", "speed", "forward", "torque", "Hz", "log", "lease", "▲", "stop", *JOINTS, *COEFFICIENTS}
         await until(app, pilot, lambda: all(part in shown(app) for part in parts))
-        assert "WALKING" in shown(app).splitlines()[0]
+        await until(app, pilot, lambda: "WALKING" in shown(app).splitlines()[0])
 
     with walked.served(short_folder / "s"):
         drive(short_folder / "s", script, width, height)
@@ -72,7 +72,8 @@ def test_it_shows_every_part_of_a_robot_that_walks(
 @pytest.mark.parametrize(("width", "height"), [(40, 10), (10, 3), (1, 1)])
 def test_a_small_terminal_shows_what_fits(walked: ServedRobot, short_folder: Path, width: int, height: int) -> None:
     async def script(app: WatchApp, pilot: Pilot[int]) -> None:
-        assert "WALKING"[: max(width - 1, 0)] in shown(app).splitlines()[0]
+        fits = "WALKING"[: max(width - 1, 0)]
+        await until(app, pilot, lambda: fits in shown(app).splitlines()[0])
 
     with walked.served(short_folder / "s"):
         drive(short_folder / "s", script, width, height)
