@@ -36,6 +36,7 @@ from firmware_host.software_version import is_compiled, software_version
 Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
 MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v")  # by a drive
+SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
 
@@ -138,10 +139,10 @@ class OperatorCalls:
         if depth_m is None:
             order = WalkOrder(adaptation.initial_depth_m, adaptive=True, strides=params["strides"])
             return self._request(caller, Request.WALK, order)
-        if not 0.0 < depth_m <= adaptation.max_depth_m:
+        if not SHALLOWEST_M <= depth_m <= adaptation.max_depth_m:
             raise RefusedError(
-                f"depth {100.0 * depth_m:g} cm: must be more than 0 and at most {100.0 * adaptation.max_depth_m:g} cm,"
-                " which is adaptation.max_depth_m in the configuration"
+                f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
+                f" {100.0 * adaptation.max_depth_m:g} cm, which is adaptation.max_depth_m in the configuration"
             )
         return self._request(caller, Request.WALK, WalkOrder(float(depth_m), adaptive=False, strides=params["strides"]))
 
