@@ -10,7 +10,7 @@ from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
-from control.fault_causes import group_by_cause
+from control.fault_causes import group_by_cause, is_settling
 from control.faults import Blocks, Fault
 from control.gait.gait import full_step_m
 from control.modes import Mode, Request
@@ -89,6 +89,7 @@ class OperatorCalls:
             **self._fault_reports(),
             "forced": bool(loop.forced),
             "notice": loop.events.notice,
+            "notice_age_s": known(now_s - loop.events.notice_s),
             "unlogged_requests": loop.events.requests.unlogged,
             "lease": str(lease.holder) if lease.held else None,
             "lease_left_s": known(lease.until_s - now_s) if lease.held else None,
@@ -106,8 +107,8 @@ class OperatorCalls:
 
     def _fault_reports(self) -> dict[str, Any]:
         """Return the fault to show first, and the gravest ones with their common causes."""
-        present = self._loop.aged_faults
-        shown = self._loop.fault or next(iter(self._loop.faults.blocking()), None)
+        present = [each for each in self._loop.aged_faults if not is_settling(each)]
+        shown = self._loop.fault or next((fault for fault, _ in present if fault.kind.blocks is not Blocks.NO), None)
         gravest = present
         if len(present) > FAULTS_PER_ANSWER:
             ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
