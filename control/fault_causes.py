@@ -92,6 +92,11 @@ class Cause(NamedTuple):
         """The hardest reaction to any of its faults."""
         return max(each.fault.kind.reaction for each in (*self.faults, *self.consequences))
 
+    def includes(self, fault: Fault) -> bool:
+        """Return whether this fault, perhaps with other values, is the cause or follows from it."""
+        present = (each.fault for each in (*self.faults, *self.consequences))
+        return any((each.kind, each.subject) == (fault.kind, fault.subject) for each in present)
+
     @property
     def blocks_arming(self) -> bool:
         return any(each.fault.kind.blocks is not Blocks.NO for each in (*self.faults, *self.consequences))

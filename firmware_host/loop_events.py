@@ -59,7 +59,7 @@ class LoopEvents:
     def forget_notice(self) -> None:
         self.notice = ""
         self.notice_s = -inf
-        self._stop_fault: Fault | None = None
+        self.stop_fault: Fault | None = None  # the first cause of the last stop
 
     def report(self, now_s: float, message: str) -> None:
         """Write a message into the log."""
@@ -94,16 +94,16 @@ class LoopEvents:
 
     def _report_fault(self, now_s: float, fault: Fault) -> None:
         self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")
-        if self._stop_fault is None:
+        if self.stop_fault is None:
             return
-        stop, cause = AgedFault(self._stop_fault, now_s - self.notice_s), AgedFault(fault, 0.0)
+        stop, cause = AgedFault(self.stop_fault, now_s - self.notice_s), AgedFault(fault, 0.0)
         first = group_by_cause([stop, cause], self._bus_of)[0]
         if first.root is fault and first.consequences:  # the stop follows from this one, which takes longer to detect
             self._notify_stop(self.notice_s, fault)
 
     def _notify_stop(self, stopped_s: float, fault: Fault) -> None:
         self.notice, self.notice_s = f"stopped by {fault.name}: {fault.advice}", stopped_s
-        self._stop_fault = fault
+        self.stop_fault = fault
 
     def report_request(self, now_s: float, request: Request, forced: str, by: str, changes: bool) -> None:
         """Log a request with its sender, unless it changes nothing or was logged just now."""
@@ -131,7 +131,7 @@ class LoopEvents:
         self.report(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
         if after in (Mode.ARMING, Mode.WALKING):
             self.forget_notice()
-        if fault and before in ENERGISED and not (self._stop_fault and before in ENDING):
+        if fault and before in ENERGISED and not (self.stop_fault and before in ENDING):
             self._notify_stop(now_s, fault)
         if before is Mode.HOLD and after is Mode.IDLE and rested:
             held_s = self._longest_hold_s

@@ -17,7 +17,7 @@ from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
-from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured
+from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured
 from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
@@ -221,7 +221,7 @@ def status_text(report: dict[str, Any]) -> str:
     lines += [_cause_text(cause) for cause in report["causes"]]
     if report["lease"]:
         lines.append(f"the lease is held by {report['lease']} for {number(report['lease_left_s'], 1)} s more")
-    notices = [report["notice"]] if report["notice"] else []
+    notices = [f"{clock_text(report['notice_age_s'])} {report['notice']}"] if report["notice"] else []
     if report["forced"]:
         notices.append("armed by 'mudskipper arm --force' against a failed check: see 'mudskipper check'")
     if report["pose"]["trouble"]:

@@ -106,7 +106,7 @@ class OperatorCalls:
         }
 
     def _fault_reports(self) -> dict[str, Any]:
-        """Return the fault to show first, and the gravest ones with their common causes."""
+        """Return the fault to show first, and the gravest ones by their causes: what stopped the robot is the first."""
         present = [each for each in self._loop.aged_faults if not is_settling(each)]
         shown = self._loop.fault or next((fault for fault, _ in present if fault.kind.blocks is not Blocks.NO), None)
         gravest = present
@@ -114,11 +114,14 @@ class OperatorCalls:
             ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
             gravest = ordered[:FAULTS_PER_ANSWER]
         faults = {each.fault: _fault_report(*each) for each in gravest}
+        causes, stop = group_by_cause(gravest, self._bus_of), self._loop.events.stop_fault
+        if stop:
+            causes.sort(key=lambda cause: not cause.includes(stop))
         return {
             "fault": faults[shown] if shown else None,
             "faults": list(faults.values()),
             "faults_left_out": len(present) - len(faults),
-            "causes": [cause_report(cause) for cause in group_by_cause(gravest, self._bus_of)],
+            "causes": [cause_report(cause) for cause in causes],
         }
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:

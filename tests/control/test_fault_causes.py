@@ -54,8 +54,8 @@ def test_a_fault_that_was_there_long_before_does_not_follow() -> None:
 
 
 def test_torque_that_was_missing_before_a_drive_had_booted_follows_from_its_restart() -> None:
-    faults = [AgedFault(K.TORQUE_MISSING.fault("left_sweep"), 3.0), AgedFault(K.DRIVE_RESTARTED.fault("left_sweep"), 1.0)]
-    (cause,) = group_by_cause(faults, BUS_OF)
+    missing, restarted = K.TORQUE_MISSING.fault("left_sweep"), K.DRIVE_RESTARTED.fault("left_sweep")
+    (cause,) = group_by_cause([AgedFault(missing, 3.0), AgedFault(restarted, 1.0)], BUS_OF)
     assert cause.root.kind is K.DRIVE_RESTARTED
 
 
