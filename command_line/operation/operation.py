@@ -69,11 +69,25 @@ def walk(
         bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
     ] = False,
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
+    mud: Annotated[str, Option("name of the mud, for the log", metavar="NAME")] = "",
+    water: Annotated[
+        float | None, Option("water content of the mud", low=0.0, high=100.0, unit="%", metavar="W")
+    ] = None,
+    trial: Annotated[str, Option("number or name of the trial", metavar="NAME")] = "",
+    operator: Annotated[str, Option("who operates the robot", metavar="NAME")] = "",
+    tag: Annotated[tuple[str, ...], Option("word that finds this walk again", metavar="WORD")] = (),
+    note: Annotated[str, Option("what to know about this walk", metavar="TEXT")] = "",
     attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
     take_over: TakeOver = False,
 ) -> int:
-    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed."""
+    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed.
+
+    A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults.
+    """
     params: dict[str, Any] = {"strides": strides, "take_over": take_over}
+    described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag), "note": note}
+    described["water"] = "" if water is None else f"{water:g}"
+    params |= {key: value for key, value in described.items() if value}
     if depth is not None:
         params["depth_m"] = depth / 100.0
     if attended:

@@ -5,7 +5,8 @@ log names the sender of every request that changes something. Methods that set t
 the holder of the lease, if there is one; methods that end a motion are not.
 """
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from math import degrees, inf
 from typing import Any
 
@@ -27,12 +28,14 @@ from firmware_host.operator.reports import (
     mud_estimate_report,
     stride_report,
 )
+from firmware_host.operator.trial_calls import TrialCalls
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
 from firmware_host.sockets.status_socket import Methods
 from firmware_host.software_version import is_compiled, software_version
 
+NO_TRIAL: Mapping[str, str] = {}
 Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
 MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v")  # by a drive
@@ -45,8 +48,16 @@ def validated(name: str, method: Method) -> Method:
 
 
 class OperatorCalls:
-    def __init__(self, loop: Loop, warnings: list[str], clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        loop: Loop,
+        warnings: list[str],
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float] = time.time,
+        trial_defaults: Mapping[str, str] = NO_TRIAL,
+    ) -> None:
         self._loop = loop
+        self._trials = TrialCalls(loop.events, clock, wall_clock, trial_defaults)
         self._lease = loop.lease
         self._warnings = warnings
         self._clock = clock
@@ -71,6 +82,10 @@ class OperatorCalls:
             "clear": self.clear,
             "lease": lambda params, caller: self._renew_lease(caller, params["for_s"]),
             "release": self.release,
+            "trial": self._trials.trial,
+            "trial_set": self._trials.trial_set,
+            "note": self._trials.note,
+            "mark": self._trials.mark,
             "reset_timing": self.reset_timing,
         }
         return {name: validated(name, method) for name, method in methods.items()}
@@ -100,6 +115,7 @@ class OperatorCalls:
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
+            "trial": self._trials.present,
             "warnings": [*loop.configuration.warnings, *self._warnings],
             "bus": _bus_report(loop),
             "log": _log_report(loop, now_s),
@@ -139,15 +155,17 @@ class OperatorCalls:
 
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
         adaptation, depth_m = self._loop.configuration.adaptation, params["depth_m"]
-        if depth_m is None:
-            order = WalkOrder(adaptation.initial_depth_m, adaptive=True, strides=params["strides"])
-            return self._request(caller, Request.WALK, order)
-        if not 0.0 < depth_m <= adaptation.max_depth_m:
+        trial = self._trials.planned(params)
+        if depth_m is not None and not 0.0 < depth_m <= adaptation.max_depth_m:
             raise RefusedError(
                 f"depth {100.0 * depth_m:g} cm: must be more than 0 and at most {100.0 * adaptation.max_depth_m:g} cm,"
                 " which is adaptation.max_depth_m in the configuration"
             )
-        return self._request(caller, Request.WALK, WalkOrder(float(depth_m), adaptive=False, strides=params["strides"]))
+        adaptive = depth_m is None
+        first_m = adaptation.initial_depth_m if adaptive else float(depth_m)
+        answer = self._request(caller, Request.WALK, WalkOrder(first_m, adaptive, params["strides"]))
+        self._trials.begin(trial, caller)
+        return answer
 
     def move(self, params: dict[str, Any], caller: Caller) -> str:
         loop = self._loop
