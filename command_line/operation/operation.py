@@ -17,7 +17,7 @@ from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
-from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured
+from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured
 from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
@@ -69,11 +69,25 @@ def walk(
         bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
     ] = False,
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
+    mud: Annotated[str, Option("name of the mud, for the log", metavar="NAME")] = "",
+    water: Annotated[
+        float | None, Option("water content of the mud", low=0.0, high=100.0, unit="%", metavar="W")
+    ] = None,
+    trial: Annotated[str, Option("number or name of the trial", metavar="NAME")] = "",
+    operator: Annotated[str, Option("who operates the robot", metavar="NAME")] = "",
+    tag: Annotated[tuple[str, ...], Option("word that finds this walk again", metavar="WORD")] = (),
+    note: Annotated[str, Option("what to know about this walk", metavar="TEXT")] = "",
     attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
     take_over: TakeOver = False,
 ) -> int:
-    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed."""
+    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed.
+
+    A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults.
+    """
     params: dict[str, Any] = {"strides": strides, "take_over": take_over}
+    described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag), "note": note}
+    described["water"] = "" if water is None else f"{water:g}"
+    params |= {key: value for key, value in described.items() if value}
     if depth is not None:
         params["depth_m"] = depth / 100.0
     if attended:
@@ -221,7 +235,7 @@ def status_text(report: dict[str, Any]) -> str:
     lines += [_cause_text(cause) for cause in report["causes"]]
     if report["lease"]:
         lines.append(f"the lease is held by {report['lease']} for {number(report['lease_left_s'], 1)} s more")
-    notices = [report["notice"]] if report["notice"] else []
+    notices = [f"{clock_text(report['notice_age_s'])} {report['notice']}"] if report["notice"] else []
     if report["forced"]:
         notices.append("armed by 'mudskipper arm --force' against a failed check: see 'mudskipper check'")
     if report["pose"]["trouble"]:

@@ -3,6 +3,7 @@
 from datetime import UTC, datetime
 from typing import Any
 
+from firmware_host.trial import BEGUN, METADATA_KEY, from_json, read_report
 from logs.files.log_reader import AnyLog
 from logs.files.tick_array import Ticks
 
@@ -16,6 +17,7 @@ def log_summary(log: AnyLog) -> dict[str, Any]:
         "robot": log.metadata.get("robot", ""),
         "run": log.metadata.get("run_id", ""),
         "segment": segment_of(log) if log.metadata.get("segment") else None,
+        "trial": from_json(log.metadata.get(METADATA_KEY, "")),
         "started": _start_time(log),
         "duration_s": round(duration_s, 3),
         "rate_hz": round((ticks - 1) / duration_s, 2) if duration_s > 0.0 else None,
@@ -45,6 +47,12 @@ def segment_of(log: AnyLog) -> int:
     """Return the number of the first segment in the run; 0 where none is given."""
     number = log.metadata.get("segment", "")
     return int(number) if number.isdecimal() else 0
+
+
+def segments_before(log: AnyLog) -> int:
+    """Return how many segments of the run may have rows of the log's first walk: none where it begins with a trial."""
+    first = read_report(log.events[0]["text"]) if log.events else None
+    return 0 if first and first.kind == BEGUN else segment_of(log)
 
 
 def begin_s(log: AnyLog) -> float:
