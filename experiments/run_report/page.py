@@ -35,7 +35,11 @@ from logs.files.log_summary import log_summary, operator_reports
 
 CM = 0.01  # in metres
 UNITS = dict.fromkeys(("first at", "last at", "at", "from"), "s") | dict.fromkeys(("depth", "step"), "cm")
-UNITS |= dict.fromkeys((*COEFFICIENTS, "left", "right", "right - left"), "N/cm³") | {"distance": "m", "speed": "cm/s"}
+UNITS |= dict.fromkeys((*COEFFICIENTS, "left", "right", "right - left"), "N/cm³") | {
+    "distance": "m",
+    "speed": "cm/s",
+    "lowest supply": "V",
+}
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w])")
 SINCE = "Times count from the beginning of the log."
 UNCERTAINTY = (
@@ -265,6 +269,7 @@ def stride_rows(run: Run) -> list[dict[str, Any]]:
             "from": f"{stride['start_s']:.2f}",
             "depth": f"{stride['depth_m'] / CM:z.1f}",
             "step": f"{stride['step_m'] / CM:z.1f}".replace("nan", "-"),
+            "lowest supply": f"{stride['supply_v']:.1f}".replace("nan", "-"),
             "outcome": stride["outcome"] + ", two surfaces" * bool(stride["two_surfaces"]),
         }
         for stride in run.strides.to_dict("records")

@@ -36,7 +36,7 @@ from logs.replay import Replay, RunningReplay, configuration_of, replay_lab
 
 SAME = 1e-6  # relative difference of a replayed estimate that is still the logged one
 AUTHORS = "the paper's authors"
-STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces")
+STRIDES = ("walk", "index", "mud", "start_s", "duration_s", "step_m", "depth_m", "outcome", "two_surfaces", "supply_v")
 ESTIMATES = ("walk", "index", "mud", "flipper", "coefficient", "estimate", "samples")
 
 
@@ -173,6 +173,7 @@ def _motion_of(walk: RecordedWalk, rows: Mapping[str, Stride], first: Stride, en
         "step_m": first["step_m"],
         "depth_m": max(float(row["depth_m"]) for row in rows.values()),
         "outcome": str(outcome_of(together, walk.geometric_step_m)),
+        "supply_v": min((v for row in rows.values() if isfinite(v := row.get("supply_min_v", nan))), default=nan),
         "two_surfaces": any(isfinite(row.get("other_surface_m", nan)) for row in rows.values()),
     }
 

@@ -11,12 +11,12 @@ from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
-from control.fault_causes import group_by_cause
+from control.fault_causes import group_by_cause, is_settling
 from control.faults import Blocks, Fault
 from control.gait.gait import full_step_m
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
-from control.records import JOINTS
+from control.records import JOINTS, UNKNOWN
 from firmware_host.lease import ALWAYS_ALLOWED
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
@@ -38,7 +38,7 @@ from firmware_host.software_version import is_compiled, software_version
 NO_TRIAL: Mapping[str, str] = {}
 Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
-MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v")  # by a drive
+MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v", "bus_current_a")  # by a drive
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
 
@@ -104,6 +104,7 @@ class OperatorCalls:
             **self._fault_reports(),
             "forced": bool(loop.forced),
             "notice": loop.events.notice,
+            "notice_age_s": known(now_s - loop.events.notice_s),
             "unlogged_requests": loop.events.requests.unlogged,
             "lease": str(lease.holder) if lease.held else None,
             "lease_left_s": known(lease.until_s - now_s) if lease.held else None,
@@ -111,6 +112,7 @@ class OperatorCalls:
             "pose": loop.pose.report()._asdict(),
             "drives": [_drive_report(loop, index, joint, now_s) for index, joint in enumerate(self._rig.joints)],
             "strides_closed": learning.strides_closed,
+            "stride_supply_min_v": self._stride_supply_v(),
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
@@ -121,26 +123,36 @@ class OperatorCalls:
         }
 
     def _fault_reports(self) -> dict[str, Any]:
-        """Return the fault to show first, and the gravest ones with their common causes."""
-        present = self._loop.aged_faults
-        shown = self._loop.fault or next(iter(self._loop.faults.blocking()), None)
+        """Return the fault to show first, and the gravest ones by their causes: what stopped the robot is the first."""
+        present = [each for each in self._loop.aged_faults if not is_settling(each)]
+        shown = self._loop.fault or next((fault for fault, _ in present if fault.kind.blocks is not Blocks.NO), None)
         gravest = present
         if len(present) > FAULTS_PER_ANSWER:
             ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
             gravest = ordered[:FAULTS_PER_ANSWER]
         faults = {each.fault: _fault_report(*each) for each in gravest}
+        causes, stop = group_by_cause(gravest, self._bus_of), self._loop.events.stop_fault
+        if stop:
+            causes.sort(key=lambda cause: not cause.includes(stop))
         return {
             "fault": faults[shown] if shown else None,
             "faults": list(faults.values()),
             "faults_left_out": len(present) - len(faults),
-            "causes": [cause_report(cause) for cause in group_by_cause(gravest, self._bus_of)],
+            "causes": [cause_report(cause) for cause in causes],
         }
+
+    def _stride_supply_v(self) -> float | None:
+        """Return the lowest voltage of any drive in the last stride."""
+        last = self._loop.learning.strides[-len(self._rig.flippers) :]
+        return known(min([closed.supply_min_v for closed in last], default=UNKNOWN))
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """Return the first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""
         wanted = [closed for closed in self._loop.learning.strides if closed.number >= params["since"]]
         return [
-            stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
+            stride_report(closed.estimate)
+            | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
+            | {"supply_min_v": known(closed.supply_min_v)}
             for closed in wanted[:STRIDES_PER_ANSWER]
         ]
 

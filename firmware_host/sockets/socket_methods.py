@@ -185,6 +185,7 @@ STATUS_KEYS = {
     "causes": "the faults grouped by cause: name, subjects, message, what_to_do, age_s, reaction, consequences",
     "forced": "whether the robot was armed by force against a present fault",
     "notice": "why the robot stopped, until it is moved again",
+    "notice_age_s": "time in s since it stopped, or nothing",
     "unlogged_requests": "number of requests since the start that changed nothing or were repeated",
     "lease": "the holder of the lease, or nothing",
     "lease_left_s": "time in s until the lease is lost unless it is renewed",
