@@ -38,6 +38,8 @@ COMMANDS: Mapping[str, Command] = {
     "disarm": ("operation.confirmed_stop.disarm", "Switch torque off at once, in any state."),
     "clear": ("operation.operation.clear", "Clear a fault and the errors of the drives."),
     "check": ("operation.operation.check", "List what prevents the robot from being armed, and what to do about it."),
+    "trial": ("operation.trial.trial", "Show or set how walks are described in their logs."),
+    "note": ("operation.trial.note", "Write a note or a marker into the log."),
     "watch": ("watch.watch.watch", "Show the robot live, with keys that operate it."),
     "fail": ("operation.failing.fail", "Make a part of the robot fail on purpose, where allowed."),
     "live": ("live.live.live", "Pass the robot's rows on to Foxglove, Lichtblick or a browser."),

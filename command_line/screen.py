@@ -86,6 +86,11 @@ def watched() -> Iterator[Callable[[str, int, int], None]]:
         progress.clear()
 
 
+def clock_text(age_s: float) -> str:
+    """Format the time of day that was `age_s` ago."""
+    return time.strftime("%H:%M:%S", time.localtime(time.time() - age_s))
+
+
 def complain(*messages: str) -> None:
     """Print messages to standard error."""
     complaints.extend(messages)

@@ -12,7 +12,10 @@ from typing import NamedTuple
 from control.faults import Blocks, Fault, FaultKind, Reaction
 
 BEFORE_S = 1.0  # a consequence may be detected this long before its cause: a heartbeat is missed after 0.5 s
+RESTART_S = 5.0  # before a restart, which is known once the drive has booted
+ANSWERED_S = 2.0  # in which a drive that has just started was asked for its settings four times
 K = FaultKind
+ASKED = (K.DRIVE_VERSION, K.WRONG_DRIVE, K.WATCHDOG_UNKNOWN)  # until the drive has answered
 SIGNALS = (
     *(K.DRIVE_SILENT, K.DRIVE_QUIET, K.POSITION_SILENT, K.CURRENT_SILENT, K.HEARTBEAT_SILENT, K.TEMPERATURE_SILENT),
     *(K.VOLTAGE_SILENT, K.POSITION_STALE, K.CURRENT_STALE, K.DRIVE_LATE),
@@ -20,6 +23,7 @@ SIGNALS = (
 POWERLESS = (K.DRIVE_DISARMED, K.ARMING_FAILED, K.TORQUE_MISSING, K.JOINT_NOT_FOLLOWING, K.ENCODER_STUCK)
 UNREACHED = (  # its watchdog trips, and its settings are unknown
     *(K.DRIVE_ERROR, K.SETPOINT_MISMATCH, *POWERLESS, K.DRIVE_ENERGISED, K.WATCHDOG_UNKNOWN, K.WRONG_DRIVE),
+    K.DRIVE_VERSION,
 )
 LATE = (K.LOOP_OVERRUN, K.FRAMES_LOST, *SIGNALS)  # signals of drives that were not asked
 
@@ -64,6 +68,11 @@ class AgedFault(NamedTuple):
     age_s: float  # since it was first detected
 
 
+def is_settling(each: AgedFault) -> bool:
+    """Return whether a drive that has just started may still answer, so that nothing needs to be shown or logged."""
+    return each.fault.kind in ASKED and each.age_s < ANSWERED_S
+
+
 class Cause(NamedTuple):
     """One cause: the fault, the same fault of other parts, and what follows from them."""
 
@@ -82,6 +91,11 @@ class Cause(NamedTuple):
     def reaction(self) -> Reaction:
         """The hardest reaction to any of its faults."""
         return max(each.fault.kind.reaction for each in (*self.faults, *self.consequences))
+
+    def includes(self, fault: Fault) -> bool:
+        """Return whether this fault, perhaps with other values, is the cause or follows from it."""
+        present = (each.fault for each in (*self.faults, *self.consequences))
+        return any((each.kind, each.subject) == (fault.kind, fault.subject) for each in present)
 
     @property
     def blocks_arming(self) -> bool:
@@ -116,6 +130,7 @@ def _root(each: AgedFault, present: Mapping[tuple[FaultKind, str], AgedFault], b
     }
     for kind in CAUSES_OF[each.fault.kind]:
         cause = present.get((kind, subjects[SCOPES.get(kind.part, "robot")]))
-        if cause and each.age_s <= cause.age_s + BEFORE_S:
+        before_s = RESTART_S if kind is K.DRIVE_RESTARTED else BEFORE_S
+        if cause and each.age_s <= cause.age_s + before_s:
             return _root(cause, present, bus_of)
     return each

@@ -47,6 +47,7 @@ from firmware_host.sockets.status_socket import StatusSocket
 from firmware_host.sockets.user_groups import load_rights
 from firmware_host.software_version import build_metadata
 from firmware_host.ticker import Tick, Ticker
+from firmware_host.trial import load_defaults
 
 EXIT_FAILED = 1
 LONGEST_SHUTDOWN_S = 5.0  # then torque goes off wherever the flippers are
@@ -145,7 +146,8 @@ def run(configuration: Configuration, rights: Rights, shutdown: Shutdown) -> int
         stack.callback(recorder.close, LONGEST_LOG_CLOSE_S)
         loop = Loop(configuration, drives, seen_pose, recorder, wall_clock=wall_clock)
         warnings = status.warnings
-        calls = OperatorCalls(loop, warnings, time.monotonic)
+        defaults = load_defaults(Path(configuration.log.directory)) if configuration.log.enabled else {}
+        calls = OperatorCalls(loop, warnings, time.monotonic, wall_clock, defaults)
         status.methods = with_failures(
             calls.methods, failures, loop.events.report, time.monotonic, calls.require_own_robot
         )

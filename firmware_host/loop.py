@@ -52,7 +52,7 @@ class Loop:
         self.pose = pose
         self.recorder = recorder
         self.lease = Lease()
-        self.events = LoopEvents(recorder, configuration.motion.longest_hold_s)
+        self.events = LoopEvents(recorder, configuration.motion.longest_hold_s, configuration.bus_of)
         self.timing = LoopTiming()
         self.learning = MudLearning(configuration)
         self.controller = _make_controller(configuration)
@@ -227,6 +227,7 @@ class Loop:
         if self.mode is Mode.IDLE:
             self.drives.request_settings(now_s)
         self.drives.send(self.sent.torques_nm, self.period_s)
+        self.drives.request_supply()
 
     def _record(self, tick: Tick, sent_after_s: float) -> None:
         tick_s = self._clock() - tick.now_s
@@ -279,7 +280,7 @@ class Loop:
         """Move joints slowly to these angles, while the pose is held."""
         path = ", ".join(f"{joint} to {angle_rad:.4f} rad" for joint, angle_rad in angles_rad.items())
         self.events.report(now_s, f"move {path} by {by}")
-        self.events.notice = ""
+        self.events.forget_notice()
         self.controller.move([angles_rad.get(joint) for joint in self.configuration.rig.joints])
 
     def _refusal(self, request: Request, order: WalkOrder | None, forced: str) -> str | None:

@@ -4,9 +4,10 @@ The notice answers a later `status`: why the robot stopped, or that its torque w
 robot is moved again.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from math import inf
 
+from control.fault_causes import ANSWERED_S, ASKED, AgedFault, group_by_cause
 from control.faults import Fault
 from control.modes import ENERGISED, Mode, Request
 from firmware_host.log.recorder import Recording
@@ -14,6 +15,7 @@ from firmware_host.log.rows import EVENT, EVENT_KIND, STRIDE_KIND, stride_row
 from firmware_host.mud_learning import LearningReport
 
 REQUEST_PERIOD_S = 1.0
+ENDING = (Mode.STOPPING, Mode.DAMPING)  # what is detected meanwhile did not stop the robot
 MAX_REQUESTS = 64  # texts to remember; each names its sender
 
 
@@ -43,13 +45,21 @@ class RequestEvents:
 
 
 class LoopEvents:
-    """Owns the notice, and which requests were logged."""
+    """Owns the notice, which requests were logged, and the faults that are logged only if they last."""
 
-    def __init__(self, recorder: Recording, longest_hold_s: float) -> None:
+    def __init__(self, recorder: Recording, longest_hold_s: float, bus_of: Mapping[str, str]) -> None:
+        """`bus_of` names the bus of each joint."""
         self._recorder = recorder
         self._longest_hold_s = longest_hold_s
+        self._bus_of = bus_of
         self.requests = RequestEvents()
+        self.forget_notice()
+        self._settling: dict[tuple[str, str], tuple[Fault, float]] = {}  # with the time at which it began
+
+    def forget_notice(self) -> None:
         self.notice = ""
+        self.notice_s = -inf
+        self.stop_fault: Fault | None = None  # the first cause of the last stop
 
     def report(self, now_s: float, message: str) -> None:
         """Write a message into the log."""
@@ -57,7 +67,7 @@ class LoopEvents:
 
     def _notify(self, now_s: float, message: str) -> None:
         """Write a message into the log and keep it as the notice."""
-        self.notice = message
+        self.notice, self.notice_s = message, now_s
         self.report(now_s, message)
 
     def report_learning(self, now_s: float, learned: LearningReport) -> None:
@@ -65,13 +75,36 @@ class LoopEvents:
         for message in learned.messages:
             self.report(now_s, message)
         for stride in learned.strides:
-            self._recorder.put(STRIDE_KIND, stride_row(now_s, stride.estimate, stride.chosen_depth_m))
+            row = stride_row(now_s, stride.estimate, stride.chosen_depth_m, stride.supply_min_v)
+            self._recorder.put(STRIDE_KIND, row)
 
     def report_faults(self, now_s: float, begun: Iterable[Fault], over: Iterable[Fault]) -> None:
+        """Write the faults that began or are over; those of a drive that may still answer only once they last."""
         for fault in begun:
-            self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")
+            if fault.kind in ASKED:
+                self._settling[fault.name, fault.subject] = fault, now_s
+            else:
+                self._report_fault(now_s, fault)
         for fault in over:
-            self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
+            if self._settling.pop((fault.name, fault.subject), None) is None:
+                self.report(now_s, f"over: {fault.name} {fault.subject}".rstrip())
+        for key, (fault, begun_s) in list(self._settling.items()) if self._settling else ():
+            if now_s - begun_s > ANSWERED_S:
+                del self._settling[key]
+                self._report_fault(now_s, fault)
+
+    def _report_fault(self, now_s: float, fault: Fault) -> None:
+        self.report(now_s, f"fault {fault.name} ({fault.kind.reaction.name.lower()}): {fault.message}")
+        if self.stop_fault is None:
+            return
+        stop, cause = AgedFault(self.stop_fault, now_s - self.notice_s), AgedFault(fault, 0.0)
+        first = group_by_cause([stop, cause], self._bus_of)[0]
+        if first.root is fault and first.consequences:  # the stop follows from this one, which takes longer to detect
+            self._notify_stop(self.notice_s, fault)
+
+    def _notify_stop(self, stopped_s: float, fault: Fault) -> None:
+        self.notice, self.notice_s = f"stopped by {fault.name}: {fault.advice}", stopped_s
+        self.stop_fault = fault
 
     def report_request(self, now_s: float, request: Request, forced: str, by: str, changes: bool) -> None:
         """Log a request with its sender, unless it changes nothing or was logged just now."""
@@ -98,9 +131,9 @@ class LoopEvents:
         because = f": {fault.message}" if fault else ""
         self.report(now_s, f"mode {before.name.lower()} to {after.name.lower()}{because}")
         if after in (Mode.ARMING, Mode.WALKING):
-            self.notice = ""
-        if fault and before in ENERGISED:
-            self.notice = f"stopped by {fault.name}: {fault.advice}"
+            self.forget_notice()
+        if fault and before in ENERGISED and not (self.stop_fault and before in ENDING):
+            self._notify_stop(now_s, fault)
         if before is Mode.HOLD and after is Mode.IDLE and rested:
             held_s = self._longest_hold_s
             self._notify(now_s, f"the pose was held for {held_s:g} s without a request: torque went off by itself")

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from control.fault_causes import AgedFault, Cause, group_by_cause
+from control.fault_causes import AgedFault, Cause, group_by_cause, is_settling
 from control.faults import FAULT_KINDS, Fault, FaultKind
 from control.records import FLIPPERS, JOINTS
 
@@ -66,9 +66,12 @@ def _episodes(events: Iterable[Mapping[str, Any]], buses: set[str]) -> list[list
                 episodes.append([])
             present.add((fault.name, fault.subject))
             episodes[-1].append(Begun(fault, event["stamp_s"], message))
-        elif over:
+        elif over and episodes:
             present = {each for each in present if each != (over[1], over[2])}
-    return episodes
+            ended = [each for each in episodes[-1] if (each.fault.name, each.fault.subject) == (over[1], over[2])]
+            if ended and is_settling(AgedFault(ended[-1].fault, event["stamp_s"] - ended[-1].stamp_s)):
+                episodes[-1].remove(ended[-1])  # only logs of version 0.2 and before have these
+    return list(filter(None, episodes))
 
 
 def _subject(kind: FaultKind, message: str, buses: set[str]) -> str:

@@ -26,7 +26,7 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from logs.files.log_error import LogError, Watch, unwatched
 from logs.files.log_reader import AnyLog, TickPass
-from logs.files.log_summary import begin_s, segment_of
+from logs.files.log_summary import begin_s, segments_before
 from logs.files.scanned_log import scan_logs
 from logs.files.tick_array import Ticks
 from logs.lab.columns import PAPER_CONSTANT_NM_A
@@ -56,7 +56,7 @@ class Replay:
     flippers: tuple[str, ...]
     map: tuple[MapRow, ...] = ()  # of the mud along the track, where there was a pose
     complete: bool = True  # False where the writer of the log was cut off, or still writes
-    segment: int = 0  # of the run with which the log begins
+    segment: int = 0  # of the run with which the log begins; 0 also where it begins with a trial
     begin_s: float = 0.0  # on the log's own clock, which is also that of the strides
     findings: tuple[Finding, ...] = ()  # what the reader noticed in a CSV of the authors
     fits: tuple[StrideFits, ...] = ()  # that the estimates come from, one for each stride
@@ -139,7 +139,7 @@ class RunningReplay:
             self._flippers,
             self._estimator.map.rows(),
             complete,
-            segment_of(log),
+            segments_before(log),
             begin_s(log),
             fits=tuple(self._fits),
             chosen_depths_m=tuple(chosen_m.get((stride.flipper, stride.t_start_s), nan) for stride in strides),

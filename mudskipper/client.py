@@ -70,9 +70,26 @@ class Client:
         """Energise the joints; `force` names the one kind of fault to overrule, such as watchdog_unknown."""
         self._move("arm", force=force)
 
-    def walk(self, strides: int = 0, depth_m: float | None = None) -> None:
-        """Walk so many strides (0: without end), at a fixed depth or at depths that adapt to the mud."""
-        self._move("walk", strides=strides, **({} if depth_m is None else {"depth_m": depth_m}))
+    def walk(self, strides: int = 0, depth_m: float | None = None, **trial: object) -> None:
+        """Walk so many strides (0: without end), at a fixed depth or at depths that adapt to the mud.
+
+        `trial` describes the walk in its log, a new one: mud, water, trial, operator, tags and note.
+        """
+        described = {key: str(value) for key, value in trial.items()}
+        self._move("walk", strides=strides, **({} if depth_m is None else {"depth_m": depth_m}), **described)
+
+    def trial(self, **defaults: object) -> Report:
+        """Return how walks are described: the `defaults` and the `present` walk. Keywords change the defaults."""
+        changes = {key: str(value) for key, value in defaults.items()}
+        return dict(self._client.call("trial_set", **changes) if changes else self._client.call("trial"))
+
+    def note(self, text: str) -> Report:
+        """Write a note into the log, and return its `time` and its `stamp_s`."""
+        return dict(self._client.call("note", text=text))
+
+    def mark(self, text: str = "") -> Report:
+        """Mark this moment in the log, such as a clap that a camera records; return its `time` and its `stamp_s`."""
+        return dict(self._client.call("mark", text=text))
 
     def move(self, **angles_rad: float) -> None:
         """Move joints slowly while the robot holds: `move(left_sweep_rad=0.1, right_sweep_rad=0.1)`."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgpack
 
-from firmware_host.sockets.rpc import NOT_PERMITTED, REQUEST
+from firmware_host.sockets.rpc import LONGEST_REQUEST, NOT_PERMITTED, REQUEST, TOO_LONG
 from firmware_host.sockets.socket_file import operators_path
 
 ANSWER_S = 5.0
@@ -68,9 +68,13 @@ class StatusClient:
         Raises CallRefusedError or NotPermittedError with the daemon's message, or NoDaemonError if no answer comes.
         """
         self._number += 1
+        request = msgpack.packb([REQUEST, self._number, method, params], unicode_errors="backslashreplace")
+        if len(request) > LONGEST_REQUEST:
+            name = max(params, key=lambda key: len(str(params[key])))
+            raise CallRefusedError(f"{name} = {params[name]!r:.40}... is too long: {TOO_LONG}")
         try:
             with suppress(ConnectionError):  # what it said before it closed the connection can still be read
-                self._socket.sendall(msgpack.packb([REQUEST, self._number, method, params]))
+                self._socket.sendall(request)
             problem, result = self._receive()
         except ConnectionError as problem_reading:
             raise DroppedError(f"the daemon on {self._path} closed the connection: {CLOSED}") from problem_reading

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from command_line import exit_codes
-from command_line.drive_state import torque_state
+from command_line.drive_state import supply_text, torque_state
 from command_line.errors import CommandError, usage_error
 from command_line.json_output import print_value
 from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
-from command_line.screen import BOLD, GREEN, RED, YELLOW, coloured
+from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured
 from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
 from control.computing.suggestion import suggestion
 from experiments.reports.counted_nouns import counted
@@ -72,11 +72,25 @@ def walk(
         bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
     ] = False,
     strides: Annotated[int, Option("stop after N (default: go on)", low=1, high=100000)] = 0,
+    mud: Annotated[str, Option("name of the mud, for the log", metavar="NAME")] = "",
+    water: Annotated[
+        float | None, Option("water content of the mud", low=0.0, high=100.0, unit="%", metavar="W")
+    ] = None,
+    trial: Annotated[str, Option("number or name of the trial", metavar="NAME")] = "",
+    operator: Annotated[str, Option("who operates the robot", metavar="NAME")] = "",
+    tag: Annotated[tuple[str, ...], Option("word that finds this walk again", metavar="WORD")] = (),
+    note: Annotated[str, Option("what to know about this walk", metavar="TEXT")] = "",
     attended: Annotated[bool, Option("stay connected; the robot stops when this command ends")] = False,
     take_over: TakeOver = False,
 ) -> int:
-    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed."""
+    """Walk at `depth`, or adapt to the mud where it is None; `adaptive` is there to be typed.
+
+    A walk with a description is a trial, and begins a new log; `mudskipper trial set` gives defaults.
+    """
     params: dict[str, Any] = {"strides": strides, "take_over": take_over}
+    described = {"mud": mud, "trial": trial, "operator": operator, "tags": ",".join(tag), "note": note}
+    described["water"] = "" if water is None else f"{water:g}"
+    params |= {key: value for key, value in described.items() if value}
     if depth is not None:
         params["depth_m"] = depth / 100.0
     if attended:
@@ -225,7 +239,7 @@ def status_text(report: dict[str, Any]) -> str:
     lines += [_cause_text(cause) for cause in report["causes"]]
     if report["lease"]:
         lines.append(f"the lease is held by {report['lease']} for {number(report['lease_left_s'], 1)} s more")
-    notices = [report["notice"]] if report["notice"] else []
+    notices = [f"{clock_text(report['notice_age_s'])} {report['notice']}"] if report["notice"] else []
     if report["forced"]:
         notices.append("armed by 'mudskipper arm --force' against a failed check: see 'mudskipper check'")
     if report["pose"]["trouble"]:
@@ -252,7 +266,18 @@ def _cause_text(cause: dict[str, Any]) -> str:
 
 def _drives_table(drives: list[dict[str, Any]]) -> str:
     rows = [
-        ("joint", "angle (°)", "current (A)", "torque (N·m)", "motor (°C)", "bus (V)", "age (ms)", "torque", "errors")
+        (
+            "joint",
+            "angle (°)",
+            "current (A)",
+            "torque (N·m)",
+            "motor (°C)",
+            "supply (V)",
+            "(A)",
+            "age (ms)",
+            "torque",
+            "errors",
+        )
     ]
     for drive in drives:
         angle_rad, age_s = drive["angle_rad"], drive["angle_age_s"]
@@ -264,6 +289,7 @@ def _drives_table(drives: list[dict[str, Any]]) -> str:
                 number(drive["torque_command_nm"], 3),
                 number(drive["temperature_c"], 0),
                 number(drive["bus_voltage_v"], 1),
+                number(drive["bus_current_a"], 1),
                 number(None if age_s is None else 1e3 * age_s, 1),
                 torque_state(drive),
                 drive["errors"] or "-",
@@ -286,6 +312,7 @@ def _loop_text(report: dict[str, Any]) -> str:
             f" {bus['error_frames']} error frames, {bus['failed_sends']} failed sends"
             + (f", {bus['lost_frames']} frames lost" if bus["lost_frames"] else "")
             + (f", {bus['refused_commands']} commands refused" if bus["refused_commands"] else ""),
+            f"supply {supply_text(report)}",
             f"pose   {poses if pose['source'] else 'none'}",
             f"log    {log['path'] or 'off'}, {counted(log['dropped'], 'row')} dropped"
             + (f", safe up to {number(log['durable_age_s'], 1)} s ago" if log.get("durable_age_s") else "")

@@ -56,7 +56,7 @@ class Feed:
             report = updated(self.history.status, tick)
             if report["mode"] == self.history.status["mode"]:  # else the reason is wanted at once
                 with self.lock:
-                    self.history.add_status(report, now_s)
+                    self.history.add_status(report, now_s, from_row=True)
                 return True
         return self._ask(now_s)
 

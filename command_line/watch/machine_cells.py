@@ -1,14 +1,14 @@
 """The machine and its walk, as cells and texts: alarm, depth, drives, loop, log and lease."""
 
-import time
 from math import degrees
 from pathlib import PurePath
 from typing import Any
 
 from rich.text import Text
 
-from command_line.drive_state import is_stale, torque_state
+from command_line.drive_state import is_stale, supply_text, torque_state
 from command_line.operation.attended_walk import MILD
+from command_line.screen import clock_text
 from command_line.watch.history import History
 from command_line.watch.mud_cells import Row, cm, right
 from experiments.reports.counted_nouns import counted
@@ -41,33 +41,60 @@ def alarm_text(history: History, now_s: float) -> Text:
     silence_s = history.silence_s(now_s)
     causes = report["causes"]
     if silence_s:
-        since = time.strftime("%H:%M:%S", time.localtime(time.time() - silence_s))
         mode = "no answer"
-        text = (f"Nothing heard from the daemon since {since}, for {silence_s:.0f} s. Torque is unknown.", BAD)
-        advice = [f"-> {history.problem or 'the daemon hangs'}. All values below are old."]
+        since = f"since {clock_text(silence_s)} ({silence_s:.0f} s)"
+        text = (f"Nothing heard from the daemon {since}: torque unknown.", BAD)
+        advice = [f"-> the values below are old; {history.problem or 'the daemon hangs'}."]
     elif causes:
         mode, cause = report["mode"], causes[0]
         following = len(cause["consequences"])
         consequence = f" {counted(following, 'fault')} as its consequence." if following else ""
-        text = (f"{cause['message']}{consequence}", WARNING if cause["reaction"] in MILD else BAD)
-        more = f" {counted(len(causes) - 1, 'other cause')}: 'mudskipper status'." if len(causes) > 1 else ""
+        style = WARNING if cause["reaction"] in MILD else BAD
+        text = (f"{history.clock_text(cause['age_s'])} {cause['message']}{consequence}", style)
+        more = f" {counted(len(causes) - 1, 'other cause')}: press f." if len(causes) > 1 else ""
         advice = [f"-> {cause['what_to_do']}.{more}"]
     else:
         mode = report["mode"]
-        text, advice = _quiet(report)
+        text, advice = _quiet(history)
     badge = (f" {mode.upper()} ", BADGES.get(mode, "reverse"))
     return Text.assemble(badge, " ", text, *((f"\n{each}", WARNING) for each in advice))
 
 
-def _quiet(report: dict[str, Any]) -> tuple[tuple[str, str], list[str]]:
+def _quiet(history: History) -> tuple[tuple[str, str], list[str]]:
     """Return the first line without a fault, and the notices below it."""
+    report = history.status
     unheard = [drive["joint"] for drive in report["drives"] if drive["heartbeat_age_s"] is None]
-    forced = "armed by force: see 'mudskipper check'" if report["forced"] else ""
-    notices = [*filter(None, [report["notice"], forced, report["pose"]["trouble"], *report["warnings"]])]
     if unheard:
         text = f"{report['robot']}: not heard yet: {', '.join(unheard)}; 'mudskipper check' says what to do"
-        return (text, WARNING), notices
-    return (f"{report['robot']}: no fault", "green"), notices
+        return (text, WARNING), notices(history)
+    return (f"{report['robot']}: no fault", "green"), notices(history)
+
+
+def notices(history: History) -> list[str]:
+    """Return what the operator should know besides the faults, the stop first."""
+    report = history.status
+    stopped = f"{history.clock_text(report['notice_age_s'])} {report['notice']}" if report["notice"] else ""
+    forced = "armed by force: see 'mudskipper check'" if report["forced"] else ""
+    return [*filter(None, [stopped, forced, report["pose"]["trouble"], *report["warnings"]])]
+
+
+def faults_text(history: History) -> Text:
+    """Return every fault with its advice in full, each cause before its consequences."""
+    report = history.status
+    faults = {f"{fault['name']} {fault['subject']}".rstrip(): fault for fault in report["faults"]}
+    lines: list[tuple[str, str]] = []
+    for cause in report["causes"]:
+        style = WARNING if cause["reaction"] in MILD else BAD
+        heading = f"{history.clock_text(cause['age_s'])} {cause['name']} ({cause['reaction'].replace('_', ' ')})"
+        lines += [(f"{heading}: {cause['message']}\n", style), (f"-> {cause['what_to_do']}\n", WARNING)]
+        for name in cause["consequences"]:
+            fault = faults[name]
+            time_of_day = history.clock_text(fault["age_s"])
+            lines.append((f"   {time_of_day} {fault['name']}: {fault['message']}\n   -> {fault['what_to_do']}\n", ""))
+        lines.append(("\n", ""))
+    if report["faults_left_out"]:
+        lines.append((f"{counted(report['faults_left_out'], 'other fault')}\n", ""))
+    return Text.assemble(*(lines or [("no fault\n\n", "")]), *(f"{each}\n" for each in notices(history)))
 
 
 def walk_text(history: History) -> Text:
@@ -90,25 +117,25 @@ def walk_text(history: History) -> Text:
     )  # fmt: skip
 
 
-def drive_rows(history: History, heard: bool) -> list[Row]:
-    """Return a row for each drive; `heard`: the daemon answers."""
-    return [_drive(drive, heard) for drive in history.status["drives"]]
+def drive_rows(history: History, silence_s: float) -> list[Row]:
+    """Return a row for each drive; `silence_s`: since when the daemon does not answer, 0 while it does."""
+    return [_drive(drive, silence_s) for drive in history.status["drives"]]
 
 
-def _drive(drive: dict[str, Any], heard: bool) -> Row:
-    stale = is_stale(drive)
+def _drive(drive: dict[str, Any], silence_s: float) -> Row:
+    stale, age_s = silence_s > 0.0 or is_stale(drive), drive["angle_age_s"]
     values = OLD if stale else ""
     current_a, limit_a, measured_c = drive["current_a"], drive["current_limit_a"], drive["temperature_c"]
     near = current_a is not None and abs(current_a) > NEAR_LIMIT * limit_a
     temperature = f"~{number(drive['winding_c'], 0)}" if measured_c is None else f"{measured_c:.0f}"
     angle = number(None if drive["angle_rad"] is None else degrees(drive["angle_rad"]), 1)
-    torque = torque_state(drive) if heard else "unknown"
+    torque = "unknown" if silence_s else torque_state(drive)
     return [
         Text(drive["joint"], "bold"),
         right(f"{angle}°", values),
         right(f"{number(current_a, 2)} / {limit_a:3g} A", values or (WARNING if near else "")),
         right(f"{temperature} °C", values),
-        right(_age(drive["angle_age_s"]), BAD if stale else "dim"),
+        right(_age(None if age_s is None else age_s + silence_s), BAD if stale else "dim"),
         right(torque, TORQUE_STYLES[torque]),
         Text(f"  {drive['errors']}", BAD),
     ]
@@ -117,11 +144,13 @@ def _drive(drive: dict[str, Any], heard: bool) -> Row:
 def _age(age_s: float | None) -> str:
     if age_s is None:
         return "never"
+    if age_s >= 100.0:
+        return f"{age_s:.0f} s"
     return f"{1e3 * age_s:.0f} ms" if age_s < 1.0 else f"{age_s:.1f} s"
 
 
 def machine_text(history: History, roomy: bool) -> Text:
-    """Return loop, log and lease in one line, or, where there is room, more of them in three."""
+    """Return loop, log, lease and supply in one line, or, where there is room, more of them in four."""
     report, apart = history.status, "\n" if roomy else "  "
     loop, late, tick = report["loop"], report["loop"]["wake_late_us"], report["loop"]["tick_us"]
     times = f"late {late['p50']:.0f}, 99 % {late['p99']:.0f} us, tick {tick['p50']:.0f}, 99 % {tick['p99']:.0f} us"
@@ -132,6 +161,7 @@ def machine_text(history: History, roomy: bool) -> Text:
         (f"{loop['missed_ticks']} missed", WARNING if loop["missed_ticks"] else ""),
         (f"{apart}log ", "bold"), _log(report["log"], roomy),
         (f"{apart}lease ", "bold"), (lease, WARNING if report["lease"] else "dim"),
+        (f"{apart}supply ", "bold"), supply_text(report),
     )  # fmt: skip
 
 

@@ -6,9 +6,9 @@ from math import log
 from typing import Any
 
 from rich.text import Text
-from textual.renderables.sparkline import Sparkline
 
 from command_line.screen import coefficient
+from command_line.watch.bars import BARS, bars
 from command_line.watch.history import History
 from experiments.reports.text_tables import number
 from experiments.reports.value_text import N_CM3, value_text
@@ -19,7 +19,7 @@ SIGNIFICANT = 2.0  # standard errors that a change must exceed
 PIECE_M = 0.05  # of the mud along the path
 MUD, BOUND = "#c08040", "yellow"
 Report = dict[str, Any]
-Row = list[Any]  # cells, each a Text or a Sparkline
+Row = list[Text]  # cells
 
 
 def right(text: str, style: str = "") -> Text:
@@ -43,7 +43,8 @@ def _coefficient(history: History, flipper: str, name: str) -> Row:
         style = BOUND if estimate["at_least"] else ""
         bound = "≥ " if estimate["at_least"] else ""
         text = bound + value_text(estimate["value"], estimate["std_error"], per=N_CM3)
-    last = Sparkline(values, width=len(values)) if values else Text()
+    errors = [reading["std_error"] or 0.0 for reading in readings if reading["valid"]]
+    last = Text(bars(values, 2.0 * SIGNIFICANT * max(errors, default=0.0))[0], "cyan")
     return [right(text, style), Text(trend(readings), "bold", justify="center"), last]
 
 
@@ -115,6 +116,6 @@ def _blocks(history: History, name: str, first: int, last: int, cells: int) -> l
     for reading in readings:
         block = "·"
         if reading:
-            block = Sparkline.BARS[int((log(reading["value"]) - low) / (high - low) * len(Sparkline.BARS))]
+            block = BARS[int((log(reading["value"]) - low) / (high - low) * len(BARS))]
         blocks.append((block * cells, BOUND if reading and reading["at_least"] else MUD))
     return blocks

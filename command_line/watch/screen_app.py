@@ -12,17 +12,19 @@ from typing import Any
 from rich.text import Text
 from textual.app import App, ComposeResult, ScreenStackError
 from textual.binding import Binding
-from textual.containers import Horizontal, Vertical
+from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.css.query import NoMatches
 from textual.events import Key
-from textual.widgets import DataTable, Footer, Label, RichLog, Sparkline, Static
+from textual.widgets import ContentSwitcher, DataTable, Footer, Label, RichLog, Static
 
 from command_line import exit_codes
 from command_line.drive_state import is_stale
 from command_line.operation.confirmation import TORQUE_UNKNOWN
+from command_line.watch.bars import bars
 from command_line.watch.feed import Feed
 from command_line.watch.history import History
-from command_line.watch.machine_cells import BADGES, alarm_text, drive_rows, machine_text, walk_text
+from command_line.watch.joint_plots import SIGNALS, View
+from command_line.watch.machine_cells import BADGES, alarm_text, drive_rows, faults_text, machine_text, walk_text
 from command_line.watch.mud_cells import COEFFICIENTS, coefficient_rows, stride_rows, strip_text
 from experiments.reports.text_tables import number
 
@@ -39,6 +41,10 @@ d       disarm: switch torque off at once; the joints sink
 a       arm: switch torque on; the robot holds its pose
 w       walk with a depth that adapts to the mud, until a stop
 c       clear faults whose cause is gone
+f       every fault with its advice in full; up and down scroll
+j       plots of the joints' angles, then currents, then torques:
+        left and right scroll by half a screen, up and down zoom,
+        home and end go to the oldest and to now
 ?       this help
 q       leave; the robot goes on with what it does
 
@@ -57,6 +63,7 @@ DRIVE_COLUMNS = (
     ("drive", 16), ("angle", 9), ("current / limit", 18), ("motor", 8), ("age", 9), ("torque", 9), ("", 40),
 )  # fmt: skip
 FORCES = {"forward": "force_x_n", "up": "force_z_n"}
+LEAST_FORCE_N = 2.0  # that fills the height of its curve: noise looks like noise
 
 
 class Rows(DataTable[Any]):
@@ -90,14 +97,15 @@ class Force(Horizontal):
 
     def compose(self) -> ComposeResult:
         yield Label(f"{self._direction:8}")
-        yield Sparkline()
+        yield Static(classes="curve")
         yield Label(classes="value")
 
     def show(self, history: History) -> None:
         samples = list(history.forces.get(f"{self._flipper} {FORCES[self._direction]}", ()))
         drives = [drive for drive in history.status["drives"] if drive["joint"].startswith(self._flipper)]
         self.set_class(any(map(is_stale, drives)), "old")
-        self.query_one(Sparkline).data = [sample for sample in samples if sample is not None][-self.size.width :]
+        curve = self.query_one(".curve", Static)
+        curve.update(Text(bars(samples[-curve.size.width :], LEAST_FORCE_N)[0], "cyan", justify="right"))
         self.query_one(".value", Label).update(f"{number(samples[-1] if samples else None, 1):>7} N ")
 
 
@@ -108,12 +116,13 @@ class WatchApp(App[int]):
     CSS = """
     * { background: ansi_default; }
     #alarm { height: auto; max-height: 3; }
-    #help { height: 1fr; }
+    ContentSwitcher { height: 1fr; }
+    #help, #joints { height: 1fr; }
+    #fault_list { height: auto; }
     #forces, #walk, #strip, #machine, Label { height: auto; }
     #forces Horizontal { height: 1; }
     Force { width: 1fr; height: 1; }
-    Force Sparkline { width: 1fr; height: 1; }
-    Sparkline > .sparkline--max-color, Sparkline > .sparkline--min-color { color: ansi_cyan; }
+    Force .curve { width: 1fr; height: 1; }
     .old { text-style: dim italic; }
     Rows { height: auto; scrollbar-size: 0 0; overflow: hidden; }
     Rows > .datatable--header { text-style: dim; background: ansi_default; }
@@ -128,8 +137,16 @@ class WatchApp(App[int]):
         Binding("a", "ask('arm')", "arm"),
         Binding("w", "ask('walk')", "walk"),
         Binding("c", "ask('clear')", "clear"),
+        Binding("f", "show('faults')", "faults"),
+        Binding("j", "plot", "joints"),
         Binding("y", "confirm", show=False),
-        Binding("question_mark", "help", "help"),
+        Binding("left", "scroll(-0.5)", show=False),
+        Binding("right", "scroll(0.5)", show=False),
+        Binding("home", "scroll(-1e9)", show=False),
+        Binding("end", "scroll(1e9)", show=False),
+        Binding("up", "zoom(0.5)", show=False),
+        Binding("down", "zoom(2.0)", show=False),
+        Binding("question_mark", "show('help')", "help"),
         Binding("q", f"exit({exit_codes.OK})", "leave"),
         Binding("ctrl+q", f"exit({exit_codes.OK})", show=False, priority=True),
         Binding("ctrl+c", f"exit({exit_codes.INTERRUPTED})", show=False, priority=True),
@@ -139,10 +156,20 @@ class WatchApp(App[int]):
         super().__init__(ansi_color=True)
         self.feed, self._flippers, self._period_s, self._send = feed, flippers, period_s, send
         self._asked = ""  # the order that waits for an answer
+        self._view = View(period_s)
 
     def compose(self) -> ComposeResult:
         yield Static(id="alarm")
-        yield Static(HELP, id="help")
+        with ContentSwitcher(initial="body"):
+            yield Static(HELP, id="help")
+            yield VerticalScroll(Static(id="fault_list"), id="faults")
+            yield Static(id="joints")
+            yield from self._body()
+        yield Static(id="question")
+        yield RichLog(id="messages", min_width=0, max_lines=100)
+        yield Footer(compact=True)
+
+    def _body(self) -> ComposeResult:
         with Vertical(id="body"):
             yield Static(id="walk")
             columns = [((f"{flipper} (N/cm³)", 18), ("", 3), ("", 9)) for flipper in self._flippers]
@@ -155,13 +182,10 @@ class WatchApp(App[int]):
             yield Rows(STRIDE_COLUMNS, "strides")
             yield Rows(DRIVE_COLUMNS, "drives")
             yield Static(id="machine")
-        yield Static(id="question")
-        yield RichLog(id="messages", min_width=0, max_lines=100)
-        yield Footer()
 
     def on_mount(self) -> None:
         self.query_one("#messages").can_focus = False
-        self.query_one("#help").display = self.query_one("#question").display = False
+        self.query_one("#question").display = False
         self.feed.start()
         self.set_interval(self._period_s, self.redraw)
 
@@ -176,9 +200,9 @@ class WatchApp(App[int]):
                 self._show(history, now_s)
 
     def _show(self, history: History, now_s: float) -> None:
-        heard, roomy = not history.silence_s(now_s), self.size.height >= ROOMY_ROWS
+        silence_s, roomy = history.silence_s(now_s), self.size.height >= ROOMY_ROWS
         self.screen.set_class(roomy, "roomy")
-        self.query_one("#body").set_class(not heard, "old")
+        self.query_one("#body").set_class(silence_s > 0.0, "old")
         self.query_one("#alarm", Static).update(alarm_text(history, now_s))
         self.query_one("#walk", Static).update(walk_text(history))
         self.query_one("#mud", Rows).show(coefficient_rows(history, self._flippers))
@@ -188,8 +212,12 @@ class WatchApp(App[int]):
             strip_text(history, self.size.width, COEFFICIENTS if roomy else ("k_s",))
         )
         self.query_one("#strides", Rows).show(stride_rows(history))
-        self.query_one("#drives", Rows).show(drive_rows(history, heard))
+        self.query_one("#drives", Rows).show(drive_rows(history, silence_s))
         self.query_one("#machine", Static).update(machine_text(history, roomy))
+        self.query_one("#fault_list", Static).update(faults_text(history))
+        plots = self.query_one("#joints", Static)
+        if plots.display:
+            plots.update(self._view.text(history, plots.size.width, plots.size.height))
 
     def on_key(self, event: Key) -> None:
         """Take any key but y as a no to a question; the actions of keys follow this."""
@@ -210,10 +238,31 @@ class WatchApp(App[int]):
         if self._asked:
             self.action_order(self._asked)
 
-    def action_help(self) -> None:
+    def action_show(self, panel: str) -> None:
+        """Show a panel in place of the body, or the body again."""
         self._ask("")
-        for name in ("#help", "#body"):
-            self.query_one(name).display = not self.query_one(name).display
+        switcher = self.query_one(ContentSwitcher)
+        switcher.current = "body" if switcher.current == panel else panel
+        self.query_one("#faults").focus() if switcher.current == "faults" else self.set_focus(None)
+        self.redraw()
+
+    def action_plot(self) -> None:
+        """Show the first signal of the joints, then the others, then the body again."""
+        shown = self.query_one(ContentSwitcher).current == "joints"
+        self._view.signal = (self._view.signal + shown) % len(SIGNALS)
+        if not shown or self._view.signal == 0:
+            self.action_show("joints")
+        self.redraw()
+
+    def action_scroll(self, screens: float) -> None:
+        with self.feed.lock:
+            if self.feed.history.joints:
+                self._view.scroll(screens * self.size.width, self.feed.history)
+        self.redraw()
+
+    def action_zoom(self, factor: float) -> None:
+        self._view.zoom(factor)
+        self.redraw()
 
     def action_exit(self, status: int) -> None:
         self.exit(status)

@@ -20,7 +20,7 @@ from firmware_host.configuration.configuration import CaptureAxis, Configuration
 from firmware_host.log.rows import STRIDE, stride_row
 from logs.files.log_error import LogError, Watch, unwatched
 from logs.files.log_reader import AnyLog, TickPass
-from logs.files.log_summary import begin_s, log_summary, segment_of
+from logs.files.log_summary import begin_s, log_summary, segments_before
 from logs.files.scanned_log import scan_logs
 from logs.lab.body_track import VERTICAL_AXIS
 from logs.lab.findings import Finding
@@ -192,7 +192,7 @@ def in_detail(walk: RecordedWalk, spans_s: Sequence[tuple[float, float]]) -> Rec
 
 def _cut_of(log: AnyLog, from_the_first: bool, to_the_last: bool) -> str:
     """Describe how the walk may extend beyond this segment of its run."""
-    number = segment_of(log)
+    number = segments_before(log)
     before = [f"begun before segment {number}"] * (from_the_first and number > 0)
     after = ["continued in the next segment"] * (to_the_last and log.complete and "segment" in log.metadata)
     return " and ".join(before + after)

@@ -32,7 +32,7 @@ FIGURES = {
 Groups = Annotated[
     tuple[GroupRule, ...],
     Option(
-        "put logs with such a file name into one group (default: the label in the name, as 12.5N)",
+        "put logs with such a file name into one group (default: the mud that the log names, or a label, as 12.5N)",
         metavar="PATTERN=NAME",
         parse=parse_rule,
     ),
@@ -65,7 +65,7 @@ def study(
     measured = [each for each in read if isinstance(each, EvaluatedLog)]
     if air:
         measured = [log._replace(in_mud=not any(matches(log.name, each) for each in air)) for log in measured]
-    groups = [group_of(log.name, group) for log in measured]
+    groups = [group_of(log.name, group, log.mud) for log in measured]
     estimates = join_estimates(measured, groups)
     summary = summary_of(measured, groups, estimates, refused)
     return Result(

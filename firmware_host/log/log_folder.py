@@ -20,6 +20,7 @@ ENDING = ".mcap"
 BROKEN = ".broken"  # after the name of a log that is being rewritten
 PART = ".part"  # after the name of one that is not whole yet
 FIRST = "-0000"
+SEGMENT = re.compile(r"(?P<run>.*)-(?P<number>\d{4,})(?P<trial>_[^-]*)?")  # of a file's name without its ending
 LAST_BYTES = b"\x89MCAP0\r\n"  # of every whole MCAP file
 
 
@@ -38,10 +39,11 @@ def first_path(folder: Path, run_id: str) -> Path:
     return folder / ACTIVE / f"{run_id}{FIRST}{ENDING}"
 
 
-def segment_path(first: Path, segment: int) -> Path:
-    if segment == 0:
+def segment_path(first: Path, segment: int, trial: str = "") -> Path:
+    """Return the path of a segment; `trial` is what its name has of the trial, such as _A_3."""
+    if segment == 0 and not trial:
         return first
-    return first.with_name(f"{first.stem.removesuffix(FIRST)}-{segment:04d}{ENDING}")
+    return first.with_name(f"{first.stem.removesuffix(FIRST)}-{segment:04d}{trial}{ENDING}")
 
 
 def finished_path(path: Path) -> Path:

@@ -33,7 +33,7 @@ class RestThinning:
         self._held: deque[tuple[int, bytes]] = deque(maxlen=self._full_ticks)
         self._mode = -1
         self._rested = 0  # ticks since torque or a change of mode
-        self._resting = False
+        self.resting = False  # for longer than is recorded in full
 
     def thin(self, rows: Iterable[tuple[int, bytes]]) -> Thinned:
         """Return the rows to write, in the order in which they came."""
@@ -53,15 +53,15 @@ class RestThinning:
         active = mode in ENERGISED or mode != self._mode
         self._mode = mode
         self._rested = 0 if active else self._rested + 1
-        was_resting, self._resting = self._resting, self._rested > self._full_ticks
-        if was_resting and not self._resting:
+        was_resting, self.resting = self.resting, self._rested > self._full_ticks
+        if was_resting and not self.resting:
             held = self.release()
             written += held
             written.append(row)
             return f"end of the rest: the {len(held)} ticks held back before this one are written after all"
         (number,) = struct.unpack_from("<I", row[1], self._number_at)
-        (self._held if self._resting and number % self._every else written).append(row)
-        begins = self._resting and not was_resting
+        (self._held if self.resting and number % self._every else written).append(row)
+        begins = self.resting and not was_resting
         return f"at rest: of the ticks, one in {self._every} is written from here on" if begins else ""
 
     def release(self) -> list[tuple[int, bytes]]:

@@ -32,7 +32,20 @@ from firmware_host.log.log_folder import (
 )
 from firmware_host.log.rest_thinning import RestThinning
 from firmware_host.log.rows import EVENT, EVENT_KIND, ROW_KINDS, TICK_KIND, opening_kinds
+from firmware_host.trial import (
+    BEGUN,
+    METADATA_KEY,
+    SET,
+    OperatorReport,
+    Trial,
+    from_json,
+    name_part,
+    read_report,
+    store_defaults,
+    to_json,
+)
 
+REPORTED = b"trial "  # in the row of an event that this module acts on
 RETRY_S = 3.0  # between two attempts at a disk that refuses
 QUOTA_INTERVAL_S = 10.0
 
@@ -51,6 +64,7 @@ class LogSegments:
         self._thinning = RestThinning(parameters.rest_hz, parameters.rest_full_s, opening_kinds(opening)[TICK_KIND])
         self._file: LogFile | None = None
         self._segment = 0
+        self._trial: Trial = {}  # that this file belongs to
         self._missing = 0  # rows that the next file has to report
         self._full = False  # the disk, when it refused
         self._deleting_helps = True
@@ -64,7 +78,25 @@ class LogSegments:
         self._open()
 
     def write(self, rows: Rows) -> None:
-        """Call this regularly, without rows too: a file is flushed by time."""
+        """Call this regularly, without rows too: a file is flushed by time. A trial is the first row of a file."""
+        written = 0
+        for index, (number, row) in enumerate(rows):
+            if number == EVENT_KIND and REPORTED in row and (report := read_report(EVENT.decode(row)["text"])):
+                self._write_rows(rows[written:index])
+                written = index
+                self._act_on(report)
+        self._write_rows(rows[written:])
+
+    def _act_on(self, report: OperatorReport) -> None:
+        """Begin a file with each trial, and store new defaults."""
+        if report.kind == BEGUN:
+            self._trial = from_json(report.text)
+            self._begin_next()
+        elif report.kind == SET and self._folder is not None:
+            with suppress(OSError):  # they hold until the daemon ends
+                store_defaults(self._folder, report.text)
+
+    def _write_rows(self, rows: Rows) -> None:
         for number, row in rows[-1:]:
             self._latest_stamp_s = ROW_KINDS[number].stamp_s(row)
         thinned = self._thinning.thin(rows)
@@ -95,7 +127,7 @@ class LogSegments:
         self._missing += count
 
     def _open(self) -> None:
-        self.path = segment_path(self._first, self._segment)
+        self.path = segment_path(self._first, self._segment, name_part(self._trial))
         try:
             self._make_room()
             if finished_path(self.path).exists():
@@ -133,6 +165,7 @@ class LogSegments:
             "rest_hz": f"{self._parameters.rest_hz:g}",
             "rest_full_s": f"{self._parameters.rest_full_s:g}",
         }
+        metadata |= {METADATA_KEY: to_json(self._trial)} if self._trial else {}
         return self._opening | {
             "metadata": self._opening["metadata"] | metadata,
             "wall_minus_monotonic_ns": time.time_ns() - time.monotonic_ns(),
@@ -168,10 +201,15 @@ class LogSegments:
             self._first_stamp_s = ROW_KINDS[number].stamp_s(row)
         long = self._latest_stamp_s - self._first_stamp_s >= self._parameters.segment_s
         if long or self._file.length >= self._parameters.segment_bytes:
-            self._finish()
-            if not self.problem:
-                self._quota_s = 0.0
-                self._open()
+            self._trial = {} if self._thinning.resting else self._trial  # the hours after a trial are not of it
+            self._begin_next()
+
+    def _begin_next(self) -> None:
+        """End this file and begin the next one; a disk that refuses is tried again later."""
+        self._finish()
+        if not self.problem:
+            self._quota_s = 0.0
+            self._open()
 
     def _finish(self) -> None:
         if self._file is None:

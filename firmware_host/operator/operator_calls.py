@@ -5,17 +5,18 @@ log names the sender of every request that changes something. Methods that set t
 the holder of the lease, if there is one; methods that end a motion are not.
 """
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from math import degrees, inf
 from typing import Any
 
 from control.controller import WalkOrder
-from control.fault_causes import group_by_cause
+from control.fault_causes import group_by_cause, is_settling
 from control.faults import Blocks, Fault
 from control.gait.gait import full_step_m
 from control.modes import Mode, Request
 from control.monitors.joint_monitor import REST_S, STILL_RAD
-from control.records import JOINTS
+from control.records import JOINTS, UNKNOWN
 from firmware_host.lease import ALWAYS_ALLOWED
 from firmware_host.loop import Loop
 from firmware_host.operator.arming_checks import arming_checks
@@ -27,15 +28,17 @@ from firmware_host.operator.reports import (
     mud_estimate_report,
     stride_report,
 )
+from firmware_host.operator.trial_calls import TrialCalls
 from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import FAULTS_PER_ANSWER, METHODS, PIECES_PER_ANSWER, STRIDES_PER_ANSWER
 from firmware_host.sockets.status_socket import Methods
 from firmware_host.software_version import is_compiled, software_version
 
+NO_TRIAL: Mapping[str, str] = {}
 Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
-MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v")  # by a drive
+MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v", "bus_current_a")  # by a drive
 SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
@@ -46,8 +49,16 @@ def validated(name: str, method: Method) -> Method:
 
 
 class OperatorCalls:
-    def __init__(self, loop: Loop, warnings: list[str], clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        loop: Loop,
+        warnings: list[str],
+        clock: Callable[[], float],
+        wall_clock: Callable[[], float] = time.time,
+        trial_defaults: Mapping[str, str] = NO_TRIAL,
+    ) -> None:
         self._loop = loop
+        self._trials = TrialCalls(loop.events, clock, wall_clock, trial_defaults)
         self._lease = loop.lease
         self._warnings = warnings
         self._clock = clock
@@ -72,6 +83,10 @@ class OperatorCalls:
             "clear": self.clear,
             "lease": lambda params, caller: self._renew_lease(caller, params["for_s"]),
             "release": self.release,
+            "trial": self._trials.trial,
+            "trial_set": self._trials.trial_set,
+            "note": self._trials.note,
+            "mark": self._trials.mark,
             "reset_timing": self.reset_timing,
         }
         return {name: validated(name, method) for name, method in methods.items()}
@@ -90,6 +105,7 @@ class OperatorCalls:
             **self._fault_reports(),
             "forced": bool(loop.forced),
             "notice": loop.events.notice,
+            "notice_age_s": known(now_s - loop.events.notice_s),
             "unlogged_requests": loop.events.requests.unlogged,
             "lease": str(lease.holder) if lease.held else None,
             "lease_left_s": known(lease.until_s - now_s) if lease.held else None,
@@ -97,35 +113,47 @@ class OperatorCalls:
             "pose": loop.pose.report()._asdict(),
             "drives": [_drive_report(loop, index, joint, now_s) for index, joint in enumerate(self._rig.joints)],
             "strides_closed": learning.strides_closed,
+            "stride_supply_min_v": self._stride_supply_v(),
             "mud": mud_estimate_report(learning.estimator.mud_estimate, self._rig),
             "loads": dict(zip(self._rig.flippers, map(load_report, learning.loads), strict=True)),
             "loop": loop.timing.summary(),
+            "trial": self._trials.present,
             "warnings": [*loop.configuration.warnings, *self._warnings],
             "bus": _bus_report(loop),
             "log": _log_report(loop, now_s),
         }
 
     def _fault_reports(self) -> dict[str, Any]:
-        """Return the fault to show first, and the gravest ones with their common causes."""
-        present = self._loop.aged_faults
-        shown = self._loop.fault or next(iter(self._loop.faults.blocking()), None)
+        """Return the fault to show first, and the gravest ones by their causes: what stopped the robot is the first."""
+        present = [each for each in self._loop.aged_faults if not is_settling(each)]
+        shown = self._loop.fault or next((fault for fault, _ in present if fault.kind.blocks is not Blocks.NO), None)
         gravest = present
         if len(present) > FAULTS_PER_ANSWER:
             ordered = sorted(present, key=lambda each: (each.fault != shown, -each.fault.kind.reaction))
             gravest = ordered[:FAULTS_PER_ANSWER]
         faults = {each.fault: _fault_report(*each) for each in gravest}
+        causes, stop = group_by_cause(gravest, self._bus_of), self._loop.events.stop_fault
+        if stop:
+            causes.sort(key=lambda cause: not cause.includes(stop))
         return {
             "fault": faults[shown] if shown else None,
             "faults": list(faults.values()),
             "faults_left_out": len(present) - len(faults),
-            "causes": [cause_report(cause) for cause in group_by_cause(gravest, self._bus_of)],
+            "causes": [cause_report(cause) for cause in causes],
         }
+
+    def _stride_supply_v(self) -> float | None:
+        """Return the lowest voltage of any drive in the last stride."""
+        last = self._loop.learning.strides[-len(self._rig.flippers) :]
+        return known(min([closed.supply_min_v for closed in last], default=UNKNOWN))
 
     def strides(self, params: dict[str, Any], caller: Caller) -> list[dict[str, Any]]:
         """Return the first STRIDES_PER_ANSWER strides from number `since` on, as far back as they are stored."""
         wanted = [closed for closed in self._loop.learning.strides if closed.number >= params["since"]]
         return [
-            stride_report(closed.estimate) | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
+            stride_report(closed.estimate)
+            | {"number": closed.number, "chosen_depth_m": closed.chosen_depth_m}
+            | {"supply_min_v": known(closed.supply_min_v)}
             for closed in wanted[:STRIDES_PER_ANSWER]
         ]
 
@@ -136,15 +164,17 @@ class OperatorCalls:
 
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
         adaptation, depth_m = self._loop.configuration.adaptation, params["depth_m"]
-        if depth_m is None:
-            order = WalkOrder(adaptation.initial_depth_m, adaptive=True, strides=params["strides"])
-            return self._request(caller, Request.WALK, order)
-        if not SHALLOWEST_M <= depth_m <= adaptation.max_depth_m:
+        trial = self._trials.planned(params)
+        if depth_m is not None and not SHALLOWEST_M <= depth_m <= adaptation.max_depth_m:
             raise RefusedError(
                 f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
                 f" {100.0 * adaptation.max_depth_m:g} cm, which is adaptation.max_depth_m in the configuration"
             )
-        return self._request(caller, Request.WALK, WalkOrder(float(depth_m), adaptive=False, strides=params["strides"]))
+        adaptive = depth_m is None
+        first_m = adaptation.initial_depth_m if adaptive else float(depth_m)
+        answer = self._request(caller, Request.WALK, WalkOrder(first_m, adaptive, params["strides"]))
+        self._trials.begin(trial, caller)
+        return answer
 
     def move(self, params: dict[str, Any], caller: Caller) -> str:
         loop = self._loop

@@ -15,6 +15,8 @@ from drivers.fault_injection.failures import LONGEST_S as LONGEST_FAILURE_S
 from drivers.fault_injection.failures import SHORTEST_S as SHORTEST_FAILURE_S
 from drivers.fault_injection.failures import USUAL_S
 from firmware_host.sockets.rpc import RefusedError
+from firmware_host.trial import KEYS as TRIAL_KEYS
+from firmware_host.trial import LONGEST_VALUE
 
 LONGEST_LEASE_S, SHORTEST_LEASE_S = 10.0, 0.1
 MAX_STRIDES = 100000  # of one walk
@@ -43,7 +45,7 @@ REQUIREMENTS = {
     Type.NUMBER: "a number",
     Type.INTEGER: "a whole number",
     Type.FLAG: "true or false",
-    Type.TEXT: f"at most {LONGEST_NAME} printable characters",
+    Type.TEXT: "at most {longest} printable characters",
 }
 
 
@@ -57,6 +59,7 @@ class Parameter(NamedTuple):
     default: bool | int | float | str | None = None
     required: bool = False
     null_is_default: bool = False  # else an explicit null is refused
+    longest: int = LONGEST_NAME  # characters of a text
 
     @property
     def bounds(self) -> str:
@@ -73,15 +76,19 @@ class Parameter(NamedTuple):
             return self.default
         if not self._accepts(value):
             bounds = f" {self.bounds}" if self.range else ""
-            raise RefusedError(f"{self.name} = {value!r:.60}: must be {REQUIREMENTS[self.type]}{bounds}")
+            raise RefusedError(f"{self.name} = {value!r:.60}: must be {self._requirement}{bounds}")
         return value
+
+    @property
+    def _requirement(self) -> str:
+        return REQUIREMENTS[self.type].format(longest=self.longest)
 
     def _accepts(self, value: Any) -> bool:
         match self.type:
             case Type.FLAG:
                 return isinstance(value, bool)
             case Type.TEXT:
-                return isinstance(value, str) and len(value) <= LONGEST_NAME and value.isprintable()
+                return isinstance(value, str) and len(value) <= self.longest and value.isprintable()
             case Type.INTEGER:
                 fits = isinstance(value, int)
             case Type.NUMBER:
@@ -98,6 +105,7 @@ class SocketMethod(NamedTuple):
     answer: str = 'the text "accepted"'
     answer_keys: Mapping[str, str] = {}  # of an answer that is a map, or a list of maps
     refuses_unknown: bool = False  # else a parameter that the method does not have is ignored
+    free: Parameter | None = None  # what parameters with any other name are
 
     def read(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return every parameter with its value or default; raises RefusedError for one that is not accepted."""
@@ -105,7 +113,8 @@ class SocketMethod(NamedTuple):
         unknown = params.keys() - names
         if self.refuses_unknown and unknown:
             raise RefusedError(f"there is no parameter {min(unknown)!r} here; there are: {', '.join(names)}")
-        return {parameter.name: parameter.value_in(params) for parameter in self.parameters}
+        free = [self.free._replace(name=name) for name in sorted(unknown)] if self.free else []
+        return {parameter.name: parameter.value_in(params) for parameter in (*self.parameters, *free)}
 
 
 LEASE_RANGE = Bounds(SHORTEST_LEASE_S, LONGEST_LEASE_S)
@@ -152,6 +161,16 @@ FAILURE = (
         default=USUAL_S,
     ),
 )
+TRIAL = tuple(Parameter(key, Type.TEXT, meaning, longest=LONGEST_VALUE) for key, meaning in TRIAL_KEYS.items())
+NOTE = Parameter("text", Type.TEXT, "what to write", longest=LONGEST_VALUE, required=True)
+CLOCKS = {
+    "stamp_s": "the loop's monotonic clock in s, as in the log",
+    "time": "the wall clock at the same moment, in ISO 8601",
+}
+TRIALS = {
+    "defaults": "the description that the next walk has",
+    "present": "the description of the present walk, or of the one before",
+}
 STATUS_KEYS = {
     "schema": "version of this answer",
     "robot": "name of the robot",
@@ -166,6 +185,7 @@ STATUS_KEYS = {
     "causes": "the faults grouped by cause: name, subjects, message, what_to_do, age_s, reaction, consequences",
     "forced": "whether the robot was armed by force against a present fault",
     "notice": "why the robot stopped, until it is moved again",
+    "notice_age_s": "time in s since it stopped, or nothing",
     "unlogged_requests": "number of requests since the start that changed nothing or were repeated",
     "lease": "the holder of the lease, or nothing",
     "lease_left_s": "time in s until the lease is lost unless it is renewed",
@@ -183,6 +203,7 @@ STATUS_KEYS = {
     "loads": "the mud's load on each flipper: torques in N·m, forces in N, depth in m",
     "loop": "rate in Hz, ticks, missed ticks, and percentiles of wake-up delay and tick duration in µs;"
     " a tick lasts until its clients are served",
+    "trial": "the description of the present walk, or of the one before",
     "warnings": "weakened protection, and what the computer could not provide for real-time operation",
     "bus": "state of every bus, and counts of errors and lost frames",
     "log": "path of the log, rows dropped, and the state of its writer and disk",
@@ -249,7 +270,9 @@ METHODS: dict[str, SocketMethod] = {
         ),
     ),
     "walk": SocketMethod(
-        Level.DRIVE, "Walk, with a depth that adapts to the mud or is fixed.", (DEPTH, STRIDES, *LEASE)
+        Level.DRIVE,
+        "Walk, with a depth that adapts to the mud or is fixed. A described walk is a trial: it begins a new log.",
+        (DEPTH, STRIDES, *LEASE, *TRIAL),
     ),
     "move": SocketMethod(
         Level.DRIVE,
@@ -270,6 +293,26 @@ METHODS: dict[str, SocketMethod] = {
         (Parameter("for_s", Type.NUMBER, "time within which it is renewed", "s", LEASE_RANGE, required=True),),
     ),
     "release": SocketMethod(Level.DRIVE, "End one's own lease; a lost one ends by itself once torque is off."),
+    "trial": SocketMethod(Level.READ, "Report how walks are described.", answer="a map", answer_keys=TRIALS),
+    "trial_set": SocketMethod(
+        Level.DRIVE,
+        "Change the description that walks have by default, until it is changed again. An empty text removes a key."
+        " Any other name of lower-case letters, digits and _ is a key too, with a text.",
+        TRIAL,
+        answer="a map",
+        answer_keys=TRIALS,
+        free=Parameter("", Type.TEXT, "", longest=LONGEST_VALUE),
+    ),
+    "note": SocketMethod(
+        Level.DRIVE, "Write a note into the log, with both clocks.", (NOTE,), answer="a map", answer_keys=CLOCKS
+    ),
+    "mark": SocketMethod(
+        Level.DRIVE,
+        "Write a marker into the log: the moment of a clap, or of a light that a camera sees.",
+        (NOTE._replace(required=False, default=""),),
+        answer="a map",
+        answer_keys=CLOCKS,
+    ),
     "reset_timing": SocketMethod(Level.DRIVE, "Start the statistics of the loop's timing again."),
     "fail": SocketMethod(
         Level.DRIVE,

@@ -14,6 +14,7 @@ import numpy as np
 
 from control.records import Rig
 from firmware_host.log.rows import EVENT_KIND, STRIDE_KIND, rig_of
+from firmware_host.trial import METADATA_KEY
 from logs.files.file_pass import EVERYTHING, FilePass, Spans
 from logs.files.log_error import LogCutError, LogError, Watch, unwatched
 from logs.files.tick_array import BLOCK_ROWS, Ticks, TickTally, divide_ticks, in_groups, in_order
@@ -131,7 +132,9 @@ def join_logs(paths: Sequence[Path], logs: Sequence[ScannedLog]) -> ScannedLog:
     tally = TickTally()
     for log in ordered:
         tally.add_after(log.tally)
+    one_trial = len({log.metadata.get(METADATA_KEY) for log in ordered}) == 1
     return ordered[0]._replace(
+        metadata={key: value for key, value in ordered[0].metadata.items() if one_trial or key != METADATA_KEY},
         strides=[stride for log in ordered for stride in log.strides],
         events=[event for log in ordered for event in log.events],
         complete=all(log.complete for log in ordered),

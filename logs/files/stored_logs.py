@@ -4,11 +4,10 @@ A preserved log is moved to kept/, where the quota does not look (firmware_host/
 """
 
 import os
-import re
 from fcntl import LOCK_NB, LOCK_SH, flock
 from pathlib import Path
 
-from firmware_host.log.log_folder import ACTIVE, DONE, ENDING, PRESERVED, TOP, log_files, move_file
+from firmware_host.log.log_folder import ACTIVE, DONE, ENDING, PRESERVED, SEGMENT, TOP, log_files, move_file
 
 
 def is_being_written(path: Path) -> bool:
@@ -26,11 +25,15 @@ def is_being_written(path: Path) -> bool:
 def run_files(path: Path) -> list[Path]:
     """Return all segments of the run that a log belongs to, wherever they are now, in their order."""
     folder = path.parent.parent if path.parent.name in (ACTIVE, DONE, PRESERVED) else path.parent
-    run = re.sub(r"-\d{4,}$", "", path.stem)
-    segments = re.compile(re.escape(run) + r"-(\d{4,})")
+    own = SEGMENT.fullmatch(path.stem)
+    run = own["run"] if own else path.stem
     files = log_files(folder, TOP, ACTIVE, DONE, PRESERVED)
-    found = {file.name: file for file in files if segments.fullmatch(file.stem)}
-    return [found[name] for name in sorted(found, key=lambda name: int(name.removesuffix(ENDING).rpartition("-")[2]))]
+    found = {
+        file.name: (int(name["number"]), file)
+        for file in files
+        if (name := SEGMENT.fullmatch(file.stem)) and name["run"] == run
+    }
+    return [file for _, file in sorted(found.values())]
 
 
 def preserve(path: Path, undo: bool = False) -> Path:

@@ -53,6 +53,12 @@ def test_a_fault_that_was_there_long_before_does_not_follow() -> None:
     assert len(group_by_cause(faults, BUS_OF)) == 2
 
 
+def test_torque_that_was_missing_before_a_drive_had_booted_follows_from_its_restart() -> None:
+    missing, restarted = K.TORQUE_MISSING.fault("left_sweep"), K.DRIVE_RESTARTED.fault("left_sweep")
+    (cause,) = group_by_cause([AgedFault(missing, 3.0), AgedFault(restarted, 1.0)], BUS_OF)
+    assert cause.root.kind is K.DRIVE_RESTARTED
+
+
 def test_drives_with_different_errors_are_different_causes() -> None:
     same = [K.DRIVE_ERROR.fault(joint, reason="watchdog expired") for joint in JOINTS[:3]]
     other = K.DRIVE_ERROR.fault(JOINTS[3], reason="too hot")

@@ -6,13 +6,17 @@ from typing import Any
 
 import pytest
 
-from control.faults import FaultKind
+from control.faults import Fault, FaultKind
 from control.modes import Mode
 from firmware_host.loop_events import LoopEvents
 from tests.recorded_events import EventRecorder
 
 Change = dict[str, Any]
 FAULT = FaultKind.LEASE_LOST.fault(holder="Anna")
+JOINT = "left_sweep"
+MISSING = FaultKind.TORQUE_MISSING.fault(JOINT)
+RESTARTED, HOT = FaultKind.DRIVE_RESTARTED.fault(JOINT), FaultKind.MOTOR_HOT.fault("right_sweep", temperature_c=95.0)
+UNKNOWN = FaultKind.WATCHDOG_UNKNOWN.fault(JOINT)
 
 
 @pytest.fixture
@@ -22,7 +26,7 @@ def recorder() -> EventRecorder:
 
 @pytest.fixture
 def events(recorder: EventRecorder) -> LoopEvents:
-    return LoopEvents(recorder, longest_hold_s=60.0)
+    return LoopEvents(recorder, longest_hold_s=60.0, bus_of={JOINT: "left"})
 
 
 def change(before: Mode, after: Mode, faulty: bool = False, rested: bool = False, up: bool = True) -> Change:
@@ -63,3 +67,29 @@ def test_a_notice_is_also_in_the_log(events: LoopEvents, recorder: EventRecorder
 def test_usual_changes_and_faults_without_torque_leave_no_notice(events: LoopEvents, changed: Change) -> None:
     events.report_mode_change(1.0, **changed)
     assert events.notice == ""
+
+
+@pytest.mark.parametrize(
+    ("later", "elapsed_s", "named"),
+    [(RESTARTED, 1.4, "drive_restarted"), (RESTARTED, 60.0, "torque_missing"), (HOT, 1.4, "torque_missing")],
+    ids=["its cause", "long after", "unrelated"],
+)
+def test_the_notice_names_the_first_cause_of_the_stop_and_its_time(
+    events: LoopEvents, later: Fault, elapsed_s: float, named: str
+) -> None:
+    events.report_mode_change(1.0, **change(Mode.WALKING, Mode.STOPPING) | {"fault": MISSING})
+    events.report_mode_change(1.2, **change(Mode.STOPPING, Mode.DAMPING, faulty=True))
+    events.report_faults(1.0 + elapsed_s, [later], [])
+    assert events.notice.startswith(f"stopped by {named}: ") and events.notice_s == 1.0
+
+
+def test_settings_that_a_drive_reports_soon_after_its_start_were_no_fault(
+    events: LoopEvents, recorder: EventRecorder
+) -> None:
+    events.report_faults(1.0, [UNKNOWN], [])
+    events.report_faults(2.0, [], [UNKNOWN])
+    assert recorder.texts == []
+    events.report_faults(3.0, [UNKNOWN], [])
+    events.report_faults(5.1, [], [])
+    events.report_faults(5.2, [], [UNKNOWN])
+    assert [text.split()[1] for text in recorder.texts] == ["watchdog_unknown", "watchdog_unknown"]

@@ -35,7 +35,9 @@ def events(*texts: str) -> list[dict[str, Any]]:
 def test_every_fault_of_every_part_is_read_back(kind: FaultKind) -> None:
     for subject in SUBJECTS.get(kind.part, ("",)):
         recorder = EventRecorder()
-        LoopEvents(recorder, 1.0).report_faults(10.0, [kind.fault(subject)], [])
+        written = LoopEvents(recorder, 1.0, {})
+        written.report_faults(10.0, [kind.fault(subject)], [])
+        written.report_faults(20.0, [], [])  # a drive that has just started had time to answer
         (cause,) = read_causes(events(*recorder.texts), TEXT)
         assert (cause.name, cause.subjects, cause.consequences) == (kind, (subject,), ())
 
@@ -46,6 +48,12 @@ def test_faults_that_were_never_present_together_do_not_follow_from_each_other()
     assert [cause.name for cause in apart] == ["bus_off", "drive_silent"]
     (together,) = read_causes(events(bus, silent), TEXT)
     assert together.name == "bus_off" and together.consequences == ("drive_silent",)
+
+
+def test_what_a_drive_reports_soon_after_its_start_was_no_fault() -> None:
+    unknown, over = "fault watchdog_unknown (none): The left_sweep drive.", "over: watchdog_unknown left_sweep"
+    assert read_causes(events(unknown, over), TEXT) == []
+    assert len(read_causes(events(unknown, *["nothing"] * 3, over), TEXT)) == 1
 
 
 class StampedEvents(NullRecorder):

@@ -15,11 +15,12 @@ from command_line.shared_options import DEFAULT_SOCKET
 from control.modes import Mode
 from firmware_host.configuration.configuration import EXIT_CONFIGURATION, StatusParameters
 from logs.files.log_reader import read_log
+from logs.files.log_summary import log_summary
 from logs.replay import replay_files
 from simulation.harness.peer import WATCHDOG_S
 from tests.command_line.command_lines import run
 from tests.running_bench import Bench
-from tests.waiting import LONGEST_S
+from tests.waiting import LONGEST_S, wait_until
 
 
 def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> None:
@@ -33,7 +34,9 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     assert bench.run("move", "left_sweep=170").returncode == exit_codes.REFUSED
     too_deep = bench.run("walk", "--depth", "19")
     assert too_deep.returncode == exit_codes.REFUSED and "19 cm" in too_deep.stderr and "5 cm" in too_deep.stderr
-    assert bench.run("walk", "--depth", "3").stdout == "walking\n"
+    described = ("--mud", "A/B", "--water", "49.5", "--trial", "3", "--tag", "wet", "--tag", "warm", "--note", "rain")
+    assert bench.run("walk", "--depth", "3", *described).stdout == "walking\n"
+    assert json.loads(bench.run("note", "it slips", "--json").stdout)["stamp_s"] > 0.0
     bench.wait_for(lambda report: report["strides_closed"] >= 2)
     status = json.loads(bench.run("status", "--json").stdout)
     assert status["schema"] == "status/2" and status["mode"] == "walking"
@@ -43,8 +46,18 @@ def test_a_session_of_all_commands_leaves_a_complete_log(own_bench: Bench) -> No
     assert bench.run("stop").stdout == "hold\n"
     assert bench.run("disarm").stdout == "idle\n"
     path = bench.stop_daemon()
-    assert read_log(path).complete
-    assert len(replay_files([path]).strides) >= 2
+    log, replayed = read_log(path), replay_files([path])
+    assert path.stem.endswith("-0001_A_B_3") and log.complete
+    assert log_summary(log)["trial"] == {
+        "mud": "A/B",
+        "water": "49.5",
+        "trial": "3",
+        "tags": "wet,warm",
+        "note": "rain",
+    }
+    assert any(event["text"].endswith(": it slips") for event in log.events)
+    assert len(replayed.strides) >= 2 and replayed.segment == 0  # nothing before the trial is needed
+    assert [stride.k_p.value for stride in replayed.strides] == [stride["k_p"] for stride in log.strides]
 
 
 def test_sigterm_in_a_walk_raises_the_flippers_and_ends_without_torque(own_bench: Bench) -> None:
@@ -64,11 +77,14 @@ def test_a_killed_daemon_leaves_idle_drives_and_a_readable_log_until_an_operator
     bench.run("arm")
     bench.run("walk")
     bench.wait_for(lambda report: report["mode"] == "walking")
+    defaults = json.loads(bench.run("trial", "set", "mud=A", "plate=flat", "--json").stdout)["defaults"]
+    wait_until((bench.logs / "trial.json").exists)
     bench.daemon.kill()
     bench.daemon.wait(LONGEST_S)
     time.sleep(2.0 * WATCHDOG_S)  # only the drives' own watchdogs can have acted
     bench.restart_daemon()
     report = bench.wait_for(lambda report: report["mode"] == "idle")
+    assert json.loads(bench.run("trial", "--json").stdout) == {"defaults": defaults, "present": {}}
     assert not any(drive["closed_loop"] for drive in report["drives"])
     assert {drive["errors"] for drive in report["drives"]} == {"watchdog expired"}
     assert report["fault"]["name"] == "drive_error"

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import copy
+from collections import deque
 from typing import Any
 
 import pytest
 
-from command_line.watch.history import History
-from command_line.watch.machine_cells import BAD, OLD, alarm_text, drive_rows, machine_text
+from command_line.watch.bars import bars
+from command_line.watch.history import History, JointSample
+from command_line.watch.joint_plots import View
+from command_line.watch.machine_cells import BAD, OLD, alarm_text, drive_rows, faults_text, machine_text
 from command_line.watch.mud_cells import BOUND, coefficient_rows, trend
 from control.faults import FaultKind
 from control.records import FLIPPERS, JOINTS
@@ -56,13 +59,53 @@ def test_a_silent_drive_has_unknown_torque(history: History) -> None:
     history.status["drives"] = [
         drive | {"angle_age_s": 1.6, "heartbeat_age_s": 1.6} for drive in history.status["drives"]
     ]
-    for _, angle, *_, age, torque, _ in drive_rows(history, heard=True):
+    for _, angle, *_, age, torque, _ in drive_rows(history, silence_s=0.0):
         assert (torque.plain, torque.style, age.plain, angle.style) == ("unknown", BAD, "1.6 s", OLD)
 
 
-def test_torque_is_unknown_while_the_daemon_is_silent(history: History) -> None:
+def test_torque_is_unknown_and_values_age_while_the_daemon_is_silent(history: History) -> None:
     assert alarm_text(history, NOW_S + 12.0).plain.startswith(" NO ANSWER ")
-    assert {row[5].plain for row in drive_rows(history, heard=False)} == {"unknown"}
+    assert {(row[4].plain, row[5].plain) for row in drive_rows(history, silence_s=12.0)} == {("12.0 s", "unknown")}
+
+
+def test_every_fault_is_listed_with_its_advice(walked: ServedRobot, history: History) -> None:
+    causes = dead_buses(walked)
+    history.status |= {"mode": "fault", "causes": causes, "faults": walked.ask("status")["faults"]}
+    listed = faults_text(history).plain
+    for fault in history.status["faults"]:
+        assert listed.count(fault["message"]) + sum(fault["name"] == cause["name"] for cause in causes)
+        assert fault["what_to_do"] in listed
+
+
+@pytest.mark.parametrize(
+    ("values", "floor", "height", "lines"),
+    [
+        ((0.0, 0.02, None, 0.01), 2.0, 1, ["▁▁ ▁"]),
+        ((0.0, 1.0, 2.0), 0.5, 1, ["▁▅█"]),
+        ((0.0, 1.0), 0.5, 2, [" █", "▁█"]),
+        ((), 1.0, 2, ["", ""]),
+    ],
+)
+def test_bars_fill_the_height_only_beyond_the_floor(
+    values: tuple[float | None, ...], floor: float, height: int, lines: list[str]
+) -> None:
+    assert bars(values, floor, height) == lines
+
+
+def test_plots_of_joints_scroll_back_and_follow_again(walked_history: History) -> None:
+    history = copy.copy(walked_history)
+    signals = {"angle_rad": (0.5,) * 4, "current_a": (None,) * 4, "torque_command_nm": (0.0,) * 4}
+    history.joints = deque(JointSample(time_s=each / 10, **signals) for each in range(1000))
+    view = View(period_s=0.1)
+    assert view.text(history, 80, 20).plain.count("▁") == 4 * 56
+    view.scroll(-100, history)
+    assert view.end_s == pytest.approx(79.9)
+    view.zoom(2.0)
+    assert "▁" * 56 in view.text(history, 80, 20).plain
+    view.signal = 1  # the current is unknown
+    assert "▁" not in view.text(history, 80, 20).plain
+    view.scroll(1e9, history)
+    assert view.end_s is None
 
 
 @pytest.mark.parametrize("roomy", [False, True])

@@ -167,6 +167,23 @@ def test_help_explains_every_key_and_keeps_the_alarm(walked: ServedRobot, short_
         drive(short_folder / "s", script)
 
 
+def test_faults_and_joint_plots_take_the_place_of_the_rest(walked: ServedRobot, short_folder: Path) -> None:
+    walked.robot.loop.events.notice = "stopped by a test"
+    walked.robot.loop.events.notice_s = walked.robot.now_s
+
+    async def script(app: WatchApp, pilot: Pilot[int]) -> None:
+        await pilot.press("f")
+        await until(app, pilot, lambda: "stopped by a test" in shown(app) and "k_p" not in shown(app))
+        for title in ("angle", "current", "torque command"):
+            await pilot.press("j")
+            await until(app, pilot, lambda title=title: f"{title} (" in shown(app))  # type: ignore[misc]
+        await pilot.press("j")
+        await until(app, pilot, lambda: "k_p" in shown(app))
+
+    with walked.served(short_folder / "s"):
+        drive(short_folder / "s", script)
+
+
 def test_it_survives_a_restart_of_the_daemon(walked: ServedRobot, resting: ServedRobot, short_folder: Path) -> None:
     path = short_folder / "s"
     serving = walked.served(path)

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import time
 from dataclasses import replace
+from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,8 +21,10 @@ from firmware_host.log import log_file, log_folder
 from firmware_host.log import segments as log_segments
 from firmware_host.log.log_folder import ACTIVE, DONE, first_path, log_files, unfinished_files
 from firmware_host.log.segments import LogSegments
+from firmware_host.trial import BEGUN, SET, OperatorReport, from_json, load_defaults, to_json
 from logs.files.log_error import LogError
 from logs.files.log_reader import read_log, read_logs
+from logs.files.stored_logs import run_files
 from tests.firmware_host.synthetic_rows import OPENING, make_event, make_ticks
 
 BY_TIME = replace(ONE_FILE, segment_s=1.0)
@@ -53,6 +56,47 @@ def test_a_segment_ends_by_its_size(tmp_path: Path) -> None:
     assert log.close()
     assert len(log_files(tmp_path, DONE)) == 5
     assert all(path.stat().st_size < 200_000 for path in log_files(tmp_path, DONE))
+
+
+def make_report(kind: str, trial: dict[str, str], tick: int = 0) -> tuple[int, bytes]:
+    return make_event(OperatorReport(kind, datetime.now(UTC), "uid 0", to_json(trial)).event, tick / 380)
+
+
+def test_a_trial_begins_a_file_with_its_name_and_ends_with_the_next_one_or_in_rest(tmp_path: Path) -> None:
+    log = make_segments(tmp_path, replace(BY_TIME, rest_hz=10.0, rest_full_s=0.5))
+    trials = [{"mud": "../A", "trial": "3", "note": "rain"}, {"mud": "грязь"}, {}, {"mud": "B"}]
+    first = 0
+    for trial, ticks in zip(trials, (500, 100, 100, 100), strict=True):
+        log.write([*make_ticks(first, first + 10, Mode.HOLD), make_report(BEGUN, trial, first + 10)])
+        write_ticks(log, first + 10, first + ticks)
+        first += ticks
+    for number in range(first, first + 600, 100):
+        log.write(make_ticks(number, number + 100, Mode.IDLE))
+    assert log.close()
+    logs = [(path.stem, from_json(read_log(path).metadata.get("trial", ""))) for path in log_files(tmp_path, DONE)]
+    named, letters, nothing, last = trials
+    assert logs == [
+        ("run-0000", {}),
+        ("run-0001_A_3", named),
+        ("run-0002_A_3", named),  # it was long
+        ("run-0003", letters),
+        ("run-0004", nothing),
+        ("run-0005_B", last),
+        ("run-0006", {}),
+    ]
+    assert run_files(tmp_path / DONE / "run-0003.mcap") == log_files(tmp_path, DONE)
+    assert read_logs(log_files(tmp_path, DONE)).metadata.get("trial") is None
+    assert read_logs(log_files(tmp_path, DONE)[1:3]).metadata["trial"] == to_json(named)
+
+
+def test_the_defaults_of_trials_are_stored_and_damaged_ones_are_no_defaults(tmp_path: Path) -> None:
+    log = make_segments(tmp_path)
+    log.write([make_report(SET, {"mud": "A"}), make_report(SET, {"mud": "B", "plate": "flat"})])
+    assert load_defaults(tmp_path) == {"mud": "B", "plate": "flat"}
+    for text in ("", "[1]", '{"mud": 1}', '{"Mud": "A"}', "\0", '{"mud": "a\\nb"}'):
+        (tmp_path / "trial.json").write_text(text)
+        assert load_defaults(tmp_path) == {}
+    assert log.close() and len(log_files(tmp_path, DONE)) == 1
 
 
 def test_every_segment_says_what_it_belongs_to_and_reads_alone(tmp_path: Path) -> None:

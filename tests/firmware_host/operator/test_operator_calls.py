@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from control.faults import FaultKind
+from control.modes import Mode
 from control.rate import PERIOD_S
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.operator.operator_calls import OperatorCalls
@@ -15,6 +16,7 @@ from firmware_host.sockets.connection import Caller
 from firmware_host.sockets.rights import Peer
 from firmware_host.sockets.rpc import RefusedError
 from firmware_host.sockets.socket_methods import METHODS, Level
+from firmware_host.trial import BEGUN, OperatorReport, from_json, read_report
 from simulation.harness.lockstep import Lockstep
 from simulation.mud.clay import MUDS
 from simulation.mud.track import Track
@@ -22,6 +24,7 @@ from tests.recorded_events import EventRecorder
 
 ANNA = Caller(1, Peer(77, 1000, frozenset({71})), Level.DRIVE)
 BEN = Caller(2, Peer(78, 1001, frozenset({71})), Level.DRIVE)
+WALL_S = 1_800_000_000.25
 
 
 class Robot:
@@ -31,7 +34,7 @@ class Robot:
         self.events = EventRecorder()
         self.steps = Lockstep(configuration, Track([(5.0, MUDS["48.5"])]), recorder=self.events)
         self.lease = self.steps.loop.lease
-        calls = OperatorCalls(self.steps.loop, [], lambda: self.steps.now_s)
+        calls = OperatorCalls(self.steps.loop, [], lambda: self.steps.now_s, lambda: WALL_S)
         self._methods = calls.methods
         self.names = set(self._methods)
 
@@ -104,13 +107,69 @@ def test_a_refused_request_is_not_logged(robot: Robot) -> None:
 def test_every_method_is_in_the_table_with_its_level(robot: Robot) -> None:
     assert METHODS.keys() - robot.names == {"fail", "failures"} and robot.names <= METHODS.keys()
     for_operators = {name for name, method in METHODS.items() if method.level is Level.DRIVE}
-    assert for_operators == {"arm", "walk", "move", "clear", "lease", "release", "reset_timing", "fail"}
+    moving = {"arm", "walk", "move", "clear", "lease", "release"}
+    assert for_operators == moving | {"trial_set", "note", "mark", "reset_timing", "fail"}
 
 
 def test_answers_have_the_keys_of_the_table(armed: Robot) -> None:
     assert list(armed.ask("status")) == list(METHODS["status"].answer_keys)
     assert list(armed.ask("hello")) == list(METHODS["hello"].answer_keys)
     assert set(armed.ask("check")[0]) == set(METHODS["check"].answer_keys)
+
+
+def test_a_described_walk_is_a_trial_and_so_is_the_walk_after_it(armed: Robot) -> None:
+    def walk(**params: Any) -> list[OperatorReport]:
+        before = len(armed.events.texts)
+        armed.ask("walk", strides=1, **params)
+        armed.steps.run_until(lambda: armed.steps.loop.mode is Mode.WALKING, 1.0)
+        armed.steps.run_until(lambda: armed.steps.loop.mode is Mode.HOLD, 20.0)
+        return [report for text in armed.events.texts[before:] if (report := read_report(text))]
+
+    assert walk() == []
+    armed.ask("trial_set", mud="A", water="49.5", plate="flat")
+    armed.ask("trial_set", BEN, plate="")
+    (first,) = walk(trial="3", water="50")
+    assert first.kind == BEGUN and first.by == str(ANNA) and first.time.timestamp() == WALL_S
+    assert from_json(first.text) == armed.ask("status")["trial"] == {"mud": "A", "water": "50", "trial": "3"}
+    assert from_json(walk()[0].text) == armed.ask("trial")["defaults"] == {"mud": "A", "water": "49.5"}
+    armed.ask("trial_set", mud="", water="")
+    assert [each.text for each in walk()] == ["{}"] and walk() == []  # the trial's log does not go on
+    with pytest.raises(RefusedError):
+        walk(mud="B", depth_m=1.0)
+    assert armed.ask("status")["trial"] == {}
+
+
+@pytest.mark.parametrize("method", ["note", "mark"])
+def test_a_note_and_a_marker_have_both_clocks(robot: Robot, method: str) -> None:
+    answer = robot.ask(method, text="clap: now")
+    report = read_report(robot.events.texts[-1])
+    assert report and report.text == "clap: now" and report.time.timestamp() == WALL_S
+    assert answer == {"stamp_s": robot.steps.now_s, "time": report.time.isoformat(timespec="microseconds")}
+
+
+@pytest.mark.parametrize(
+    ("method", "params", "reason"),
+    [
+        ("note", {"text": "x" * 1001}, "text"),
+        ("note", {"text": "a\nb"}, "text"),
+        ("note", {"text": "\x1b[2J"}, "text"),
+        ("mark", {"text": 3}, "text"),
+        ("trial_set", {"Mud": "A"}, "'Mud'"),
+        ("trial_set", {"a b": "A"}, "'a b'"),
+        ("trial_set", {"plate": 1.0}, "plate"),
+        ("trial_set", {"water": "wet"}, "water"),
+        ("trial_set", {"water": "nan"}, "water"),
+        ("trial_set", {name: "ü" * 900 for name in ("mud", "note")}, "3000"),
+        ("walk", {"water": "101"}, "water"),
+    ],
+)  # fmt: skip
+def test_a_description_that_cannot_be_logged_is_refused_with_its_key(
+    robot: Robot, method: str, params: dict[str, Any], reason: str
+) -> None:
+    with pytest.raises(RefusedError) as refused:
+        robot.ask(method, **params)
+    assert reason in str(refused.value) and len(str(refused.value)) < 200
+    assert robot.ask("trial") == {"defaults": {}, "present": {}} and not robot.events.about("uid")
 
 
 @pytest.mark.parametrize("end", ["hang_up", "silence"])
