@@ -5,6 +5,7 @@ flipper against the right one, mud against air, and each log against itself with
 """
 
 from collections.abc import Sequence
+from errno import ENOTDIR
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -81,10 +82,10 @@ def study(
 
 
 def _logs_in(folders: Sequence[Path], patterns: Sequence[str]) -> list[Paths]:
-    """Return the logs. Raises OptionError for a folder without logs, and for a pattern that no log matches."""
+    """Return the logs. Raises OptionError for a folder without logs and a pattern that no log matches, and OSError."""
     for path in folders:
         if not path.exists():
-            raise OptionError(f"{path}: no such folder")
+            raise NotADirectoryError(ENOTDIR, "there is no such folder", str(path))
     logs = find_logs(folders)
     if not logs:
         raise OptionError(f"{folders[0]}: holds no log: no file whose name ends with .csv, .csv.gz or .mcap")

@@ -122,4 +122,4 @@ def test_the_configured_folder_is_the_default(folder: Path, capsys: pytest.Captu
     configuration.write_text(text.replace("/var/lib/mudskipper/logs", str(folder)), encoding="utf-8")
     assert main.main(["log", "list", "--config", str(configuration)]) == exit_codes.OK
     assert "1.mcap" in capsys.readouterr().out
-    assert main.main(["log", "recover", "--config", str(folder / "none.toml")]) == exit_codes.CONFIGURATION
+    assert main.main(["log", "recover", "--config", str(folder / "none.toml")]) == exit_codes.UNHEALTHY
