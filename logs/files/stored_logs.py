@@ -66,7 +66,7 @@ def why_not_read(path: Path, problem: OSError) -> str:
 def why_not_moved(path: Path, problem: OSError) -> str:
     if not isinstance(problem, PermissionError):
         return f"{path}: {problem.strerror or problem}"
-    return f"{path}: only the daemon's own user and root may move logs: do this as root"
+    return f"{path}: only the daemon's own user and root may change logs: do this as root"
 
 
 def size_text(size: float) -> str:

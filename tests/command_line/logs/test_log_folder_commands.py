@@ -112,7 +112,7 @@ def test_a_user_who_may_not_read_or_move_a_log_gets_advice(
     assert f"have root add you to the group of {log}, then log in again, or do this as root" in capsys.readouterr().err
     assert main.main(["log", "preserve", log]) == exit_codes.UNHEALTHY
     assert capsys.readouterr().err.endswith(
-        "1.mcap: only the daemon's own user and root may move logs: do this as root\n"
+        "1.mcap: only the daemon's own user and root may change logs: do this as root\n"
     )
 
 
