@@ -49,4 +49,5 @@ def _write_and_announce(folder: Path, logs: Path) -> None:
     programs = Path(sys.executable).parent
     print(f"Simulating, until Ctrl-C. In other terminals:\n  {programs}/mudskipperd --config {path}")
     print(f"  export MUDSKIPPER_SOCKET={folder}/mudskipper.sock; {programs}/mudskipper status")
-    print(f"'kill -USR1 {os.getpid()}' moves joints back that lie beyond their limits.", flush=True)
+    print(f"'kill -USR1 {os.getpid()}' moves joints back that lie beyond their limits.")
+    print(f"'kill -USR2 {os.getpid()}' presses the emergency stop, and again to release it.", flush=True)

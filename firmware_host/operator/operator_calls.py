@@ -103,6 +103,7 @@ class OperatorCalls:
             "moving": loop.controller.moving,
             **self._fault_reports(),
             "forced": bool(loop.forced),
+            "power_cut": loop.fault_monitor.power_cut or None,
             "notice": loop.events.notice,
             "notice_age_s": known(now_s - loop.events.notice_s),
             "unlogged_requests": loop.events.requests.unlogged,

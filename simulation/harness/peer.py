@@ -137,6 +137,7 @@ def simulate(configuration: Configuration, ground: Ground, seed: int, announce: 
     except OSError as problem:
         return _refuse(f"the pose source cannot be provided on this computer: {problem.strerror or problem}")
     signal.signal(signal.SIGUSR1, lambda number, frame: peer.robot.request_put_back())
+    signal.signal(signal.SIGUSR2, lambda number, frame: peer.robot.turn_emergency_stop())
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, peer.end)
     take_precedence()

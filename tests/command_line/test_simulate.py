@@ -93,7 +93,9 @@ def test_on_blocks_the_flippers_lie_in_reach_of_no_mud(short_folder: Path, peers
     assert plant.angles_rad == pytest.approx((0.0, RESTING_RAD, 0.0, RESTING_RAD))
 
 
-def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_signals_move_the_flippers_back_by_hand_and_press_the_emergency_stop(
+    short_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class HandedPeer(peer.Peer):
         """A simulated robot with its joints at their stops; it runs for one step."""
 
@@ -101,19 +103,25 @@ def test_a_signal_moves_the_flippers_back_by_hand(short_folder: Path, monkeypatc
             for arm in self.robot.plant.arms:
                 arm.sweep_rad, arm.adduction_rad = END_STOPS_RAD
             signal.raise_signal(signal.SIGUSR1)
+            signal.raise_signal(signal.SIGUSR2)
             self._pose.step = lambda now_s, plant: self.end(0, None)  # type: ignore[method-assign]
             super().run()
+            powered.append(self.robot.powered)
             lying.extend((arm.sweep_rad, arm.adduction_rad) for arm in self.robot.plant.arms)
 
     lying: list[tuple[float, float]] = []
+    powered: list[bool] = []
     monkeypatch.setattr(peer, "take_precedence", lambda: None)
     monkeypatch.setattr(peer, "Peer", HandedPeer)
-    before = {number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)}
+    before = {
+        number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGTERM, signal.SIGINT)
+    }
     try:
         assert main(["simulate", "--config", str(write_local_setup(short_folder, short_folder))]) == exit_codes.OK
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+    assert powered == [False]
     assert len(lying) == 2 and all(abs(sweep) < 0.05 and abs(adduction) < 0.5 for sweep, adduction in lying)
 
 
