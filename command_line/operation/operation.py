@@ -19,6 +19,7 @@ from command_line.operation.attended_walk import MILD, attend
 from command_line.operation.mode_output import print_mode
 from command_line.screen import BOLD, GREEN, RED, YELLOW, clock_text, coloured
 from command_line.shared_options import DEFAULT_CONFIG, Json, Socket
+from control.computing.suggestion import suggestion
 from experiments.reports.counted_nouns import counted
 from experiments.reports.text_tables import number, table
 from experiments.study.option import Option
@@ -26,6 +27,7 @@ from operator_client.status_client import DroppedError, NoDaemonError, StatusCli
 
 ARMING_S = 5.0
 CLEARING_S = 1.5
+LEAST_DEPTH_CM = 0.5  # that the daemon accepts
 POLL_S = 0.05
 MODE_COLOURS = {
     "fault": RED,
@@ -71,7 +73,8 @@ def walk(
     socket: Socket,
     json: Json = False,
     depth: Annotated[  # the daemon knows the robot's limit
-        float | None, Option("insertion depth of every stride", unit="cm", above=0.0, alternative="depth")
+        float | None,
+        Option("insertion depth of every stride", unit="cm", low=LEAST_DEPTH_CM, high=20.0, alternative="depth"),
     ] = None,
     adaptive: Annotated[
         bool, Option("choose the depth from the mud once a stride (default)", alternative="depth")
@@ -110,7 +113,7 @@ def joint_angle(text: str) -> tuple[str, float]:
 
     joint, _, angle_deg = text.partition("=")
     if joint and joint not in JOINTS:
-        raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; there are {', '.join(JOINTS)}")
+        raise argparse.ArgumentTypeError(f"{text}: there is no joint {joint!r}; {suggestion(joint, JOINTS)}")
     with suppress(ValueError):
         if joint and isfinite(float(angle_deg)):
             return joint, float(angle_deg)
@@ -119,7 +122,8 @@ def joint_angle(text: str) -> tuple[str, float]:
 
 def move(
     angles: Annotated[
-        tuple[tuple[str, float], ...], Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle)
+        tuple[tuple[str, float], ...],
+        Option("left_sweep=10 ...", metavar="JOINT=DEG", parse=joint_angle, offers="{joint}="),
     ],
     *,
     socket: Socket,

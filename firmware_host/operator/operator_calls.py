@@ -39,6 +39,7 @@ NO_TRIAL: Mapping[str, str] = {}
 Method = Callable[[dict[str, Any], Caller], Any]
 RESTING_RAD_S = STILL_RAD / REST_S
 MEASURED = ("angle_rad", "velocity_rad_s", "current_a", "temperature_c", "bus_voltage_v", "bus_current_a")  # by a drive
+SHALLOWEST_M = 0.005  # of a walk, as of every depth in the configuration: a smaller one is a slip of the unit
 PORT_COUNTERS = ("error_frames", "failed_sends", "lost_frames")
 
 
@@ -165,10 +166,10 @@ class OperatorCalls:
     def walk(self, params: dict[str, Any], caller: Caller) -> str:
         adaptation, depth_m = self._loop.configuration.adaptation, params["depth_m"]
         trial = self._trials.planned(params)
-        if depth_m is not None and not 0.0 < depth_m <= adaptation.max_depth_m:
+        if depth_m is not None and not SHALLOWEST_M <= depth_m <= adaptation.max_depth_m:
             raise RefusedError(
-                f"depth {100.0 * depth_m:g} cm: must be more than 0 and at most {100.0 * adaptation.max_depth_m:g} cm,"
-                " which is adaptation.max_depth_m in the configuration"
+                f"depth {100.0 * depth_m:g} cm: must be from {100.0 * SHALLOWEST_M:g} to"
+                f" {100.0 * adaptation.max_depth_m:g} cm, which is adaptation.max_depth_m in the configuration"
             )
         adaptive = depth_m is None
         first_m = adaptation.initial_depth_m if adaptive else float(depth_m)
