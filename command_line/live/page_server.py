@@ -9,6 +9,7 @@ can send. The page asks over the same path whether a stop would reach the robot,
 import json
 import queue
 import threading
+import time
 from collections.abc import Collection, Sequence
 from contextlib import closing, suppress
 from http import HTTPStatus
@@ -18,6 +19,7 @@ from typing import Any
 
 from command_line.live.own_page import own_page
 from command_line.operation.confirmation import TORQUE_UNKNOWN, end_motion
+from command_line.watch.orders import send_order
 from control.geometry import FlipperGeometry
 from control.modes import Mode
 from control.records import TWO_FLIPPERS, Phase
@@ -25,6 +27,7 @@ from firmware_host.configuration.file_problems import ConfigurationError
 from firmware_host.configuration.loading import parse_configuration
 from firmware_host.log.rows import STRIDE, TICK
 from firmware_host.operator.reports import known
+from firmware_host.sockets.rpc import LONGEST_REQUEST
 from operator_client.live_rows import LiveRow, LiveRows
 from operator_client.status_client import CallRefusedError, NoDaemonError, NotPermittedError, StatusClient
 
@@ -32,6 +35,7 @@ PAGE = Path(__file__).with_name("page.html")
 INTERVAL_S = 0.1  # between two messages
 QUEUED = 20  # messages for one viewer: two seconds
 RECENT_STRIDES = 60  # that a new viewer gets
+LONGEST_TEXT = 1 << 20  # bytes that are read of a note
 STOP_HEADER = "X-Mudskipper"
 ANSWER_S = 2.0  # of the daemon, whether it would take a stop
 
@@ -122,7 +126,8 @@ class PageServer:
                 newest = row
             else:
                 kept = self._strides if row.kind.topic == STRIDE.topic else self._events
-                kept.append(finite(row.values))
+                wall_s = row.stamp_s + time.time() - time.monotonic()  # this program runs on the robot's computer
+                kept.append(finite(row.values | {"wall_s": wall_s}))
         if newest is not None:
             self._tick = finite(newest.values)
         if self._tick is not None and not 0.0 <= self._tick["stamp_s"] - self._sent_s < INTERVAL_S:
@@ -199,8 +204,19 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(*stop_robot(self.server.status_socket))
         elif self.path == "/can_stop":
             self._answer(*can_stop(self.server.status_socket))
+        elif self.path in ("/note", "/mark"):
+            self._answer(
+                HTTPStatus.OK, send_order(self.server.status_socket, self.path[1:], text=self._text()).encode()
+            )
         else:
             self._answer(HTTPStatus.NOT_FOUND, b"there is no such page")
+
+    def _text(self) -> str:
+        """Return the text that was sent; one that the daemon would refuse as too long is cut off."""
+        length = self.headers.get("Content-Length", "")
+        self.close_connection = True  # what is not read would be taken for the next request
+        text = self.rfile.read(min(int(length), LONGEST_TEXT) if length.isdecimal() else 0)
+        return text[:LONGEST_REQUEST].decode(errors="replace")
 
     def _refusal(self) -> str | None:
         """Return why this request is none of the own page; every route asks."""

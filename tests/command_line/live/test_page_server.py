@@ -1,6 +1,7 @@
 """The live page: rows reach every browser, a hanging browser loses only its own, and no other page stops the robot."""
 
 import json
+import time
 from collections.abc import Iterator
 from http.client import HTTPConnection, HTTPResponse
 from math import nan
@@ -43,9 +44,11 @@ def next_message(response: HTTPResponse) -> dict[str, Any]:
             return dict(json.loads(line.removeprefix("data: ")))
 
 
-def post(page: PageServer, path: str = "/stop", **headers: str) -> tuple[int, str]:
+def post(page: PageServer, path: str = "/stop", body: str = "", **headers: str) -> tuple[int, str]:
     connection = HTTPConnection(ADDRESS, page.port, timeout=60)
-    connection.request("POST", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+    connection.request(
+        "POST", path, body.encode(), headers={name.replace("_", "-"): value for name, value in headers.items()}
+    )
     response = connection.getresponse()
     return response.status, response.read().decode()
 
@@ -68,6 +71,7 @@ def test_strides_and_events_reach_a_browser_once_and_unknown_numbers_are_null(pa
     first, second = next_message(browser), next_message(browser)
     assert first["strides"][0]["index"] == 3 and first["strides"][0]["k_s"] == 5e5
     assert first["events"][0]["text"] == "walk"
+    assert first["events"][0]["wall_s"] == pytest.approx(1.0 + time.time() - time.monotonic(), abs=1.0)
     assert first["tick"]["body_x_m"] is None
     assert first["lost"] == 7
     assert (second["strides"], second["events"]) == ([], [])
@@ -159,6 +163,15 @@ def test_the_page_learns_whether_a_stop_would_reach_the_robot(
     assert post(page, path="/can_stop", X_Mudskipper="stop")[0] == REACHES
     with ServedRobot(resting_robot(configuration)).served(short_folder / "no daemon"):
         assert post(page, path="/can_stop", X_Mudskipper="stop") == (200, "ready")
+        for path, body, answer in (
+            ("/note", "it slips", "note: 20"),
+            ("/mark", "", "mark: 20"),
+            ("/note", "", "note: 20"),
+        ):
+            assert post(page, path, body, X_Mudskipper="stop")[1].startswith(answer)
+        for body in ("a\nb", "x" * 1_000_000, "\0"):
+            assert "note refused: text = " in post(page, "/note", body, X_Mudskipper="stop")[1]
+    assert post(page, "/note", "it slips")[0] == REFUSED
 
 
 def test_a_stop_without_a_daemon_says_to_cut_the_power(page: PageServer) -> None:
