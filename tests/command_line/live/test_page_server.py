@@ -12,6 +12,7 @@ import pytest
 from command_line.live.page_server import KEPT, PageServer, robot_facts
 from firmware_host.configuration.configuration import Configuration
 from firmware_host.log.rows import EVENT, STRIDE, TICK
+from firmware_host.sockets.connection import Caller
 from operator_client.live_rows import LiveRow
 from tests.command_line.watch.served_robot import ServedRobot, resting_robot
 
@@ -130,10 +131,13 @@ def test_the_page_learns_whether_a_stop_would_reach_the_robot(
 ) -> None:
     assert post(page, path="/can_stop", X_Mudskipper="stop")[0] == REACHES
     robot = ServedRobot(resting_robot(configuration))
-    asked: list[dict[str, Any]] = []
-    robot.methods["status"] = lambda params, caller, status=robot.methods["status"]: (
-        asked.append(params) or status(params, caller)
-    )
+    answer, asked = robot.methods["status"], []
+
+    def status(params: dict[str, Any], caller: Caller) -> Any:
+        asked.append(params)
+        return answer(params, caller)
+
+    robot.methods["status"] = status
     with robot.served(short_folder / "no daemon"):
         page_of_robot = PageServer(ADDRESS, 0, short_folder / "no daemon")
         answers = [post(page_of_robot, path="/can_stop", X_Mudskipper="stop") for _ in range(10)]
